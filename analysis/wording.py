@@ -1,7 +1,7 @@
 """Formatting of numbers, p-values, lists and sentences for reports, tables and messages.
 
-All text for users is formatted here, so that it is uniform: a true minus sign (U+2212), a fixed number
-of decimals, and an en dash for a missing number.
+Used by all reports and messages, so that their text is uniform: a true minus sign (U+2212), a fixed number of
+decimals, and an en dash for a missing number.
 """
 
 import re
@@ -24,8 +24,8 @@ _MAX_LISTED = 12
 def typeset(formatted: str) -> str:
     """Replace the hyphen of a formatted number by the minus sign (U+2212), and remove it from a zero.
 
-    For every number in text for users that can be negative. Files for programs, and text that may be copied into a
-    command, keep the ASCII "-".
+    To be applied to every number in text for users that can be negative. Files for programs, and text that may be
+    copied into a command, keep the ASCII "-".
     """
     return formatted.replace("-", "−") if float(formatted) else formatted.replace("-", "")
 
@@ -36,12 +36,13 @@ def format_number(value: float | None, digits: int = 2) -> str:
 
 
 def format_signed(value: float, digits: int = 2) -> str:
-    """The number with its sign, also where it is positive."""
+    """Format a number with its sign, also where it is positive."""
     return typeset(f"{value:+.{digits}f}")
 
 
 def mark_cut(value: float | None, cut: bool, digits: int = 2) -> str:
-    """The value, followed by "cut" where the largest permitted level (cap) limited it; a dash for None."""
+    """Format a threshold, followed by "cut" where the largest permitted level (cap) limited it, so that it is censored;
+    a dash for None."""
     return f"{format_number(value, digits)} cut" if cut and value is not None else format_number(value, digits)
 
 

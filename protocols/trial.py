@@ -1,7 +1,7 @@
-"""One presentation of a study as a row of results: what was presented, answered, and delivered by the device.
+"""One presentation of a study as a row of results: stimulus, answer, and acceleration delivered by the device.
 
-`Trial` is the row type of `trials.csv`, which the analysis reads; its columns are listed in docs/formats.md. The
-unit of a number is the suffix of its name.
+`Trial` is the row type of `trials.csv`, which `study.store.formats` writes and `analysis.psychophysics` reads; its
+columns are listed in docs/formats.md. The unit of a number is the suffix of its name.
 """
 
 from dataclasses import dataclass
@@ -22,9 +22,10 @@ class TrialStatus(Enum):
 
     OK = "ok"
     FLAGGED = "flagged"
-    """Counts, but the stimulus should be inspected (for example a hand that leaned on the spring, or late ticks)."""
+    """Valid, but the stimulus should be inspected (for example a hand that leaned on the spring, or late ticks)."""
     UNMEASURED = "unmeasured"
-    """Counts; answered before a full period of the steady stimulus was recorded, or its recording was lost."""
+    """Valid, but without a measurement: answered before a full period of the steady stimulus was recorded, or the
+    recording was lost."""
     SPOILED = "spoiled"
     """Void: presented again as the next attempt of the same trial."""
     OPEN = "open"
@@ -39,7 +40,7 @@ class VoidCause(Enum):
     PAUSED = "paused"
     """The participant asked for a pause."""
     LEFT = "left"
-    """The participant left, or the program was interrupted by Ctrl-C."""
+    """The participant ended the session, or the program was interrupted by Ctrl-C."""
     LATE = "late"
     """No answer within the protocol's time limit."""
     EARLY = "early"
@@ -59,12 +60,14 @@ class VoidCause(Enum):
 
 
 PARTICIPANT_CAUSES = frozenset({VoidCause.ASKED, VoidCause.PAUSED, VoidCause.LEFT, VoidCause.LATE, VoidCause.EARLY})
-"""Causes that a participant can bring about at will while feeling the stimulus."""
+"""Causes that a participant can bring about deliberately after feeling the stimulus, which could bias the results: the
+analysis counts them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One presentation, one row of `trials.csv`. None where a value does not exist, or not yet."""
+    """One presentation, one row of `trials.csv`. None: the value does not exist, or not yet. Runs, trials and
+    attempts are numbered from 0."""
 
     subject: str
     session: str
@@ -125,6 +128,6 @@ class Trial:
         return self.level_n if self.nominal_n is None else self.nominal_n
 
     @property
-    def counts(self) -> bool:
-        """Whether the answer moved the staircase."""
+    def is_valid(self) -> bool:
+        """Whether the answer is valid: given, and the presentation is not void. Catch trials are included."""
         return self.answer is not None and self.status is not TrialStatus.SPOILED

@@ -2,7 +2,7 @@
 
 from datetime import UTC, datetime
 
-from study.session.views.local_time import local_time
+from study.session.views.local_time import format_time_in_zone
 
 
 def machine_zone(time: datetime) -> datetime:
@@ -16,4 +16,4 @@ def machine_zone(time: datetime) -> datetime:
 
 def local_now() -> str:
     """Local time now, such as "2026-11-22 14:05 +01:00"."""
-    return local_time(datetime.now(UTC).isoformat(), machine_zone)
+    return format_time_in_zone(datetime.now(UTC).isoformat(), machine_zone)

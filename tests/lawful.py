@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.errors.choose_measure import make_measure
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit
-from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.search.explain import Explanation, retune_alone
 from analysis.diagnosis.search.search_context import SearchContext
 from equalizer.effects.discovered_law import Channels, law_effect, law_values
@@ -67,9 +67,9 @@ def _sweep() -> FloatArray:
 def arena_of(recording: Recording, model: MechanicalModel | None = None) -> tuple[SearchContext, Explanation]:
     """And what re-tuning alone leaves."""
     given = model or device(1)
-    measure = measure_of([recording], given).measure
-    tuning = tuning_of(given, recording.command.channels)
+    measure = make_measure([recording], given).measure
+    tuning = make_tuning(given, recording.command.channels)
     context = SearchContext(measure.shorten(), measure, tuning, map)
     before = evaluate_fit(context.measure, tuning, np.zeros(len(tuning.names)), NO_EFFECTS)
-    given_, retuned = (context.with_test_score(context.candidate(fitted)) for fitted in (before, retune_alone(context)))
+    given_, retuned = (context.with_test_score(context.score_fit(fitted)) for fitted in (before, retune_alone(context)))
     return context, Explanation(given_, retuned, retuned, (), ())

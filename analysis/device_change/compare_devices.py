@@ -127,7 +127,7 @@ def _compare_responses(accepted: FrequencyResponse, today: FrequencyResponse, li
     shared = np.intersect1d(accepted.frequency_hz[accepted.reliable], today.frequency_hz[today.reliable])
     if not len(shared):
         raise NotMeasurableError("no frequency is reliable in both recordings")
-    accepted, today = (measured.of_lines(np.isin(measured.frequency_hz, shared)) for measured in (accepted, today))
+    accepted, today = (measured.select_lines(np.isin(measured.frequency_hz, shared)) for measured in (accepted, today))
     for axis, channel in enumerate(accepted.input_channels):
         # Norm over all outputs of the response to this force. Its median ratio over frequency is the change of gain;
         # differences from that common factor are changes of the response.
@@ -205,7 +205,7 @@ def _find_peak_hz(response: FrequencyResponse, band_hz: tuple[float, float], axi
     """Frequency of the strongest response to the force along `axis`, within the band extended by half on either
     side."""
     widening = (band_hz[1] / band_hz[0]) ** 0.5
-    lines = response.within(band_hz[0] / widening, band_hz[1] * widening)
+    lines = response.select_band(band_hz[0] / widening, band_hz[1] * widening)
     strength = np.linalg.norm(lines.response[:, :, axis], axis=1)
     return float(lines.frequency_hz[int(np.argmax(strength))])
 

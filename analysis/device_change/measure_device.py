@@ -14,7 +14,7 @@ from equalizer.identification.frequency_response.experiments import instrument_s
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError, estimate_transfer
 from equalizer.signals.recording import Recording, Segment
-from equalizer.signals.signal import FloatArray, Signal, runs_of
+from equalizer.signals.signal import FloatArray, Signal, find_runs
 
 STROKES_BELOW_HZ = 1.0
 """Sinusoids below this frequency count as strokes: those of the shipped daily check have 0.5 Hz, and the lowest
@@ -130,7 +130,7 @@ def _measure_loss_per_path(recording: Recording, start: int, stop: int, axis: in
 
 def _select_settled_rests(recording: Recording) -> list[FloatArray]:
     """Responses (k, outputs) in the second half of each long rest; transients decay in the first half."""
-    rests = runs_of(np.asarray(~instrument_signal(recording).any(axis=1)))
+    rests = find_runs(np.asarray(~instrument_signal(recording).any(axis=1)))
     longest = max((stop - start for start, stop in rests), default=0)
     return [
         recording.response.samples[(start + stop) // 2 : stop] for start, stop in rests if stop - start > longest / 2

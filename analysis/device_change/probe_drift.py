@@ -22,7 +22,7 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
-from analysis.device_change.probe_lines import ProbeLines, friction_shapes
+from analysis.device_change.probe_lines import ProbeLines, compute_friction_spectra
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 IntArray = npt.NDArray[np.int64]
@@ -93,7 +93,7 @@ def find_drifts(probes: Sequence[TimedProbe], period: int, causes: Sequence[str]
     first_probes = [probe for level_probes in by_level.values() for probe in level_probes[:BASE_CYCLES]]
     newest = [level_probes[-1] for level_probes in by_level.values()]
     compared_probes = [*first_probes, *newest]
-    shapes = friction_shapes(tuple(probe.lines for probe in compared_probes), period)
+    shapes = compute_friction_spectra(tuple(probe.lines for probe in compared_probes), period)
     probe_levels, newest_s = (
         np.array([probe.level_n for probe in compared_probes]),
         max(probe.time_s for probe in newest),

@@ -17,23 +17,23 @@ import numpy.typing as npt
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-DRIVEN_SHARE = 0.1
+LEAST_DRIVEN_SHARE = 0.1
 """Least amplitude of a driven line, relative to the strongest of its axis: weaker lines are due to rounding and to the
 virtual spring. By hand."""
 
-FROM_HZ = 3.0
+INTEGRATION_FROM_HZ = 3.0
 """Lower end of the lines at which the acceleration is integrated twice: below it, the result is the sensor's drift. By
 hand."""
 
-TO_HZ = 150.0
+POSITION_TO_HZ = 150.0
 """Upper end of the lines that make up the position: above it, the handle hardly moves. By hand."""
 
-BREAK_AWAYS_M = tuple(np.geomspace(2e-6, 5e-5, 8).tolist())
+BREAK_AWAY_LENGTHS_M = tuple(np.geomspace(2e-6, 5e-5, 8).tolist())
 """Break-away lengths x0 of Dahl's law that are tried (m), from a stiff contact to a soft one. Too large a length gives
 too large a level of friction, too small a length too small a level: by some 10 % where lengths differ by a factor of
 1.6, by 40 % for a factor of 2.5. By hand."""
 
-PASSES = 3
+INTEGRATED_PERIODS = 3
 """Number of periods over which Dahl's law is integrated; the last is used. Its initial state decays within a few
 break-away lengths of motion, so that the force is then periodic."""
 
@@ -54,103 +54,111 @@ class ProbeLines:
     """(lines, axes): from the encoders, in m; NaN where there are none."""
 
 
-def probe_lines(recording: Recording, period_s: float) -> ProbeLines:
-    """Spectra of the mean period of a probe; of its first segment where the recording has segments. period_s: period of
-    the multisine. Raises ValueError where less than a period was recorded, or samples are missing."""
-    period = round(period_s * recording.sample_rate_hz)
+def compute_probe_lines(recording: Recording, period_s: float) -> ProbeLines:
+    """Compute the spectra of the mean period of a probe; of its first segment where the recording has segments.
+    period_s: period of the multisine. Raises ValueError where less than a period was recorded, or samples are
+    missing."""
+    period_samples = round(period_s * recording.sample_rate_hz)
     # With a virtual spring, the command also holds the spring's force, which would count as driven.
     excitation_signal = recording.command if recording.excitation is None else recording.excitation
     start, stop = 0, len(recording)
     if recording.segments:
         start, stop = recording.segments[0].start, recording.segments[0].stop
-    if stop - start > 2 * period:  # the first of many periods holds the transient
-        start += period
+    if stop - start > 2 * period_samples:  # the first of many periods holds the transient
+        start += period_samples
     excitation, force, acceleration = (
-        _mean_spectrum(signal.samples[start:stop], period)
+        _compute_mean_spectrum(signal.samples[start:stop], period_samples)
         for signal in (excitation_signal, recording.command, recording.response)
     )
     if not np.isfinite(force).all() or not np.isfinite(acceleration).all():
         raise ValueError("the recording has missing samples")
     position = np.full(force.shape, np.nan, dtype=complex)
     if recording.position is not None and recording.position.samples.shape[1] == force.shape[1]:
-        position = _mean_spectrum(recording.position.samples[start:stop], period)
+        position = _compute_mean_spectrum(recording.position.samples[start:stop], period_samples)
     amplitude = np.abs(excitation)
     return ProbeLines(
         frequency_hz=np.arange(1, len(force) + 1) / period_s,
-        driven=amplitude > DRIVEN_SHARE * amplitude.max(axis=0),
+        driven=amplitude > LEAST_DRIVEN_SHARE * amplitude.max(axis=0),
         force_n=force,
         acceleration_mps2=acceleration,
         position_m=position,
     )
 
 
-MASS_LINES_HZ = (30.0, 60.0)
+MASS_BAND_HZ = (30.0, 60.0)
 """Band in Hz in which the response is nearly that of a mass: friction and springs matter below it, the modes of the
 linkage above it. By hand."""
 
 
-def apparent_mass_kg(lines: ProbeLines) -> float:
-    """Apparent mass in kg: median of the real part of force over acceleration, over the driven lines in
-    `MASS_LINES_HZ`, each on its driven axis. A hand on the handle adds to it. Raises ValueError where there is no such
+def estimate_apparent_mass_kg(lines: ProbeLines) -> float:
+    """Estimate the apparent mass in kg: median of the real part of force over acceleration, over the driven lines in
+    `MASS_BAND_HZ`, each on its driven axis. A hand on the handle adds to it. Raises ValueError where there is no such
     line, or the median is not positive."""
-    low_hz, high_hz = MASS_LINES_HZ
+    low_hz, high_hz = MASS_BAND_HZ
     in_band = (lines.frequency_hz >= low_hz) & (lines.frequency_hz <= high_hz)
-    rows, axes = np.nonzero(lines.driven & in_band[:, None])
-    if not len(rows):
+    line_indices, axis_indices = np.nonzero(lines.driven & in_band[:, None])
+    if not len(line_indices):
         raise ValueError(
             f"it has no driven line between {low_hz:g} and {high_hz:g} Hz, from which the handle's mass is estimated"
         )
     with np.errstate(divide="ignore", invalid="ignore"):  # a dead sensor reads zero
-        mass_kg = float(np.median((lines.force_n[rows, axes] / lines.acceleration_mps2[rows, axes]).real))
+        mass_kg = float(
+            np.median(
+                (lines.force_n[line_indices, axis_indices] / lines.acceleration_mps2[line_indices, axis_indices]).real
+            )
+        )
     if not np.isfinite(mass_kg) or mass_kg <= 0:
         raise ValueError("its acceleration does not follow the force: check the accelerometer and its cable")
     return mass_kg
 
 
-def _mean_spectrum(samples: FloatArray, period: int) -> ComplexArray:
-    """(lines, axes): spectrum of the mean of the last whole periods, without the lines at zero and half the rate."""
-    periods = len(samples) // period
-    if not periods:
+def _compute_mean_spectrum(samples: FloatArray, period_samples: int) -> ComplexArray:
+    """Compute (lines, axes): spectrum of the mean of the last whole periods, without the lines at zero and half the
+    rate. samples: (n, axes). Raises ValueError where they are shorter than a period."""
+    period_count = len(samples) // period_samples
+    if not period_count:
         raise ValueError("less than one whole period was recorded")
-    mean = samples[len(samples) - periods * period :].reshape(periods, period, -1).mean(axis=0)
-    spectrum: ComplexArray = (2 / period * np.fft.rfft(mean, axis=0))[1 : period // 2]
+    mean_period = (
+        samples[len(samples) - period_count * period_samples :].reshape(period_count, period_samples, -1).mean(axis=0)
+    )
+    spectrum: ComplexArray = (2 / period_samples * np.fft.rfft(mean_period, axis=0))[1 : period_samples // 2]
     return spectrum
 
 
-def friction_shapes(probes: tuple[ProbeLines, ...], period: int) -> ComplexArray:
-    """(break-aways, probes, lines, axes): spectrum of dry friction of 1 N along each axis of each probe's motion, for
-    every break-away length. period: samples.
+def compute_friction_spectra(probes: tuple[ProbeLines, ...], period_samples: int) -> ComplexArray:
+    """Compute (lengths, probes, lines, axes): spectrum of dry friction of 1 N along each axis of each probe's motion,
+    for every length in `BREAK_AWAY_LENGTHS_M`.
 
     Sample k is the friction at the end of the step from k to k + 1. It thus belongs to the command k, which is held
     over that step and whose acceleration is read at its end; so commands and friction may be added line by line.
     """
-    position_m = np.stack([_position_m(probe, period) for probe in probes], axis=1)
+    position_m = np.stack([_estimate_position_m(probe, period_samples) for probe in probes], axis=1)
     step_m = np.diff(position_m, axis=0, append=position_m[:1])
-    lengths_m = np.array(BREAK_AWAYS_M)[:, None, None]
-    force = np.zeros((len(BREAK_AWAYS_M), *position_m.shape[1:]))
-    one_period = np.zeros((period, *force.shape))
-    for tick in range(PASSES * period):
-        step = step_m[tick % period][None]
+    lengths_m = np.array(BREAK_AWAY_LENGTHS_M)[:, None, None]
+    friction_n = np.zeros((len(BREAK_AWAY_LENGTHS_M), *position_m.shape[1:]))
+    last_period_n = np.zeros((period_samples, *friction_n.shape))
+    for sample in range(INTEGRATED_PERIODS * period_samples):
+        step = step_m[sample % period_samples][None]
         direction = np.sign(step)
         # Exact over a step of constant direction, so that the force never leaves -1 to 1, however long the step.
-        sliding_force = direction - (direction - force) * np.exp(-np.abs(step) / lengths_m)
-        force = np.where(step == 0, force, sliding_force)
-        one_period[tick % period] = force
-    spectrum: ComplexArray = 2 / period * np.fft.rfft(one_period, axis=0)[1 : period // 2]
+        sliding_force = direction - (direction - friction_n) * np.exp(-np.abs(step) / lengths_m)
+        friction_n = np.where(step == 0, friction_n, sliding_force)
+        last_period_n[sample % period_samples] = friction_n
+    spectrum: ComplexArray = 2 / period_samples * np.fft.rfft(last_period_n, axis=0)[1 : period_samples // 2]
     shapes: ComplexArray = np.moveaxis(spectrum, 0, 2)
     return shapes
 
 
-def _position_m(probe: ProbeLines, period: int) -> FloatArray:
-    """(period, axes): from the encoders, which sit where friction acts; without them, the acceleration integrated
-    twice."""
+def _estimate_position_m(probe: ProbeLines, period_samples: int) -> FloatArray:
+    """Estimate the position in m over one period, (period_samples, axes): from the encoders, which are where friction
+    acts; without them, the acceleration integrated twice."""
     frequency_hz = probe.frequency_hz[:, None]
     if np.isfinite(probe.position_m).all():
-        lines = np.where(frequency_hz <= TO_HZ, probe.position_m, 0)
+        position_lines_m = np.where(frequency_hz <= POSITION_TO_HZ, probe.position_m, 0)
     else:
-        in_band = (frequency_hz >= FROM_HZ) & (frequency_hz <= TO_HZ)
-        lines = np.where(in_band, probe.acceleration_mps2 / -((2 * np.pi * frequency_hz) ** 2), 0)
-    spectrum = np.zeros((period // 2 + 1, lines.shape[1]), dtype=complex)
-    spectrum[1 : period // 2] = lines * period / 2
-    position_m: FloatArray = np.fft.irfft(spectrum, period, axis=0)
+        in_band = (frequency_hz >= INTEGRATION_FROM_HZ) & (frequency_hz <= POSITION_TO_HZ)
+        position_lines_m = np.where(in_band, probe.acceleration_mps2 / -((2 * np.pi * frequency_hz) ** 2), 0)
+    spectrum = np.zeros((period_samples // 2 + 1, position_lines_m.shape[1]), dtype=complex)
+    spectrum[1 : period_samples // 2] = position_lines_m * period_samples / 2
+    position_m: FloatArray = np.fft.irfft(spectrum, period_samples, axis=0)
     return position_m

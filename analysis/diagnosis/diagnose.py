@@ -1,9 +1,14 @@
-"""The whole diagnosis: from recordings and a model to findings, without files, clocks or screens.
+"""The diagnosis: from recordings and a model to findings about missing physics. `diagnose` accesses no file or screen.
 
-There are three ways. Without a given model, laws are found by the force balance and confirmed by simulation; where that
-names none, effects are searched by simulation. With a given model, effects are searched by simulation, then judged by
-held-out gain and by the force balance with that model. With clean recordings of the device, faults are found by
-comparison with them (`contrast`), and by search where no fault explains the difference.
+The method depends on what is given:
+
+* no model (it was fitted to the recordings): laws are selected by a force balance (regression of the command on the
+  motion) and confirmed by simulation; where none is named, effects of the catalogue are searched by simulation;
+* a model: effects are searched by simulation, then judged by held-out gain and by the force balance with that model;
+* clean recordings of the same device: faults are found by comparison with them (`contrast`), and by a search where no
+  fault explains the difference.
+
+Called by `study.workflows.diagnosis.diagnose_recordings` (the command `hapteq diagnose`) and by the blind tests.
 """
 
 from collections.abc import Sequence
@@ -16,22 +21,22 @@ import numpy as np
 from analysis.diagnosis.confirm.fitting_measures import FittingMeasure, choose_fitting_measure
 from analysis.diagnosis.confirm.require_gain import require_enough_gain
 from analysis.diagnosis.data.input_checks import is_too_short_to_name
-from analysis.diagnosis.data.observed_parts import names_of_parts
+from analysis.diagnosis.data.observed_parts import name_parts
 from analysis.diagnosis.diagnosis_settings import BALANCE, DiagnosisSettings
-from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.errors.choose_measure import make_measure
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.localisation.clean_floor import CleanFloor, NothingLearned
 from analysis.diagnosis.result.assemble_findings import assemble_findings
 from analysis.diagnosis.result.candidates import (
-    add_balance_classes,
-    add_balances_to_search,
+    add_balances_with_fitted_model,
+    add_balances_with_given_model,
     collect_balance_errors,
     describe_linear_terms,
 )
 from analysis.diagnosis.result.curves.state_maps import StateMaps, compute_state_maps
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.result.unconfirmed import list_unconfirmed_candidates
+from analysis.diagnosis.result.unconfirmed_candidates import list_unconfirmed_candidates
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
@@ -46,7 +51,7 @@ if TYPE_CHECKING:
     from analysis.diagnosis.balance.judge_laws import Balance
 
 
-TOO_SHORT = "the recordings are so short that other laws would explain them equally well"
+TOO_SHORT_TO_NAME = "the recordings are so short that other laws would explain them equally well"
 """Reason not to name a law of short recordings (`is_too_short_to_name`)."""
 
 
@@ -57,16 +62,17 @@ def diagnose(
     map_: Mapper,
     progress: Progress,
 ) -> Findings:
-    """Findings about the physics that the model lacks. recordings: of one device, alike in channels, units and rate;
-    not checked here (see `input_checks`). map_: as `map`, may run in parallel. progress: receives a description of the
-    current step and the share that is done. Raises NothingLearned where clean recordings cannot be compared."""
+    """Findings about the physics that the model lacks. recordings: of one device, with the same channels, units and
+    rate; not checked here (see `input_checks`). map_: as `map`, may run in parallel. progress: receives a description
+    of the current step and the share that is done, 0 to 1. Raises NothingLearned where clean recordings cannot be
+    compared."""
     balances: tuple[Balance, ...] = ()
     if settings.fitted and not settings.clean:
         progress("testing laws in the force balance", 0.0)
         computed_balances = settings.balances
-        balances = computed_balances if computed_balances is not None else _balances(recordings, settings, map_)
+        balances = computed_balances if computed_balances is not None else _compute_balances(recordings, settings, map_)
         if is_too_short_to_name(recordings):
-            balances = tuple(balance.without_names(TOO_SHORT) for balance in balances)
+            balances = tuple(balance.without_names(TOO_SHORT_TO_NAME) for balance in balances)
         findings = _diagnose_by_balance(recordings, model, settings, map_, progress, balances)
         if findings is not None:
             return findings
@@ -85,12 +91,12 @@ def _diagnose_by_balance(
     balances: "tuple[Balance, ...]",
 ) -> Findings | None:
     """Findings with the laws that the force balances name; None where they name none, or simulations confirm none."""
-    # Imported here, as below: a given model is searched by simulation.
+    # Imported on demand, to shorten the start of the program: a diagnosis with a given model does not need them.
     from analysis.diagnosis.confirm.confirm_laws import has_open_parameter, search_by_balance
     from analysis.diagnosis.confirm.force_balance_measures import list_fitting_measures
 
-    for number, fitting in enumerate(list_fitting_measures(recordings, model, balances, settings.compared)):
-        progress("fitting the named laws", 0.2 + 0.3 * number)
+    for measure_index, fitting in enumerate(list_fitting_measures(recordings, model, balances, settings.compared)):
+        progress("fitting the named laws", 0.2 + 0.3 * measure_index)
         context = make_search_context(recordings[0], fitting, settings, map_)
         repeats = all(floor.method == "repeats" for floor in fitting.chosen.floors)
         search_laws = partial(search_by_balance, context, balances, repeats)
@@ -108,16 +114,17 @@ def _diagnose_by_model(
     progress: Progress,
     balances: "tuple[Balance, ...]" = (),
 ) -> Findings:
-    """Findings by search with simulations of the model. balances: force balances of a model fitted by the program."""
+    """Findings by a search with simulations of the model. balances: force balances, where the model was fitted to the
+    recordings."""
     fitting = choose_fitting_measure(recordings, model, settings.clean, settings.compared, about_mean=settings.fitted)
     if settings.fitted and balances:
-        # Imported here, as above: only a model that was fitted has balances.
+        # Imported on demand: only a fitted model has balances.
         from analysis.diagnosis.confirm.force_balance_measures import choose_forces_of_balance
 
         fitting = choose_forces_of_balance(recordings, fitting, balances)
     if settings.fitted and is_too_short_to_name(recordings):
-        unsearched = SearchOutcome(_evaluate_given_model(recordings, fitting, settings, map_), CleanFloor())
-        return _assemble(recordings, settings, fitting, unsearched, balances)
+        given_outcome = SearchOutcome(_evaluate_given_model(recordings, fitting, settings, map_), CleanFloor())
+        return _assemble(recordings, settings, fitting, given_outcome, balances)
     outcome = search_by_simulation(recordings, fitting, settings, map_, progress, balances)
     if not settings.fitted and not settings.clean:
         progress("testing laws in the force balance", 0.9)
@@ -133,19 +140,21 @@ def _diagnose_with_clean(
     map_: Mapper,
     progress: Progress,
 ) -> Findings:
-    """Findings by comparison with the clean recordings. A given model is searched by simulation instead where it
-    predicts the clean recordings well or repeats show the noise, unless the comparison contradicts the result, and
-    where the comparison leaves the fault open."""
-    # Imported here, as below: only some diagnoses have clean recordings.
+    """Findings by comparison with the clean recordings, or by a search with simulations of a given model.
+
+    The search is used where the model predicts the clean recordings well or the noise is known from repeats, unless the
+    comparison contradicts its result; otherwise where the comparison names no fault.
+    """
+    # Imported on demand: only some diagnoses have clean recordings.
     from analysis.diagnosis.reference.compare_with_reference import find_contrast, noise_is_from_repeats, predicts_clean
     from analysis.diagnosis.reference.learn_model_error import learn_model_floor
     from analysis.diagnosis.result.contrast_findings import add_contrast
 
-    fitting = FittingMeasure(model, measure_of(recordings, model))
+    fitting = FittingMeasure(model, make_measure(recordings, model))
     progress("comparing with the clean recordings", 0.1)
     contrast = find_contrast(recordings, settings.clean, frozenset(settings.without), settings.time_left)
     if is_too_short_to_name(recordings):
-        contrast = contrast.withdraw_name(TOO_SHORT)
+        contrast = contrast.withdraw_name(TOO_SHORT_TO_NAME)
     if not settings.fitted and (noise_is_from_repeats(fitting.chosen) or predicts_clean(model, settings.clean)):
         findings_by_model = _diagnose_by_model(recordings, model, settings, map_, progress)
         diagnosis_by_model = findings_by_model.diagnosis
@@ -156,20 +165,20 @@ def _diagnose_with_clean(
         searched_findings = _search_with_clean(recordings, model, settings, contrast.tested_effects, map_, progress)
         if searched_findings is not None:
             return searched_findings
-    unsearched = _evaluate_given_model(recordings, fitting, settings, map_)
+    given_result = _evaluate_given_model(recordings, fitting, settings, map_)
     progress("writing the results", 0.95)
     floor = CleanFloor() if settings.fitted else learn_model_floor(settings.clean, model, recordings, map_, progress)
-    findings = _assemble(recordings, settings, fitting, SearchOutcome(unsearched, floor), ())
+    findings = _assemble(recordings, settings, fitting, SearchOutcome(given_result, floor), ())
     return add_contrast(findings, contrast, recordings[0], FAULT_BEYOND)
 
 
 def _evaluate_given_model(
     recordings: Sequence[Recording], fitting: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
 ) -> SearchResult:
-    """The search result of the given model without a search: nothing is named."""
+    """Error of the given model without effects, as a search result that names nothing."""
     context = make_search_context(recordings[0], fitting, settings, map_)
     given_fit = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NO_EFFECTS)
-    candidate = context.with_test_score(context.candidate(given_fit))
+    candidate = context.with_test_score(context.score_fit(given_fit))
     return SearchResult(context, Explanation(candidate, candidate, candidate, (), ()), Judgement("unexplained", False))
 
 
@@ -197,9 +206,11 @@ def _search_with_clean(
     return _assemble(recordings, settings, fitting, replace(outcome, result=result), ())
 
 
-def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings, map_: Mapper) -> "tuple[Balance, ...]":
+def _compute_balances(
+    recordings: Sequence[Recording], settings: DiagnosisSettings, map_: Mapper
+) -> "tuple[Balance, ...]":
     """Force balances of the recordings, one per command; none where the guard caught a crash."""
-    # Imported here: a given model has a balance of its own.
+    # Imported on demand: a diagnosis with a given model computes its balances in `decide_with_model`.
     from analysis.diagnosis.balance.balances import find_balances
 
     fit_balances = partial(find_balances, recordings, frozenset(settings.without), settings.time_left, map_)
@@ -209,12 +220,13 @@ def _balances(recordings: Sequence[Recording], settings: DiagnosisSettings, map_
 def _judge_with_model(
     recordings: Sequence[Recording], fitting: FittingMeasure, outcome: SearchOutcome, settings: DiagnosisSettings
 ) -> "tuple[SearchOutcome, tuple[Balance, ...]]":
-    """The outcome after the decision by held-out gain, and the force balances with the model as their base; unchanged,
-    without balances, where nothing remains unexplained, or where a statistic such as band power was compared."""
+    """The outcome after the decision by held-out gain, and the force balances with the model as their base. The outcome
+    is unchanged, without balances, where nothing remains unexplained, or where a statistic of the response such as band
+    power was compared."""
     result = outcome.result
     if result.judgement.verdict not in ("unexplained", "partly_explained") or result.found.statistic is not None:
         return outcome, ()
-    # Imported here: only where a model is given, and the search leaves something unexplained.
+    # Imported on demand: only needed where the search with a given model leaves a mismatch unexplained.
     from analysis.diagnosis.confirm.decide_with_model import ResultWithModel, decide_with_model
 
     decide = partial(decide_with_model, recordings, fitting, result, settings.time_left)
@@ -229,22 +241,22 @@ def _assemble(
     outcome: SearchOutcome,
     balances: "Sequence[Balance]",
 ) -> Findings:
-    """The findings from the outcome of a search: named effects, candidates, maps of states, errors and remarks."""
-    result, names = outcome.result, names_of_parts(recordings, settings.names)
+    """The findings from the outcome of a search: named effects, candidates, maps of states, errors, remarks."""
+    result, names = outcome.result, name_parts(recordings, settings.names)
     explanation = result.found if result.judgement.named else replace(result.found, after=result.found.retuned)
     findings = assemble_findings(replace(result, found=explanation), fitting.chosen.floors, names, outcome.floor)
     channels = recordings[0].command.channels
     unconfirmed = list_unconfirmed_candidates(result.unconfirmed, findings.black_box, recordings[0], fitting.model)
     if settings.fitted:
-        diagnosis = add_balance_classes(findings.diagnosis, balances, channels, unconfirmed)
+        diagnosis = add_balances_with_fitted_model(findings.diagnosis, balances, channels, unconfirmed)
     else:
-        diagnosis = add_balances_to_search(findings.diagnosis, balances, unconfirmed, channels)
+        diagnosis = add_balances_with_given_model(findings.diagnosis, balances, unconfirmed, channels)
     draw_maps = partial(compute_state_maps, diagnosis, balances, findings.evidence, recordings[0])
     maps: tuple[StateMaps, ...] = settings.guard.run("the map of states", "its making", draw_maps, ())
     guard_remarks = settings.guard.sentences + (() if all(balance.complete for balance in balances) else (OUT_OF_TIME,))
-    linear = describe_linear_terms(balances, channels, not recordings[0].is_timed) if settings.fitted else ()
+    linear_remarks = describe_linear_terms(balances, channels, not recordings[0].is_timed) if settings.fitted else ()
     remarks = tuple(
-        dict.fromkeys((*guard_remarks, *fitting.chosen.remarks, *result.remarks, *linear, *findings.remarks))
+        dict.fromkeys((*guard_remarks, *fitting.chosen.remarks, *result.remarks, *linear_remarks, *findings.remarks))
     )
     errors_by_balance = collect_balance_errors(diagnosis, balances, channels)
     named_effects = {effect.effect for effect in diagnosis.effects}

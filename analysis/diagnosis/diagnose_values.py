@@ -11,7 +11,7 @@ from analysis.diagnosis.data.input_checks import require_comparable, require_mod
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.first_model.first_model import FirstModel
-from analysis.diagnosis.first_model.fit_without_model import first_model_of, fit_first_linear_model
+from analysis.diagnosis.first_model.fit_without_model import fit_first_linear_model, fit_first_model
 from analysis.diagnosis.prepare_recordings import keep_common_signals, prepare_recordings
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.types import Mapper, Progress
@@ -63,7 +63,7 @@ def _first_model(
 ) -> FirstModel:
     """A linear model with remarks: of these recordings with their force balances, or of the clean ones alone."""
     if not settings.clean:
-        return first_model_of(recordings, settings.without, settings.time_left, progress, map_)
+        return fit_first_model(recordings, settings.without, settings.time_left, progress, map_)
     step = "fitting a linear model, as none was given"
     return FirstModel(
         *fit_first_linear_model(settings.clean, lambda share: progress(step, share), "the clean recordings")

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import ConfigDict, Field, JsonValue, TypeAdapter, ValidationError, model_validator
 from pydantic.dataclasses import dataclass
 
-from equalizer.laws.law import ActsOn, Law, law_of
+from equalizer.laws.law import ActsOn, Law, parse_law
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME, Place
 from equalizer.signals.listed_problems import ListedProblemsError
 
@@ -43,7 +43,7 @@ class FoundLaw:
     @model_validator(mode="after")
     def _require_valid_expression(self) -> Self:
         """Parse the expression in the language of laws; ValueError where it needs other signals than it lists."""
-        law = law_of(self.expression, self.acts_on, self.axis)
+        law = parse_law(self.expression, self.acts_on, self.axis)
         if set(law.variables) != set(self.variables):
             signals = ", ".join(law.variables) or "no signals"
             raise ValueError(f"the law {self.expression} needs {signals}, but its variables list others")
@@ -66,6 +66,7 @@ class Mismatch:
 
     @model_validator(mode="after")
     def _require_rising_band(self) -> Self:
+        """ValueError where the limits of the band are negative or do not rise."""
         if not 0 <= self.band_hz[0] < self.band_hz[1]:
             raise ValueError(f"band_hz must rise from 0 or more, not {list(self.band_hz)}")
         return self
@@ -81,6 +82,7 @@ class Estimate:
 
     @model_validator(mode="after")
     def _require_rising_interval(self) -> Self:
+        """ValueError where the lower limit of the interval is above the upper one."""
         if self.ci95 is not None and self.ci95[0] > self.ci95[1]:
             raise ValueError(f"ci95 must rise, not {list(self.ci95)}")
         return self
@@ -256,7 +258,7 @@ def diagnosis_from_json(document: dict[str, Any]) -> Diagnosis:
         ) from error
 
 
-def diagnosis_schema() -> dict[str, Any]:
+def build_diagnosis_schema() -> dict[str, Any]:
     """JSON Schema of what `diagnosis_to_json` gives."""
     return _ADAPTER.json_schema(mode="serialization")
 

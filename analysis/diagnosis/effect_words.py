@@ -1,10 +1,13 @@
-"""Plain words for the effects of the vocabulary: nouns, places, and how their parameters are printed."""
+"""Plain words for the effects of the vocabulary: nouns, places, units, and how their parameters are printed.
+
+Used by the sentences, tables and figures of a diagnosis (`analysis/diagnosis/result`, `analysis/reports`).
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from analysis.diagnosis.document import Estimate
-from analysis.diagnosis.unit_wording import percent_text, value_text
+from analysis.diagnosis.unit_wording import format_percent, format_value
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, Place
 from equalizer.signals.unit_system import UnitSystem
 
@@ -183,23 +186,23 @@ LAW_WORDS: Mapping[str, LawWords] = {
 }
 """Laws of the force balance, and faults found by comparison with clean recordings, that the catalogue lacks."""
 
-PLAYED_AS_FORMULA = (
+SIMULATED_AS_FORMULA = (
     "actuator_curve", "condition_dependent_friction", "condition_dependent_damping", "condition_dependent_stiffness",
     "condition_dependent_force",
 )  # fmt: skip
 """Those of them that are simulated as a discovered law."""
 
-OF_THE_WHOLE = ("sensor_misalignment", "cross_axis_sensitivity", "clock_drift", "logger_offset", "lost_samples")
+WHOLE_DEVICE_FAULTS = ("sensor_misalignment", "cross_axis_sensitivity", "clock_drift", "logger_offset", "lost_samples")
 """Faults of the whole sensor or logger, for which no place is named where all channels share them."""
 
 
-def noun_of(effect: str) -> str:
+def get_noun(effect: str) -> str:
     """The plain noun of an effect; its name with spaces where it has none."""
     words = _find_words(effect)
     return words.noun if words else effect.replace("_", " ")
 
 
-def place_of(effect: str) -> Place:
+def get_place(effect: str) -> Place:
     """Place (mechanism, actuator, sensor or hand) at which an effect of the vocabulary, or a law outside it, acts."""
     entry = EFFECTS_BY_NAME.get(effect)
     law = LAW_WORDS.get(effect)
@@ -207,38 +210,39 @@ def place_of(effect: str) -> Place:
 
 
 def _find_words(effect: str) -> EffectWords | None:
+    """Words for an effect of the vocabulary or a law of `LAW_WORDS`; None for any other name."""
     law = LAW_WORDS.get(effect)
     return EFFECT_WORDS.get(effect) if law is None else law.words
 
 
-def unit_of(effect: str, parameter: str, system: UnitSystem) -> str:
+def get_parameter_unit(effect: str, parameter: str, system: UnitSystem) -> str:
     """The unit of an effect's parameter; "1" where it is not known."""
     if effect in LAW_WORDS:
         linear, rotational = LAW_WORDS[effect].units.get(parameter, ("1", "1"))
         return rotational if system.rotational else system.express(linear)
     entry = EFFECTS_BY_NAME.get(effect)
-    units = {} if entry is None else {p.name: p.unit_in(system, "1") for p in entry.parameters}
+    units = {} if entry is None else {p.name: p.find_unit(system, "1") for p in entry.parameters}
     return units.get(parameter, "1")
 
 
-def place_words(place: Place, axis: str | None, single: bool = False) -> str:
+def format_place(place: Place, axis: str | None, single: bool = False) -> str:
     """Where an effect acts, in words. single: the device has one axis, which then needs no name."""
     if place == "hand":
         return "at the handle" if axis is None or single else f"at the handle, along {axis}"
-    one_place, all_places = _SEATS[place]
+    one_place, all_places = _PLACE_PHRASES[place]
     if axis is None:
         return one_place.format("").replace("  ", " ") if single else all_places
     return one_place.format(axis)
 
 
-_SEATS: Mapping[str, tuple[str, str]] = {
+_PLACE_PHRASES: Mapping[str, tuple[str, str]] = {
     "mechanism": ("on the {} drive", "on all drives"),
     "actuator": ("in the {} actuator", "in all actuators"),
     "sensor": ("in the {} channel", "in all channels"),
 }
 
 
-def parameters_text(effect: str, parameters: Mapping[str, Estimate]) -> str:
+def format_parameters(effect: str, parameters: Mapping[str, Estimate]) -> str:
     """ "0.15 N [0.14, 0.16] in motion, 0.21 N [0.19, 0.23] at rest"."""
     effect_words = _find_words(effect)
     wording = dict(effect_words.parameters) if effect_words else {}
@@ -247,7 +251,7 @@ def parameters_text(effect: str, parameters: Mapping[str, Estimate]) -> str:
         wording = dict.fromkeys(main, _VALUE_ALONE)
     shares = effect_words.shares if effect_words else ()
     texts = [
-        words.format(estimate_text(parameters[name], name in shares))
+        words.format(format_estimate(parameters[name], name in shares))
         for name, words in wording.items()
         if name in parameters
     ]
@@ -256,8 +260,8 @@ def parameters_text(effect: str, parameters: Mapping[str, Estimate]) -> str:
     return ", ".join(texts)
 
 
-def estimate_text(estimate: Estimate, share: bool = False) -> str:
+def format_estimate(estimate: Estimate, share: bool = False) -> str:
     """An estimate with its unit and 95 % interval. share: print it in per cent."""
     if share:
-        return percent_text(estimate.value, estimate.ci95)
-    return value_text(estimate.value, estimate.unit, estimate.ci95)
+        return format_percent(estimate.value, estimate.ci95)
+    return format_value(estimate.value, estimate.unit, estimate.ci95)

@@ -13,13 +13,13 @@ import numpy as np
 
 from analysis.diagnosis.data.find_segments import find_segments
 from analysis.diagnosis.data.input_checks import require_different, require_usable_data
-from analysis.diagnosis.data.measured_motion import all_as_force_driven
-from analysis.diagnosis.data.observed_parts import LEAST_SAMPLES, parts_of
+from analysis.diagnosis.data.measured_motion import convert_all_to_force_driven
+from analysis.diagnosis.data.observed_parts import LEAST_SAMPLES, find_parts
 from analysis.diagnosis.settings import BRIDGED_GAP_ERROR, LEAST_GAPLESS_SHARE
 from analysis.diagnosis.types import Mask
 from analysis.wording import begin_sentence, conjoin
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray, runs_of
+from equalizer.signals.signal import FloatArray, find_runs
 
 CONSTANT_RANGE = 1e-9
 """Range of a signal over its largest magnitude, below which changes are rounding errors."""
@@ -48,10 +48,10 @@ def prepare_recordings(
     omission_remarks: tuple[str, ...] = ()
     if without_model:
         # Imported here: a given model says which motion each force drives.
-        from analysis.diagnosis.first_model.one_motion_per_force import one_motion_per_force
+        from analysis.diagnosis.first_model.one_motion_per_force import convert_to_driven_motions
 
-        force_recordings, omission_remarks = one_motion_per_force(with_segments)
-    driven, gaps = bridge_gaps(all_as_force_driven(force_recordings), names)
+        force_recordings, omission_remarks = convert_to_driven_motions(with_segments)
+    driven, gaps = bridge_gaps(convert_all_to_force_driven(force_recordings), names)
     compared = prepare_comparison(driven, names, without_model if accept_short is None else accept_short)
     return PreparedRecordings(compared.recordings, (*repeats, *omission_remarks, *gaps, *compared.remarks))
 
@@ -135,11 +135,11 @@ def _bridge_or_cut(recording: Recording, name: str) -> tuple[Recording, str]:
     missing: Mask = np.asarray(np.isnan(recording.command.samples).any(axis=1))
     if not missing.any() or missing.all():
         return recording, ""
-    gaps = runs_of(missing)
+    gaps = find_runs(missing)
     interpolated = _interpolate(recording.command.samples)
     wide = [gap for gap in gaps if not _can_bridge(recording.command.samples, gap[1] - gap[0])]
     narrow = [gap for gap in gaps if gap not in wide]
-    parts = [part for stretch in parts_of(recording) for part in _list_stretches_between(stretch, wide)]
+    parts = [part for stretch in find_parts(recording) for part in _list_stretches_between(stretch, wide)]
     if sum(stop - start for start, stop in parts) < LEAST_GAPLESS_SHARE * int((~missing).sum()):
         return recording, ""
     changed_recording = replace(recording, command=replace(recording.command, samples=interpolated))

@@ -1,7 +1,7 @@
 """The search by simulation: selects the effects to try, runs `search`, and adds rattling play where that explains more.
 
 Where force balances were fitted first, their laws decide which effects remain to be tried. With clean recordings, the
-model error learned from these counts as noise.
+model error learned from these counts as noise. Called by `diagnose`.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 from analysis.diagnosis.confirm.fitting_measures import FittingMeasure
 from analysis.diagnosis.confirm.require_gain import require_enough_gain, unname_doubtful_effects
-from analysis.diagnosis.data.measured_motion import time_unit
+from analysis.diagnosis.data.measured_motion import select_time_unit
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
-from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search import HUM, FurtherSearches, move_model_further, search_effects
@@ -24,18 +24,18 @@ from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import Effect
 from equalizer.effects.law_entry import library_effects
 from equalizer.effects.placing import place_of_effect
-from equalizer.plant.mechanical_model import MechanicalModel, with_units_of
+from equalizer.plant.mechanical_model import MechanicalModel, adopt_recording_units
 from equalizer.signals.recording import Recording
 
 if TYPE_CHECKING:
     from analysis.diagnosis.balance.judge_laws import Balance
 
 
-TESTED_BY_BALANCE = ("force_deadband", "force_saturation", "force_nonlinearity")
+BALANCE_TESTED_EFFECTS = ("force_deadband", "force_saturation", "force_nonlinearity")
 """Laws of the command that a force balance tests; a law that it does not name is taken as absent."""
 LOWEST_MAINS_HZ = 45.0
 """Lowest frequency (Hz) at which a tone is accepted as mains hum: power grids run at 50 or 60 Hz."""
-GAINS = ("force_gain", "sensor_gain")
+GAIN_EFFECTS = ("force_gain", "sensor_gain")
 """Effects that a model fitted to the recordings absorbs: a wrong gain shows only with a calibrated model."""
 
 
@@ -51,11 +51,13 @@ class SearchOutcome:
 def make_search_context(
     recording: Recording, fitting: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
 ) -> SearchContext:
-    """The shared state of the search. recording: as given by the user, for names and units; the records of a measure
-    that compares forces differ from it."""
+    """Make the shared state of the search. recording: as given by the user, for names and units; the records of a
+    measure that compares forces differ from it."""
     measure = fitting.chosen.measure
-    model = with_units_of(fitting.model, recording.command.units, recording.response.units, time_unit(recording))
-    tuning = tuning_of(model, recording.command.channels)
+    model = adopt_recording_units(
+        fitting.model, recording.command.units, recording.response.units, select_time_unit(recording)
+    )
+    tuning = make_tuning(model, recording.command.channels)
     return SearchContext(measure.shorten(), measure, tuning, map_, frozenset(settings.without), guard=settings.guard)
 
 
@@ -67,12 +69,12 @@ def search_by_simulation(
     progress: Progress,
     balances: "Sequence[Balance]",
 ) -> SearchOutcome:
-    """The result of the search by simulation. balances: force balances of the same recordings, if any; where they name
-    a law, no effect is tried, else only effects of the actuator and the sensor that a balance cannot observe. Raises
-    NothingLearned with clean recordings from which no model error can be learned."""
+    """Search by simulation for the missing effects. balances: force balances of the same recordings, if any; where they
+    name a law, no effect is tried, else only effects of the actuator and the sensor that a balance cannot observe.
+    Raises NothingLearned with clean recordings from which no model error can be learned."""
     chosen, context = fitting.chosen, make_search_context(recordings[0], fitting, settings, map_)
     catalogue = _select_catalogue(settings, recordings[0], context.excluded)
-    may_be_named = [effect for effect in catalogue if effect.name not in context.excluded]
+    nameable_effects = [effect for effect in catalogue if effect.name not in context.excluded]
     if balances:
         has_named_law = any(balance.named for balance in balances)
         # Effects of the actuator show only in complete commands: not in those reduced by the force of other motions.
@@ -82,10 +84,10 @@ def search_by_simulation(
             if has_named_law
             else [e for e in catalogue if _is_unobservable(e.name, place_of_effect(e), is_complete_command)]
         )
-        may_be_named = []
-    impacts = _ImpactSearch(fitting, may_be_named, settings, progress)
+        nameable_effects = []
+    impacts = _ImpactSearch(fitting, nameable_effects, settings, progress)
     if settings.clean:
-        observable = [effect for effect in may_be_named if chosen.measure.can_observe(effect)]
+        observable = [effect for effect in nameable_effects if chosen.measure.can_observe(effect)]
         outcome = _search_with_learned_error(
             recordings, fitting.model, (context, catalogue, observable), settings, progress
         )
@@ -93,12 +95,12 @@ def search_by_simulation(
         outcome = _search(context, catalogue, settings, progress, impacts)
         if has_low_hum(outcome.result.found):
             catalogue = [effect for effect in catalogue if effect.name != HUM]
-            impacts = _ImpactSearch(fitting, may_be_named, settings, progress)
+            impacts = _ImpactSearch(fitting, nameable_effects, settings, progress)
             outcome = _search(context, catalogue, settings, progress, impacts)
     if balances and outcome.result.judgement.named:
         repeats = all(floor.method == "repeats" for floor in chosen.floors)
         outcome = replace(outcome, result=unname_doubtful_effects(require_enough_gain(outcome.result, repeats)))
-    return replace(outcome, result=impacts.at_end(outcome.result))
+    return replace(outcome, result=impacts.explain_at_end(outcome.result))
 
 
 class _ImpactSearch:
@@ -110,32 +112,35 @@ class _ImpactSearch:
     ) -> None:
         """catalogue: the effects that may be named."""
         self._fitting, self._catalogue, self._settings, self._progress = fitting, catalogue, settings, progress
-        self._found: SearchResult | None = None
-        self._steps = -1
+        self._play_result: SearchResult | None = None
+        self._searched_step_count = -1
 
-    def before_thirds(self, result: SearchResult) -> SearchResult:
-        """The result with play, where the drive repeats, two effects leave the mismatch unexplained, and play explains
-        all of it: a third effect would take much time and could not predict a chaotic waveform."""
+    def explain_before_third_effect(self, result: SearchResult) -> SearchResult:
+        """Return the result with play, where the drive repeats, two effects leave the mismatch unexplained, and play
+        explains all of it: a third effect would take much time and could not predict a chaotic waveform."""
         repeats = any(floor.method == "repeats" for floor in self._fitting.chosen.floors)
         unexplained = not result.judgement.named and judge(result.found).verdict == "unexplained"
         if not repeats or not unexplained or has_low_hum(result.found) or not self._settings.time_left():
             return result
-        with_play = self._look(result)
+        with_play = self._search_for_play(result)
         return with_play if with_play is not None and with_play.judgement.verdict == "explained" else result
 
-    def at_end(self, result: SearchResult) -> SearchResult:
-        """The result with play, where the search leaves a mismatch that play explains at least partly."""
-        has_mismatch = result.judgement.verdict in ("unexplained", "partly_explained") and not names_discovered_law(
+    def explain_at_end(self, result: SearchResult) -> SearchResult:
+        """Return the result with play, where the search leaves a mismatch that play explains; else the result as it is,
+        as where a discovered law is named, a sensor fault is certain, or no time is left."""
+        has_mismatch = result.judgement.verdict in ("unexplained", "partly_explained") and not has_discovered_law(
             result
         )
         if not has_mismatch or result.context.certain or not self._settings.time_left():
             return result
-        return self._look(result) or result
+        return self._search_for_play(result) or result
 
-    def _look(self, result: SearchResult) -> SearchResult | None:
-        """The result with play, or None where play does not explain the recordings; cached (see the class). Where the
-        time ended before that is known, the result as it is, which then says so."""
-        if self._steps < 0 or (self._found is not None and len(result.found.steps) > self._steps):
+    def _search_for_play(self, result: SearchResult) -> SearchResult | None:
+        """Return the result with play, or None where play does not explain the recordings. Cached until the result has
+        more effects. Where the time ended before that is known, the result with a remark that says so."""
+        if self._searched_step_count < 0 or (
+            self._play_result is not None and len(result.found.steps) > self._searched_step_count
+        ):
             # Imported here, because only a diagnosis that leaves a mismatch looks for impacts.
             from analysis.diagnosis.result.impact_wording import IMPACTS_COMPARED
             from analysis.diagnosis.search.impacts import explain_impacts
@@ -143,13 +148,13 @@ class _ImpactSearch:
             self._progress("looking for rattling play", 0.9)
             floors, time_left = self._fitting.chosen.floors, self._settings.time_left
             explanation = explain_impacts(result.context, result.found, floors, self._catalogue, time_left)
-            self._found, self._steps = None, len(result.found.steps)
+            self._play_result, self._searched_step_count = None, len(result.found.steps)
             if explanation is None and not time_left():
-                self._found = replace(result, remarks=tuple(dict.fromkeys((*result.remarks, OUT_OF_TIME))))
+                self._play_result = replace(result, remarks=tuple(dict.fromkeys((*result.remarks, OUT_OF_TIME))))
             elif explanation is not None:
                 remarks = (IMPACTS_COMPARED, *((OUT_OF_TIME,) if explanation.ended_early else ()))
-                self._found = SearchResult(result.context, explanation, judge(explanation), remarks)
-        return self._found
+                self._play_result = SearchResult(result.context, explanation, judge(explanation), remarks)
+        return self._play_result
 
 
 def _search_with_learned_error(
@@ -159,7 +164,7 @@ def _search_with_learned_error(
     settings: DiagnosisSettings,
     progress: Progress,
 ) -> SearchOutcome:
-    """The search in which the model error on the clean recordings counts as noise. search_inputs: the shared state, the
+    """Search while the model error on the clean recordings counts as noise. search_inputs: the shared state, the
     effects to try, and the effects that may be named as sensor faults without a search. Raises NothingLearned."""
     from analysis.diagnosis.reference.learn_model_error import learn_model_error
     from analysis.diagnosis.reference.model_free_faults import find_sensor_faults
@@ -179,16 +184,16 @@ def _search(
     progress: Progress,
     impacts: _ImpactSearch,
 ) -> SearchOutcome:
-    """The search without clean recordings: with laws outside the catalogue where `settings` asks for them, and, unless
+    """Search without clean recordings: with laws outside the catalogue where `settings` asks for them, and, unless
     the model was fitted to the recordings, repeated with a wider bound where needed."""
-    law_searches = FurtherSearches(before_thirds=impacts.before_thirds)
+    law_searches = FurtherSearches(before_thirds=impacts.explain_before_third_effect)
     if settings.discovery and not settings.fitted:
         # Imported here, because only a diagnosis that searches for laws needs their grammar.
         from analysis.diagnosis.discovery.add_laws import LawSearch
 
         laws = LawSearch(progress, settings.time_left)
         law_searches = FurtherSearches(
-            _skip_with_hum(laws.add_short), impacts.before_thirds, _skip_with_hum(laws.add_any)
+            _skip_with_hum(laws.add_short), impacts.explain_before_third_effect, _skip_with_hum(laws.add_any)
         )
     result = search_effects(context, catalogue, progress, settings.time_left, law_searches)
     # A model that was fitted to the recordings has no calibration, hence no bound to widen.
@@ -198,26 +203,26 @@ def _search(
 
 
 def _skip_with_hum(add_laws: Callable[[SearchResult], SearchResult]) -> Callable[[SearchResult], SearchResult]:
-    """The law search, skipped where hum below the mains was found: that is no answer, and the search is repeated
+    """Wrap the law search: skip it where hum below mains frequency was found, because the search is then repeated
     without hum before any law is added."""
     return lambda result: result if has_low_hum(result.found) else add_laws(result)
 
 
 def _select_catalogue(settings: DiagnosisSettings, recording: Recording, excluded: frozenset[str]) -> list[Effect]:
-    """The effects to try: the catalogue and the kept laws without the excluded effects; excluded effects that others
-    refine are included as rivals that cannot be named."""
-    omitted = {*settings.without, *(GAINS if settings.fitted and not settings.clean else ())}
+    """Select the effects to try: the catalogue and the kept laws without the excluded effects; excluded effects that
+    others refine are included as rivals that cannot be named."""
+    omitted = {*settings.without, *(GAIN_EFFECTS if settings.fitted and not settings.clean else ())}
     all_effects = (*CATALOGUE, *library_effects(settings.kept, recording))
     catalogue = [effect for effect in all_effects if effect.name not in omitted]
     refined = {name for effect in catalogue for name in effect.simpler}
     return catalogue + [effect for effect in CATALOGUE if effect.name in refined & excluded]
 
 
-def _is_unobservable(name: str, place: str, complete: bool) -> bool:
+def _is_unobservable(name: str, place: str, is_complete_command: bool) -> bool:
     """Whether a force balance cannot observe an effect of the actuator or the sensor. complete: an actuator drives the
     device with the commands as recorded, neither reduced by other forces nor with an imposed motion."""
-    untested = name != "body_on_actuator" and name not in TESTED_BY_BALANCE
-    return place == "sensor" or (place == "actuator" and complete and untested)
+    is_untested = name != "body_on_actuator" and name not in BALANCE_TESTED_EFFECTS
+    return place == "sensor" or (place == "actuator" and is_complete_command and is_untested)
 
 
 def has_low_hum(explanation: Explanation) -> bool:
@@ -226,7 +231,7 @@ def has_low_hum(explanation: Explanation) -> bool:
     return any(effect.effect.name == HUM and effect.values["frequency"] < LOWEST_MAINS_HZ for effect in placed_effects)
 
 
-def names_discovered_law(result: SearchResult) -> bool:
+def has_discovered_law(result: SearchResult) -> bool:
     """Whether a discovered law is among the named effects."""
     claims = result.found.after.fitted.hypothesis.claims
     return result.judgement.named and any(claim.effect.law is not None for claim in claims)

@@ -73,7 +73,7 @@ MASSLESS_SHARE = 1e-3
 SPRING_SHARE = 0.05  # share of the misfit that springs must remove to be part of a fitted rigid model
 RETUNING_NAMED, RETUNING_DOUBTED = 1.0, 3.0  # standard deviations from which a moved parameter is listed, and doubted
 
-# Localisation of a mismatch (`mismatch_cells`, `level_trends`, `entry_point`, `find_tied_states`). By hand.
+# Localisation of a mismatch (`mismatch_cells`, `level_trends`, `entry_point`, `find_state_dependences`). By hand.
 FALSE_DISCOVERY_RATE = 0.01  # of cells and states, by the test of Benjamini and Bogomolov (2014)
 DISTORTION_P = 0.001  # p-value below which a kind of distortion is significant
 STEADY_DB = 1.5  # dB per doubling of the level, within which a distortion neither rises nor falls

@@ -2,6 +2,7 @@
 
 The outcomes are those of a bank of simulated devices with concealed effects. Vertical bars in the figure of detection
 thresholds mark an ideal observer, which compares the device with and without the effect and has no model to re-tune.
+Called by `write_proof`.
 """
 
 from collections.abc import Sequence
@@ -14,38 +15,44 @@ from analysis.evaluation.blind_test.calibration import Calibration
 from analysis.evaluation.blind_test.detection import EffectDraws, compute_rates_by_size, make_detection_strips
 from analysis.evaluation.blind_test.outcome import Outcome
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, new_figure, plain_axes, ratio_ticks
+from analysis.figures.style import BLACK, BLUE, GREY, ORANGE, VERMILLION, create_figure, set_ratio_ticks, style_axes
 
-MARKS = {"right": ("o", BLUE), "in the set": ("D", ORANGE), "missed": ("X", VERMILLION), "invisible": (".", GREY)}
+OUTCOME_MARKS = {
+    "right": ("o", BLUE),
+    "in the set": ("D", ORANGE),
+    "missed": ("X", VERMILLION),
+    "invisible": (".", GREY),
+}
 """Marker and colour of each outcome of a single effect (`Outcome`)."""
-NO_ANSWER = "no name"
+NO_NAME_COLUMN = "no name"
 """Column of the confusion matrix for devices of which no effect is named."""
 
 
-def blind_test_pictures(outcomes: Sequence[Outcome], calibration: Calibration) -> tuple[Picture, ...]:
-    """Pictures of detection thresholds, detection by effect size and confusion, where the bank has devices with a
-    single effect; and of reliability, where effects were named."""
+def make_blind_test_pictures(outcomes: Sequence[Outcome], calibration: Calibration) -> tuple[Picture, ...]:
+    """Make the pictures of detection thresholds, detection by effect size and confusion, where the bank has devices
+    with a single effect; and of reliability, where effects were named."""
     singles = [outcome for outcome in outcomes if outcome.kind == "single"]
     pictures = []
     if singles:
         pictures += [
-            _strips_picture(make_detection_strips(singles)),
-            _size_picture(singles),
-            _confusion_picture(singles),
+            _make_strips_picture(make_detection_strips(singles)),
+            _make_size_picture(singles),
+            _make_confusion_picture(singles),
         ]
     if calibration.bins:
-        pictures.append(_reliability_picture(calibration))
+        pictures.append(_make_reliability_picture(calibration))
     return tuple(pictures)
 
 
-def _strips_picture(strips: Sequence[EffectDraws]) -> Picture:
-    """Detection thresholds: a row per effect, with the outcome of each device over the effect's strength (0 to 1)."""
-    figure = new_figure(8.8, 1.3 + 0.21 * len(strips))
+def _make_strips_picture(strips: Sequence[EffectDraws]) -> Picture:
+    """Draw the detection thresholds: a row per effect, with the outcome of each device over the effect's strength (0 to
+    1)."""
+    figure = create_figure(8.8, 1.3 + 0.21 * len(strips))
     axes = figure.add_subplot()
-    plain_axes(axes)
+    style_axes(axes)
     for row, strip in enumerate(strips):
         for strength, outcome in strip.draws:
-            marker, colour = MARKS[outcome]
+            marker, colour = OUTCOME_MARKS[outcome]
             axes.plot(strength, row, marker, color=colour, markersize=6.5 if marker != "." else 5)
         if strip.ideal_threshold is not None:
             axes.vlines(strip.ideal_threshold, row - 0.38, row + 0.38, color=BLACK, linewidth=1.4)
@@ -55,7 +62,7 @@ def _strips_picture(strips: Sequence[EffectDraws]) -> Picture:
     axes.set_xlabel("strength, from the weakest that is drawn to the strongest (logarithmic)")
     handles = [
         Line2D([], [], marker=marker_style, color=marker_colour, linestyle="", label=outcome)
-        for outcome, (marker_style, marker_colour) in MARKS.items()
+        for outcome, (marker_style, marker_colour) in OUTCOME_MARKS.items()
     ]
     handles.append(
         Line2D([], [], marker="|", color=BLACK, linestyle="", markersize=9, label="ideal observer detects it")
@@ -73,12 +80,12 @@ def _strips_picture(strips: Sequence[EffectDraws]) -> Picture:
     )  # fmt: skip
 
 
-def _size_picture(singles: Sequence[Outcome]) -> Picture:
-    """Detection curve: share of devices whose effect is named right, over the change of the readings by the effect (rms
-    over the noise's rms)."""
-    figure = new_figure(7.4, 3.6)
+def _make_size_picture(singles: Sequence[Outcome]) -> Picture:
+    """Draw the detection curve: share of devices whose effect is named right, over the change of the readings by the
+    effect (rms over the noise's rms)."""
+    figure = create_figure(7.4, 3.6)
     axes = figure.add_subplot()
-    plain_axes(axes)
+    style_axes(axes)
     size_bins = compute_rates_by_size(singles)
     axes.set_xscale("log")
     changes = [size_bin.median_change for size_bin in size_bins]
@@ -92,7 +99,7 @@ def _size_picture(singles: Sequence[Outcome]) -> Picture:
     axes.plot(changes, [size_bin.rate for size_bin in size_bins], "o-", color=BLUE, linewidth=1.2)
     axes.set_ylim(-0.02, 1.02)
     if max(changes) > min(changes):
-        ratio_ticks(axes.xaxis, min(changes), max(changes))
+        set_ratio_ticks(axes.xaxis, min(changes), max(changes))
     axes.set_xlabel("change of the readings by the effect: rms over the noise's, worst channel")
     axes.set_ylabel("share named right")
     return Picture(
@@ -104,17 +111,18 @@ def _size_picture(singles: Sequence[Outcome]) -> Picture:
     )  # fmt: skip
 
 
-def _confusion_picture(singles: Sequence[Outcome]) -> Picture:
-    """Confusion matrix of the detectable single effects: concealed effect (rows) against the first named (columns)."""
+def _make_confusion_picture(singles: Sequence[Outcome]) -> Picture:
+    """Draw the confusion matrix of the detectable single effects: concealed effect (rows) against the first named
+    (columns)."""
     detectable = [outcome for outcome in singles if outcome.detectable]
-    answers = [outcome.named_names[0] if outcome.named else NO_ANSWER for outcome in detectable]
+    answers = [outcome.named_names[0] if outcome.named else NO_NAME_COLUMN for outcome in detectable]
     pairs = [(outcome.names[0], answer) for outcome, answer in zip(detectable, answers, strict=True)]
-    names = sorted({true for true, _ in pairs} | {answer for _, answer in pairs if answer != NO_ANSWER})
-    columns = [*names, NO_ANSWER]
+    names = sorted({true for true, _ in pairs} | {answer for _, answer in pairs if answer != NO_NAME_COLUMN})
+    columns = [*names, NO_NAME_COLUMN]
     counts = np.zeros((len(names), len(columns)))
     for true, answer in pairs:
         counts[names.index(true), columns.index(answer)] += 1
-    figure = new_figure(9.6, 2.2 + 0.23 * len(names))
+    figure = create_figure(9.6, 2.2 + 0.23 * len(names))
     axes = figure.add_subplot()
     _draw_counts(axes, counts)
     axes.set_yticks(range(len(names)), labels=[name.replace("_", " ") for name in names], fontsize=8)
@@ -129,7 +137,8 @@ def _confusion_picture(singles: Sequence[Outcome]) -> Picture:
 
 
 def _draw_counts(axes: Axes, counts: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> None:
-    """Cells of the confusion matrix, shaded by their count; the diagonal in another colour. counts: (rows, columns)."""
+    """Draw the cells of the confusion matrix, shaded by their count; the diagonal in another colour. counts: (rows,
+    columns)."""
     rows, columns = counts.shape
     largest_count = max(counts.max(initial=1.0), 1.0)
     for i in range(rows):
@@ -147,11 +156,11 @@ def _draw_counts(axes: Axes, counts: np.ndarray[tuple[int, ...], np.dtype[np.flo
         axes.spines[side].set_visible(False)
 
 
-def _reliability_picture(calibration: Calibration) -> Picture:
-    """Reliability diagram: share of right names over their stated probability, with the diagonal."""
-    figure = new_figure(5.2, 4.4)
+def _make_reliability_picture(calibration: Calibration) -> Picture:
+    """Draw the reliability diagram: share of right names over their stated probability, with the diagonal."""
+    figure = create_figure(5.2, 4.4)
     axes = figure.add_subplot()
-    plain_axes(axes)
+    style_axes(axes)
     axes.plot([0, 1], [0, 1], color=GREY, linewidth=1.0, linestyle="--")
     for probability_bin in calibration.bins:
         axes.vlines(probability_bin.stated, probability_bin.low, probability_bin.high, color=BLUE, linewidth=1.4)

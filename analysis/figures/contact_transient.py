@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLUE, GREEN, GREY, VERMILLION, new_figure, plain_axes
+from analysis.figures.style import BLUE, GREEN, GREY, VERMILLION, create_figure, style_axes
 from equalizer.signals.signal import FloatArray
 
 Play = tuple[str, FloatArray, FloatArray]
@@ -30,7 +30,7 @@ def contact_picture(normal: FloatArray, sample_rate_hz: float, target: FloatArra
 
 
 def _draw_transient(normal: FloatArray, rate_hz: float, target: FloatArray, plays: tuple[Play, ...]) -> Figure:
-    figure = new_figure(4.3 * len(plays), 5.6)
+    figure = create_figure(4.3 * len(plays), 5.6)
     grid = figure.subplots(3, len(plays), sharex=True, sharey="row", squeeze=False)
     time_ms = 1000 * np.arange(len(target)) / rate_hz
     for column, (name, forces, measured) in zip(grid.T, plays, strict=True):
@@ -44,7 +44,7 @@ def _draw_transient(normal: FloatArray, rate_hz: float, target: FloatArray, play
         column[0].set_title(name, fontsize=10)
         column[2].set_xlabel("Time after the contact (ms)")
         for axes in column:
-            plain_axes(axes)
+            style_axes(axes)
     for axes, label in zip(grid[:, 0], ("Along (m/s²)", "Across (m/s²)", "Force (N)"), strict=True):
         axes.set_ylabel(label, fontsize=9)
     for axes in (grid[0, 0], grid[2, 0]):

@@ -14,14 +14,14 @@ from matplotlib.lines import Line2D
 from analysis.figures.style import (
     BLUE,
     GREY,
-    PAGE_IN,
+    PAGE_WIDTH_IN,
     VERMILLION,
+    create_figure,
+    create_panel_grid,
     draw_no_data_note,
-    name_panel_axes,
-    new_figure,
-    newton_ticks,
-    panel_grid,
-    plain_axes,
+    label_panel_axes,
+    set_newton_ticks,
+    style_axes,
 )
 from protocols.trial import Trial
 
@@ -32,26 +32,26 @@ _RASTER_FROM = 400
 def draw_delivered(trials: Sequence[Trial]) -> Figure:
     """Figure of acceleration amplitude (m/s²) along and perpendicular to the commanded direction, against the level
     (N). Trials that do not count or have no measured acceleration are left out; a note where none remains."""
-    measured = [trial for trial in trials if trial.counts and trial.delivered_mps2]
+    measured = [trial for trial in trials if trial.is_valid and trial.delivered_mps2]
     if not measured:
-        return draw_no_data_note(new_figure(PAGE_IN, 2.0), "No trial has a measured acceleration.")
+        return draw_no_data_note(create_figure(PAGE_WIDTH_IN, 2.0), "No trial has a measured acceleration.")
     frequencies = sorted({trial.frequency_hz for trial in measured})
-    figure, panels = panel_grid(len(frequencies), 2.3, sharex=True)
+    figure, panels = create_panel_grid(len(frequencies), 2.3, sharex=True)
     levels = [trial.level_n for trial in measured]
     panels[0].set_xscale("log")
     panels[0].set_xlim(0.8 * min(levels), 1.25 * max(levels))
     for panel, frequency in zip(panels, frequencies, strict=False):
         _draw_frequency(panel, [trial for trial in measured if trial.frequency_hz == frequency])
-        newton_ticks(panel.xaxis, min(levels), max(levels))
+        set_newton_ticks(panel.xaxis, min(levels), max(levels))
         panel.set_title(f"{frequency:g} Hz", fontsize=10, loc="left")
     panels[-1].legend(handles=_legend_handles(), loc="center", fontsize=9, frameon=False)
-    name_panel_axes(panels, len(frequencies), "Level (N)", "Measured (m/s²)")
+    label_panel_axes(panels, len(frequencies), "Level (N)", "Measured (m/s²)")
     return figure
 
 
 def _draw_frequency(axes: Axes, trials: list[Trial]) -> None:
     """One panel. The grey line is the median ratio of acceleration along the direction to level, times the level."""
-    plain_axes(axes)
+    style_axes(axes)
     rasterized = len(trials) > _RASTER_FROM
     levels = np.array([trial.level_n for trial in trials])
     on_axis = np.array([trial.delivered_mps2 for trial in trials], dtype=np.float64)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.typing import LineStyleType
 
-from analysis.figures.style import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, draw_no_data_note, new_figure
+from analysis.figures.style import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, create_figure, draw_no_data_note
 from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.wording import format_number
 
@@ -29,13 +29,13 @@ def draw_ellipsoids(results: Sequence[EllipsoidResult]) -> Figure:
     dash. A note is drawn where there are no results.
     """
     if not results:
-        return draw_no_data_note(new_figure(8.6, 2.0), "There is no ellipsoid to draw.")
+        return draw_no_data_note(create_figure(8.6, 2.0), "There is no ellipsoid to draw.")
     frequencies = sorted({result.frequency_hz for result in results})
     directions = list(dict.fromkeys(result.along for result in results))
     height = 1.1 * max(0.4, *(_half_height(result) for result in results))
     columns = min(_COLUMNS, len(frequencies))
     block_count = -(-len(frequencies) // columns)
-    figure = new_figure(8.6, (1.6 + 2 * min(2.0, 8.0 / columns) * height / 1.15) * block_count + 0.4)
+    figure = create_figure(8.6, (1.6 + 2 * min(2.0, 8.0 / columns) * height / 1.15) * block_count + 0.4)
     grid = figure.subplots(2 * block_count, columns, squeeze=False, sharex=True, sharey=True)
     for grid_row in grid:
         for axes in grid_row:

@@ -13,12 +13,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, new_figure, plain_axes
-from equalizer.identification.frequency_response.coupling import worst_coupling
+from analysis.figures.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION, create_figure, style_axes
+from equalizer.identification.frequency_response.coupling import compute_worst_coupling
 from equalizer.identification.frequency_response.coupling_onset import CouplingOnset
 from equalizer.identification.frequency_response.frequency_bands import FrequencyBand
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
-from equalizer.identification.frequency_response.octave_bins import octave_bins
+from equalizer.identification.frequency_response.octave_bins import average_octave_bins
 
 _COLOURS = {"low": GREEN, "middle": BLUE, "high": PURPLE}
 _HALF_HEIGHT, _EXTRA_HALF_HEIGHT = 0.4, 0.35
@@ -50,10 +50,10 @@ def draw_frequency_bands(
 ) -> Figure:
     """Figure of the measured coupling above, and of perception and control by band below, over a logarithmic frequency
     axis."""
-    figure = new_figure(8.6, 4.6)
+    figure = create_figure(8.6, 4.6)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[1.35, 1])
     lowest, highest = bands[0].low_hz, bands[-1].high_hz
-    _draw_coupling(above, response.within(lowest, highest), onset)
+    _draw_coupling(above, response.select_band(lowest, highest), onset)
     _draw_rows(below, onset, bands, direction_limit_hz)
     for axes in (above, below):
         for edge in [band.low_hz for band in bands[1:]]:
@@ -68,11 +68,11 @@ def draw_frequency_bands(
 
 def _draw_coupling(axes: Axes, response: FrequencyResponse, onset: CouplingOnset) -> None:
     """Worst coupling of the reliable lines in per cent, averaged over 1/24 octave, with the threshold of the onset."""
-    plain_axes(axes)
-    lines = response.of_lines(response.reliable)
+    style_axes(axes)
+    lines = response.select_lines(response.reliable)
     if len(lines):
-        bins = octave_bins(lines, 1 / 24)
-        axes.plot(bins.frequency_hz, 100 * worst_coupling(bins.response), color=BLUE, linewidth=1.3)
+        bins = average_octave_bins(lines, 1 / 24)
+        axes.plot(bins.frequency_hz, 100 * compute_worst_coupling(bins.response), color=BLUE, linewidth=1.3)
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g} %"))
     axes.yaxis.set_minor_formatter(NullFormatter())

@@ -1,6 +1,7 @@
 """Figures of a recording before any model is fitted: time series, spectra, coherence, levels, derivatives.
 
-They show the values of `analysis.look.overview.Overview`; each figure is drawn only where the recording has its data.
+Called by `look_report`. They show the values of `analysis.look.overview.Overview`; each figure is drawn only where the
+recording has its data.
 """
 
 from collections.abc import Sequence
@@ -14,59 +15,59 @@ from matplotlib.ticker import MaxNLocator
 
 from analysis.diagnosis.types import Mask
 from analysis.figures.picture import Picture, count_in_samples
-from analysis.figures.style import BLACK, BLUE, COLOURS, GREY, MARKERS, ORANGE, SKY, new_figure, plain_axes
+from analysis.figures.style import BLACK, BLUE, COLOURS, GREY, MARKERS, ORANGE, SKY, create_figure, style_axes
 from analysis.look.channels import Channel
-from analysis.look.kinematics import KinematicPair, derivative
+from analysis.look.kinematics import KinematicPair, differentiate
 from analysis.look.overview import Overview
 from equalizer.signals.signal import FloatArray
 
-COLUMNS = 1200
+ENVELOPE_COLUMNS = 1200
 """Columns of a drawn time series, each from its lowest to its highest sample."""
 SHOWN_SAMPLES = 600
 """Samples that are shown where two time series are compared."""
 _FIT_COLOUR, _TEST_COLOUR, _BAND_COLOUR = "#EEF3E6", "#FBEFD9", "#EEF3E6"
 """Background colours of samples to fit, of samples to test, and of the driven band."""
-_DECADES = 8
+_SHOWN_DECADES = 8
 """Decades of amplitude that a spectrum shows, from its largest value down."""
 _ROLE_COLOURS = {"command": ORANGE, "excitation": ORANGE, "response": BLUE, "position": SKY, "condition": GREY}
 
 
-def look_pictures(overview: Overview, number: int) -> tuple[Picture, ...]:
-    """All figures of one recording; in samples instead of seconds where its time axis is unknown. number: number of the
-    recording on the page, from 1, for the names of the pictures."""
-    pictures = [_signals_picture(overview, f"signals-{number}")]
+def make_look_pictures(overview: Overview, number: int) -> tuple[Picture, ...]:
+    """Make all figures of one recording; in samples instead of seconds where its time axis is unknown. number: number
+    of the recording on the page, from 1, for the names of the pictures."""
+    pictures = [_make_signals_picture(overview, f"signals-{number}")]
     if overview.spectra is not None:
-        pictures.append(_spectra_picture(overview, f"spectra-{number}"))
+        pictures.append(_make_spectra_picture(overview, f"spectra-{number}"))
     if overview.coherences:
-        pictures.append(_coherence_picture(overview, f"coherence-{number}"))
+        pictures.append(_make_coherence_picture(overview, f"coherence-{number}"))
     if len(overview.levels) > 2:
-        pictures.append(_levels_picture(overview, f"levels-{number}"))
+        pictures.append(_make_levels_picture(overview, f"levels-{number}"))
     if overview.pairs:
-        pictures.append(_derivatives_picture(overview, f"derivatives-{number}"))
+        pictures.append(_make_derivatives_picture(overview, f"derivatives-{number}"))
     return tuple(pictures if overview.recording.is_timed else map(count_in_samples, pictures))
 
 
-def _channel_panels(overview: Overview, height_in: float) -> tuple[Figure, list[Axes]]:
-    """A figure with a titled panel per channel. height_in: height of a panel in inches."""
-    figure = new_figure(8.6, 0.8 + height_in * len(overview.channels))
+def _make_channel_panels(overview: Overview, height_in: float) -> tuple[Figure, list[Axes]]:
+    """Make a figure with a titled panel per channel. height_in: height of a panel in inches."""
+    figure = create_figure(8.6, 0.8 + height_in * len(overview.channels))
     axes = figure.subplots(len(overview.channels), 1, sharex=True, squeeze=False)[:, 0]
     for channel, panel in zip(overview.channels, axes, strict=True):
-        plain_axes(panel)
-        panel.set_title(f"{channel.role} {channel.name} ({_unit_text(channel.unit)})", fontsize=9, loc="left", pad=3)
+        style_axes(panel)
+        panel.set_title(f"{channel.role} {channel.name} ({_format_unit(channel.unit)})", fontsize=9, loc="left", pad=3)
     return figure, list(axes)
 
 
-def _signals_picture(overview: Overview, name: str) -> Picture:
-    """Time series of all channels, with the samples to fit and to test, and the boundaries of parts."""
-    figure, axes = _channel_panels(overview, 1.15)
+def _make_signals_picture(overview: Overview, name: str) -> Picture:
+    """Draw the time series of all channels, with the samples to fit and to test, and the boundaries of parts."""
+    figure, axes = _make_channel_panels(overview, 1.15)
     rate_hz = overview.recording.sample_rate_hz
     for channel, panel in zip(overview.channels, axes, strict=True):
-        times_s, low, high = envelope(channel.samples, rate_hz)
+        times_s, low, high = compute_envelope(channel.samples, rate_hz)
         panel.fill_between(times_s, low, high, color=_ROLE_COLOURS[channel.role], linewidth=0.6)
         for segment in overview.recording.segments:
             if segment.role:
-                shade = _FIT_COLOUR if segment.role == "fit" else _TEST_COLOUR
-                panel.axvspan(segment.start / rate_hz, segment.stop / rate_hz, color=shade, zorder=0, linewidth=0)
+                role_colour = _FIT_COLOUR if segment.role == "fit" else _TEST_COLOUR
+                panel.axvspan(segment.start / rate_hz, segment.stop / rate_hz, color=role_colour, zorder=0, linewidth=0)
         for start, _ in overview.stretches[1:]:
             panel.axvline(start / rate_hz, color=GREY, linewidth=0.7, linestyle=(0, (1, 2)))
     figure.supxlabel("Time (s)", fontsize=10)
@@ -82,9 +83,11 @@ def _signals_picture(overview: Overview, name: str) -> Picture:
     )
 
 
-def envelope(samples: FloatArray, rate_hz: float, columns: int = COLUMNS) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Start times (s), lowest and highest samples of equal stretches; (k,) each, k at most `columns`. Missing samples
-    (NaN) are ignored."""
+def compute_envelope(
+    samples: FloatArray, rate_hz: float, columns: int = ENVELOPE_COLUMNS
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Compute start times (s), lowest and highest samples of equal stretches, (k,) each, k at most `columns`. Missing
+    samples (NaN) are ignored."""
     starts = np.unique(np.linspace(0, len(samples), min(columns, len(samples)), endpoint=False).astype(int))
     low = np.fmin.reduceat(samples, starts)
     high = np.fmax.reduceat(samples, starts)
@@ -93,13 +96,13 @@ def envelope(samples: FloatArray, rate_hz: float, columns: int = COLUMNS) -> tup
     return starts / rate_hz, low, high
 
 
-def _spectra_picture(overview: Overview, name: str) -> Picture:
-    """Amplitude densities of all channels, in their units per root hertz."""
+def _make_spectra_picture(overview: Overview, name: str) -> Picture:
+    """Draw the amplitude densities of all channels, in their units per root hertz."""
     assert overview.spectra is not None
-    figure, axes = _channel_panels(overview, 1.25)
+    figure, axes = _make_channel_panels(overview, 1.25)
     frequency_hz = overview.spectra.frequency_hz
     for k, (channel, panel) in enumerate(zip(overview.channels, axes, strict=True)):
-        amplitude = np.sqrt(overview.spectra.power(k))
+        amplitude = np.sqrt(overview.spectra.get_power_density(k))
         if np.nanmin(channel.samples) == np.nanmax(channel.samples):
             panel.text(0.5, 0.5, "constant", transform=panel.transAxes, ha="center", fontsize=9, color=GREY)
             continue
@@ -107,7 +110,7 @@ def _spectra_picture(overview: Overview, name: str) -> Picture:
         panel.set_yscale("log")
         if amplitude.max() > 0:
             top = float(amplitude.max())
-            panel.set_ylim(max(0.5 * float(amplitude[amplitude > 0].min()), top * 10.0**-_DECADES), 2 * top)
+            panel.set_ylim(max(0.5 * float(amplitude[amplitude > 0].min()), top * 10.0**-_SHOWN_DECADES), 2 * top)
         _shade_bands(panel, overview)
     axes[0].set_xscale("log")
     axes[0].set_xlim(float(frequency_hz[0]), float(frequency_hz[-1]))
@@ -130,24 +133,24 @@ def _shade_bands(panel: Axes, overview: Overview) -> None:
         panel.axvspan(low, high, color=_BAND_COLOUR, zorder=0)
 
 
-def _band_lines(overview: Overview) -> Mask:
+def _select_band_lines(overview: Overview) -> Mask:
     """(lines,): the spectral lines from the lowest to the highest driven frequency."""
     assert overview.spectra is not None
     low, high = min(band.low_hz for band in overview.bands), max(band.high_hz for band in overview.bands)
     return np.asarray((overview.spectra.frequency_hz >= low) & (overview.spectra.frequency_hz <= high))
 
 
-def _coherence_picture(overview: Overview, name: str) -> Picture:
-    """Multiple coherence of each response with all commands; faint outside the driven band."""
+def _make_coherence_picture(overview: Overview, name: str) -> Picture:
+    """Draw the multiple coherence of each response with all commands; faint outside the driven band."""
     assert overview.spectra is not None
-    figure = new_figure(8.6, 3.0)
+    figure = create_figure(8.6, 3.0)
     panel = figure.subplots()
-    plain_axes(panel)
+    style_axes(panel)
     _shade_bands(panel, overview)
     for k, coherence in enumerate(overview.coherences):
         colour = COLOURS[k % len(COLOURS)]
         panel.plot(overview.spectra.frequency_hz, coherence.multiple, color=colour, lw=0.7, alpha=0.3)
-        in_band = _band_lines(overview)
+        in_band = _select_band_lines(overview)
         panel.plot(
             overview.spectra.frequency_hz[in_band],
             coherence.multiple[in_band],
@@ -171,27 +174,28 @@ def _coherence_picture(overview: Overview, name: str) -> Picture:
     )
 
 
-def _levels_picture(overview: Overview, name: str) -> Picture:
-    """Rms of each command and response by segment, relative to its largest: curves of a linear device coincide."""
-    figure = new_figure(8.6, 3.2)
+def _make_levels_picture(overview: Overview, name: str) -> Picture:
+    """Draw the rms of each command and response by segment, relative to its largest: curves of a linear device
+    coincide."""
+    figure = create_figure(8.6, 3.2)
     panel = figure.subplots()
-    plain_axes(panel)
+    style_axes(panel)
     numbers = [level.number for level in overview.levels]
     strongest = [max(level.rms[k] for level in overview.levels) for k in range(len(overview.channels))]
     drawn_channels = [
-        k for k, c in enumerate(overview.channels) if c.role in ("command", "response") and strongest[k] > 0
+        k for k, channel in enumerate(overview.channels) if channel.role in ("command", "response") and strongest[k] > 0
     ]
     for position, k in enumerate(drawn_channels):
-        sizes = np.array([level.rms[k] for level in overview.levels]) / strongest[k]
+        relative_rms = np.array([level.rms[k] for level in overview.levels]) / strongest[k]
         panel.plot(
             numbers,
-            np.where(sizes > 0, sizes, np.nan),
+            np.where(relative_rms > 0, relative_rms, np.nan),
             color=COLOURS[position % len(COLOURS)],
             marker=MARKERS[position % len(MARKERS)],
             markersize=5,
             linewidth=0.8,
             linestyle=":" if overview.channels[k].role == "command" else "-",
-            label=f"{overview.channels[k].label} ({_unit_text(overview.channels[k].format(strongest[k]))})",
+            label=f"{overview.channels[k].label} ({_format_unit(overview.channels[k].format(strongest[k]))})",
         )
     panel.set_ylim(0, 1.05)
     panel.set_xlabel("Segment", fontsize=10)
@@ -208,10 +212,10 @@ def _levels_picture(overview: Overview, name: str) -> Picture:
     )
 
 
-def _derivatives_picture(overview: Overview, name: str) -> Picture:
-    """Recorded velocities or accelerations compared with the differentiated signals of the same motion."""
+def _make_derivatives_picture(overview: Overview, name: str) -> Picture:
+    """Draw recorded velocities or accelerations compared with the differentiated signals of the same motion."""
     pairs = overview.pairs
-    figure = new_figure(8.6, 0.8 + 1.9 * len(pairs))
+    figure = create_figure(8.6, 0.8 + 1.9 * len(pairs))
     axes = figure.subplots(len(pairs), 1, squeeze=False)[:, 0]
     for pair, panel in zip(pairs, axes, strict=True):
         _draw_pair(panel, pair, overview)
@@ -231,23 +235,25 @@ def _derivatives_picture(overview: Overview, name: str) -> Picture:
 
 
 def _draw_pair(panel: Axes, pair: KinematicPair, overview: Overview) -> None:
-    """A recorded channel, and central differences of the channel whose derivative it should be."""
+    """Draw a recorded channel, and central differences of the channel whose derivative it should be."""
     rate_hz = overview.recording.sample_rate_hz
     by_label = {channel.label: channel for channel in overview.channels}
     recorded = by_label[pair.derivative]
-    start, stop = _most_varying_part(recorded, overview.stretches)
+    start, stop = _find_most_varying_part(recorded, overview.stretches)
     times_s = np.arange(start, stop) / rate_hz
     # Differences within this stretch only: positions jump where two parts of a recording meet.
-    differences = derivative(by_label[pair.place].samples[start:stop], pair.order, rate_hz)
-    plain_axes(panel)
+    differences = differentiate(by_label[pair.place].samples[start:stop], pair.order, rate_hz)
+    style_axes(panel)
     panel.plot(times_s, recorded.samples[start:stop], color=BLACK, linewidth=2.2, alpha=0.35)
     panel.plot(times_s, differences, color=BLUE, linewidth=1.0)
-    panel.set_title(f"{pair.derivative} ({_unit_text(recorded.unit)}) and {pair.place}", fontsize=9, loc="left", pad=3)
+    panel.set_title(
+        f"{pair.derivative} ({_format_unit(recorded.unit)}) and {pair.place}", fontsize=9, loc="left", pad=3
+    )
     panel.set_xlim(float(times_s[0]), float(times_s[-1]))
 
 
-def _most_varying_part(channel: Channel, stretches: Sequence[tuple[int, int]]) -> tuple[int, int]:
-    """First and end sample of the `SHOWN_SAMPLES` samples (or fewer, in a shorter stretch) in which the channel's
+def _find_most_varying_part(channel: Channel, stretches: Sequence[tuple[int, int]]) -> tuple[int, int]:
+    """Find first and end sample of the `SHOWN_SAMPLES` samples (or fewer, in a shorter stretch) in which the channel's
     variance is largest; missing samples count as the mean."""
     largest, best_part = -1.0, stretches[0]
     for start, stop in stretches:
@@ -262,6 +268,6 @@ def _most_varying_part(channel: Channel, stretches: Sequence[tuple[int, int]]) -
     return best_part
 
 
-def _unit_text(unit: str) -> str:
-    """The unit with a raised 2; "no unit" for "1"."""
+def _format_unit(unit: str) -> str:
+    """Format the unit with a raised 2; "no unit" for "1"."""
     return "no unit" if unit == "1" else unit.replace("^2", "²")

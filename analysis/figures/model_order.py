@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLUE, GREY, ORANGE, VERMILLION, new_figure, plain_axes
+from analysis.figures.style import BLUE, GREY, ORANGE, VERMILLION, create_figure, style_axes
 from equalizer.identification.state_space.order_report import VISIBLE, OrderReport
 
 
@@ -30,7 +30,7 @@ def model_order_picture(report: OrderReport, chosen: int) -> Picture:
 def draw_model_order(report: OrderReport, chosen: int) -> Figure:
     """Figure of the singular values (left), and of errors and multiplications by order (right). chosen: order of the
     identified model."""
-    figure = new_figure(8.6, 3.2)
+    figure = create_figure(8.6, 3.2)
     left_axes, right_axes = figure.subplots(1, 2)
     _draw_singular_values(left_axes, report)
     _draw_errors(right_axes, report, chosen)
@@ -39,7 +39,7 @@ def draw_model_order(report: OrderReport, chosen: int) -> Figure:
 
 def _draw_singular_values(axes: Axes, report: OrderReport) -> None:
     """Singular values in units of the noise; those above `VISIBLE` are filled."""
-    plain_axes(axes)
+    style_axes(axes)
     values = report.singular_values
     number = np.arange(1, len(values) + 1)
     is_visible = number <= report.visible_order
@@ -57,7 +57,7 @@ def _draw_singular_values(axes: Axes, report: OrderReport) -> None:
 def _draw_errors(axes: Axes, report: OrderReport, chosen: int) -> None:
     """Held-out errors in per cent with the noise as their lower limit, and multiplications per tick on a second
     axis."""
-    plain_axes(axes)
+    style_axes(axes)
     orders = [row.order for row in report.rows]
     axes.semilogy(orders, [100 * row.held_out_error for row in report.rows], "o-", color=VERMILLION, markersize=5)
     axes.axhline(100 * report.held_out_noise, color=GREY, linestyle="--", linewidth=1)

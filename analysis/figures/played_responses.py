@@ -16,7 +16,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from analysis.evaluation.reproduction.played_response import PlayedResponse
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLUE, GREEN, GREY, VERMILLION, draw_no_data_note, new_figure, plain_axes
+from analysis.figures.style import BLUE, GREEN, GREY, VERMILLION, create_figure, draw_no_data_note, style_axes
 
 _AXES = "xyz"
 _COLOURS = (BLUE, VERMILLION, GREEN)
@@ -55,8 +55,8 @@ def friction_picture(rows: Sequence[PlayedResponse]) -> Picture:
 def draw_played_responses(rows: Sequence[PlayedResponse]) -> Figure:
     """Figure with a row of panels per response and three columns, one per axis of the wanted acceleration."""
     if not rows:
-        return draw_no_data_note(new_figure(8.6, 2.0), "Nothing was played.")
-    figure = new_figure(8.6, 0.8 + 1.75 * len(rows))
+        return draw_no_data_note(create_figure(8.6, 2.0), "Nothing was played.")
+    figure = create_figure(8.6, 0.8 + 1.75 * len(rows))
     grid = figure.subplots(len(rows), 3, sharex=True, sharey=True, squeeze=False)
     for panels, row in zip(grid, rows, strict=True):
         for target_axis, axes in enumerate(panels):
@@ -75,7 +75,7 @@ def draw_played_responses(rows: Sequence[PlayedResponse]) -> Figure:
 def _draw_panel(axes: Axes, row: PlayedResponse, target_axis: int) -> None:
     """Draw |T| in dB over frequency for the three delivered axes. target_axis: index of the wanted axis, drawn
     thicker."""
-    plain_axes(axes)
+    style_axes(axes)
     axes.axhline(0, color=GREY, linewidth=0.8)
     for delivered_axis, colour in enumerate(_COLOURS):
         # -180 dB at the least, far below the axis: the logarithm of 0 is never taken.

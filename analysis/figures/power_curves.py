@@ -13,7 +13,7 @@ from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLUE, GREY, ORANGE, PAGE_IN, VERMILLION, new_figure, plain_axes
+from analysis.figures.style import BLUE, GREY, ORANGE, PAGE_WIDTH_IN, VERMILLION, create_figure, style_axes
 from analysis.psychophysics.power.power_curve import CONFIDENCE, PowerPoint, Share
 from analysis.threshold_words import REVERSALS
 from equalizer.signals.signal import FloatArray
@@ -57,7 +57,7 @@ def _reference_percent(effect_db: float) -> float:
 
 def _draw_power(points: Sequence[PowerPoint], effect_db: float, means: str) -> Figure:
     """Two panels: power (above) and coverage (below) over the number of participants."""
-    figure = new_figure(PAGE_IN, 5.6)
+    figure = create_figure(PAGE_WIDTH_IN, 5.6)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     curves = (
         ("all answers in one model", BLUE, "o-", [point.primary for point in points]),
@@ -79,7 +79,7 @@ def _draw_power(points: Sequence[PowerPoint], effect_db: float, means: str) -> F
     # A fixed margin, so that the markers of one sample size stay close together where there are few sizes.
     below.set_xlim(people.min() - _MARGIN_PEOPLE, people.max() + _MARGIN_PEOPLE)
     for axes in (above, below):
-        plain_axes(axes)
+        style_axes(axes)
     figure.legend(*above.get_legend_handles_labels(), loc="outside upper right", ncols=3, fontsize=8, frameon=False)
     return figure
 

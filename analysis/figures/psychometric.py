@@ -16,15 +16,15 @@ from analysis.figures.style import (
     BLACK,
     BLUE,
     GREY,
+    create_figure,
+    create_panel_grid,
     draw_no_data_note,
-    name_panel_axes,
-    new_figure,
-    newton_ticks,
-    panel_grid,
-    plain_axes,
+    label_panel_axes,
+    set_newton_ticks,
+    style_axes,
 )
 from analysis.psychophysics.hierarchy.answers import Answers
-from analysis.psychophysics.hierarchy.curve import TARGET
+from analysis.psychophysics.hierarchy.curve import TARGET_PROPORTION
 from analysis.psychophysics.hierarchy.observed_shares import (
     FittedCurves,
     ObservedShare,
@@ -46,7 +46,7 @@ _LARGEST_MARKER_TRIALS = 100
 def draw_people_curves(answers: Answers, fit: FittedCurves) -> Figure:
     """Figure of all people together, one panel per frequency, over the level in dB re each person's threshold."""
     k = len(fit.frequencies_hz)
-    figure, panels = panel_grid(k, _ROW_IN, sharex=True)
+    figure, panels = create_panel_grid(k, _ROW_IN, sharex=True)
     shares_by_frequency = [compute_group_shares(answers, fit, index) for index in range(k)]
     levels = [share.level_db for shares in shares_by_frequency for share in shares]
     above_db = np.linspace(min(levels) - 1.0, max(levels) + 1.0, 200)
@@ -57,7 +57,7 @@ def draw_people_curves(answers: Answers, fit: FittedCurves) -> Figure:
         )
         axes.axvline(0.0, color=GREY, linestyle=":", linewidth=1.0)
         axes.set_title(f"{fit.frequencies_hz[index]:g} Hz", fontsize=10, loc="left")
-    name_panel_axes(panels, k, "Level re threshold (dB)", "Right (%)")
+    label_panel_axes(panels, k, "Level re threshold (dB)", "Right (%)")
     panels[-1].legend(
         handles=_legend_handles("curve of the model,\nmean of the people"), loc="center", fontsize=8.5, frameon=False
     )
@@ -70,8 +70,8 @@ def draw_person_curves(answers: Answers, fit: FittedCurves, person: int, cap_n: 
     estimate, k = fit.persons[person], len(fit.frequencies_hz)
     answered = [(index, shares) for index in range(k) if (shares := compute_person_shares(answers, person, index))]
     if not answered:
-        return draw_no_data_note(new_figure(4.0, 2.0), "There is no answer to draw.")
-    figure, panels = panel_grid(len(answered), _ROW_IN)
+        return draw_no_data_note(create_figure(4.0, 2.0), "There is no answer to draw.")
+    figure, panels = create_panel_grid(len(answered), _ROW_IN)
     for axes, (index, shares) in zip(panels, answered, strict=False):
         levels = [10.0 ** (share.level_db / 20.0) for share in shares]
         low_n, high_n = 0.8 * min(levels), 1.15 * max(*levels, cap_n)
@@ -83,11 +83,11 @@ def draw_person_curves(answers: Answers, fit: FittedCurves, person: int, cap_n: 
         if not estimate.above_cap[index]:
             axes.axvline(estimate.thresholds_n[index], color=GREY, linestyle=":", linewidth=1.0)
         axes.set_xscale("log")
-        newton_ticks(axes.xaxis, low_n, high_n)
+        set_newton_ticks(axes.xaxis, low_n, high_n)
         axes.set_xlim(low_n, high_n)
         size = "above the cap" if estimate.above_cap[index] else f"{estimate.thresholds_n[index]:.2f} N"
         axes.set_title(f"{fit.frequencies_hz[index]:g} Hz: {size}", fontsize=10, loc="left")
-    name_panel_axes(panels, len(answered), "Level (N)", "Right (%)")
+    label_panel_axes(panels, len(answered), "Level (N)", "Right (%)")
     cap = Line2D([], [], color=GREY, linestyle="--", linewidth=1, label=f"cap {cap_n:g} N")
     panels[-1].legend(handles=[*_legend_handles("curve of the model"), cap], loc="center", fontsize=8.5, frameon=False)
     return figure
@@ -95,8 +95,8 @@ def draw_person_curves(answers: Answers, fit: FittedCurves, person: int, cap_n: 
 
 def _draw_shares(axes: Axes, x: Sequence[float], shares: Sequence[ObservedShare]) -> None:
     """Draw shares in percent at the places `x`, with their intervals and a dotted line at the threshold's share."""
-    plain_axes(axes)
-    axes.axhline(100 * TARGET, color=GREY, linestyle=":", linewidth=1.0)
+    style_axes(axes)
+    axes.axhline(100 * TARGET_PROPORTION, color=GREY, linestyle=":", linewidth=1.0)
     for level, share in zip(x, shares, strict=True):
         axes.plot([level, level], [100 * share.lower, 100 * share.upper], color=BLUE, linewidth=0.8, zorder=1)
         axes.plot(level, 100 * share.share, "o", color=BLUE, markersize=_marker_size(share.trials), zorder=3,
@@ -123,5 +123,7 @@ def _legend_handles(curve: str) -> list[Line2D]:
             )
         ),
         Line2D([], [], color=BLACK, linewidth=1.4, label=curve),
-        Line2D([], [], color=GREY, linestyle=":", linewidth=1.0, label=f"threshold, {100 * TARGET:.1f} % right"),
+        Line2D(
+            [], [], color=GREY, linestyle=":", linewidth=1.0, label=f"threshold, {100 * TARGET_PROPORTION:.1f} % right"
+        ),
     ]

@@ -11,8 +11,8 @@ from analysis.evaluation.reproduction.measured_device import MeasuredDevice
 from analysis.figures.frequency_bands import frequency_bands_picture
 from analysis.figures.picture import Picture
 from analysis.figures.played_responses import friction_picture, played_responses_picture
-from analysis.figures.study_pictures import ellipsoid_picture, study_pictures
-from analysis.figures.transfer_functions import transfer_functions_picture
+from analysis.figures.study_pictures import make_ellipsoid_picture, study_pictures
+from analysis.figures.transfer_functions import make_transfer_functions_picture
 from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from equalizer.identification.frequency_response.frequency_bands import FrequencyBand
@@ -31,7 +31,7 @@ def reproduction_pictures(
     return {
         1: (frequency_bands_picture(device.response, device.onset, bands, direction_limit_hz),),
         2: tuple(picture for picture in study_pictures(study) if picture.name == "thresholds"),
-        3: (ellipsoid_picture(shapes),),
-        4: (transfer_functions_picture(device.response),),
+        3: (make_ellipsoid_picture(shapes),),
+        4: (make_transfer_functions_picture(device.response),),
         5: (played_responses_picture(rows.figure_rows), friction_picture(rows.friction_rows)),
     }

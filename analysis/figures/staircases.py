@@ -2,6 +2,7 @@
 
 Dots and crosses are right and wrong answers, rings are reversals; the threshold averages the levels at the last of
 them (black rings), or is the mean of Psi's posterior. A dashed line is the cap, the highest level allowed.
+`analysis.figures.study_pictures` puts it into a study report.
 """
 
 from collections.abc import Sequence
@@ -15,94 +16,111 @@ from analysis.figures.style import (
     BLACK,
     BLUE,
     GREY,
-    PAGE_IN,
+    PAGE_WIDTH_IN,
     VERMILLION,
+    create_figure,
+    create_panel_grid,
     draw_no_data_note,
-    name_panel_axes,
-    new_figure,
-    newton_ticks,
-    panel_grid,
-    plain_axes,
+    label_panel_axes,
+    set_newton_ticks,
+    style_axes,
 )
 from analysis.psychophysics.runs import Run
-from analysis.psychophysics.thresholds import RunEnd, Threshold, threshold_of
+from analysis.psychophysics.thresholds import RunEnd, Threshold, compute_run_threshold
 from protocols.definition.staircase_rule import StaircaseRule
 
-_ROW_IN = 2.2
+_PANEL_ROW_HEIGHT_IN = 2.2
 """Height of a row of panels, in inches."""
 
 
 def draw_staircases(runs: Sequence[Run], rule: StaircaseRule) -> Figure:
-    """One panel per run, ordered by frequency; a note where there is no run. runs: of one participant."""
+    """Draw one panel per run, ordered by frequency, session and run; a note where there is no run. runs: of a single
+    participant; rule: their staircase rule."""
     if not runs:
-        return draw_no_data_note(new_figure(PAGE_IN, 2.0), "There is no run to draw.")
+        return draw_no_data_note(create_figure(PAGE_WIDTH_IN, 2.0), "There is no run to draw.")
     lowest_n = 0.75 * min([trial.staircase_n for run in runs for trial in run.answered], default=rule.start_n)
-    ordered = sorted(runs, key=lambda run: (run.frequency_hz, run.session, run.run))
-    figure, panels = panel_grid(len(ordered), _ROW_IN)
-    for panel, run in zip(panels, ordered, strict=False):
-        _draw_run(panel, run, rule)
+    ordered_runs = sorted(runs, key=lambda run: (run.frequency_hz, run.session, run.run))
+    figure, panels = create_panel_grid(len(ordered_runs), _PANEL_ROW_HEIGHT_IN)
+    for panel, run in zip(panels, ordered_runs, strict=False):
+        _draw_staircase(panel, run, rule)
         panel.set_ylim(lowest_n, 1.25 * rule.cap_n)
-        newton_ticks(panel.yaxis, lowest_n, rule.cap_n)
-    name_panel_axes(panels, len(ordered), "Trial", "Level (N)")
-    panels[-1].legend(handles=_legend_handles(rule), loc="center", fontsize=8.5, frameon=False)
+        set_newton_ticks(panel.yaxis, lowest_n, rule.cap_n)
+    label_panel_axes(panels, len(ordered_runs), "Trial", "Level (N)")
+    panels[-1].legend(handles=_make_legend_handles(rule), loc="center", fontsize=8.5, frameon=False)
     return figure
 
 
-def _draw_run(axes: Axes, run: Run, rule: StaircaseRule) -> None:
+def _draw_staircase(axes: Axes, run: Run, rule: StaircaseRule) -> None:
     """Draw the levels, answers, reversals and threshold of a run; without a threshold where the run is not complete."""
-    plain_axes(axes)
-    levels = np.array([trial.staircase_n for trial in run.answered])
-    numbers = np.arange(1, len(levels) + 1)
+    style_axes(axes)
+    levels_n = np.array([trial.staircase_n for trial in run.answered])
+    trial_numbers = np.arange(1, len(levels_n) + 1)
     is_correct = np.array([bool(trial.correct) for trial in run.answered], dtype=bool)
-    reversals = np.array(run.state.reversal_trials, dtype=int)
-    averaged = reversals[-rule.averaged_reversals :] if run.complete else reversals[:0]
+    reversal_indices = np.array(run.state.reversal_trials, dtype=int)
+    averaged_indices = reversal_indices[-rule.averaged_reversals :] if run.complete else reversal_indices[:0]
     axes.axhline(rule.cap_n, color=GREY, linestyle="--", linewidth=1)
-    axes.plot(numbers, levels, color=GREY, linewidth=0.9, drawstyle="steps-post", zorder=1)
-    axes.plot(numbers[is_correct], levels[is_correct], "o", color=BLUE, markersize=2.8)
-    axes.plot(numbers[~is_correct], levels[~is_correct], "x", color=VERMILLION, markersize=4.5, markeredgewidth=1.3)
-    axes.plot(numbers[reversals], levels[reversals], "o", markersize=8, markerfacecolor="none", markeredgecolor=GREY)
-    axes.plot(numbers[averaged], levels[averaged], "o", markersize=8, markerfacecolor="none", markeredgecolor=BLACK)
-    row = threshold_of(run, rule)
-    if row.threshold_n is not None:
+    axes.plot(trial_numbers, levels_n, color=GREY, linewidth=0.9, drawstyle="steps-post", zorder=1)
+    axes.plot(trial_numbers[is_correct], levels_n[is_correct], "o", color=BLUE, markersize=2.8)
+    axes.plot(
+        trial_numbers[~is_correct], levels_n[~is_correct], "x", color=VERMILLION, markersize=4.5, markeredgewidth=1.3
+    )
+    axes.plot(
+        trial_numbers[reversal_indices],
+        levels_n[reversal_indices],
+        "o",
+        markersize=8,
+        markerfacecolor="none",
+        markeredgecolor=GREY,
+    )
+    axes.plot(
+        trial_numbers[averaged_indices],
+        levels_n[averaged_indices],
+        "o",
+        markersize=8,
+        markerfacecolor="none",
+        markeredgecolor=BLACK,
+    )
+    threshold = compute_run_threshold(run, rule)
+    if threshold.threshold_n is not None:
         axes.plot(
-            [numbers[averaged[0]] if len(averaged) else 1, numbers[-1]],
-            [row.threshold_n] * 2,
+            [trial_numbers[averaged_indices[0]] if len(averaged_indices) else 1, trial_numbers[-1]],
+            [threshold.threshold_n] * 2,
             color=BLACK,
             linewidth=1.1,
             zorder=3,
         )
     axes.set_yscale("log")
-    axes.set_title(f"{run.frequency_hz:g} Hz{_outcome_text(row)}", fontsize=10, loc="left")
+    axes.set_title(f"{run.frequency_hz:g} Hz{_describe_outcome(threshold)}", fontsize=10, loc="left")
 
 
-def _outcome_text(row: Threshold) -> str:
-    """End of a panel's title: the threshold in N, or why there is none."""
-    if row.threshold_n is not None:
-        return f": {row.threshold_n:.2f} N{', cut by the cap' if row.censored else ''}"
-    return " (stopped by the trial limit)" if row.ended is RunEnd.TRIAL_LIMIT else " (not complete)"
+def _describe_outcome(threshold: Threshold) -> str:
+    """Text that ends a panel's title: the threshold in N, or why there is none."""
+    if threshold.threshold_n is not None:
+        return f": {threshold.threshold_n:.2f} N{', cut by the cap' if threshold.censored else ''}"
+    return " (stopped by the trial limit)" if threshold.ended is RunEnd.TRIAL_LIMIT else " (not complete)"
 
 
-def _legend_handles(rule: StaircaseRule) -> list[Line2D]:
-    """Entries of the legend; no reversals where the Psi method chose the levels."""
+def _make_legend_handles(rule: StaircaseRule) -> list[Line2D]:
+    """Make the entries of the legend; without reversals where the Psi method chose the levels."""
     return [
         Line2D([], [], marker="o", color=BLUE, markersize=4, linewidth=0, label="right"),
         Line2D([], [], marker="x", color=VERMILLION, linewidth=0, label="wrong"),
-        *([] if rule.is_bayesian else _reversal_handles(rule)),
+        *([] if rule.is_bayesian else _make_reversal_handles(rule)),
         Line2D([], [], color=BLACK, linewidth=1.1, label="threshold"),
         Line2D([], [], color=GREY, linestyle="--", linewidth=1, label=f"cap {rule.cap_n:g} N"),
     ]
 
 
-def _reversal_handles(rule: StaircaseRule) -> list[Line2D]:
+def _make_reversal_handles(rule: StaircaseRule) -> list[Line2D]:
     """Legend entries of averaged and other reversals."""
     return [
-        _circle_handle(BLACK, f"reversal, one of the last {rule.averaged_reversals}"),
-        _circle_handle(GREY, "reversal, not averaged"),
+        _make_circle_handle(BLACK, f"reversal, one of the last {rule.averaged_reversals}"),
+        _make_circle_handle(GREY, "reversal, not averaged"),
     ]
 
 
-def _circle_handle(colour: str, label: str) -> Line2D:
-    """Legend entry: an open circle of this colour."""
+def _make_circle_handle(colour: str, label: str) -> Line2D:
+    """Make a legend entry: an open circle of this colour with its label."""
     return Line2D(
         [], [], marker="o", markersize=8, markerfacecolor="none", markeredgecolor=colour, linewidth=0, label=label
     )

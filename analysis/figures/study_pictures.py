@@ -1,7 +1,7 @@
-"""All figures of one study with titles and captions, in the order of its report.
+"""All figures of one study with titles and captions, in the order of its report (`analysis.reports.study_report`).
 
 Thresholds by frequency and in other units, psychometric functions of the model, delivered acceleration, staircases, and
-acceleration ellipses. A figure without data is left out; figures of single participants are folded.
+acceleration ellipses. A figure without data is left out; in the report, those of single participants are collapsed.
 """
 
 import re
@@ -15,32 +15,32 @@ from analysis.figures.psychometric import draw_people_curves, draw_person_curves
 from analysis.figures.staircases import draw_staircases
 from analysis.figures.thresholds import draw_thresholds
 from analysis.figures.thresholds_by_unit import can_be_drawn, draw_thresholds_by_unit
-from analysis.psychophysics.detection import above_detection
+from analysis.psychophysics.detection import compute_thresholds_above_detection
 from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.hierarchy.answers import count_answers
 from analysis.psychophysics.hierarchy.observed_shares import BIN_DB
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
 from analysis.psychophysics.study_analysis import StudyAnalysis
-from analysis.psychophysics.threshold_table import ThresholdTable, threshold_table
+from analysis.psychophysics.threshold_table import ThresholdTable, tabulate_thresholds
 from analysis.threshold_words import threshold_words
 
 
 def study_pictures(analysis: StudyAnalysis, ellipsoids: Sequence[EllipsoidResult] = ()) -> tuple[Picture, ...]:
-    """Pictures of the study, in the order of the report; without those that have no data."""
+    """Make the pictures of the study, in the order of the report; without those that have no data."""
     pictures = []
     if any(row.complete for row in analysis.thresholds):
-        pictures.append(_thresholds_picture(analysis))
-        pictures += _units_pictures(analysis)
-    pictures += _curve_pictures(analysis)
-    if any(trial.counts and trial.delivered_mps2 for trial in analysis.trials):
-        pictures.append(_delivered_picture(analysis))
-    pictures += _staircase_pictures(analysis)
+        pictures.append(_make_thresholds_picture(analysis))
+        pictures += _make_units_pictures(analysis)
+    pictures += _make_curve_pictures(analysis)
+    if any(trial.is_valid and trial.delivered_mps2 for trial in analysis.trials):
+        pictures.append(_make_delivered_picture(analysis))
+    pictures += _make_staircase_pictures(analysis)
     if ellipsoids:
-        pictures.append(ellipsoid_picture(ellipsoids))
+        pictures.append(make_ellipsoid_picture(ellipsoids))
     return tuple(pictures)
 
 
-def ellipsoid_picture(ellipsoids: Sequence[EllipsoidResult]) -> Picture:
+def make_ellipsoid_picture(ellipsoids: Sequence[EllipsoidResult]) -> Picture:
     """Picture of the acceleration ellipses by frequency, with its caption."""
     return Picture(
         name="ellipsoids",
@@ -54,7 +54,7 @@ def ellipsoid_picture(ellipsoids: Sequence[EllipsoidResult]) -> Picture:
     )
 
 
-def _thresholds_picture(analysis: StudyAnalysis) -> Picture:
+def _make_thresholds_picture(analysis: StudyAnalysis) -> Picture:
     """Picture of the thresholds in newtons, with group means and comparison intervals."""
     return Picture(
         name="thresholds",
@@ -67,12 +67,12 @@ def _thresholds_picture(analysis: StudyAnalysis) -> Picture:
     )
 
 
-def _units_pictures(analysis: StudyAnalysis) -> list[Picture]:
+def _make_units_pictures(analysis: StudyAnalysis) -> list[Picture]:
     """The picture of the thresholds in all units with data, as a list; empty where newtons are the only such unit."""
     tables = [
         table
-        for table in _unit_tables(analysis)
-        if any(can_be_drawn(v, table.quantity) for row in table.values for v in row)
+        for table in _list_unit_tables(analysis)
+        if any(can_be_drawn(value, table.quantity) for row in table.values for value in row)
     ]
     if len(tables) < 2:
         return []
@@ -93,22 +93,22 @@ def _units_pictures(analysis: StudyAnalysis) -> list[Picture]:
     ]
 
 
-def _unit_tables(analysis: StudyAnalysis) -> list[ThresholdTable]:
+def _list_unit_tables(analysis: StudyAnalysis) -> list[ThresholdTable]:
     """Tables of thresholds in N, m/s², mm, and dB above the detection threshold, in this order."""
     frequencies_hz = analysis.table.frequencies_hz
     measured = [
-        threshold_table(analysis.thresholds, frequencies_hz, quantity)
+        tabulate_thresholds(analysis.thresholds, frequencies_hz, quantity)
         for quantity in ("threshold_mps2", "threshold_mm")
     ]
-    return [analysis.table, *measured, above_detection(analysis.table, analysis.detection_table)]
+    return [analysis.table, *measured, compute_thresholds_above_detection(analysis.table, analysis.detection_table)]
 
 
-def _curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
-    """Medians of the model, then psychometric functions of all people together and of each person; empty without a
-    fit."""
+def _make_curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
+    """Pictures of the medians by the hierarchical model, then of the psychometric functions of all people together and
+    of each person; empty without a fit."""
     fit = analysis.primary or analysis.single
-    answers = count_answers(analysis.trials, fit.frequencies_hz) if fit is not None else None
-    if fit is None or answers is None:
+    answer_counts = count_answers(analysis.trials, fit.frequencies_hz) if fit is not None else None
+    if fit is None or answer_counts is None:
         return []
     points_text = (
         f"Points: shares of right answers in bins of {BIN_DB:g} dB, with Wilson's 95 % intervals; the larger, the more "
@@ -120,14 +120,14 @@ def _curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
         title="Psychometric functions, all people together",
         caption=f"{points_text}Levels are relative to each person's threshold by the model of all answers, whose curve "
         f"is drawn. {threshold_words(analysis.protocol.staircase).levels}",
-        figure=draw_people_curves(answers, primary),
+        figure=draw_people_curves(answer_counts, primary),
     )
     return [
-        *([_medians_picture(primary, analysis.protocol.staircase.cap_n)] if primary else []),
+        *([_make_medians_picture(primary, analysis.protocol.staircase.cap_n)] if primary else []),
         *([people_picture] if people_picture else []),
         *(
             Picture(
-                name=f"psychometric-{number}-{_file_name(subject)}",
+                name=f"psychometric-{subject_number}-{_sanitize_subject_code(subject)}",
                 title=f"Psychometric functions of {subject}",
                 caption=points_text
                 + (
@@ -136,15 +136,15 @@ def _curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
                     if primary
                     else "Curves: the most probable ones of this person."
                 ),
-                figure=draw_person_curves(answers, fit, number - 1, analysis.protocol.staircase.cap_n),
+                figure=draw_person_curves(answer_counts, fit, subject_number - 1, analysis.protocol.staircase.cap_n),
                 folded=True,
             )
-            for number, subject in enumerate(answers.subjects, start=1)
+            for subject_number, subject in enumerate(answer_counts.subjects, start=1)
         ),
     ]
 
 
-def _medians_picture(primary: PrimaryAnalysis, cap_n: float) -> Picture:
+def _make_medians_picture(primary: PrimaryAnalysis, cap_n: float) -> Picture:
     """Picture of the median thresholds by the hierarchical model, with the direction limit."""
     return Picture(
         name="medians",
@@ -158,12 +158,12 @@ def _medians_picture(primary: PrimaryAnalysis, cap_n: float) -> Picture:
     )
 
 
-def _file_name(subject: str) -> str:
-    """The subject's code with letters, digits and hyphens only, as picture names need."""
+def _sanitize_subject_code(subject: str) -> str:
+    """Replace characters of a subject's code other than ASCII letters and digits by hyphens, as picture names need."""
     return re.sub(r"[^A-Za-z0-9]+", "-", subject).strip("-")
 
 
-def _delivered_picture(analysis: StudyAnalysis) -> Picture:
+def _make_delivered_picture(analysis: StudyAnalysis) -> Picture:
     """Picture of the delivered acceleration over the commanded level, along and off the direction."""
     return Picture(
         name="delivered",
@@ -175,12 +175,12 @@ def _delivered_picture(analysis: StudyAnalysis) -> Picture:
     )
 
 
-def _staircase_pictures(analysis: StudyAnalysis) -> list[Picture]:
-    """A folded picture per participant with the levels of all runs."""
+def _make_staircase_pictures(analysis: StudyAnalysis) -> list[Picture]:
+    """A picture per participant with the levels of all runs, collapsed in the report."""
     subjects = dict.fromkeys(run.subject for run in analysis.runs)
     return [
         Picture(
-            name=f"staircases-{index}-{_file_name(subject)}",
+            name=f"staircases-{index}-{_sanitize_subject_code(subject)}",
             title=f"{'Levels' if analysis.protocol.staircase.is_bayesian else 'Staircases'} of {subject}",
             caption=threshold_words(analysis.protocol.staircase).track,
             figure=draw_staircases(

@@ -11,14 +11,14 @@ from matplotlib.lines import Line2D
 
 from analysis.figures.style import (
     BLACK,
-    CUT_MARKER,
+    CENSORED_MARKER,
     GREY,
-    PAGE_IN,
+    PAGE_WIDTH_IN,
+    choose_colour,
+    choose_marker,
+    create_figure,
     draw_no_data_note,
-    new_figure,
-    participant_colour,
-    participant_marker,
-    plain_axes,
+    style_axes,
 )
 from analysis.psychophysics.comparisons import Comparisons
 from analysis.psychophysics.threshold_table import ThresholdTable
@@ -37,11 +37,11 @@ def draw_thresholds(table: ThresholdTable, comparisons: Comparisons, cap_n: floa
     table: thresholds in newtons. comparisons: of the same table; where it has no intervals, means are drawn without.
     cap_n: largest force of the study (N), drawn as a line.
     """
-    figure = new_figure(PAGE_IN, 4.2)
+    figure = create_figure(PAGE_WIDTH_IN, 4.2)
     if not table.subjects:
         return draw_no_data_note(figure, "There is no completed run to draw.")
     axes = figure.add_subplot()
-    plain_axes(axes)
+    style_axes(axes)
     axes.axhline(cap_n, color=GREY, linestyle="--", linewidth=1.2)
     axes.annotate(
         f"cap {cap_n:g} N", (0, cap_n), xycoords=("axes fraction", "data"), xytext=(4, 4), textcoords="offset points",
@@ -66,7 +66,7 @@ def _draw_participants(axes: Axes, table: ThresholdTable) -> None:
     for index, row in enumerate(table.values):
         positions = np.arange(len(row)) + offsets[index]
         values = np.array([np.nan if value is None else value for value in row], dtype=float)
-        axes.plot(positions, values, "-", color=participant_colour(index), linewidth=0.7, alpha=0.45, zorder=1)
+        axes.plot(positions, values, "-", color=choose_colour(index), linewidth=0.7, alpha=0.45, zorder=1)
         for x, value, cut in zip(positions, row, table.censored[index], strict=True):
             if value is not None:
                 draw_threshold(axes, x, value, index, cut)
@@ -75,8 +75,8 @@ def _draw_participants(axes: Axes, table: ThresholdTable) -> None:
 def draw_threshold(axes: Axes, x: float, value: float, participant: int, cut: bool) -> None:
     """Draw one threshold (N) at the place x of its frequency; hollow with an arrow upwards if the cap cut it.
     participant: index, which determines marker and colour."""
-    colour = participant_colour(participant)
-    axes.plot(x, value, participant_marker(participant), color=colour, markersize=6, alpha=0.85,
+    colour = choose_colour(participant)
+    axes.plot(x, value, choose_marker(participant), color=colour, markersize=6, alpha=0.85,
               markerfacecolor="white" if cut else colour, markeredgecolor=colour if cut else "white",
               markeredgewidth=1.1 if cut else 0.5)  # fmt: skip
     if cut:
@@ -91,14 +91,14 @@ def _draw_stopped(axes: Axes, table: ThresholdTable, cap_n: float) -> None:
     for index, row in enumerate(table.stopped):
         for position, is_stopped in enumerate(row):
             if is_stopped:
-                axes.plot(position + offsets[index], _STOPPED_AT * cap_n, participant_marker(index), markersize=6,
-                          color=participant_colour(index), markerfacecolor="none")  # fmt: skip
+                axes.plot(position + offsets[index], _STOPPED_AT * cap_n, choose_marker(index), markersize=6,
+                          color=choose_colour(index), markerfacecolor="none")  # fmt: skip
 
 
 def _draw_means(axes: Axes, table: ThresholdTable, comparisons: Comparisons) -> None:
     """Draw the mean of each frequency, with its comparison interval where there is one."""
     intervals = {interval.name: interval for interval in comparisons.intervals}
-    for position, (name, values) in enumerate(table.groups().items()):
+    for position, (name, values) in enumerate(table.group_by_frequency().items()):
         measured = [value for value in values if value is not None]
         if not measured:
             continue
@@ -119,7 +119,7 @@ def _legend_handles(table: ThresholdTable, comparisons: Comparisons) -> list[Lin
                 [],
                 [],
                 color=GREY,
-                marker=CUT_MARKER,
+                marker=CENSORED_MARKER,
                 linewidth=0,
                 markersize=9,
                 label="cut by the cap\n(hollow marker)",
@@ -139,9 +139,7 @@ def _legend_handles(table: ThresholdTable, comparisons: Comparisons) -> list[Lin
         )
     if len(table.subjects) <= _LEGEND_LIMIT:
         handles += [
-            Line2D(
-                [], [], color=participant_colour(index), marker=participant_marker(index), linewidth=0, label=subject
-            )
+            Line2D([], [], color=choose_colour(index), marker=choose_marker(index), linewidth=0, label=subject)
             for index, subject in enumerate(table.subjects)
         ]
     return handles

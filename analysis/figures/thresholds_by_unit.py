@@ -14,14 +14,14 @@ from matplotlib.lines import Line2D
 
 from analysis.figures.style import (
     BLACK,
-    CUT_MARKER,
+    CENSORED_MARKER,
     GREY,
-    PAGE_IN,
-    new_figure,
-    participant_colour,
-    participant_marker,
-    plain_axes,
-    ratio_ticks,
+    PAGE_WIDTH_IN,
+    choose_colour,
+    choose_marker,
+    create_figure,
+    set_ratio_ticks,
+    style_axes,
 )
 from analysis.figures.thresholds import draw_threshold
 from analysis.psychophysics.threshold_table import Quantity, ThresholdTable
@@ -48,7 +48,7 @@ def draw_thresholds_by_unit(tables: Sequence[ThresholdTable]) -> Figure:
     one value for which `can_be_drawn` is true."""
     columns = 2 if len(tables) > 1 else 1
     rows = -(-len(tables) // columns)
-    figure = new_figure(PAGE_IN, _PANEL_IN * rows + _LEGEND_IN)
+    figure = create_figure(PAGE_WIDTH_IN, _PANEL_IN * rows + _LEGEND_IN)
     panel_axes = [axes for grid_row in figure.subplots(rows, columns, squeeze=False) for axes in grid_row]
     for axes, table in zip(panel_axes, tables, strict=False):
         _draw_table(axes, table)
@@ -67,13 +67,13 @@ def can_be_drawn(value: float | None, quantity: Quantity) -> bool:
 
 def _draw_table(axes: Axes, table: ThresholdTable) -> None:
     """Draw one panel; values that are missing or cannot be drawn are gaps. Medians are those of the drawn values."""
-    plain_axes(axes)
+    style_axes(axes)
     drawable = [[value if can_be_drawn(value, table.quantity) else np.nan for value in row] for row in table.values]
     values = np.array(drawable, dtype=float)
     offsets = np.linspace(-_SPREAD / 2, _SPREAD / 2, len(values)) if len(values) > 1 else np.zeros(1)
     for person, row in enumerate(values):
         positions = np.arange(len(row)) + offsets[person]
-        axes.plot(positions, row, "-", color=participant_colour(person), linewidth=0.7, alpha=0.5, zorder=1)
+        axes.plot(positions, row, "-", color=choose_colour(person), linewidth=0.7, alpha=0.5, zorder=1)
         for x, value, cut in zip(positions, row, table.censored[person], strict=True):
             if np.isfinite(value):
                 draw_threshold(axes, float(x), float(value), person, cut)
@@ -97,15 +97,17 @@ def _draw_table(axes: Axes, table: ThresholdTable) -> None:
     axes.set_yscale("log")
     low, high = _ROOM_BELOW * float(np.nanmin(values)), _ROOM_ABOVE * float(np.nanmax(values))
     axes.set_ylim(low, high)
-    ratio_ticks(axes.yaxis, low, high)
+    set_ratio_ticks(axes.yaxis, low, high)
 
 
 def _legend_handles(tables: Sequence[ThresholdTable]) -> list[Line2D]:
     handles = [
-        Line2D([], [], color=GREY, marker=participant_marker(0), linewidth=0.7, label="a participant"),
+        Line2D([], [], color=GREY, marker=choose_marker(0), linewidth=0.7, label="a participant"),
         Line2D([], [], color=BLACK, linewidth=2.2, label="median of what is shown"),
     ]
     if any(table.cut for table in tables):
-        cut = Line2D([], [], color=GREY, marker=CUT_MARKER, linewidth=0, markersize=9, label="cut by the cap (hollow)")
+        cut = Line2D(
+            [], [], color=GREY, marker=CENSORED_MARKER, linewidth=0, markersize=9, label="cut by the cap (hollow)"
+        )
         handles.append(cut)
     return handles

@@ -2,7 +2,7 @@
 
 Magnitude over frequency, both logarithmic, a panel per entry of the transfer matrix. Lines are averaged over bins of
 1/24 octave (`octave_bins`); the range of single lines and their expected noise are drawn as well, and on request the
-response of a fitted model.
+response of a fitted model. Called for the identification report and the reproduction of the paper.
 """
 
 from collections.abc import Sequence
@@ -16,12 +16,12 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLUE, GREY, ORANGE, SKY, VERMILLION, draw_no_data_note, new_figure, plain_axes
+from analysis.figures.style import BLUE, GREY, ORANGE, SKY, VERMILLION, create_figure, draw_no_data_note, style_axes
 from equalizer.identification.frequency_response.frequency_response import BoolArray, FrequencyResponse
-from equalizer.identification.frequency_response.octave_bins import OctaveBins, octave_bins
+from equalizer.identification.frequency_response.octave_bins import OctaveBins, average_octave_bins
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-_BIN_OCTAVES = 1 / 24
+_BIN_WIDTH_OCTAVES = 1 / 24
 """Width of a bin in which lines are averaged for drawing, octaves."""
 _UNRELIABLE_COLOUR = "#B8B8B8"
 """Colour of bins that are not reliable."""
@@ -39,10 +39,11 @@ class ResponseCurve:
     """(lines, outputs, inputs), complex, in the unit of the measured response."""
 
 
-def transfer_functions_picture(
+def make_transfer_functions_picture(
     response: FrequencyResponse, model: ResponseCurve | None = None, band_hz: tuple[float, float] | None = None
 ) -> Picture:
-    """Picture of all transfer functions with its caption. band_hz: band to mark in every panel, as that of a fit."""
+    """Make the picture of all transfer functions with its caption. band_hz: band to mark in every panel, as that of a
+    fit."""
     return Picture(
         name="transfer-functions",
         title="Transfer functions of all channels",
@@ -56,56 +57,62 @@ def transfer_functions_picture(
 def draw_transfer_functions(
     response: FrequencyResponse, model: ResponseCurve | None = None, band_hz: tuple[float, float] | None = None
 ) -> Figure:
-    """Figure of the magnitudes of all entries, a row per output and a column per input. model: drawn dashed; band_hz:
+    """Draw the magnitudes of all entries, a row per output and a column per input. model: drawn dashed; band_hz:
     drawn shaded."""
     if not len(response):
-        return draw_no_data_note(new_figure(8.6, 2.0), "There is no line to draw.")
-    outputs, inputs = response.response.shape[1:]
-    figure = new_figure(8.6, 0.9 + 2.05 * outputs)
-    grid = figure.subplots(outputs, inputs, sharex=True, sharey=True, squeeze=False)
-    bins = octave_bins(response, _BIN_OCTAVES)
+        return draw_no_data_note(create_figure(8.6, 2.0), "There is no line to draw.")
+    output_count, input_count = response.response.shape[1:]
+    figure = create_figure(8.6, 0.9 + 2.05 * output_count)
+    axes_grid = figure.subplots(output_count, input_count, sharex=True, sharey=True, squeeze=False)
+    bins = average_octave_bins(response, _BIN_WIDTH_OCTAVES)
     for row, output in enumerate(response.output_channels):
         for column, input_ in enumerate(response.input_channels):
-            axes: Axes = grid[row][column]
+            axes: Axes = axes_grid[row][column]
             _draw_entry(axes, bins, row, column)
             if band_hz is not None:
                 axes.axvspan(*band_hz, color=_BAND_COLOUR, zorder=0)
             if model is not None:
                 axes.plot(model.frequency_hz, np.abs(model.response[:, row, column]), "--", color=VERMILLION, lw=1.2)
             axes.set_title(f"{input_} → {output}", fontsize=9, loc="left", pad=3)
-    _scale_axes(grid[0][0], bins)
+    _scale_axes(axes_grid[0][0], bins)
     figure.supylabel(
-        f"Magnitude ({_unit_text(response.output_unit)} per {_unit_text(response.input_unit)})", fontsize=10
+        f"Magnitude ({_typeset_unit(response.output_unit)} per {_typeset_unit(response.input_unit)})", fontsize=10
     )
     figure.supxlabel("Frequency (Hz)", fontsize=10)
-    handles = _legend_handles(bins, model, band_hz)
+    handles = _make_legend_handles(bins, model, band_hz)
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), fontsize=8.5, frameon=False)
     return figure
 
 
 def _draw_entry(axes: Axes, bins: OctaveBins, row: int, column: int) -> None:
     """Draw one entry: mean magnitude, range of single lines, and expected noise of a line (standard deviation)."""
-    plain_axes(axes)
-    mean = np.abs(bins.response[:, row, column])
-    low, high = bins.lowest[:, row, column], bins.highest[:, row, column]
+    style_axes(axes)
+    mean_magnitude = np.abs(bins.response[:, row, column])
+    lowest_magnitude, highest_magnitude = bins.lowest[:, row, column], bins.highest[:, row, column]
     for mask, line_colour, shade_colour in (
         (~bins.reliable, _UNRELIABLE_COLOUR, "#E6E6E6"),
         (bins.reliable, BLUE, SKY),
     ):
-        extended = _extend_mask(mask)
+        extended_mask = _extend_mask(mask)
         axes.fill_between(
-            bins.frequency_hz, low, high, where=extended.tolist(), color=shade_colour, alpha=0.45, linewidth=0
+            bins.frequency_hz,
+            lowest_magnitude,
+            highest_magnitude,
+            where=extended_mask.tolist(),
+            color=shade_colour,
+            alpha=0.45,
+            linewidth=0,
         )
-        axes.plot(bins.frequency_hz, np.where(extended, mean, np.nan), color=line_colour, linewidth=1.2)
-    floor = np.sqrt(bins.noise_variance[:, row, column])
-    axes.plot(bins.frequency_hz, floor, ":", color=ORANGE, linewidth=1.1)
+        axes.plot(bins.frequency_hz, np.where(extended_mask, mean_magnitude, np.nan), color=line_colour, linewidth=1.2)
+    noise_sd = np.sqrt(bins.noise_variance[:, row, column])
+    axes.plot(bins.frequency_hz, noise_sd, ":", color=ORANGE, linewidth=1.1)
 
 
 def _extend_mask(mask: BoolArray) -> BoolArray:
-    """The mask, with the bin after each true bin included, so that a curve that changes its colour has no gap."""
-    extended = mask.copy()
-    extended[1:] |= mask[:-1]
-    return extended
+    """Extend the mask (bins,) by the bin after each true bin, so that a curve that changes its colour has no gap."""
+    extended_mask = mask.copy()
+    extended_mask[1:] |= mask[:-1]
+    return extended_mask
 
 
 def _scale_axes(axes: Axes, bins: OctaveBins) -> None:
@@ -124,10 +131,10 @@ def _scale_axes(axes: Axes, bins: OctaveBins) -> None:
     axes.yaxis.set_minor_formatter(NullFormatter())
 
 
-def _legend_handles(
+def _make_legend_handles(
     bins: OctaveBins, model: ResponseCurve | None, band_hz: tuple[float, float] | None
 ) -> Sequence[Line2D | Patch]:
-    """Handles of the legend, for what the figure shows."""
+    """Make the legend's handles for what the figure shows."""
     handles: list[Line2D | Patch] = [
         Line2D([], [], color=BLUE, linewidth=1.4, label="measured"),
         Patch(color=SKY, alpha=0.45, label="single lines"),
@@ -144,6 +151,6 @@ def _legend_handles(
     return handles
 
 
-def _unit_text(unit: str) -> str:
-    """The unit in ASCII, such as m/s^2, with a superscript 2."""
+def _typeset_unit(unit: str) -> str:
+    """Typeset an ASCII unit such as m/s^2 with a superscript 2."""
     return unit.replace("^2", "²")

@@ -10,7 +10,7 @@ import numpy as np
 
 from analysis.wording import typeset
 from equalizer.signals.recording import Recording
-from equalizer.signals.recording_checks import signals_of
+from equalizer.signals.recording_checks import collect_signals
 from equalizer.signals.signal import FloatArray
 
 Stretch = tuple[int, int]
@@ -48,7 +48,7 @@ def channels_of(recording: Recording) -> tuple[Channel, ...]:
     """All channels of all signals of a recording."""
     return tuple(
         Channel(role, name, quantity, unit, np.ascontiguousarray(samples))
-        for role, signal in signals_of(recording).items()
+        for role, signal in collect_signals(recording).items()
         for name, quantity, unit, samples in zip(
             signal.channels, signal.quantities, signal.units, signal.samples.T, strict=True
         )

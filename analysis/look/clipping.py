@@ -13,7 +13,7 @@ import numpy as np
 from analysis.diagnosis.noise.rounding import rounding_step
 from analysis.look.channels import Channel
 from analysis.look.check import Check, add_fine_if_none
-from equalizer.signals.signal import FloatArray, runs_of
+from equalizer.signals.signal import FloatArray, find_runs
 
 CLIPPING = "clipping"
 LEAST_SAMPLES = 5
@@ -68,7 +68,7 @@ def count_clipped_samples(samples: FloatArray) -> int:
     next_below = int(np.sum((gap_free < top - tolerance) & (gap_free >= top - tolerance - width)))
     if at_top.sum() < LEAST_SAMPLES or at_top.sum() < _LEAST_CROWDING * next_below:
         return 0
-    runs = runs_of(at_top)
+    runs = find_runs(at_top)
     rises = [_extrapolate_rise(gap_free, start, stop) for start, stop in runs]
     least_rise = max(_STEPS * step, 1e-6 * float(np.ptp(finite)))
     run_lengths = [stop - start for (start, stop), rise in zip(runs, rises, strict=True) if rise > least_rise]

@@ -1,7 +1,7 @@
-"""Checks of completeness: missing samples, constant channels, copies of other channels.
+"""Checks of a recording for missing samples, constant channels and copies of other channels. Called by `overview`.
 
 A constant sensor or two identical sensors usually mean an unplugged cable or a wrong channel map. A channel is a copy
-of another where it equals that channel, scaled and shifted (least squares), to the rounding of single precision.
+of another if it equals that channel, scaled and shifted (least squares), within the rounding of single precision.
 """
 
 from collections.abc import Iterator, Sequence
@@ -11,50 +11,54 @@ import numpy as np
 
 from analysis.look.channels import Channel, rms
 from analysis.look.check import Check, add_fine_if_none
-from equalizer.signals.signal import FloatArray, runs_of
+from equalizer.signals.signal import FloatArray, find_runs
 
 MISSING, CONSTANT, COPIES = "missing samples", "constant channels", "copied channels"
-_USELESS_SHARE = 0.2
-"""Share of missing samples above which a channel is useless to most analyses."""
-_SAME_STORED = 1e-6
-"""Largest rms difference between a channel and its copy, relative to the rms: rounding in single precision."""
-_FIRST_FEW = 1000
-"""Number of samples that are compared first, to save time: most pairs of channels differ there already."""
+_WRONG_MISSING_SHARE = 0.2
+"""Share of missing samples above which the check is "wrong" instead of a notice: most analyses cannot use the channel.
+Chosen by hand."""
+_COPY_TOLERANCE = 1e-6
+"""Largest rms difference between a channel and its copy, relative to the rms of the copy: rounding in single
+precision."""
+_SUBSET_SIZE = 1000
+"""Approximate number of samples, evenly spaced, that are compared first to save time: most pairs differ in these."""
 
 
 def check_missing_samples(channels: Sequence[Channel], rate_hz: float) -> tuple[Check, ...]:
     """A check of each channel with missing samples; a single "fine" check where no channel has any."""
-    checks = tuple(_check_missing(channel, rate_hz) for channel in channels if not np.isfinite(channel.samples).all())
+    checks = tuple(
+        _report_missing_samples(channel, rate_hz) for channel in channels if not np.isfinite(channel.samples).all()
+    )
     return add_fine_if_none(MISSING, checks, "No sample is missing in any channel.")
 
 
-def _check_missing(channel: Channel, rate_hz: float) -> Check:
-    """The check of a channel with at least one missing sample: "wrong" above the share `_USELESS_SHARE`."""
+def _report_missing_samples(channel: Channel, rate_hz: float) -> Check:
+    """The check of a channel with at least one missing sample: "wrong" above `_WRONG_MISSING_SHARE`."""
     is_missing = ~np.isfinite(channel.samples)
-    count, first = int(is_missing.sum()), int(np.argmax(is_missing))
-    longest = max(stop - start for start, stop in runs_of(is_missing))
+    count, first_gap = int(is_missing.sum()), int(np.argmax(is_missing))
+    longest_gap = max(stop - start for start, stop in find_runs(is_missing))
     return Check(
         MISSING,
-        "wrong" if count > _USELESS_SHARE * len(is_missing) else "notice",
-        f"{channel.label} lacks {count} of {len(is_missing)} samples, the first at {first / rate_hz:.4g} s; the "
-        f"longest gap is {longest} samples.",
+        "wrong" if count > _WRONG_MISSING_SHARE * len(is_missing) else "notice",
+        f"{channel.label} lacks {count} of {len(is_missing)} samples, the first at {first_gap / rate_hz:.4g} s; the "
+        f"longest gap is {longest_gap} samples.",
         "Cut the gaps out with segments, or record again; analyses that need every sample refuse them by name.",
     )
 
 
 def check_constant_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """A check of each constant command or sensor; a single "fine" check where all change. Conditions and excitations
-    are left out: they may be constant."""
+    """A check of each constant command or sensor; a single "fine" check if all vary. Conditions and excitations are
+    left out: they may be constant."""
     measured = [channel for channel in channels if channel.role not in ("condition", "excitation")]
     checks = tuple(
-        _constant_check(channel)
+        _report_constant_channel(channel)
         for channel in measured
         if channel.finite_samples.size and np.ptp(channel.finite_samples) == 0
     )
     return add_fine_if_none(CONSTANT, checks, "Every command and every sensor changes.")
 
 
-def _constant_check(channel: Channel) -> Check:
+def _report_constant_channel(channel: Channel) -> Check:
     """The check of a constant channel: a notice for a command, "wrong" for a sensor."""
     text = f"{channel.label} is {channel.format(float(channel.finite_samples[0]))} throughout."
     if channel.role == "command":
@@ -63,47 +67,52 @@ def _constant_check(channel: Channel) -> Check:
 
 
 def check_copied_channels(channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """A check of each channel that is a copy of another, also scaled or shifted; a single "fine" check without copies.
-    An excitation may equal its command: without feedback they are the same signal."""
-    checks = tuple(_copy_checks(channels))
+    """A check of each channel that is a copy of another, possibly scaled and shifted; a single "fine" check without
+    copies. An excitation may equal its command: without feedback they are the same signal."""
+    checks = tuple(_compare_pairs(channels))
     return add_fine_if_none(COPIES, checks, "No channel is a copy of another.")
 
 
-def _copy_checks(channels: Sequence[Channel]) -> Iterator[Check]:
-    """Compare each pair of channels that change; "wrong" where both are commands or responses, else a notice."""
+def _compare_pairs(channels: Sequence[Channel]) -> Iterator[Check]:
+    """A check of each pair of varying channels that are copies: "wrong" if both are commands or responses, else a
+    notice."""
     changing = [channel for channel in channels if channel.finite_samples.size and np.ptp(channel.finite_samples) > 0]
     for first, second in combinations(changing, 2):
         if {first.role, second.role} == {"command", "excitation"}:
             continue
-        factor = _find_copy_factor(first.samples, second.samples)
-        if factor is None:
+        scale = _match_channels(first.samples, second.samples)
+        if scale is None:
             continue
-        scaled = "" if abs(factor - 1) < _SAME_STORED else f" times {factor:.6g}, up to an offset"
-        independent = {first.role, second.role} <= {"command", "response"}
+        scale_text = "" if abs(scale - 1) < _COPY_TOLERANCE else f" times {scale:.6g}, up to an offset"
+        is_suspicious = {first.role, second.role} <= {"command", "response"}
         yield Check(
             COPIES,
-            "wrong" if independent else "notice",
-            f"{second.label} is {first.label}{scaled}, sample by sample.",
+            "wrong" if is_suspicious else "notice",
+            f"{second.label} is {first.label}{scale_text}, sample by sample.",
             "Check the map: two sensors never agree to the last digit; leave one of them out.",
         )
 
 
-def _find_copy_factor(first: FloatArray, second: FloatArray) -> float | None:
-    """Factor from the first channel to the second; None where the second is no copy. Both: (n,)."""
-    subset = slice(None, None, max(1, len(first) // _FIRST_FEW))
-    if len(first) > _FIRST_FEW and _copy_factor(first[subset], second[subset]) is None:
+def _match_channels(first: FloatArray, second: FloatArray) -> float | None:
+    """Scale factor from the first channel to the second, both (n,); None if the second is not a copy."""
+    subset = slice(None, None, max(1, len(first) // _SUBSET_SIZE))
+    if len(first) > _SUBSET_SIZE and _fit_scale(first[subset], second[subset]) is None:
         return None
-    return _copy_factor(first, second)
+    return _fit_scale(first, second)
 
 
-def _copy_factor(values: FloatArray, copy: FloatArray) -> float | None:
-    """Least-squares factor between both channels about their means; None where the residual exceeds rounding."""
+def _fit_scale(values: FloatArray, copy: FloatArray) -> float | None:
+    """Least-squares scale factor from `values` to `copy`, both (n,), about their means; None if the residual exceeds
+    `_COPY_TOLERANCE`, a channel is constant, or fewer than three samples are finite in both."""
     is_finite = np.isfinite(values) & np.isfinite(copy)
     if is_finite.sum() < 3:
         return None
-    first, second = values[is_finite] - values[is_finite].mean(), copy[is_finite] - copy[is_finite].mean()
-    size, energy = rms(second), float(first @ first)
-    if energy == 0 or size == 0:
+    centred_values, centred_copy = (
+        values[is_finite] - values[is_finite].mean(),
+        copy[is_finite] - copy[is_finite].mean(),
+    )
+    copy_rms, energy = rms(centred_copy), float(centred_values @ centred_values)
+    if energy == 0 or copy_rms == 0:
         return None
-    factor = float(first @ second) / energy
-    return factor if rms(second - factor * first) < _SAME_STORED * size else None
+    scale = float(centred_values @ centred_copy) / energy
+    return scale if rms(centred_copy - scale * centred_values) < _COPY_TOLERANCE * copy_rms else None

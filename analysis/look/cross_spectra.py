@@ -1,7 +1,8 @@
 """One-sided power and cross spectral densities of all channels by Welch's method: averages over Hann windows.
 
 Windows overlap by half; a straight line is subtracted from each. No window spans two stretches of a recording or
-contains a missing sample, so gaps do not leak into the spectra.
+contains a missing sample, so gaps do not leak into the spectra. Used by all checks of `analysis.look` that compare
+channels by frequency.
 
 Reference: Welch, IEEE Transactions on Audio and Electroacoustics 15 (1967), 70-73.
 """
@@ -15,12 +16,12 @@ import numpy.typing as npt
 from analysis.look.channels import Channel, Stretch
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-_WINDOWS = 12
+_TARGET_WINDOW_COUNT = 12
 """Number of half-overlapping windows to aim for. The estimated coherence of unrelated signals averages 1 / n for n
 independent windows, so coherences near 0.1 mean little here."""
-_SHORTEST, _LONGEST = 32, 8192
+_SHORTEST_WINDOW_SAMPLES, _LONGEST_WINDOW_SAMPLES = 32, 8192
 """Shortest and longest window, samples."""
-MOST_WINDOWS = 400
+LARGEST_WINDOW_COUNT = 400
 """Largest number of windows that are averaged, spread over the recording: more take time without benefit."""
 
 
@@ -37,54 +38,60 @@ class CrossSpectra:
     columns: tuple[str, ...]
     """Labels of the channels."""
 
-    def power(self, channel: int) -> FloatArray:
+    def get_power_density(self, channel_index: int) -> FloatArray:
         """(lines,): power spectral density of a channel, in its unit² / Hz. channel: its index."""
-        density: FloatArray = self.matrix[:, channel, channel].real
+        density: FloatArray = self.matrix[:, channel_index, channel_index].real
         return density
 
-    def coherence(self, first: int, second: int) -> FloatArray:
+    def compute_coherence(self, first_index: int, second_index: int) -> FloatArray:
         """(lines,): magnitude-squared coherence of two channels, 0 to 1; 0 where either has no power."""
-        amplitude_product = np.sqrt(self.power(first)) * np.sqrt(self.power(second))
+        amplitude_product = np.sqrt(self.get_power_density(first_index)) * np.sqrt(self.get_power_density(second_index))
         return np.asarray(
-            (np.abs(self.matrix[:, first, second]) / np.where(amplitude_product > 0, amplitude_product, np.inf)) ** 2
+            (
+                np.abs(self.matrix[:, first_index, second_index])
+                / np.where(amplitude_product > 0, amplitude_product, np.inf)
+            )
+            ** 2
         )
 
 
-def cross_spectra(
+def estimate_cross_spectra(
     channels: Sequence[Channel], stretches: Sequence[Stretch], rate_hz: float, samples_per_window: int = 0
 ) -> CrossSpectra | None:
-    """Cross-spectral densities of the channels; None where no window is whole. stretches: at least one. rate_hz: sample
-    rate. samples_per_window: 0: chosen by the length of the recording."""
-    columns = np.column_stack([channel.samples for channel in channels])
+    """Estimate the cross-spectral densities of the channels; None where no window is complete: too short a record, or
+    missing samples in every window. stretches: (start, stop) of parts without gaps, at least one. rate_hz: sample
+    rate. samples_per_window: 0 = chosen by the length of the recording."""
+    channel_samples = np.column_stack([channel.samples for channel in channels])
     sample_count = sum(stop - start for start, stop in stretches)
-    target_length = 2 ** int(np.log2(max(2 * sample_count / _WINDOWS, _SHORTEST)))
-    length = min(samples_per_window or min(target_length, _LONGEST), max(stop - start for start, stop in stretches))
-    length -= length % 2  # even, so that the last line is at the Nyquist frequency
-    if length < _SHORTEST:
+    target_samples = 2 ** int(np.log2(max(2 * sample_count / _TARGET_WINDOW_COUNT, _SHORTEST_WINDOW_SAMPLES)))
+    window_samples = min(
+        samples_per_window or min(target_samples, _LONGEST_WINDOW_SAMPLES),
+        max(stop - start for start, stop in stretches),
+    )
+    window_samples -= window_samples % 2  # even, so that the last line is at the Nyquist frequency
+    if window_samples < _SHORTEST_WINDOW_SAMPLES:
         return None
     window_starts = [
-        window_start
+        first
         for start, stop in stretches
-        for window_start in range(start, stop - length + 1, max(1, length // 2))
+        for first in range(start, stop - window_samples + 1, max(1, window_samples // 2))
     ]
     complete_starts = [
-        window_start
-        for window_start in window_starts
-        if np.isfinite(columns[window_start : window_start + length]).all()
+        first for first in window_starts if np.isfinite(channel_samples[first : first + window_samples]).all()
     ]
-    used_starts = complete_starts[:: max(1, -(-len(complete_starts) // MOST_WINDOWS))]
+    used_starts = complete_starts[:: max(1, -(-len(complete_starts) // LARGEST_WINDOW_COUNT))]
     if not used_starts:
         return None
-    window, line_basis = np.hanning(length + 1)[:-1], _straight_lines(length)
-    product_sums = np.zeros((length // 2, len(channels), len(channels)), dtype=np.complex128)
-    for window_start in used_starts:
-        detrended = columns[window_start : window_start + length]
-        detrended = detrended - line_basis @ (line_basis.T @ detrended)
-        lines = np.fft.rfft(detrended * window[:, None], axis=0)[1 : length // 2 + 1]
-        product_sums += np.einsum("li,lj->lij", lines.conj(), lines)
-    product_sums[-1] /= 2  # the line at the Nyquist frequency stands for itself alone
-    scale = 2.0 / (rate_hz * float(np.sum(window**2)) * len(used_starts))
-    frequency_hz = np.arange(1, length // 2 + 1) * (rate_hz / length)
+    hann_window, line_basis = np.hanning(window_samples + 1)[:-1], _make_line_basis(window_samples)
+    product_sums = np.zeros((window_samples // 2, len(channels), len(channels)), dtype=np.complex128)
+    for first in used_starts:
+        segment = channel_samples[first : first + window_samples]
+        segment = segment - line_basis @ (line_basis.T @ segment)
+        spectra = np.fft.rfft(segment * hann_window[:, None], axis=0)[1 : window_samples // 2 + 1]
+        product_sums += np.einsum("li,lj->lij", spectra.conj(), spectra)
+    product_sums[-1] /= 2  # the line at the Nyquist frequency has no counterpart at a negative frequency
+    scale = 2.0 / (rate_hz * float(np.sum(hann_window**2)) * len(used_starts))
+    frequency_hz = np.arange(1, window_samples // 2 + 1) * (rate_hz / window_samples)
     return CrossSpectra(
         frequency_hz,
         np.asarray(product_sums * scale, dtype=np.complex128),
@@ -93,7 +100,8 @@ def cross_spectra(
     )
 
 
-def _straight_lines(length: int) -> npt.NDArray[np.float64]:
-    """(length, 2): orthonormal basis of the straight lines that are subtracted from each window."""
+def _make_line_basis(length: int) -> npt.NDArray[np.float64]:
+    """Make an orthonormal basis (length, 2) of the straight lines; length in samples. Its projection is subtracted from
+    each window."""
     ramp = np.arange(length) - (length - 1) / 2
     return np.column_stack([np.full(length, length**-0.5), ramp / np.sqrt(ramp @ ramp)])

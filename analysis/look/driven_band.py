@@ -1,4 +1,10 @@
-"""Driven frequency band of each command, and multiple coherence of each response with all commands."""
+"""Checks of the excitation: driven frequency band of each command, multiple coherence of each response with all
+commands, and segments without excitation. Called by `overview`.
+
+The multiple coherence of a response with q inputs is S_xy^H S_xx^-1 S_xy / S_yy at each spectral line, between 0 and 1.
+Source: J. S. Bendat, A. G. Piersol, Random Data, 4th ed., Wiley 2010, chapter 7. Unrelated signals have, for n averaged
+windows, a mean of q / n, which is subtracted.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,20 +18,22 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 DRIVEN, COHERENCE = "driven axes", "coherence"
-BELOW_PEAK = 1e-2
-"""Share of the highest density below which a line is not driven."""
-LEAST_DRIVE = 1e-4
-"""Power relative to the strongest command of the same unit, below which a command is not driven."""
+LEAST_RELATIVE_DENSITY = 1e-2
+"""Power spectral density, relative to the highest of the command, above which a line is driven."""
+LEAST_RELATIVE_POWER = 1e-4
+"""Power, relative to the strongest command of the same unit, below which a command is not driven."""
 LOW_COHERENCE, POOR_COHERENCE = 0.8, 0.1
-"""Coherent share of a response's power below which it is reported, and below which the channel may be a wrong one."""
+"""Coherent share of a response's power below which there is a notice, and below which the check is "wrong" (the channel
+may be a wrong one)."""
 _BROADBAND_KINDS = frozenset({"multisine", "noise", "binary", "sweep", "rest"})
+"""Kinds of segments for which the estimate of coherence by windows is reliable."""
 _NOTABLE_SHARE = 0.01
-"""Share of a response's power in an octave that is worth naming."""
+"""Least share of a response's power that an octave must contain to be reported."""
 
 
 @dataclass(frozen=True, slots=True)
 class DrivenBand:
-    """The frequency band that a command drives."""
+    """The frequency band in which a command is driven: from the first to the last driven line."""
 
     command: str
     low_hz: float
@@ -34,91 +42,109 @@ class DrivenBand:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResponseCoherence:
-    """Multiple coherence of a response with all commands, and where in the driven band it is lowest."""
+    """Multiple coherence of a response with all driven commands, and the octave of the driven band where it is
+    lowest."""
 
     response: str
     multiple: FloatArray
-    """(lines,): share of its power that all commands together explain linearly, 0 to 1."""
+    """(lines,): share of the response's power that is linear in all commands together, 0 to 1."""
     share: float
-    """Share of its power in the driven band."""
+    """That share for the whole driven band: the coherence averaged with the response's power as weight."""
     lowest_hz: float
-    """Middle of the worst octave there, of those that hold some of its power."""
+    """Geometric centre of the octave with the lowest share, of those that contain a notable part of the power."""
     lowest: float
-    """Share of the power of that octave."""
+    """Share of that octave."""
 
 
 def find_driven_bands(spectra: CrossSpectra, channels: Sequence[Channel]) -> tuple[DrivenBand, ...]:
-    """Driven band of each excitation where it was recorded, else of each command."""
-    role = "excitation" if any(_does_change(c) and c.role == "excitation" for c in channels) else "command"
+    """Driven band of each excitation if excitations were recorded, else of each command. Channels that are not driven
+    are left out."""
+    role = (
+        "excitation"
+        if any(_is_varying(candidate) and candidate.role == "excitation" for candidate in channels)
+        else "command"
+    )
     bands = []
-    powers = {k: spectra.power(k) for k, channel in enumerate(channels) if channel.role == role}
-    for k, power in powers.items():
+    powers = {index: spectra.get_power_density(index) for index, channel in enumerate(channels) if channel.role == role}
+    for index, power in powers.items():
         same_unit_powers = [
-            other_power.sum() for j, other_power in powers.items() if channels[j].unit == channels[k].unit
+            other_power.sum()
+            for other_index, other_power in powers.items()
+            if channels[other_index].unit == channels[index].unit
         ]
-        if power.max() <= 0 or power.sum() < LEAST_DRIVE * max(same_unit_powers):
+        if power.max() <= 0 or power.sum() < LEAST_RELATIVE_POWER * max(same_unit_powers):
             continue
-        lines = spectra.frequency_hz[power > BELOW_PEAK * power.max()]
-        bands.append(DrivenBand(channels[k].name, float(lines[0]), float(lines[-1])))
+        lines = spectra.frequency_hz[power > LEAST_RELATIVE_DENSITY * power.max()]
+        bands.append(DrivenBand(channels[index].name, float(lines[0]), float(lines[-1])))
     return tuple(bands)
 
 
-def _does_change(channel: Channel) -> bool:
+def _is_varying(channel: Channel) -> bool:
+    """Whether the channel takes more than one value."""
     return bool(channel.finite_samples.size and np.ptp(channel.finite_samples) > 0)
 
 
-def response_coherences(
+def estimate_coherences(
     spectra: CrossSpectra, channels: Sequence[Channel], bands: Sequence[DrivenBand]
 ) -> tuple[ResponseCoherence, ...]:
-    """Coherence of each response with the driven commands, by band. Empty where nothing is driven, or too few windows
-    were averaged."""
-    inputs = [k for k, c in enumerate(channels) if c.role == "command" and c.name in {band.command for band in bands}]
+    """Multiple coherence of each response that varies with all driven commands. Empty if nothing is driven, or if fewer
+    than 2 q + 2 windows were averaged for q inputs."""
+    inputs = [
+        index
+        for index, candidate in enumerate(channels)
+        if candidate.role == "command" and candidate.name in {band.command for band in bands}
+    ]
     if not inputs or spectra.windows < 2 * len(inputs) + 2:
         return ()
     low, high = min(band.low_hz for band in bands), max(band.high_hz for band in bands)
     in_band = (spectra.frequency_hz >= low) & (spectra.frequency_hz <= high)
     coherences = []
-    for k, channel in enumerate(channels):
-        if channel.role == "response" and _does_change(channel):
-            multiple = _multiple_coherence(spectra, inputs, k)
-            power = spectra.power(k)[in_band]
-            worst_hz, worst = _worst_octave(spectra.frequency_hz[in_band], multiple[in_band], power)
+    for index, channel in enumerate(channels):
+        if channel.role == "response" and _is_varying(channel):
+            multiple = _estimate_multiple_coherence(spectra, inputs, index)
+            power = spectra.get_power_density(index)[in_band]
+            worst_hz, worst = _find_worst_octave(spectra.frequency_hz[in_band], multiple[in_band], power)
             share = float(np.sum(multiple[in_band] * power) / np.sum(power))
             coherences.append(ResponseCoherence(channel.name, multiple, share, worst_hz, worst))
     return tuple(coherences)
 
 
-def _multiple_coherence(spectra: CrossSpectra, inputs: list[int], response: int) -> FloatArray:
-    """Multiple coherence (lines,), corrected for its chance value with as many windows."""
-    power_in = spectra.matrix[:, inputs][:, :, inputs]
-    # A hint of independent noise in every command keeps collinear ones from being divided by nothing.
-    floor = 1e-9 * np.trace(power_in, axis1=1, axis2=2).real.clip(min=np.finfo(np.float64).tiny)
-    regular = power_in + floor[:, None, None] * np.eye(len(inputs))
-    cross_power = spectra.matrix[:, inputs, response]
+def _estimate_multiple_coherence(spectra: CrossSpectra, inputs: list[int], response: int) -> FloatArray:
+    """Multiple coherence (lines,) of the response with the inputs (indices of channels), less its mean for unrelated
+    signals and rescaled, so that it is 0 for these and 1 for a linear relation."""
+    input_spectra = spectra.matrix[:, inputs][:, :, inputs]
+    # Diagonal loading: the spectral matrix of collinear commands is singular.
+    diagonal_loading = 1e-9 * np.trace(input_spectra, axis1=1, axis2=2).real.clip(min=np.finfo(np.float64).tiny)
+    regularised = input_spectra + diagonal_loading[:, None, None] * np.eye(len(inputs))
+    cross_spectrum = spectra.matrix[:, inputs, response]
     coherent_power = np.einsum(
-        "li,li->l", cross_power.conj(), np.linalg.solve(regular, cross_power[..., None])[..., 0]
+        "li,li->l", cross_spectrum.conj(), np.linalg.solve(regularised, cross_spectrum[..., None])[..., 0]
     ).real
-    power = spectra.power(response)
+    power = spectra.get_power_density(response)
     uncorrected = np.clip(coherent_power / np.where(power > 0, power, np.inf), 0.0, 1.0)
-    chance_share = len(inputs) / spectra.windows
-    return np.asarray(np.clip((uncorrected - chance_share) / (1 - chance_share), 0.0, 1.0))
+    chance_coherence = len(inputs) / spectra.windows
+    return np.asarray(np.clip((uncorrected - chance_coherence) / (1 - chance_coherence), 0.0, 1.0))
 
 
-def _worst_octave(frequency_hz: FloatArray, coherence: FloatArray, power: FloatArray) -> tuple[float, float]:
+def _find_worst_octave(frequency_hz: FloatArray, coherence: FloatArray, power: FloatArray) -> tuple[float, float]:
+    """Geometric centre (Hz) of the octave with the lowest coherent share of power, and that share. All: (lines,)."""
     octaves = np.floor(np.log2(frequency_hz))
-    shares = {}
+    coherence_by_octave = {}
     for octave in np.unique(octaves):
         octave_power = power[octaves == octave]
         if octave_power.sum() >= _NOTABLE_SHARE * power.sum():
-            shares[float(octave)] = float(np.sum(coherence[octaves == octave] * octave_power) / octave_power.sum())
-    worst = min(shares, key=lambda octave: shares[octave])
-    return float(2.0 ** (worst + 0.5)), shares[worst]
+            coherence_by_octave[float(octave)] = float(
+                np.sum(coherence[octaves == octave] * octave_power) / octave_power.sum()
+            )
+    worst = min(coherence_by_octave, key=lambda octave: coherence_by_octave[octave])
+    return float(2.0 ** (worst + 0.5)), coherence_by_octave[worst]
 
 
 def check_driven_axes(recording: Recording, bands: Sequence[DrivenBand]) -> tuple[Check, ...]:
-    """Commands that never move, and segments that name an excitation that is not there."""
+    """Checks of the excitation: a notice for each command that is not driven, "wrong" for each segment that states an
+    amplitude without excitation."""
     driven = {band.command for band in bands}
-    idle = [name for name in recording.command.channels if name not in driven]
+    undriven_commands = [name for name in recording.command.channels if name not in driven]
     checks = [
         Check(
             DRIVEN,
@@ -126,15 +152,17 @@ def check_driven_axes(recording: Recording, bands: Sequence[DrivenBand]) -> tupl
             f"command '{name}' is not driven.",
             "Its effect cannot be determined; leave it out, or record it driven.",
         )
-        for name in idle
+        for name in undriven_commands
     ]
-    checks += [Check(DRIVEN, "wrong", sentence, "Correct the segments.") for sentence in silent_segments(recording)]
+    checks += [
+        Check(DRIVEN, "wrong", sentence, "Correct the segments.") for sentence in find_silent_segments(recording)
+    ]
     text = "; ".join(f"'{band.command}' is driven from {band.low_hz:.3g} to {band.high_hz:.3g} Hz" for band in bands)
     return (*checks, *((Check(DRIVEN, "fine", f"Command {text}."),) if text else ()))
 
 
-def silent_segments(recording: Recording) -> tuple[str, ...]:
-    """Segments that state an amplitude, but in which no command moves."""
+def find_silent_segments(recording: Recording) -> tuple[str, ...]:
+    """A sentence for each segment that states an amplitude, but in which all commands are zero."""
     sentences = []
     for number, segment in enumerate(recording.segments, start=1):
         segment_samples = recording.command.samples[segment.start : segment.stop]
@@ -147,20 +175,20 @@ def silent_segments(recording: Recording) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def coherence_checks(coherences: Sequence[ResponseCoherence], recording: Recording) -> tuple[Check, ...]:
-    """Checks of the coherences. For single steps, slow signals and controllers, windows are no good estimate: a notice
-    at most."""
+def check_coherences(coherences: Sequence[ResponseCoherence], recording: Recording) -> tuple[Check, ...]:
+    """A check of each coherence. For single steps, slow signals and feedback controllers, the estimate by windows is
+    unreliable: a notice at most."""
     kinds = {segment.kind for segment in recording.segments}
-    broad = bool(kinds) and kinds <= _BROADBAND_KINDS and recording.excitation is None
-    return tuple(_coherence_check(coherence, broad) for coherence in coherences)
+    is_broadband = bool(kinds) and kinds <= _BROADBAND_KINDS and recording.excitation is None
+    return tuple(_check_coherence(coherence, is_broadband) for coherence in coherences)
 
 
-def _coherence_check(coherence: ResponseCoherence, broad: bool) -> Check:
+def _check_coherence(coherence: ResponseCoherence, is_broadband: bool) -> Check:
     text = (
         f"Of the power of response '{coherence.response}' in the driven band, {coherence.share:.1%} is linear in the "
         f"commands, least around {coherence.lowest_hz:.3g} Hz ({coherence.lowest:.0%})."
     )
-    if coherence.share < POOR_COHERENCE and broad:
+    if coherence.share < POOR_COHERENCE and is_broadband:
         return Check(
             COHERENCE, "wrong", text, "Look for a wrong channel, a large time shift, or an input that was not recorded."
         )

@@ -2,6 +2,7 @@
 
 In a linear device the response grows in proportion to the command. A gain that differs between the weakest and the
 strongest segment indicates a nonlinearity (friction, end stops, hardening, saturation), or noise.
+Called by `analysis.look.overview`.
 """
 
 from collections.abc import Sequence
@@ -15,9 +16,10 @@ from analysis.wording import typeset
 from equalizer.signals.recording import Recording, Segment
 
 LEVELS = "levels"
+"""Name of the check."""
 _LEAST_LEVEL_RATIO = 1.5
 """Least ratio of the strongest to the weakest command for which gains are compared."""
-NOTABLE_CHANGE, LARGE_CHANGE = 0.05, 0.3
+NOTABLE_GAIN_CHANGE, LARGE_GAIN_CHANGE = 0.05, 0.3
 """Relative change of the gain (rms of response over rms of command) above which it is reported, and called large."""
 
 
@@ -37,8 +39,8 @@ class SegmentLevel:
     """Rms about the mean of each channel, in the channel's unit."""
 
 
-def segment_levels(recording: Recording, channels: Sequence[Channel]) -> tuple[SegmentLevel, ...]:
-    """Levels of all segments, or of the whole recording where it has no segments."""
+def compute_segment_levels(recording: Recording, channels: Sequence[Channel]) -> tuple[SegmentLevel, ...]:
+    """Compute the levels of all segments, or of the whole recording where it has no segments."""
     full_record = (Segment(0, len(recording), "unmarked"),)
     rate_hz = recording.sample_rate_hz
     return tuple(
@@ -49,67 +51,79 @@ def segment_levels(recording: Recording, channels: Sequence[Channel]) -> tuple[S
             segment.start / rate_hz,
             (segment.stop - segment.start) / rate_hz,
             segment.period,
-            tuple(rms(_finite_samples(channel, segment)) for channel in channels),
+            tuple(rms(_select_finite_samples(channel, segment)) for channel in channels),
         )
         for number, segment in enumerate(recording.segments or full_record, start=1)
     )
 
 
-def _finite_samples(channel: Channel, segment: Segment) -> np.ndarray:
-    """Finite samples of the channel in the segment."""
+def _select_finite_samples(channel: Channel, segment: Segment) -> np.ndarray:
+    """Select the finite samples (n,) of the channel in the segment."""
     segment_samples = channel.samples[segment.start : segment.stop]
     return np.asarray(segment_samples[np.isfinite(segment_samples)])
 
 
-def level_checks(levels: Sequence[SegmentLevel], channels: Sequence[Channel]) -> tuple[Check, ...]:
+def check_proportionality(levels: Sequence[SegmentLevel], channels: Sequence[Channel]) -> tuple[Check, ...]:
     """Check the proportionality of each response over segments of the most frequent kind, for each set of active
     commands. Empty where commands differ in unit, or no segment is excited."""
-    commands = [k for k, channel in enumerate(channels) if channel.role == "command"]
-    kinds = [level.kind for level in levels if level.kind not in ("rest", "free")]
-    if not kinds or len({channels[k].unit for k in commands}) > 1:
+    command_indices = [index for index, channel in enumerate(channels) if channel.role == "command"]
+    excited_kinds = [level.kind for level in levels if level.kind not in ("rest", "free")]
+    if not excited_kinds or len({channels[index].unit for index in command_indices}) > 1:
         return ()
-    main_kind = max(set(kinds), key=kinds.count)
-    rows = [(_command_level(level, commands), level) for level in levels if level.kind == main_kind]
+    main_kind = max(set(excited_kinds), key=excited_kinds.count)
+    command_levels = [
+        (_compute_command_rms(level, command_indices), level) for level in levels if level.kind == main_kind
+    ]
     # Different axes may have different gains: only segments that drive the same axes are compared.
-    groups = {_active_commands(level, commands) for _, level in rows}
+    active_sets = {_find_active_commands(level, command_indices) for _, level in command_levels}
     checks = []
-    for group in groups:
-        comparable = [(size, level) for size, level in rows if _active_commands(level, commands) == group and size > 0]
-        if len(comparable) > 1 and max(s for s, _ in comparable) > _LEAST_LEVEL_RATIO * min(s for s, _ in comparable):
-            checks += [_proportion_check(comparable, k, c) for k, c in enumerate(channels) if c.role == "response"]
+    for active_set in active_sets:
+        comparable_levels = [
+            (command_rms, level)
+            for command_rms, level in command_levels
+            if _find_active_commands(level, command_indices) == active_set and command_rms > 0
+        ]
+        if len(comparable_levels) > 1 and max(s for s, _ in comparable_levels) > _LEAST_LEVEL_RATIO * min(
+            s for s, _ in comparable_levels
+        ):
+            checks += [
+                _compare_response_gains(comparable_levels, index, response_channel)
+                for index, response_channel in enumerate(channels)
+                if response_channel.role == "response"
+            ]
     return tuple(check for check in checks if check is not None)
 
 
-def _command_level(level: SegmentLevel, commands: Sequence[int]) -> float:
-    """Root of the sum of squares of the commands' rms."""
-    return float(np.hypot.reduce([level.rms[k] for k in commands]))
+def _compute_command_rms(level: SegmentLevel, command_indices: Sequence[int]) -> float:
+    """Compute the root of the sum of squares of the commands' rms, in their common unit."""
+    return float(np.hypot.reduce([level.rms[index] for index in command_indices]))
 
 
-def _active_commands(level: SegmentLevel, commands: Sequence[int]) -> tuple[bool, ...]:
-    """Whether each command exceeds a tenth of the strongest in this segment."""
-    strongest = max(level.rms[k] for k in commands)
-    return tuple(level.rms[k] > 0.1 * strongest for k in commands)
+def _find_active_commands(level: SegmentLevel, command_indices: Sequence[int]) -> tuple[bool, ...]:
+    """Find the driven commands: True where the rms exceeds a tenth of the largest in this segment."""
+    strongest_rms = max(level.rms[index] for index in command_indices)
+    return tuple(level.rms[index] > 0.1 * strongest_rms for index in command_indices)
 
 
-def _proportion_check(
-    comparable: Sequence[tuple[float, SegmentLevel]], response: int, channel: Channel
+def _compare_response_gains(
+    comparable_levels: Sequence[tuple[float, SegmentLevel]], response_index: int, channel: Channel
 ) -> Check | None:
     """Compare the gains of one response in the weakest and the strongest segment; None where it does not move.
 
     comparable: (rms of the command, segment) of comparable segments. response: index of the channel.
     """
-    ordered = sorted(comparable, key=lambda row: row[0])
-    weakest, strongest = ordered[0], ordered[-1]
-    if weakest[1].rms[response] == 0 or strongest[1].rms[response] == 0:
+    ordered_levels = sorted(comparable_levels, key=lambda pair: pair[0])
+    weakest, strongest = ordered_levels[0], ordered_levels[-1]
+    if weakest[1].rms[response_index] == 0 or strongest[1].rms[response_index] == 0:
         return None
-    gains = [level.rms[response] / size for size, level in (weakest, strongest)]
-    change = gains[1] / gains[0] - 1
+    gains = [level.rms[response_index] / command_rms for command_rms, level in (weakest, strongest)]
+    gain_change = gains[1] / gains[0] - 1
     text = (
         f"From the weakest to the strongest {weakest[1].kind} ({strongest[0] / weakest[0]:.3g} times) the rms of "
-        f"{channel.label} over that of the command changes by {typeset(f'{100 * change:+.3g}')} %."
+        f"{channel.label} over that of the command changes by {typeset(f'{100 * gain_change:+.3g}')} %."
     )
-    if abs(change) < NOTABLE_CHANGE:
+    if abs(gain_change) < NOTABLE_GAIN_CHANGE:
         return Check(LEVELS, "fine", text)
-    large = abs(change) > LARGE_CHANGE
-    advice = "The device is far from linear: friction, stops, hardening or saturation." if large else ""
+    is_large = abs(gain_change) > LARGE_GAIN_CHANGE
+    advice = "The device is far from linear: friction, stops, hardening or saturation." if is_large else ""
     return Check(LEVELS, "notice", text, advice or "The device is slightly nonlinear, or noise contributes to the rms.")

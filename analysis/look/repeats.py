@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.data.find_segments import find_designed_command, find_period
-from analysis.diagnosis.noise.periods import find_settled_periods, period_samples
+from analysis.diagnosis.noise.periods import find_settled_periods, stack_periods
 from analysis.look.channels import Stretch, rms
 from analysis.look.check import Check
 from analysis.wording import conjoin, typeset
@@ -72,7 +72,7 @@ def _compute_repeat_noise(recording: Recording, *, declared: bool) -> tuple[Repe
     for periods in find_settled_periods(recording):
         if periods.count < 2:
             continue
-        by_period = period_samples(recording.response.samples, periods)
+        by_period = stack_periods(recording.response.samples, periods)
         mean = by_period.mean(axis=0)
         rms_between_repeats = np.sqrt(
             np.sum((by_period - mean) ** 2, axis=(0, 1)) / ((periods.count - 1) * periods.length)

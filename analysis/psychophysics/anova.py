@@ -8,6 +8,7 @@ takes every frequency) their differences stay in the error term, and the test is
     omega² = (SS_between - (k - 1) MS_within) / (SS_total + MS_within)
 
 References: Fisher, Statistical Methods for Research Workers (1925); Hays, Statistics (1963), for omega².
+Called by `analysis.psychophysics.study_analysis` and by the simulated studies of `power.power_curve`.
 """
 
 import math
@@ -49,67 +50,70 @@ class OneWayAnova:
     notes: tuple[str, ...]
 
 
-def one_way_anova(groups: Mapping[str, Sequence[float | None]]) -> OneWayAnova:
-    """One-way ANOVA over named groups of values, all in one unit. None and NaN are gaps and left out; groups may differ
-    in size. Never raises: what the data do not determine is None, with the reason in `notes`."""
-    samples = {name: _finite_values(values) for name, values in groups.items()}
+def compute_one_way_anova(groups: Mapping[str, Sequence[float | None]]) -> OneWayAnova:
+    """Compute a one-way ANOVA over named groups of values, all in one unit. None and NaN are gaps and left out; groups
+    may differ in size. Never raises: what the data do not determine is None, with the reason in `notes`."""
+    samples = {name: _select_finite_values(values) for name, values in groups.items()}
     summaries = tuple(_summarise_group(name, sample) for name, sample in samples.items())
-    gaps = sum(len(values) for values in groups.values()) - sum(len(sample) for sample in samples.values())
-    notes = [f"{gaps} missing value{'s' if gaps != 1 else ''} left out."] if gaps else []
+    gap_count = sum(len(values) for values in groups.values()) - sum(len(sample) for sample in samples.values())
+    notes = [f"{gap_count} missing value{'s' if gap_count != 1 else ''} left out."] if gap_count else []
     notes += [f"There is no value at {group.name}." for group in summaries if group.n == 0]
     nonempty_groups = [sample for sample in samples.values() if len(sample)]
     if len(nonempty_groups) < 2:
         notes.append(f"A comparison needs values in at least two groups; there are {len(nonempty_groups)}.")
-        return _empty_anova(summaries, notes)
+        return _make_undetermined_anova(summaries, notes)
     df_between, df_within = len(nonempty_groups) - 1, sum(map(len, nonempty_groups)) - len(nonempty_groups)
     if df_within < 1:
         notes.append("Every group holds a single value, so there is no spread within groups to compare with.")
-        return _empty_anova(summaries, notes, df_between, df_within)
+        return _make_undetermined_anova(summaries, notes, df_between, df_within)
     return _compute_anova(nonempty_groups, summaries, notes)
 
 
 def _compute_anova(
     nonempty_groups: list[FloatArray], summaries: tuple[GroupSummary, ...], notes: list[str]
 ) -> OneWayAnova:
-    """The equations of the module. nonempty_groups: at least two groups, not empty, with more values than groups."""
+    """Evaluate the equations of the module. nonempty_groups: at least two groups, not empty, with more values than
+    groups."""
     all_values = np.concatenate(nonempty_groups)
     grand_mean = all_values.mean()
     ss_between = float(sum(len(sample) * (sample.mean() - grand_mean) ** 2 for sample in nonempty_groups))
     ss_within = float(sum(((sample - sample.mean()) ** 2).sum() for sample in nonempty_groups))
     df_between, df_within = len(nonempty_groups) - 1, len(all_values) - len(nonempty_groups)
-    if is_rounding(ss_within, all_values):
+    if is_rounding_error(ss_within, all_values):
         notes.append("All values within each group are equal, so there is no spread to compare with: no F, no p.")
-        return _empty_anova(summaries, notes, df_between, df_within)
-    mean_square = ss_within / df_within
+        return _make_undetermined_anova(summaries, notes, df_between, df_within)
+    mean_square_within = ss_within / df_within
     ss_total = ss_between + ss_within
-    f = ss_between / df_between / mean_square
+    f = ss_between / df_between / mean_square_within
     return OneWayAnova(
         groups=summaries,
         df_between=df_between,
         df_within=df_within,
         ss_between=ss_between,
         ss_within=ss_within,
-        mean_square_within=mean_square,
+        mean_square_within=mean_square_within,
         f=f,
         p=float(f_distribution.sf(f, df_between, df_within)),
         eta_squared=ss_between / ss_total,
-        omega_squared=max(0.0, (ss_between - df_between * mean_square) / (ss_total + mean_square)),
+        omega_squared=max(0.0, (ss_between - df_between * mean_square_within) / (ss_total + mean_square_within)),
         notes=tuple(notes),
     )
 
 
-def is_rounding(sum_of_squares: float, values: FloatArray) -> bool:
+def is_rounding_error(sum_of_squares: float, values: FloatArray) -> bool:
     """Whether a sum of squares of differences is nothing but rounding of the values (n,) that it was computed from: at
     most n (64 eps max |value|)², eps the relative spacing of 64-bit floats. 64 by hand."""
-    scale = float(np.abs(values).max())
-    return bool(sum_of_squares <= values.size * (64 * np.finfo(float).eps * scale) ** 2)
+    largest_magnitude = float(np.abs(values).max())
+    return bool(sum_of_squares <= values.size * (64 * np.finfo(float).eps * largest_magnitude) ** 2)
 
 
-def _finite_values(values: Sequence[float | None]) -> FloatArray:
+def _select_finite_values(values: Sequence[float | None]) -> FloatArray:
+    """Select the values (n,) that are neither None, NaN nor infinite."""
     return np.array([value for value in values if value is not None and math.isfinite(value)], dtype=np.float64)
 
 
 def _summarise_group(name: str, sample: FloatArray) -> GroupSummary:
+    """Summarise a group's values (n,); mean None below one value, standard deviation None below two."""
     return GroupSummary(
         name=name,
         n=len(sample),
@@ -118,7 +122,8 @@ def _summarise_group(name: str, sample: FloatArray) -> GroupSummary:
     )
 
 
-def _empty_anova(
+def _make_undetermined_anova(
     groups: tuple[GroupSummary, ...], notes: list[str], df_between: int | None = None, df_within: int | None = None
 ) -> OneWayAnova:
+    """Make a result without sums of squares, F and p; degrees of freedom where they are known."""
     return OneWayAnova(groups, df_between, df_within, None, None, None, None, None, None, None, tuple(notes))

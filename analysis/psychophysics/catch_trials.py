@@ -37,7 +37,7 @@ def catch_tallies(trials: Iterable[Trial]) -> tuple[CatchTally, ...]:
     frequencies ascending."""
     answers: dict[str, dict[float, list[bool]]] = {}
     for trial in trials:
-        if trial.phase is Phase.CATCH and trial.counts:
+        if trial.phase is Phase.CATCH and trial.is_valid:
             answers.setdefault(trial.subject, {}).setdefault(trial.frequency_hz, []).append(not trial.correct)
     return tuple(
         _tally(subject, frequency_hz, sum(wrong), len(wrong))

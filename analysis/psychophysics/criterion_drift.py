@@ -16,7 +16,7 @@ from statistics import NormalDist
 
 from scipy.stats import t as student
 
-from analysis.psychophysics.bias import criterion_variance, response_bias
+from analysis.psychophysics.bias import compute_criterion_variance, estimate_response_bias
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,29 +31,31 @@ class CriterionDrift:
     """The largest p value with a single run left out: one unusual run is no drift."""
 
 
-FEWEST_RUNS = 4
-"""Fewest runs with a criterion. With one left out (`p_without_a_run`), three remain; two would always fit a line."""
-PRIOR_FREEDOM = 6
+MIN_RUNS = 4
+"""Smallest number of runs with a criterion. With a run left out (`p_without_a_run`), three remain; a line fits two
+points exactly."""
+PRIOR_DEGREES_OF_FREEDOM = 6
 """Prior degrees of freedom of the dispersion of all sessions (d0 of Smyth), chosen by hand. A session of five runs has
 3 of its own."""
 
 _Point = tuple[float, float, float]
-"""A run: number of trials before its middle, criterion, and weight (one over the criterion's binomial variance)."""
+"""A run: number of trials before its middle, criterion c, and weight (inverse of the criterion's binomial variance)."""
 _Run = tuple[Sequence[int], Sequence[bool]]
-"""A run's directions shown (1 or 2) and whether each answer was right, as for `response_bias`."""
+"""A run's directions shown (1 or 2) and whether each answer was right, as for `estimate_response_bias`."""
 
 
-def criterion_drifts(sessions: Sequence[Sequence[_Run]]) -> tuple[CriterionDrift | None, ...]:
-    """Drift of the response criterion, per session: weighted regression of the criteria of its runs on the number of
-    trials before their middles. sessions: of one study, each with its runs in order. None for a session with fewer than
-    `FEWEST_RUNS` runs in which both directions were shown.
+def estimate_criterion_drifts(sessions: Sequence[Sequence[_Run]]) -> tuple[CriterionDrift | None, ...]:
+    """Estimate the drift of the response criterion per session: weighted regression of the criteria of its runs on the
+    number of trials before their middles. sessions: those of one study, each with its runs in order. None for a session
+    with fewer than `MIN_RUNS` runs in which both directions were shown.
     """
-    points_by_session = [_regression_points(runs) for runs in sessions]
+    points_by_session = [_make_regression_points(runs) for runs in sessions]
     fits = [_fit_line(points) for points in points_by_session if points is not None]
-    all_freedom = sum(fit.freedom for fit in fits)
-    shared_dispersion = max(1.0, sum(fit.chi_squared for fit in fits) / all_freedom) if fits else 1.0
+    shared_degrees_of_freedom = sum(fit.degrees_of_freedom for fit in fits)
+    shared_dispersion = max(1.0, sum(fit.chi_squared for fit in fits) / shared_degrees_of_freedom) if fits else 1.0
     return tuple(
-        None if points is None else _test_drift(points, shared_dispersion, all_freedom) for points in points_by_session
+        None if points is None else _test_drift(points, shared_dispersion, shared_degrees_of_freedom)
+        for points in points_by_session
     )
 
 
@@ -65,61 +67,70 @@ class _LineFit:
     z: float
     """Slope over its standard error, if all variance were binomial (dispersion 1)."""
     chi_squared: float
-    freedom: int
+    """Weighted sum of squared residuals about the line."""
+    degrees_of_freedom: int
 
 
-def _regression_points(runs: Sequence[_Run]) -> list[_Point] | None:
-    """Points of the regression; None with fewer than `FEWEST_RUNS`."""
+def _make_regression_points(runs: Sequence[_Run]) -> list[_Point] | None:
+    """Points of the regression; None with fewer than `MIN_RUNS`."""
     points, trials_before = list[_Point](), 0
     for directions, correct in runs:
-        if (bias := response_bias(directions, correct)) is not None:
+        if (bias := estimate_response_bias(directions, correct)) is not None:
             points.append(
-                (trials_before + len(directions) / 2.0, bias.criterion, 1.0 / _criterion_variance(directions, correct))
+                (
+                    trials_before + len(directions) / 2.0,
+                    bias.criterion,
+                    1.0 / _compute_variance_without_bias(directions, correct),
+                )
             )
         trials_before += len(directions)
-    return points if len(points) >= FEWEST_RUNS else None
+    return points if len(points) >= MIN_RUNS else None
 
 
 def _fit_line(points: Sequence[_Point]) -> _LineFit:
     """Weighted least squares of the criteria on the number of trials."""
-    weight = sum(w for _, _, w in points)
-    mean_position = sum(w * position for position, _, w in points) / weight
-    mean = sum(w * criterion for _, criterion, w in points) / weight
-    spread = sum(w * (position - mean_position) ** 2 for position, _, w in points)
-    slope = sum(w * (position - mean_position) * criterion for position, criterion, w in points) / spread
-    chi_squared = sum(
-        w * (criterion - mean - slope * (position - mean_position)) ** 2 for position, criterion, w in points
+    total_weight = sum(w for _, _, w in points)
+    mean_position = sum(w * position for position, _, w in points) / total_weight
+    mean_criterion = sum(w * criterion for _, criterion, w in points) / total_weight
+    position_sum_of_squares = sum(w * (position - mean_position) ** 2 for position, _, w in points)
+    slope = (
+        sum(w * (position - mean_position) * criterion for position, criterion, w in points) / position_sum_of_squares
     )
-    return _LineFit(slope, slope * math.sqrt(spread), chi_squared, len(points) - 2)
+    chi_squared = sum(
+        w * (criterion - mean_criterion - slope * (position - mean_position)) ** 2 for position, criterion, w in points
+    )
+    return _LineFit(slope, slope * math.sqrt(position_sum_of_squares), chi_squared, len(points) - 2)
 
 
-def _test_drift(points: Sequence[_Point], shared_dispersion: float, all_freedom: int) -> CriterionDrift:
-    """Slope of a session and its tests. shared_dispersion: dispersion of all sessions; all_freedom: its degrees of
-    freedom."""
+def _test_drift(points: Sequence[_Point], shared_dispersion: float, shared_degrees_of_freedom: int) -> CriterionDrift:
+    """Slope of a session and its tests. shared_dispersion: dispersion of all sessions (s0), with
+    `shared_degrees_of_freedom`."""
     fit = _fit_line(points)
-    freedom = fit.freedom + PRIOR_FREEDOM
-    dispersion = (fit.chi_squared + PRIOR_FREEDOM * shared_dispersion) / freedom
+    degrees_of_freedom = fit.degrees_of_freedom + PRIOR_DEGREES_OF_FREEDOM
+    dispersion = (fit.chi_squared + PRIOR_DEGREES_OF_FREEDOM * shared_dispersion) / degrees_of_freedom
     # In a study of one session the shared dispersion is its own: it adds no degrees of freedom.
-    freedom = min(freedom, all_freedom)
+    degrees_of_freedom = min(degrees_of_freedom, shared_degrees_of_freedom)
     z_without_a_run = [_fit_line([*points[:omitted], *points[omitted + 1 :]]).z for omitted in range(len(points))]
     return CriterionDrift(
         100.0 * fit.slope,
-        _two_sided_p(fit.z, dispersion, freedom),
-        max(_two_sided_p(z, dispersion, freedom) for z in z_without_a_run),
+        _compute_two_sided_p(fit.z, dispersion, degrees_of_freedom),
+        max(_compute_two_sided_p(z, dispersion, degrees_of_freedom) for z in z_without_a_run),
     )
 
 
-def _two_sided_p(z: float, dispersion: float, freedom: int) -> float:
+def _compute_two_sided_p(z: float, dispersion: float, degrees_of_freedom: int) -> float:
     """Two-sided p value. A dispersion of 1 or less counts as 1, a known value: normal test; above 1 it is estimated:
     Student's test. The p value jumps at 1. Student's test throughout would be continuous, but would detect far fewer
     drifts (docs/statistics.md)."""
     if dispersion <= 1.0:
         return 2.0 * NormalDist().cdf(-abs(z))
-    return float(2.0 * student.sf(abs(z) / math.sqrt(dispersion), freedom))
+    return float(2.0 * student.sf(abs(z) / math.sqrt(dispersion), degrees_of_freedom))
 
 
-def _criterion_variance(directions_shown: Sequence[int], correct: Sequence[bool]) -> float:
+def _compute_variance_without_bias(directions_shown: Sequence[int], correct: Sequence[bool]) -> float:
     """Variance of a run's criterion, computed for both directions at the run's overall share of right answers, as if
     there were no bias. With the rates of each direction, runs with a strong bias would get little weight."""
-    first = sum(direction == 1 for direction in directions_shown)
-    return criterion_variance(sum(correct), first, len(directions_shown) - first)
+    first_direction_count = sum(direction == 1 for direction in directions_shown)
+    return compute_criterion_variance(
+        sum(correct), first_direction_count, len(directions_shown) - first_direction_count
+    )

@@ -2,7 +2,7 @@
 
 The contrast is the threshold at one frequency minus that at another, by two analyses: the hierarchical model of all
 answers (dB, t interval over people) and the published one-way analysis (N, Tukey's interval). The protocol says which
-is primary; both are reported.
+is primary; both are reported. Called by `analysis.psychophysics.study_analysis`.
 """
 
 from collections.abc import Sequence
@@ -11,19 +11,19 @@ from typing import Literal
 
 from analysis.psychophysics.comparisons import Comparisons
 from analysis.psychophysics.hierarchy.primary import FAR_ABOVE_NOTE, PrimaryAnalysis
-from analysis.psychophysics.threshold_table import ThresholdTable, frequency_name
+from analysis.psychophysics.threshold_table import ThresholdTable, format_frequency
 from analysis.threshold_words import threshold_words
 from analysis.wording import capitalise, conjoin
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.staircase_rule import StaircaseRule
 
-NOT_CONVERGED = "The fit did not converge: do not use these numbers."
-TUKEY = "{means} in newtons, one-way; Tukey's interval and p, which hold for all pairs together."
-NO_MODEL = "The model needs answers of two participants, at two frequencies."
-NO_DIFFERENCE = (
+NOT_CONVERGED_NOTE = "The fit did not converge: do not use these numbers."
+TUKEY_NOTE = "{means} in newtons, one-way; Tukey's interval and p, which hold for all pairs together."
+NO_MODEL_NOTE = "The model needs answers of two participants, at two frequencies."
+NO_DIFFERENCE_NOTE = (
     "It needs two participants with enough answers at both frequencies, and differences that are not all equal."
 )
-NO_PAIR = "It needs thresholds at both frequencies, and a spread within frequencies."
+NO_PAIR_NOTE = "It needs thresholds at both frequencies, and a spread within frequencies."
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ class DeclaredResult:
     """Declared method of the interval; undeclared: the method that belongs to `primary`."""
 
 
-def declared_result(
+def compute_declared_result(
     declared: AnalysisSettings,
     primary: PrimaryAnalysis | None,
     comparisons: Comparisons,
@@ -75,19 +75,20 @@ def declared_result(
     left_out: Sequence[str],
     rule: StaircaseRule,
 ) -> DeclaredResult:
-    """The declared contrast by both analyses, the declared one first. primary: with the contrast of `declared`; None
-    without a fit. table: thresholds in newtons, from which `comparisons` come. rule: staircase rule of the runs."""
+    """Compute the declared contrast by both analyses, the declared one first. primary: with the contrast of `declared`;
+    None without a fit. table: thresholds in newtons, from which `comparisons` come. rule: staircase rule of the
+    runs."""
     results = []
     if declared.contrast_hz:
         pair_hz = (declared.contrast_hz[0], declared.contrast_hz[1])
         results = [
-            _contrast_by_model(pair_hz, primary, declared.primary == "hierarchical"),
-            _contrast_as_published(
+            _make_model_contrast(pair_hz, primary, declared.primary == "hierarchical"),
+            _make_published_contrast(
                 pair_hz,
                 comparisons,
                 table,
                 declared.primary == "published",
-                TUKEY.format(means=capitalise(threshold_words(rule).means)),
+                TUKEY_NOTE.format(means=capitalise(threshold_words(rule).means)),
             ),
         ]
         results.sort(key=lambda result: not result.declared)
@@ -104,36 +105,45 @@ def declared_result(
     )
 
 
-def _contrast_by_model(pair_hz: tuple[float, float], primary: PrimaryAnalysis | None, declared: bool) -> ContrastResult:
-    """The contrast by the hierarchical model, in dB; without values, and with the reason, where there is none."""
+def _make_model_contrast(
+    pair_hz: tuple[float, float], primary: PrimaryAnalysis | None, is_declared: bool
+) -> ContrastResult:
+    """Make the contrast by the hierarchical model, in dB; without values, and with the reason, where there is none."""
     contrast = primary.declared_contrast if primary is not None else None
     if primary is None or contrast is None:
-        people, reason = (0, NO_MODEL) if primary is None else (len(primary.persons), _no_contrast(pair_hz, primary))
-        return ContrastResult("hierarchical", declared, "dB", (people, people), None, None, None, None, (reason,))
+        participant_count, reason = (
+            (0, NO_MODEL_NOTE)
+            if primary is None
+            else (len(primary.persons), _explain_missing_contrast(pair_hz, primary))
+        )
+        return ContrastResult(
+            "hierarchical", is_declared, "dB", (participant_count, participant_count), None, None, None, None, (reason,)
+        )
     return ContrastResult(
         analysis="hierarchical",
-        declared=declared,
+        declared=is_declared,
         unit="dB",
         participants=(contrast.participants, contrast.participants),
         difference=contrast.difference_db,
         lower=contrast.lower_db,
         upper=contrast.upper_db,
         p=contrast.p,
-        notes=(*_cap_notes(pair_hz, primary), *(() if primary.converged else (NOT_CONVERGED,))),
+        notes=(*_describe_cap_effects(pair_hz, primary), *(() if primary.converged else (NOT_CONVERGED_NOTE,))),
     )
 
 
-def _no_contrast(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> str:
-    """Sentence on why the model gives no contrast."""
+def _explain_missing_contrast(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> str:
+    """Explain in a sentence why the model gives no contrast."""
     if set(pair_hz) <= set(primary.far_above_hz):
         return FAR_ABOVE_NOTE
-    missing = [f"{frequency_hz:g} Hz" for frequency_hz in pair_hz if frequency_hz in primary.missing_hz]
-    return f"There is no answer at {conjoin(missing)} yet." if missing else NO_DIFFERENCE
+    missing_frequencies = [f"{frequency_hz:g} Hz" for frequency_hz in pair_hz if frequency_hz in primary.missing_hz]
+    return f"There is no answer at {conjoin(missing_frequencies)} yet." if missing_frequencies else NO_DIFFERENCE_NOTE
 
 
-def _cap_notes(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> tuple[str, ...]:
-    """Notes on the interval of a contrast where a median lies above the cap. Such a median is known only to be high, so
-    the difference, first minus second, has a valid lower end for the first and a valid upper end for the second."""
+def _describe_cap_effects(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> tuple[str, ...]:
+    """Describe the limits of a contrast's interval where a median lies above the cap. Such a median is known only to be
+    high, so the difference, first minus second, has a valid lower end for the first and a valid upper end for the
+    second."""
     above_cap_hz = [
         median.frequency_hz for median in primary.medians if median.above_cap and median.frequency_hz in pair_hz
     ]
@@ -146,19 +156,22 @@ def _cap_notes(pair_hz: tuple[float, float], primary: PrimaryAnalysis) -> tuple[
     )
 
 
-def _contrast_as_published(
-    pair_hz: tuple[float, float], comparisons: Comparisons, table: ThresholdTable, declared: bool, first_note: str
+def _make_published_contrast(
+    pair_hz: tuple[float, float], comparisons: Comparisons, table: ThresholdTable, is_declared: bool, method_note: str
 ) -> ContrastResult:
-    """The contrast by the one-way analysis, in newtons, with Tukey's interval. first_note: first note."""
-    first, second = (frequency_name(frequency_hz) for frequency_hz in pair_hz)
-    groups = table.groups()
-    sizes = [sum(value is not None for value in groups.get(name, ())) for name in (first, second)]
-    people = (sizes[0], sizes[1])
-    notes = (first_note, *filter(None, [table.coverage]))
-    pair = next((pair for pair in comparisons.pairs if {pair.first, pair.second} == {first, second}), None)
+    """Make the contrast by the one-way analysis, in newtons, with Tukey's interval. method_note: note on the method,
+    which comes first. A note alone where the contrast is not determined."""
+    first_name, second_name = (format_frequency(frequency_hz) for frequency_hz in pair_hz)
+    groups = table.group_by_frequency()
+    participant_counts = [
+        sum(value is not None for value in groups.get(name, ())) for name in (first_name, second_name)
+    ]
+    participants = (participant_counts[0], participant_counts[1])
+    notes = (method_note, *filter(None, [table.coverage]))
+    pair = next((pair for pair in comparisons.pairs if {pair.first, pair.second} == {first_name, second_name}), None)
     if pair is None:
-        return ContrastResult("published", declared, "N", people, None, None, None, None, (NO_PAIR,))
+        return ContrastResult("published", is_declared, "N", participants, None, None, None, None, (NO_PAIR_NOTE,))
     # A pair is stored as its second group minus its first.
-    limits = (pair.lower, pair.upper) if pair.second == first else (-pair.upper, -pair.lower)
-    difference = pair.difference if pair.second == first else -pair.difference
-    return ContrastResult("published", declared, "N", people, difference, *limits, pair.p, notes)
+    limits = (pair.lower, pair.upper) if pair.second == first_name else (-pair.upper, -pair.lower)
+    difference = pair.difference if pair.second == first_name else -pair.difference
+    return ContrastResult("published", is_declared, "N", participants, difference, *limits, pair.p, notes)

@@ -4,7 +4,7 @@ Chance is 50 %, as for the choice of a direction, so the same staircase converge
 answers. Sensitivity is d' = (z(H) - z(F)) / sqrt(2). Direction thresholds are then given in dB above detection.
 
 Source of the two-interval sensitivity: N. A. Macmillan, C. D. Creelman, Detection Theory: A User's Guide, 2nd ed.
-(2005), chapter 7.
+(2005), chapter 7. Called by `analysis.psychophysics.study_analysis` for protocols with a detection phase.
 """
 
 import math
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from analysis.psychophysics.runs import recompute_runs
 from analysis.psychophysics.threshold_table import ThresholdTable
-from analysis.psychophysics.thresholds import Threshold, threshold_of
+from analysis.psychophysics.thresholds import Threshold, compute_run_threshold
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.procedure.run_rules import make_staircase_rule
 from protocols.procedure.staircase import to_db
@@ -32,24 +32,28 @@ class BelowDetection:
     """Detection threshold, N."""
 
 
-def detection_thresholds(trials: Iterable[Trial], protocol: StudyProtocol) -> tuple[Threshold, ...]:
-    """One row per detection run. `d_prime` is that of two intervals; criterion as in `analysis.psychophysics.bias`.
+def compute_detection_thresholds(trials: Iterable[Trial], protocol: StudyProtocol) -> tuple[Threshold, ...]:
+    """Compute the threshold of each detection run. `d_prime` is that of two intervals; criterion as in
+    `analysis.psychophysics.bias`.
 
     Raises InconsistentTrialsError (a ValueError) where the trials contradict the rule.
     """
     rule = make_staircase_rule(protocol, Phase.DETECTION)
-    rows = (threshold_of(run, rule) for run in recompute_runs(trials, rule, Phase.DETECTION))
+    thresholds = (compute_run_threshold(run, rule) for run in recompute_runs(trials, rule, Phase.DETECTION))
     # The decision depends on the difference of two intervals, whose variance is twice that of one.
-    return tuple(row if row.d_prime is None else replace(row, d_prime=row.d_prime / math.sqrt(2)) for row in rows)
+    return tuple(
+        threshold if threshold.d_prime is None else replace(threshold, d_prime=threshold.d_prime / math.sqrt(2))
+        for threshold in thresholds
+    )
 
 
-def above_detection(direction: ThresholdTable, detection: ThresholdTable) -> ThresholdTable:
-    """Direction thresholds in dB above the detection threshold of the same participant and frequency; None where either
-    is missing. Both tables in newtons. A value is marked as cut where the cap cut either threshold."""
+def compute_thresholds_above_detection(direction: ThresholdTable, detection: ThresholdTable) -> ThresholdTable:
+    """Express direction thresholds in dB above the detection threshold of the same participant and frequency; None
+    where either is missing. Both tables in newtons. A value is marked as cut where the cap cut either threshold."""
     rows_db, censored = [], []
     for subject, row, cut_flags in zip(direction.subjects, direction.values, direction.censored, strict=True):
         detection_cells = [
-            _detection_cell(detection, subject, frequency_hz) for frequency_hz in direction.frequencies_hz
+            _look_up_detection_threshold(detection, subject, frequency_hz) for frequency_hz in direction.frequencies_hz
         ]
         rows_db.append(
             tuple(
@@ -58,21 +62,23 @@ def above_detection(direction: ThresholdTable, detection: ThresholdTable) -> Thr
             )
         )
         censored.append(
-            tuple(threshold or is_cut for threshold, (_, is_cut) in zip(cut_flags, detection_cells, strict=True))
+            tuple(is_censored or is_cut for is_censored, (_, is_cut) in zip(cut_flags, detection_cells, strict=True))
         )
     return replace(direction, quantity="above_detection_db", values=tuple(rows_db), censored=tuple(censored), notes=())
 
 
-def _detection_cell(detection: ThresholdTable, subject: str, frequency_hz: float) -> tuple[float | None, bool]:
-    """Detection threshold (N; None where missing), and whether the cap cut it."""
+def _look_up_detection_threshold(
+    detection: ThresholdTable, subject: str, frequency_hz: float
+) -> tuple[float | None, bool]:
+    """Look up a detection threshold (N; None where missing), and whether the cap cut it."""
     if subject not in detection.subjects or frequency_hz not in detection.frequencies_hz:
         return None, False
     row, column = detection.subjects.index(subject), detection.frequencies_hz.index(frequency_hz)
     return detection.values[row][column], detection.censored[row][column]
 
 
-def directions_below_detection(direction: ThresholdTable, detection: ThresholdTable) -> tuple[BelowDetection, ...]:
-    """Participants and frequencies whose direction threshold lies below their detection threshold. Both tables in
+def find_directions_below_detection(direction: ThresholdTable, detection: ThresholdTable) -> tuple[BelowDetection, ...]:
+    """Find participants and frequencies whose direction threshold lies below their detection threshold. Both tables in
     newtons; direction thresholds that the cap cut are left out."""
     detection_n = {
         (subject, frequency_hz): threshold_n

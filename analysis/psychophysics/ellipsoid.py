@@ -10,7 +10,8 @@ Two definitions, both for a sinusoidal force of constant amplitude along a test 
   lock-in. Noise averages out, harmonics are excluded, and a phase difference between axes widens the ellipse.
 
 Frame: first axis = test direction; third = the device axis most nearly perpendicular to it, made perpendicular;
-second = third x first. For a direction in a plane of device axes the first two axes span that plane.
+second = third x first. For a direction in a plane of device axes the first two axes span that plane. Called by
+`study.workflows.results.analyze_data` and by the reproduction of the paper.
 """
 
 import math
@@ -24,9 +25,9 @@ from equalizer.signals.lockin import phasors
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 
-HARMONICS = 5
+MOST_HARMONICS = 5
 """Largest number of harmonics that are fitted, the fundamental included; only those below half the sample rate are."""
-ORTHONORMAL = 1e-3
+ORTHONORMALITY_TOLERANCE = 1e-3
 """Largest error of a rotation's R R' against the identity: allows entries written with three digits. By hand."""
 
 
@@ -67,7 +68,7 @@ class PhasorEllipse:
     """Amplitude perpendicular to the test direction over that along it; None if the latter is 0. The perpendicular
     amplitude is the root sum of squares of both axes."""
     harmonic_share: float
-    """Squared amplitudes of harmonics 2 to `HARMONICS`, summed over all axes, over those of the fundamental."""
+    """Squared amplitudes of harmonics 2 to `MOST_HARMONICS`, summed over all axes, over those of the fundamental."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +84,8 @@ class EllipsoidResult:
     phasor: PhasorEllipse
 
 
-def ellipsoids(recording: Recording, sensor_to_device: FloatArray | None = None) -> tuple[EllipsoidResult, ...]:
-    """One result per sinusoid of the recording, in the order played.
+def compute_ellipsoids(recording: Recording, sensor_to_device: FloatArray | None = None) -> tuple[EllipsoidResult, ...]:
+    """Compute one result per sinusoid of the recording, in the order played.
 
     The response must be acceleration in m/s^2 on three axes; meta["segments"] states frequency_hz, along and
     unit_vector (in the device's frame) of each sinusoidal segment. sensor_to_device: (3, 3) rotation from the sensor's
@@ -97,16 +98,18 @@ def ellipsoids(recording: Recording, sensor_to_device: FloatArray | None = None)
             f"an acceleration ellipsoid needs a response of 3 accelerations, not {response.samples.shape[1]} "
             f"channels of {response.quantity}"
         )
-    descriptions = _descriptions(recording)
+    descriptions = _read_segment_descriptions(recording)
     rotation = np.eye(3) if sensor_to_device is None else np.asarray(sensor_to_device, dtype=np.float64)
     results = []
-    for number, (segment, description) in enumerate(zip(recording.segments, descriptions, strict=True), start=1):
+    for segment_number, (segment, description) in enumerate(
+        zip(recording.segments, descriptions, strict=True), start=1
+    ):
         if segment.kind != "sine":
             continue
-        samples = response.samples[segment.start : segment.stop] @ rotation.T
-        if not np.isfinite(samples).all():
-            raise ValueError(f"segment {number} (sine): the response has missing values")
-        results.append(_segment_result(samples, recording.sample_rate_hz, segment, description))
+        acceleration_mps2 = response.samples[segment.start : segment.stop] @ rotation.T
+        if not np.isfinite(acceleration_mps2).all():
+            raise ValueError(f"segment {segment_number} (sine): the response has missing values")
+        results.append(_compute_segment_ellipsoid(acceleration_mps2, recording.sample_rate_hz, segment, description))
     if not results:
         raise ValueError(
             "the recording has no segment of kind sine, so there is no ellipsoid to compute; "
@@ -115,8 +118,9 @@ def ellipsoids(recording: Recording, sensor_to_device: FloatArray | None = None)
     return tuple(results)
 
 
-def sensor_frame(recording: Recording) -> FloatArray | None:
-    """(3, 3): rotation from the sensor's axes to the device's, as the recording states it; None if it states none.
+def read_sensor_frame(recording: Recording) -> FloatArray | None:
+    """Read the rotation (3, 3) from the sensor's axes to the device's, as the recording states it; None if it states
+    none.
 
     Raises ValueError where its rows are not orthonormal, which would distort every ellipse, and for a reflection, which
     would mirror it.
@@ -131,16 +135,17 @@ def sensor_frame(recording: Recording) -> FloatArray | None:
         raise ValueError("the sensor's frame is not a matrix of numbers") from error
     if rotation.shape != (3, 3):
         raise ValueError(f"the sensor's frame has the shape {rotation.shape}; it must be (3, 3)")
-    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=ORTHONORMAL):
+    if not np.allclose(rotation @ rotation.T, np.eye(3), atol=ORTHONORMALITY_TOLERANCE):
         raise ValueError("the sensor's frame is not a rotation: its rows must be perpendicular and of length 1")
     if np.linalg.det(rotation) < 0.0:
         raise ValueError("the sensor's frame is a reflection, not a rotation: an axis of it has the wrong sign")
     return rotation
 
 
-def direction_frame(unit_vector: FloatArray) -> FloatArray:
-    """(3, 3): the rows are the axes of the test direction's frame, so that frame @ v has the components of a vector v
-    of the device's frame. Raises ValueError unless unit_vector is (3,) and of norm 1 (within 0.1 %)."""
+def compute_direction_frame(unit_vector: FloatArray) -> FloatArray:
+    """Compute the matrix (3, 3) whose rows are the axes of the test direction's frame, so that frame @ v has the
+    components of a vector v of the device's frame. Raises ValueError unless unit_vector is (3,) and of norm 1 (within
+    0.1 %)."""
     first = np.asarray(unit_vector, dtype=np.float64)
     length = float(np.linalg.norm(first))
     if first.shape != (3,) or not math.isclose(length, 1.0, rel_tol=1e-3):
@@ -152,57 +157,59 @@ def direction_frame(unit_vector: FloatArray) -> FloatArray:
     return np.stack([first, np.cross(third, first), third])
 
 
-def moment_ellipsoid(samples: FloatArray) -> MomentEllipsoid:
-    """Ellipsoid of second moments. samples: (n, 3), m/s^2, in the test direction's frame; their mean is subtracted
-    (gravity, sensor offset). Raises ValueError where they are constant."""
-    centred = samples - samples.mean(axis=0)
-    mean_square = centred.T @ centred / len(centred)
-    eigenvalues, vectors = np.linalg.eigh(mean_square)
+def compute_moment_ellipsoid(samples: FloatArray) -> MomentEllipsoid:
+    """Compute the ellipsoid of second moments. samples: (n, 3), m/s^2, in the test direction's frame; their mean is
+    subtracted (gravity, sensor offset). Raises ValueError where they are constant."""
+    centred_mps2 = samples - samples.mean(axis=0)
+    mean_square = centred_mps2.T @ centred_mps2 / len(centred_mps2)
+    eigenvalues, eigenvectors = np.linalg.eigh(mean_square)
     if eigenvalues[-1] <= 0.0:
         raise ValueError("the response does not move at all: there is no ellipsoid")
-    axes = np.sqrt(np.maximum(eigenvalues[::-1], 0.0))
-    tilt_deg, turn_deg = _angles_deg(vectors[:, -1])
+    semi_axes_mps2 = np.sqrt(np.maximum(eigenvalues[::-1], 0.0))
+    tilt_deg, turn_deg = _compute_axis_angles_deg(eigenvectors[:, -1])
     return MomentEllipsoid(
         mean_square=tuple(tuple(float(value) for value in row) for row in mean_square),
-        semi_axes_mps2=(float(axes[0]), float(axes[1]), float(axes[2])),
+        semi_axes_mps2=(float(semi_axes_mps2[0]), float(semi_axes_mps2[1]), float(semi_axes_mps2[2])),
         tilt_deg=tilt_deg,
         turn_deg=turn_deg,
     )
 
 
-def phasor_ellipse(samples: FloatArray, sample_rate_hz: float, frequency_hz: float) -> PhasorEllipse:
-    """Ellipse of the acceleration's fundamental. samples: (n, 3), m/s^2, in the test direction's frame. Raises
-    ValueError for less than one period, or where nothing moves at this frequency."""
-    harmonics = max(1, min(HARMONICS, math.ceil(sample_rate_hz / 2 / frequency_hz) - 1))
-    tones = phasors(samples, sample_rate_hz, frequency_hz, harmonics)
-    fundamental = tones[0]
+def compute_phasor_ellipse(samples: FloatArray, sample_rate_hz: float, frequency_hz: float) -> PhasorEllipse:
+    """Compute the ellipse of the acceleration's fundamental. samples: (n, 3), m/s^2, in the test direction's frame.
+    Raises ValueError for less than one period, or where nothing moves at this frequency."""
+    harmonic_count = max(1, min(MOST_HARMONICS, math.ceil(sample_rate_hz / 2 / frequency_hz) - 1))
+    harmonic_phasors = phasors(samples, sample_rate_hz, frequency_hz, harmonic_count)
+    fundamental = harmonic_phasors[0]
     # Re(p exp(i phi)) over all phi is the image of the unit circle under the matrix [Re p, -Im p]: the semi-axes of
     # the ellipse are the singular values of that matrix, along its left singular vectors.
-    directions, axes, _ = np.linalg.svd(np.column_stack([fundamental.real, -fundamental.imag]), full_matrices=False)
-    if axes[0] <= 0.0:
+    directions, semi_axes_mps2, _ = np.linalg.svd(
+        np.column_stack([fundamental.real, -fundamental.imag]), full_matrices=False
+    )
+    if semi_axes_mps2[0] <= 0.0:
         raise ValueError("the response does not move at all: there is no ellipse")
-    tilt_deg, turn_deg = _angles_deg(directions[:, 0])
-    on_axis, off_axis = abs(fundamental[0]), float(np.linalg.norm(fundamental[1:]))
-    energy = np.sum(np.abs(tones) ** 2, axis=1)
+    tilt_deg, turn_deg = _compute_axis_angles_deg(directions[:, 0])
+    on_axis_mps2, off_axis_mps2 = abs(fundamental[0]), float(np.linalg.norm(fundamental[1:]))
+    squared_amplitudes = np.sum(np.abs(harmonic_phasors) ** 2, axis=1)
     return PhasorEllipse(
-        semi_axes_mps2=(float(axes[0]), float(axes[1])),
+        semi_axes_mps2=(float(semi_axes_mps2[0]), float(semi_axes_mps2[1])),
         tilt_deg=tilt_deg,
         turn_deg=turn_deg,
-        ellipticity=float(axes[1] / axes[0]),
-        on_axis_mps2=float(on_axis),
-        off_axis_ratio=float(off_axis / on_axis) if on_axis > 0 else None,
-        harmonic_share=float(energy[1:].sum() / energy[0]),
+        ellipticity=float(semi_axes_mps2[1] / semi_axes_mps2[0]),
+        on_axis_mps2=float(on_axis_mps2),
+        off_axis_ratio=float(off_axis_mps2 / on_axis_mps2) if on_axis_mps2 > 0 else None,
+        harmonic_share=float(squared_amplitudes[1:].sum() / squared_amplitudes[0]),
     )
 
 
-def _segment_result(
+def _compute_segment_ellipsoid(
     samples: FloatArray, sample_rate_hz: float, segment: Segment, description: dict[str, Any]
 ) -> EllipsoidResult:
-    """Result of one segment. samples: (n, 3), m/s^2, in the device's frame. description: its entry of
+    """Compute the result of one segment. samples: (n, 3), m/s^2, in the device's frame. description: its entry of
     meta["segments"]."""
     frequency_hz = float(description["frequency_hz"])
-    in_frame = samples @ direction_frame(np.asarray(description["unit_vector"], dtype=np.float64)).T
-    whole_periods = int(len(in_frame) * frequency_hz / sample_rate_hz + 1e-9)
+    frame_samples = samples @ compute_direction_frame(np.asarray(description["unit_vector"], dtype=np.float64)).T
+    whole_periods = int(len(frame_samples) * frequency_hz / sample_rate_hz + 1e-9)
     if whole_periods < 1:
         raise ValueError(f"the sinusoid of {frequency_hz:g} Hz is shorter than one period")
     return EllipsoidResult(
@@ -210,30 +217,32 @@ def _segment_result(
         along=str(description["along"]),
         amplitude_n=segment.amplitude,
         # Only whole periods: a partial period would bias the mean squares.
-        moments=moment_ellipsoid(in_frame[: round(whole_periods * sample_rate_hz / frequency_hz)]),
-        phasor=phasor_ellipse(in_frame, sample_rate_hz, frequency_hz),
+        moments=compute_moment_ellipsoid(frame_samples[: round(whole_periods * sample_rate_hz / frequency_hz)]),
+        phasor=compute_phasor_ellipse(frame_samples, sample_rate_hz, frequency_hz),
     )
 
 
-def _descriptions(recording: Recording) -> Sequence[dict[str, Any]]:
-    """The entries of meta["segments"]. Raises ValueError unless there is a complete one for every sinusoid."""
+def _read_segment_descriptions(recording: Recording) -> Sequence[dict[str, Any]]:
+    """Read the entries of meta["segments"]. Raises ValueError unless there is a complete one for every sinusoid."""
     descriptions = recording.meta.get("segments")
     if not isinstance(descriptions, Sequence) or len(descriptions) != len(recording.segments):
         raise ValueError(
             'meta["segments"] must describe each of the '
             f"{len(recording.segments)} segments in order (frequency_hz, along, unit_vector)"
         )
-    for number, (segment, description) in enumerate(zip(recording.segments, descriptions, strict=True), start=1):
-        missing = [key for key in ("frequency_hz", "along", "unit_vector") if key not in description]
-        if segment.kind == "sine" and missing:
-            raise ValueError(f'meta["segments"]: segment {number} (sine) lacks {", ".join(missing)}')
+    for segment_number, (segment, description) in enumerate(
+        zip(recording.segments, descriptions, strict=True), start=1
+    ):
+        missing_keys = [key for key in ("frequency_hz", "along", "unit_vector") if key not in description]
+        if segment.kind == "sine" and missing_keys:
+            raise ValueError(f'meta["segments"]: segment {segment_number} (sine) lacks {", ".join(missing_keys)}')
     return descriptions
 
 
-def _angles_deg(axis: FloatArray) -> tuple[float, float]:
-    """Tilt of an axis (a line without sign) from the first axis, and its signed angle when projected on the first two
-    axes, both in degrees. axis: (3,)"""
-    tilt = math.degrees(math.atan2(float(np.linalg.norm(axis[1:])), abs(float(axis[0]))))
+def _compute_axis_angles_deg(axis: FloatArray) -> tuple[float, float]:
+    """Compute the tilt of an axis (a line without sign) from the first axis, and its signed angle when projected on the
+    first two axes, both in degrees. axis: (3,)"""
+    tilt_deg = math.degrees(math.atan2(float(np.linalg.norm(axis[1:])), abs(float(axis[0]))))
     sign = 1.0 if axis[0] >= 0 else -1.0
-    turn = math.degrees(math.atan2(sign * float(axis[1]), sign * float(axis[0])))
-    return tilt, turn
+    turn_deg = math.degrees(math.atan2(sign * float(axis[1]), sign * float(axis[0])))
+    return tilt_deg, turn_deg

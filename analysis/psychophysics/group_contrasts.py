@@ -6,7 +6,7 @@ values is 0 where both have the same variance. Values are thresholds, or pseudo-
 
 Sources: S. Holm, Scand. J. Stat. 6 (1979), 65-70; D. J. Schuirmann, J. Pharmacokinet. Biopharm. 15 (1987), 657-680 (two
 one-sided tests); E. J. G. Pitman, Biometrika 31 (1939), 9-12 and W. A. Morgan, Biometrika 31 (1939), 13-19 (equal
-spread of paired values).
+spread of paired values). Called by `study_analysis`, `hierarchy.primary` and the simulated studies of `power`.
 """
 
 import math
@@ -69,44 +69,51 @@ class MeanErrors:
     """Degrees of freedom for Student's t."""
 
 
-def mean_errors(values: FloatArray, has_answers: NDArray[np.bool_]) -> MeanErrors:
-    """Standard errors of the means of pseudo-values. values: (n, m), a row per person; has_answers: (n, m), True where
-    the value rests on answers of the person there, False where it rests only on answers at other frequencies.
+def compute_mean_errors(values: FloatArray, has_answers: NDArray[np.bool_]) -> MeanErrors:
+    """Compute standard errors of the means of pseudo-values. values: (n, m), a row per person; has_answers: (n, m),
+    True where the value rests on answers of the person there, False where it rests only on answers at other
+    frequencies.
 
     Where all have answers this is s / sqrt(n) with n - 1 degrees of freedom. Otherwise the variances of both groups
     add, with the degrees of freedom of F. E. Satterthwaite, Biometrics Bull. 2 (1946), 110-114: the estimate depends
     mostly on the few people with answers, so that their number counts, not that of all.
     """
-    n = len(values)
+    person_count = len(values)
     people = has_answers.sum(axis=0)
-    squares = ((values - values.mean(axis=0)) / n) ** 2
+    squared_deviations = ((values - values.mean(axis=0)) / person_count) ** 2
     answered_df = np.maximum(people - 1, 1)
-    answered_variance = np.sum(squares * has_answers, axis=0) * people / answered_df
-    unanswered_variance, unanswered_df = np.sum(squares * ~has_answers, axis=0), np.maximum(n - people, 1)
+    answered_variance = np.sum(squared_deviations * has_answers, axis=0) * people / answered_df
+    unanswered_variance, unanswered_df = (
+        np.sum(squared_deviations * ~has_answers, axis=0),
+        np.maximum(person_count - people, 1),
+    )
     error = np.where(
-        people == n, values.std(axis=0, ddof=1) / math.sqrt(n), np.sqrt(answered_variance + unanswered_variance)
+        people == person_count,
+        values.std(axis=0, ddof=1) / math.sqrt(person_count),
+        np.sqrt(answered_variance + unanswered_variance),
     )
     # Where all values are equal both variances are 0, and df stays that of the people with answers.
     df_denominator = answered_variance**2 / answered_df + unanswered_variance**2 / unanswered_df
-    df = np.where(people == n, n - 1.0, answered_df)
+    df = np.where(people == person_count, person_count - 1.0, answered_df)
     df = np.divide(
         (answered_variance + unanswered_variance) ** 2,
         df_denominator,
         out=df,
-        where=(people < n) & (df_denominator > 0),
+        where=(people < person_count) & (df_denominator > 0),
     )
     return MeanErrors(people, np.where(people < 2, math.inf, error), df)
 
 
-def contrasts(
+def compute_contrasts(
     frequencies_hz: Sequence[float],
     values_db: FloatArray,
     confidence: float,
     has_answers: NDArray[np.bool_] | None = None,
 ) -> tuple[Contrast, ...]:
-    """Contrasts of each frequency against the first. values_db: (n, k), NaN for a gap. Contrasts with fewer than two
-    participants, or with the same difference in all, are left out, but count in Holm's family: its size is planned, not
-    chosen by the data. has_answers: (n, k), for pseudo-values, which have no gaps; see `mean_errors`."""
+    """Compute the contrasts of each frequency against the first. values_db: (n, k), NaN for a gap. Contrasts with fewer
+    than two participants, or with the same difference in all, are left out, but count in Holm's family: its size is
+    planned, not chosen by the data. has_answers: (n, k), for pseudo-values, which have no gaps; see
+    `compute_mean_errors`."""
     has_answers = np.isfinite(values_db) if has_answers is None else has_answers
     pairs = []
     for index in range(1, len(frequencies_hz)):
@@ -118,51 +125,53 @@ def contrasts(
         )
         if answered_both.sum() >= 2 and np.ptp(paired_db[:, 1] - paired_db[:, 0]) > ROUNDING_DB:
             pairs.append((frequencies_hz[index], _Pair(paired_db, answered_both)))
-    corrected = holm_correction([pair.p for _, pair in pairs], len(frequencies_hz) - 1)
+    corrected_p_values = apply_holm_correction([pair.p for _, pair in pairs], len(frequencies_hz) - 1)
     return tuple(
-        _compute_contrast(frequency, frequencies_hz[0], pair, p_holm, confidence)
-        for (frequency, pair), p_holm in zip(pairs, corrected, strict=True)
+        _compute_contrast(frequency_hz, frequencies_hz[0], pair, p_holm, confidence)
+        for (frequency_hz, pair), p_holm in zip(pairs, corrected_p_values, strict=True)
     )
 
 
-def pair_contrast(
+def compute_pair_contrast(
     frequencies_hz: Sequence[float],
     values_db: FloatArray,
     pair_hz: Sequence[float],
     confidence: float,
     has_answers: NDArray[np.bool_] | None = None,
 ) -> Contrast | None:
-    """Contrast of the first frequency of the pair minus the second. values_db, has_answers: (n, k), as for `contrasts`.
+    """Compute the contrast of the first frequency of the pair minus the second. values_db, has_answers: (n, k), as for
+    `compute_contrasts`.
 
-    None without a pair, where one of the two was not played, and where `contrasts` leaves it out. The family has one
-    test, so that `p_holm` equals `p`.
-    """
+    None without a pair, where one of the two was not played, and where `compute_contrasts` leaves it out. The family
+    has one test, so that `p_holm` equals `p`."""
     if len(pair_hz) != 2 or not set(pair_hz) <= set(frequencies_hz):
         return None
     first, second = (list(frequencies_hz).index(frequency_hz) for frequency_hz in pair_hz)
     columns = [second, first]
     pair_has_answers = None if has_answers is None else has_answers[:, columns]
-    return next(iter(contrasts((pair_hz[1], pair_hz[0]), values_db[:, columns], confidence, pair_has_answers)), None)
+    return next(
+        iter(compute_contrasts((pair_hz[1], pair_hz[0]), values_db[:, columns], confidence, pair_has_answers)), None
+    )
 
 
-def holm_correction(p_values: Sequence[float], planned: int | None = None) -> tuple[float, ...]:
-    """p values with Holm's step-down correction, in the order given. planned: size of the family, including tests
+def apply_holm_correction(p_values: Sequence[float], planned: int | None = None) -> tuple[float, ...]:
+    """Correct p values by Holm's step-down method; in the order given. planned: size of the family, including tests
     without a p value, which rank last; None: the number of p values."""
-    size = len(p_values) if planned is None else planned
-    corrected, largest = [0.0] * len(p_values), 0.0
+    family_size = len(p_values) if planned is None else planned
+    corrected_p_values, largest_p = [0.0] * len(p_values), 0.0
     for rank, index in enumerate(sorted(range(len(p_values)), key=lambda i: p_values[i])):
-        largest = max(largest, min(1.0, (size - rank) * p_values[index]))
-        corrected[index] = largest
-    return tuple(corrected)
+        largest_p = max(largest_p, min(1.0, (family_size - rank) * p_values[index]))
+        corrected_p_values[index] = largest_p
+    return tuple(corrected_p_values)
 
 
 class _Pair:
     """Values (n, 2) in dB at two frequencies, with mean, standard error, degrees of freedom and p value of their
-    differences, second minus first. answered_both: (n,), `has_answers` of `mean_errors`."""
+    differences, second minus first. answered_both: (n,), `has_answers` of `compute_mean_errors`."""
 
     def __init__(self, paired_db: FloatArray, answered_both: NDArray[np.bool_]) -> None:
         self.paired_db, self.differences = paired_db, paired_db[:, 1] - paired_db[:, 0]
-        errors = mean_errors(self.differences[:, None], answered_both[:, None])
+        errors = compute_mean_errors(self.differences[:, None], answered_both[:, None])
         self.people, self.all_answered = int(errors.people[0]), bool(answered_both.all())
         self.mean, self.error, self.df = float(self.differences.mean()), float(errors.error[0]), float(errors.df[0])
         self.p = float(2.0 * student.sf(abs(self.mean) / self.error, self.df))
@@ -171,9 +180,9 @@ class _Pair:
 def _compute_contrast(
     frequency_hz: float, against_hz: float, pair: _Pair, p_holm: float, confidence: float
 ) -> Contrast:
-    """The contrast of a pair, with its interval at this confidence and its further tests."""
+    """Compute the contrast of a pair, with its interval at this confidence and its further tests."""
     half_width = float(student.ppf(0.5 + confidence / 2, pair.df)) * pair.error
-    p_equivalence = _equivalence_p(pair.mean, pair.error, pair.df)
+    p_equivalence = _compute_equivalence_p(pair.mean, pair.error, pair.df)
     return Contrast(
         frequency_hz=frequency_hz,
         against_hz=against_hz,
@@ -191,6 +200,6 @@ def _compute_contrast(
     )
 
 
-def _equivalence_p(mean_db: float, error_db: float, df: float, margin_db: float = EQUIVALENCE_DB) -> float:
-    """p value of Schuirmann's two one-sided t tests: the larger of the two."""
+def _compute_equivalence_p(mean_db: float, error_db: float, df: float, margin_db: float = EQUIVALENCE_DB) -> float:
+    """Compute the p value of Schuirmann's two one-sided t tests: the larger of the two."""
     return float(student.sf((margin_db - abs(mean_db)) / error_db, df))

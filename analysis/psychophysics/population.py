@@ -36,7 +36,9 @@ def split_by_population(trials: Iterable[Trial]) -> dict[Population, tuple[Trial
 def _population_of(subject: str, session: str, rows: list[Trial]) -> Population:
     """Population of one session, whose trials are `rows`; raises ValueError where they disagree."""
     # Only answered trials count, if there are any: `felt` may not be known yet for a trial without an answer.
-    kinds = {_trial_population(trial) for trial in rows if trial.counts} or {_trial_population(trial) for trial in rows}
+    kinds = {_trial_population(trial) for trial in rows if trial.is_valid} or {
+        _trial_population(trial) for trial in rows
+    }
     if len(kinds) > 1:
         kind_names = " and ".join(kind.value for kind in Population if kind in kinds)
         raise ValueError(

@@ -2,7 +2,8 @@
 Friedman's rank test.
 
 Every participant takes every frequency (condition), so that differences between participants are removed from the error
-term: F = (SS_conditions / (k - 1)) / (SS_error / ((n - 1) (k - 1))). Participants with a missing value are left out.
+term: F = (SS_conditions / (k - 1)) / (SS_error / ((n - 1) (k - 1))) for n participants and k conditions. Participants
+with a missing value are left out. Called by `study_analysis` and by the primary analysis (`hierarchy.primary`).
 
 Source: S. W. Greenhouse, S. Geisser, Psychometrika 24 (1959), 95-112; effect size: S. Olejnik, J. Algina,
 Psychol. Methods 8 (2003), 434-447 (generalized eta squared); H. Huynh, L. S. Feldt, J. Educ. Stat. 1 (1976), 69-82;
@@ -18,14 +19,14 @@ import numpy as np
 from scipy.stats import chi2, friedmanchisquare
 from scipy.stats import f as f_distribution
 
-from analysis.psychophysics.anova import is_rounding
+from analysis.psychophysics.anova import is_rounding_error
 from equalizer.signals.signal import FloatArray
 
 
 @dataclass(frozen=True, slots=True)
-class Friedman:
-    """Friedman's test, which uses only the ranks within each participant: neither the scale nor the distance of a value
-    from the cap matters. Results are None where the test is impossible; `notes` say why."""
+class FriedmanTest:
+    """Result of Friedman's test, which uses only the ranks within each participant and therefore does not depend on the
+    scale of the values. Results are None where the test is impossible; `notes` say why."""
 
     participants: int
     """Number of participants without a missing value."""
@@ -39,7 +40,7 @@ class Friedman:
     notes: tuple[str, ...]
 
 
-def friedman(values: Sequence[Sequence[float | None]]) -> Friedman:
+def compute_friedman_test(values: Sequence[Sequence[float | None]]) -> FriedmanTest:
     """Friedman's test of values[subject][condition]; rows with None, NaN or infinity are left out."""
     rows = np.array(
         [row for row in values if all(value is not None and math.isfinite(value) for value in row)], dtype=np.float64
@@ -53,11 +54,11 @@ def friedman(values: Sequence[Sequence[float | None]]) -> Friedman:
     elif np.all(rows == rows[:, :1]):
         reason = "Every participant has the same value in all conditions, so there are no ranks to compare."
     if reason:
-        return Friedman(len(rows), None, None, None, None, (reason,))
+        return FriedmanTest(len(rows), None, None, None, None, (reason,))
     result = friedmanchisquare(*rows.T)
     df = conditions - 1
     chi_squared = float(result.statistic)
-    return Friedman(len(rows), chi_squared, df, float(result.pvalue), chi_squared / (len(rows) * df), ())
+    return FriedmanTest(len(rows), chi_squared, df, float(result.pvalue), chi_squared / (len(rows) * df), ())
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,8 +100,9 @@ class RepeatedMeasures:
     """p-value of Mauchly's test; small where sphericity is violated."""
 
 
-def repeated_measures(subjects: Sequence[str], values: Sequence[Sequence[float | None]]) -> RepeatedMeasures:
-    """Analysis of values[subject][condition], any unit; None, NaN and infinity count as missing."""
+def analyse_repeated_measures(subjects: Sequence[str], values: Sequence[Sequence[float | None]]) -> RepeatedMeasures:
+    """Repeated-measures analysis of variance of values[subject][condition], any unit; None, NaN and infinity count as
+    missing. subjects: names, one per row."""
     complete = [all(value is not None and math.isfinite(value) for value in row) for row in values]
     left_out = tuple(subject for subject, is_complete in zip(subjects, complete, strict=True) if not is_complete)
     conditions = len(values[0]) if values else 0
@@ -108,19 +110,20 @@ def repeated_measures(subjects: Sequence[str], values: Sequence[Sequence[float |
     notes = [f"Left out because a value is missing: {', '.join(left_out)}."] if left_out else []
     if len(rows) < 2:
         notes.append(f"The analysis within participants needs two who have every condition; there are {len(rows)}.")
-        return _empty_analysis(len(rows), left_out, conditions, notes)
+        return _make_empty_analysis(len(rows), left_out, conditions, notes)
     if conditions < 2:
         notes.append(f"The analysis within participants needs two conditions; there are {conditions}.")
-        return _empty_analysis(len(rows), left_out, conditions, notes)
-    ss_conditions, ss_participants, ss_error = _sums_of_squares(rows)
-    if is_rounding(ss_error, rows):
+        return _make_empty_analysis(len(rows), left_out, conditions, notes)
+    ss_conditions, ss_participants, ss_error = _compute_sums_of_squares(rows)
+    if is_rounding_error(ss_error, rows):
         notes.append("All participants change alike over the conditions, so there is no error to compare with.")
-        return _empty_analysis(len(rows), left_out, conditions, notes)
+        return _make_empty_analysis(len(rows), left_out, conditions, notes)
     return _compute_analysis(rows, left_out, (ss_conditions, ss_participants, ss_error), notes)
 
 
-def greenhouse_geisser(rows: FloatArray) -> float:
-    """Epsilon from the double-centred covariance of the conditions. rows: (participants, conditions)."""
+def compute_greenhouse_geisser_epsilon(rows: FloatArray) -> float:
+    """Greenhouse and Geisser's epsilon, from the double-centred covariance of the conditions. rows: (participants,
+    conditions)."""
     k = int(rows.shape[1])
     covariance = np.cov(rows, rowvar=False)
     centred = covariance - covariance.mean(axis=0) - covariance.mean(axis=1)[:, None] + covariance.mean()
@@ -128,25 +131,25 @@ def greenhouse_geisser(rows: FloatArray) -> float:
     return min(1.0, max(1.0 / (k - 1), epsilon))
 
 
-def huynh_feldt(epsilon: float, participants: int, conditions: int) -> float:
+def compute_huynh_feldt_epsilon(epsilon: float, participants: int, conditions: int) -> float:
     """Huynh and Feldt's epsilon from Greenhouse and Geisser's. It may exceed 1; the caller limits it to 1."""
     n, df = participants, conditions - 1
     return (n * df * epsilon - 2.0) / (df * (n - 1.0 - df * epsilon))
 
 
-def mauchly(rows: FloatArray) -> tuple[float, float] | None:
+def compute_mauchly_test(rows: FloatArray) -> tuple[float, float] | None:
     """W and p of Mauchly's test of sphericity. rows: (participants, conditions). None for two conditions, or where the
     covariance of the contrasts is singular."""
     n, k = rows.shape
     p = k - 1
     if p < 2 or n - 1 < p:
         return None
-    # Orthonormal contrasts: an orthogonal basis of which the constant vector is left out.
+    # Orthonormal contrasts: an orthonormal basis without the constant vector.
     contrasts = np.linalg.qr(np.column_stack([np.ones(k), np.eye(k)[:, 1:]]))[0][:, 1:]
-    values = np.linalg.eigvalsh(np.cov(rows @ contrasts, rowvar=False))
-    if values[0] <= 0:
+    eigenvalues = np.linalg.eigvalsh(np.cov(rows @ contrasts, rowvar=False))
+    if eigenvalues[0] <= 0:
         return None
-    w = float(np.exp(np.log(values).sum() - p * np.log(values.mean())))
+    w = float(np.exp(np.log(eigenvalues).sum() - p * np.log(eigenvalues.mean())))
     # Chi-squared approximation with Anderson's second-order term.
     df = p * (p + 1) // 2 - 1
     scale = (n - 1) - (2 * p**2 + p + 2) / (6 * p)
@@ -156,7 +159,7 @@ def mauchly(rows: FloatArray) -> tuple[float, float] | None:
     return w, min(1.0, p_first_order + correction * (float(chi2.sf(chi_squared, df + 4)) - p_first_order))
 
 
-def _sums_of_squares(rows: FloatArray) -> tuple[float, float, float]:
+def _compute_sums_of_squares(rows: FloatArray) -> tuple[float, float, float]:
     """Sums of squares of conditions, participants and error. rows: (participants, conditions)."""
     n, k = rows.shape
     by_condition = rows.mean(axis=0) - rows.mean()
@@ -166,16 +169,18 @@ def _sums_of_squares(rows: FloatArray) -> tuple[float, float, float]:
 
 
 def _compute_analysis(
-    rows: FloatArray, left_out: tuple[str, ...], sums: tuple[float, float, float], notes: list[str]
+    rows: FloatArray, left_out: tuple[str, ...], sums_of_squares: tuple[float, float, float], notes: list[str]
 ) -> RepeatedMeasures:
-    """The analysis of complete rows (n, k). sums: of squares, as by `_sums_of_squares`, with an error above 0."""
-    (n, k), (ss_conditions, ss_participants, ss_error) = rows.shape, sums
+    """The analysis of complete rows (n, k). sums_of_squares: of conditions, participants and error (above 0)."""
+    (n, k), (ss_conditions, ss_participants, ss_error) = rows.shape, sums_of_squares
     df_conditions, df_error = k - 1, (n - 1) * (k - 1)
     f = (ss_conditions / df_conditions) / (ss_error / df_error)
-    epsilon = greenhouse_geisser(rows)
+    epsilon = compute_greenhouse_geisser_epsilon(rows)
     # Otherwise the denominator of Huynh and Feldt's epsilon is not positive.
-    corrected = min(1.0, huynh_feldt(epsilon, n, k)) if n - 1 > df_conditions * epsilon else 1.0
-    sphericity = mauchly(rows)
+    epsilon_huynh_feldt = (
+        min(1.0, compute_huynh_feldt_epsilon(epsilon, n, k)) if n - 1 > df_conditions * epsilon else 1.0
+    )
+    sphericity = compute_mauchly_test(rows)
     return RepeatedMeasures(
         participants=n,
         left_out=left_out,
@@ -193,17 +198,17 @@ def _compute_analysis(
         partial_eta_squared=ss_conditions / (ss_conditions + ss_error),
         generalized_eta_squared=ss_conditions / (ss_conditions + ss_participants + ss_error),
         notes=tuple(notes),
-        epsilon_huynh_feldt=corrected,
-        p_huynh_feldt=float(f_distribution.sf(f, corrected * df_conditions, corrected * df_error)),
+        epsilon_huynh_feldt=epsilon_huynh_feldt,
+        p_huynh_feldt=float(f_distribution.sf(f, epsilon_huynh_feldt * df_conditions, epsilon_huynh_feldt * df_error)),
         mauchly_w=sphericity[0] if sphericity else None,
         mauchly_p=sphericity[1] if sphericity else None,
     )
 
 
-def _empty_analysis(
+def _make_empty_analysis(
     participants: int, left_out: tuple[str, ...], conditions: int, notes: list[str]
 ) -> RepeatedMeasures:
-    """A result without numbers; the last of `notes` says why."""
+    """The result of an analysis that is impossible; the last of `notes` says why."""
     return RepeatedMeasures(
         participants=participants,
         left_out=left_out,

@@ -77,7 +77,7 @@ def recompute_runs(
 def _recompute(rows: list[Trial], rule: StaircaseRule, rove_db: float) -> Run:
     """The run of these rows, at least one, of one subject, session and run number."""
     first = rows[0]
-    valid_trials = tuple(sorted((trial for trial in rows if trial.counts), key=lambda trial: trial.trial))
+    valid_trials = tuple(sorted((trial for trial in rows if trial.is_valid), key=lambda trial: trial.trial))
     _refuse_inconsistent_rows(rows, valid_trials)
     state = _replay_answers(valid_trials, rule, rove_db)
     staircase_trials = [trial for trial in rows if trial.phase is not Phase.CATCH]

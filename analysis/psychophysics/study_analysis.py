@@ -11,29 +11,34 @@ from typing import Any
 
 import numpy as np
 
-from analysis.psychophysics.anova import OneWayAnova, one_way_anova
+from analysis.psychophysics.anova import OneWayAnova, compute_one_way_anova
 from analysis.psychophysics.catch_trials import CatchTally, catch_tallies
 from analysis.psychophysics.comparisons import Comparisons, compare_all
-from analysis.psychophysics.cues.cue_findings import CueFinding, cue_findings, cue_warnings
-from analysis.psychophysics.cues.delivered_cues import CueGap, cue_gaps
-from analysis.psychophysics.declared_result import DeclaredResult, declared_result
-from analysis.psychophysics.detection import detection_thresholds
-from analysis.psychophysics.equalized_delivery import deliveries, delivery_warning
-from analysis.psychophysics.group_contrasts import Contrast, contrasts
+from analysis.psychophysics.cues.cue_findings import CueFinding, compute_cue_findings, make_cue_warnings
+from analysis.psychophysics.cues.delivered_cues import CueGap, find_cue_gaps
+from analysis.psychophysics.declared_result import DeclaredResult, compute_declared_result
+from analysis.psychophysics.detection import compute_detection_thresholds
+from analysis.psychophysics.equalized_delivery import compute_deliveries, make_delivery_warning
+from analysis.psychophysics.group_contrasts import Contrast, compute_contrasts
 from analysis.psychophysics.hierarchy.answers import count_answers
-from analysis.psychophysics.hierarchy.primary import CONFIDENCE, PrimaryAnalysis, primary_analysis
+from analysis.psychophysics.hierarchy.primary import CONFIDENCE, PrimaryAnalysis, compute_primary_analysis
 from analysis.psychophysics.hierarchy.single_persons import SinglePersons, fit_single_persons
 from analysis.psychophysics.population import Population, split_by_population
-from analysis.psychophysics.repeated_measures import Friedman, RepeatedMeasures, friedman, repeated_measures
+from analysis.psychophysics.repeated_measures import (
+    FriedmanTest,
+    RepeatedMeasures,
+    analyse_repeated_measures,
+    compute_friedman_test,
+)
 from analysis.psychophysics.repeated_trials import repeat_warning
 from analysis.psychophysics.runs import Run, recompute_runs
-from analysis.psychophysics.study_warnings import side_warnings, study_warnings
-from analysis.psychophysics.threshold_table import ThresholdTable, threshold_table
-from analysis.psychophysics.thresholds import Threshold, threshold_of
-from analysis.psychophysics.tobit import tobit_contrasts
-from analysis.psychophysics.two_analyses import comparison_text, declaration_text
+from analysis.psychophysics.study_warnings import list_catch_and_detection_warnings, list_study_warnings
+from analysis.psychophysics.threshold_table import ThresholdTable, tabulate_thresholds
+from analysis.psychophysics.thresholds import Threshold, compute_run_threshold
+from analysis.psychophysics.tobit import compute_tobit_contrasts
+from analysis.psychophysics.two_analyses import describe_comparison, describe_declaration
 from analysis.wording import format_f_text, format_p_text
-from equalizer.signals.summary import Summarised, Summary
+from equalizer.signals.summary import Summary, SummaryDisplay
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.procedure.practice import PracticeState, count_right_of_last, is_practice_over, is_practice_passed
 from protocols.trial import Phase, Trial
@@ -72,7 +77,7 @@ def evaluate_practice_runs(trials: Iterable[Trial], protocol: StudyProtocol) -> 
 
 def _evaluate_practice_run(rows: list[Trial], protocol: StudyProtocol) -> PracticeRun:
     first, settings = rows[0], protocol.practice
-    valid_trials = sorted((trial for trial in rows if trial.counts), key=lambda trial: trial.trial)
+    valid_trials = sorted((trial for trial in rows if trial.is_valid), key=lambda trial: trial.trial)
     state = PracticeState(tuple(bool(trial.correct) for trial in valid_trials))
     return PracticeRun(
         subject=first.subject,
@@ -88,7 +93,7 @@ def _evaluate_practice_run(rows: list[Trial], protocol: StudyProtocol) -> Practi
 
 
 @dataclass(frozen=True, repr=False, slots=True)
-class StudyAnalysis(Summarised):
+class StudyAnalysis(SummaryDisplay):
     """Thresholds and statistics of one study's trials, of one population."""
 
     protocol: StudyProtocol
@@ -103,7 +108,7 @@ class StudyAnalysis(Summarised):
     anova: OneWayAnova
     comparisons: Comparisons
     within: RepeatedMeasures
-    ranks: Friedman
+    ranks: FriedmanTest
     difference: str
     """Difference between the published one-way analysis and the analysis within participants, in words."""
     primary: PrimaryAnalysis | None
@@ -134,7 +139,7 @@ class StudyAnalysis(Summarised):
         return Summary(
             f"{len(table.subjects)} participants, {len(self.runs)} runs, {len(self.trials)} trials",
             (
-                *((name, _format_mean(values)) for name, values in table.groups().items()),
+                *((name, _format_mean(values)) for name, values in table.group_by_frequency().items()),
                 *(("warning", warning) for warning in self.warnings),
             ),
         )
@@ -155,34 +160,33 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol, left_out: Se
     """
     population, rule = _find_single_population(trials), protocol.staircase
     runs = recompute_runs(trials, rule, rove_db=protocol.stimulus.rove_db)
-    rows = tuple(threshold_of(run, rule) for run in runs)
+    rows = tuple(compute_run_threshold(run, rule) for run in runs)
     tested = tuple(trial for trial in trials if trial.phase is Phase.TEST)
-    table = threshold_table(rows, protocol.stimulus.frequencies_hz)
-    detection, catches = detection_thresholds(trials, protocol), catch_tallies(trials)
-    detection_table = threshold_table(detection, protocol.detection.frequencies_hz)
-    anova, within = one_way_anova(table.groups()), repeated_measures(table.subjects, table.values)
+    table = tabulate_thresholds(rows, protocol.stimulus.frequencies_hz)
+    detection, catches = compute_detection_thresholds(trials, protocol), catch_tallies(trials)
+    detection_table = tabulate_thresholds(detection, protocol.detection.frequencies_hz)
+    anova, within = (
+        compute_one_way_anova(table.group_by_frequency()), analyse_repeated_measures(table.subjects, table.values),
+    )  # fmt: skip
     comparisons, (primary, single) = compare_all(anova, CONFIDENCE), _fit_models(tested, protocol)
     (means, tobit), cues, gaps = (
-        _compute_mean_contrasts(rows, primary, protocol),
-        cue_findings(tested),
-        cue_gaps(tested),
-    )
+        _compute_mean_contrasts(rows, primary, protocol), compute_cue_findings(tested), find_cue_gaps(tested),
+    )  # fmt: skip
     return StudyAnalysis(
         protocol=protocol, population=population, trials=tested, runs=runs, thresholds=rows, table=table,
         anova=anova, comparisons=comparisons, within=within,
-        ranks=friedman(table.values),
+        ranks=compute_friedman_test(table.values),
         difference=describe_design_difference(anova, within),
         primary=primary,
-        single=single,
-        mean_contrasts=means,
-        tobit=tobit,
-        declared=declaration_text(protocol.analysis),
-        declared_result=declared_result(protocol.analysis, primary, comparisons, table, left_out, rule),
-        compared=comparison_text(primary, means, comparisons, table, rule),
+        single=single, mean_contrasts=means, tobit=tobit,
+        declared=describe_declaration(protocol.analysis),
+        declared_result=compute_declared_result(protocol.analysis, primary, comparisons, table, left_out, rule),
+        compared=describe_comparison(primary, means, comparisons, table, rule),
         warnings=(
-            *study_warnings(tested, rows, table, protocol),
-            *filter(None, [repeat_warning(trials), delivery_warning(deliveries(tested)), *cue_warnings(cues, gaps)]),
-            *side_warnings(catches, detection, table, detection_table),
+            *list_study_warnings(tested, rows, table, protocol),
+            *filter(None, [repeat_warning(trials), make_delivery_warning(compute_deliveries(tested)),
+                           *make_cue_warnings(cues, gaps)]),
+            *list_catch_and_detection_warnings(catches, detection, table, detection_table),
         ),
         detection=detection, detection_table=detection_table, catches=catches,
         practice=evaluate_practice_runs(trials, protocol), cues=cues, cue_gaps=gaps,
@@ -206,7 +210,7 @@ def _fit_models(
     """The hierarchical model; where it has too few participants or frequencies, thresholds of single persons instead.
     At most one of the two is not None."""
     answers, cap_n = count_answers(trials, protocol.stimulus.frequencies_hz), protocol.staircase.cap_n
-    primary = primary_analysis(answers, cap_n, declared_hz=protocol.analysis.contrast_hz)
+    primary = compute_primary_analysis(answers, cap_n, declared_hz=protocol.analysis.contrast_hz)
     return primary, fit_single_persons(answers, cap_n) if primary is None and answers is not None else None
 
 
@@ -216,12 +220,12 @@ def _compute_mean_contrasts(
     """Contrasts of the reversal means and of Tobit's model of them (dB). They use the frequencies of the primary model
     where it exists, so that all contrasts have the same reference, the lowest frequency."""
     frequencies_hz = primary.frequencies_hz if primary is not None else protocol.stimulus.frequencies_hz
-    table = threshold_table(rows, frequencies_hz, "threshold_db")
+    table = tabulate_thresholds(rows, frequencies_hz, "threshold_db")
     if not table.subjects or not table.frequencies_hz:
         return (), ()
     values = np.array(table.values, dtype=np.float64)
-    means = contrasts(table.frequencies_hz, values, CONFIDENCE)
-    return means, tobit_contrasts(table.frequencies_hz, values, np.array(table.censored), CONFIDENCE)
+    means = compute_contrasts(table.frequencies_hz, values, CONFIDENCE)
+    return means, compute_tobit_contrasts(table.frequencies_hz, values, np.array(table.censored), CONFIDENCE)
 
 
 def make_anova_document(analysis: StudyAnalysis) -> dict[str, Any]:

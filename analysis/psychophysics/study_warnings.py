@@ -1,8 +1,8 @@
-"""Warnings about the results of a study, as sentences for its report.
+"""Warnings about the results of a study, as sentences for its report. Called by `study_analysis`.
 
-They cover runs without a threshold, thresholds cut by the cap, small or unequal samples, answers at chance, response
-bias and its drift, trials that were spoiled, flagged or not measured, lapses in catch trials, and direction thresholds
-below detection.
+They cover runs without a threshold, thresholds censored by the cap, small or unequal samples, answers at chance,
+response bias and its drift, trials that were spoiled (void, presented again), flagged or not measured, lapses in catch
+trials, and direction thresholds below detection. Each `_warn_of_...` returns one sentence, empty without a finding.
 """
 
 import math
@@ -10,10 +10,10 @@ from collections.abc import Iterable, Sequence
 
 from scipy.stats import binom
 
-from analysis.psychophysics.bias import criterion_variance
+from analysis.psychophysics.bias import compute_criterion_variance
 from analysis.psychophysics.catch_trials import CatchTally, wilson_interval
-from analysis.psychophysics.criterion_drift import criterion_drifts
-from analysis.psychophysics.detection import directions_below_detection
+from analysis.psychophysics.criterion_drift import estimate_criterion_drifts
+from analysis.psychophysics.detection import find_directions_below_detection
 from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.psychophysics.thresholds import RunEnd, Threshold
 from analysis.threshold_words import threshold_words
@@ -23,19 +23,19 @@ from protocols.definition.study_protocol import StudyProtocol
 from protocols.trial import Trial, TrialStatus
 
 FEW_PARTICIPANTS = 5
-"""Number of participants below which means and tests say little about people in general."""
+"""Number of participants below which means and tests hardly generalise to the population."""
 STRONG_BIAS = 0.6
-"""Magnitude of the criterion c (units of d') above which a run is named: at d' = 1.64 it lowers the share of right
-answers by 0.04. An unbiased observer exceeds it by chance in about one of 250 whole runs."""
+"""Magnitude of the criterion c (units of d') above which a run is listed as biased: at d' = 1.64 it lowers the share of
+right answers by 0.04. An unbiased observer exceeds it by chance in about one of 250 complete runs."""
 BIAS_ERRORS = 2.58
 """Standard errors by which a criterion must also differ from 0 (1 % by chance): in unfinished runs of 3 to 12 trials,
 one in ten of an unbiased observer exceeds `STRONG_BIAS`. From 45 trials on `STRONG_BIAS` is the stricter limit."""
 DRIFT_LEVEL, LEFT_OUT_LEVEL = 0.02, 0.2
 """Levels of the test for a drift of the criterion in a session: of all runs, and with any single run left out. Together
-they named 3 of 1000 simulated sessions with a constant criterion, and 438 of 1000 whose criterion moved by 0.3 in 100
+they flag 3 of 1000 simulated sessions with a constant criterion, and 438 of 1000 whose criterion moves by 0.3 in 100
 trials (tests/references/drift_flag.py)."""
 MANY_LAPSES = 0.1
-"""Lapse rate on catch trials above which a participant is named: the published staircase assumes attentive people."""
+"""Lapse rate on catch trials above which a participant is listed: the staircase assumes attentive participants."""
 PERCEIVED_BY_ALL_HZ = 15.0
 """Highest frequency (Hz) at which all participants are expected to feel the direction at full level, so that an error
 in a catch trial there is a lapse."""
@@ -44,23 +44,23 @@ REPEAT_SD_DB = 2.4
 500 simulated runs under the published rule (Weibull slope 2, 2 % lapses)."""
 
 
-def study_warnings(
+def list_study_warnings(
     trials: Sequence[Trial], rows: Sequence[Threshold], table: ThresholdTable, protocol: StudyProtocol
 ) -> tuple[str, ...]:
-    """All warnings about the direction thresholds. trials: of the test phase. rows, table: thresholds of runs and table
-    of thresholds in newtons, computed from these trials."""
+    """All warnings about the direction thresholds. trials: of the test phase. rows: thresholds of their runs. table:
+    those thresholds (N) by participant and frequency."""
     if not rows:
         return ("There are no test trials, so there is no threshold of direction.",)
     candidates = (
         _warn_of_stopped(rows, protocol.staircase),
-        _incomplete_warning(rows, protocol.staircase),
+        _warn_of_incomplete(rows, protocol.staircase),
         _warn_of_missing(table),
         _warn_of_censored(table, protocol.staircase),
-        _few_participants_warning(table),
-        _unequal_sizes_warning(table),
-        _chance_warning(rows),
-        _bias_warning(rows),
-        _drift_warning(trials),
+        _warn_of_few_participants(table),
+        _warn_of_unequal_sizes(table),
+        _warn_of_chance(rows),
+        _warn_of_bias(rows),
+        _warn_of_drift(trials),
         _warn_of_spoiled(trials),
         _warn_of_flagged(trials),
         _warn_of_unmeasured(trials),
@@ -69,82 +69,82 @@ def study_warnings(
     return tuple(sentence for sentence in candidates if sentence)
 
 
-def side_warnings(
+def list_catch_and_detection_warnings(
     catches: Sequence[CatchTally],
     detection: Sequence[Threshold],
     table: ThresholdTable,
     detection_table: ThresholdTable,
 ) -> tuple[str, ...]:
-    """Warnings about catch trials and detection runs. table: direction thresholds; detection_table: detection
-    thresholds, both in newtons."""
-    incomplete = [_run_text(row) for row in detection if not row.complete]
-    censored = [_run_text(row) for row in detection if row.complete and row.censored]
+    """Warnings about catch trials and detection runs. detection: thresholds of the detection runs. table,
+    detection_table: direction and detection thresholds (N) by participant and frequency."""
+    incomplete = [_describe_run(row) for row in detection if not row.complete]
+    censored = [_describe_run(row) for row in detection if row.complete and row.censored]
     candidates = (
-        _lapse_warning(catches),
-        f"{_count_text(incomplete, 'detection run')} not complete and without a threshold: {conjoin(incomplete)}."
+        _warn_of_lapses(catches),
+        f"{_format_count(incomplete, 'detection run')} not complete and without a threshold: {conjoin(incomplete)}."
         if incomplete
         else "",
-        f"{_count_text(censored, 'detection threshold')} cut by the cap: {conjoin(censored)}." if censored else "",
+        f"{_format_count(censored, 'detection threshold')} cut by the cap: {conjoin(censored)}." if censored else "",
         _warn_of_undetected(detection),
-        _below_detection_warning(table, detection_table),
+        _warn_of_below_detection(table, detection_table),
         *detection_table.notes,
     )
     return tuple(sentence for sentence in candidates if sentence)
 
 
-def _incomplete_warning(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
+def _warn_of_incomplete(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
     runs = [
-        f"{_run_text(row)} ({_progress(row, rule)})"
+        f"{_describe_run(row)} ({_describe_progress(row, rule)})"
         for row in rows
         if not row.complete and row.ended is not RunEnd.TRIAL_LIMIT
     ]
-    return f"{_count_text(runs, 'run')} not complete and without a threshold: {conjoin(runs)}." if runs else ""
+    return f"{_format_count(runs, 'run')} not complete and without a threshold: {conjoin(runs)}." if runs else ""
 
 
 def _warn_of_stopped(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
     stopped_runs = [
-        f"{_run_text(row)} ({_progress(row, rule)}, {row.trials_at_cap} trials at the cap)"
+        f"{_describe_run(row)} ({_describe_progress(row, rule)}, {row.trials_at_cap} trials at the cap)"
         for row in rows
         if row.ended is RunEnd.TRIAL_LIMIT
     ]
     if not stopped_runs:
         return ""
     return (
-        f"{_count_text(stopped_runs, 'run')} stopped by the limit of {rule.trial_limit} trials, without a threshold: "
+        f"{_format_count(stopped_runs, 'run')} stopped by the limit of {rule.trial_limit} trials, without a threshold: "
         f"{conjoin(stopped_runs)}. The limit stops participants who cannot discriminate the directions far more often "
         "than others, so the remaining means are too low."
     )
 
 
-def _progress(row: Threshold, rule: StaircaseRule) -> str:
-    """Progress of an unfinished run: its reversals, or under Psi its trials."""
+def _describe_progress(row: Threshold, rule: StaircaseRule) -> str:
+    """Progress of an incomplete run: its reversals, or with the Psi method its trials."""
     if rule.is_bayesian:
         return f"{row.trials} trials"
     return f"{row.reversals} of {rule.reversals} reversals"
 
 
 def _warn_of_missing(table: ThresholdTable) -> str:
-    gaps = [f"{subject} at {frequency:g} Hz" for subject, frequency in table.gaps()]
-    return f"No threshold for {conjoin(gaps)}." if gaps else ""
+    missing_cells = [f"{subject} at {frequency:g} Hz" for subject, frequency in table.list_gaps()]
+    return f"No threshold for {conjoin(missing_cells)}." if missing_cells else ""
 
 
 def _warn_of_censored(table: ThresholdTable, rule: StaircaseRule) -> str:
-    cases = [
+    cells = [
         f"{subject} at {frequency:g} Hz"
         for subject, row in zip(table.subjects, table.censored, strict=True)
         for frequency, censored in zip(table.frequencies_hz, row, strict=True)
         if censored
     ]
-    if not cases:
+    if not cells:
         return ""
     return (
-        f"{_count_text(cases, 'threshold')} cut by the cap of {rule.cap_n:g} N, {threshold_words(rule).cut}: "
-        f"{conjoin(cases)}. As in the published analysis they enter means and tests as plain numbers, so means near "
+        f"{_format_count(cells, 'threshold')} cut by the cap of {rule.cap_n:g} N, {threshold_words(rule).cut}: "
+        f"{conjoin(cells)}. As in the published analysis they enter means and tests as plain numbers, so means near "
         "the cap are too low, differences towards it too small, and intervals and effect sizes without coverage."
     )
 
 
-def _few_participants_warning(table: ThresholdTable) -> str:
+def _warn_of_few_participants(table: ThresholdTable) -> str:
     count = len(table.subjects)
     if count >= FEW_PARTICIPANTS:
         return ""
@@ -153,27 +153,27 @@ def _few_participants_warning(table: ThresholdTable) -> str:
     return f"There are only {count} participants: means and tests say little about people in general."
 
 
-def _unequal_sizes_warning(table: ThresholdTable) -> str:
-    sizes = {sum(value is not None for value in column) for column in table.groups().values()}
+def _warn_of_unequal_sizes(table: ThresholdTable) -> str:
+    sizes = {sum(value is not None for value in column) for column in table.group_by_frequency().values()}
     if len(sizes) < 2:
         return ""
     return "The frequencies have unequally many thresholds, so the comparison intervals are approximate."
 
 
-def _chance_warning(rows: Sequence[Threshold]) -> str:
-    guessed = _runs_at_chance(rows)
+def _warn_of_chance(rows: Sequence[Threshold]) -> str:
+    chance_runs = _list_runs_at_chance(rows)
     return (
         "Answers not shown to be better than chance (one-sided binomial test, 5 %; a threshold far above the cap looks "
-        f"the same): {conjoin(guessed)}."
-        if guessed
+        f"the same): {conjoin(chance_runs)}."
+        if chance_runs
         else ""
     )
 
 
-def _runs_at_chance(rows: Sequence[Threshold]) -> list[str]:
-    """Texts of the runs whose answers are not shown to be better than chance."""
+def _list_runs_at_chance(rows: Sequence[Threshold]) -> list[str]:
+    """Descriptions of the runs whose answers are not significantly better than chance."""
     return [
-        f"{_run_text(row)} ({row.percent_correct:.0f} % right of {row.trials})"
+        f"{_describe_run(row)} ({row.percent_correct:.0f} % right of {row.trials})"
         for row in rows
         if row.percent_correct is not None and not _is_above_chance(row.percent_correct, row.trials)
     ]
@@ -185,9 +185,9 @@ def _is_above_chance(percent_correct: float, trials: int) -> bool:
     return bool(binom.sf(correct_count - 1, trials, 0.5) < 0.05)
 
 
-def _bias_warning(rows: Sequence[Threshold]) -> str:
+def _warn_of_bias(rows: Sequence[Threshold]) -> str:
     biased_runs = [
-        f"{_run_text(row)} (criterion {format_signed(row.criterion)})"
+        f"{_describe_run(row)} (criterion {format_signed(row.criterion)})"
         for row in rows
         if row.criterion is not None and _is_biased(row, row.criterion)
     ]
@@ -197,36 +197,36 @@ def _bias_warning(rows: Sequence[Threshold]) -> str:
 
 
 def _is_biased(row: Threshold, criterion: float) -> bool:
-    """Whether the criterion exceeds both limits. Its standard error is that of a run with both directions equally
-    often."""
+    """Whether the criterion exceeds `STRONG_BIAS` and `BIAS_ERRORS` standard errors. The standard error assumes that
+    both directions were shown equally often."""
     half, correct = row.trials / 2.0, round(row.trials * (row.percent_correct or 0.0) / 100.0)
-    return abs(criterion) > max(STRONG_BIAS, BIAS_ERRORS * math.sqrt(criterion_variance(correct, half, half)))
+    return abs(criterion) > max(STRONG_BIAS, BIAS_ERRORS * math.sqrt(compute_criterion_variance(correct, half, half)))
 
 
-def _drift_warning(trials: Iterable[Trial]) -> str:
-    """Sentence on sessions in which the criterion drifted over the runs; empty without any."""
+def _warn_of_drift(trials: Iterable[Trial]) -> str:
+    """Sessions in which the criterion drifts over the runs, by both levels `DRIFT_LEVEL` and `LEFT_OUT_LEVEL`."""
     sessions: dict[tuple[str, str], dict[int, list[Trial]]] = {}
     for trial in trials:
-        if trial.counts:
+        if trial.is_valid:
             sessions.setdefault((trial.subject, trial.session), {}).setdefault(trial.run, []).append(trial)
-    drifts = criterion_drifts(
-        [[_directions_and_answers(runs[run]) for run in sorted(runs)] for runs in sessions.values()]
+    drifts = estimate_criterion_drifts(
+        [[_extract_answers(runs[run]) for run in sorted(runs)] for runs in sessions.values()]
     )
-    drifting = [
+    drifting_sessions = [
         f"{subject} ({session}, criterion {format_signed(drift.per_100_trials)} per 100 trials)"
         for (subject, session), drift in zip(sessions, drifts, strict=True)
         if drift is not None and drift.p < DRIFT_LEVEL and drift.p_without_a_run < LEFT_OUT_LEVEL
     ]
-    if not drifting:
+    if not drifting_sessions:
         return ""
     return (
         f"A bias towards one of the two answers changed from run to run of a session (p < {DRIFT_LEVEL:g} each, in "
         "addition to the variation between runs without a trend), which raises thresholds if strong: "
-        f"{conjoin(drifting)}."
+        f"{conjoin(drifting_sessions)}."
     )
 
 
-def _directions_and_answers(run: Sequence[Trial]) -> tuple[list[int], list[bool]]:
+def _extract_answers(run: Sequence[Trial]) -> tuple[list[int], list[bool]]:
     """Directions shown (1 or 2), and whether each answer was right."""
     return [trial.direction_shown for trial in run], [bool(trial.correct) for trial in run]
 
@@ -246,7 +246,7 @@ def _warn_of_flagged(trials: Iterable[Trial]) -> str:
 
 
 def _warn_of_unmeasured(trials: Iterable[Trial]) -> str:
-    count = sum(trial.counts and trial.delivered_mps2 is None for trial in trials)
+    count = sum(trial.is_valid and trial.delivered_mps2 is None for trial in trials)
     if not count:
         return ""
     return (
@@ -255,46 +255,46 @@ def _warn_of_unmeasured(trials: Iterable[Trial]) -> str:
     )
 
 
-def _lapse_warning(catches: Sequence[CatchTally]) -> str:
-    """Sentence on participants with many wrong catch trials up to `PERCEIVED_BY_ALL_HZ`; empty without any."""
-    lapsing = []
+def _warn_of_lapses(catches: Sequence[CatchTally]) -> str:
+    """Participants with more than `MANY_LAPSES` wrong catch trials up to `PERCEIVED_BY_ALL_HZ`."""
+    lapses = []
     felt_tallies = [tally for tally in catches if tally.frequency_hz <= PERCEIVED_BY_ALL_HZ]
     for subject in dict.fromkeys(tally.subject for tally in felt_tallies):
         wrong = sum(tally.wrong for tally in felt_tallies if tally.subject == subject)
         answered = sum(tally.given for tally in felt_tallies if tally.subject == subject)
         if wrong > MANY_LAPSES * answered:
             lower, upper = wilson_interval(wrong, answered)
-            lapsing.append(f"{subject} ({wrong} of {answered}; 95 % interval {100 * lower:.0f} to {100 * upper:.0f} %)")
-    if not lapsing:
+            lapses.append(f"{subject} ({wrong} of {answered}; 95 % interval {100 * lower:.0f} to {100 * upper:.0f} %)")
+    if not lapses:
         return ""
     return (
         f"More than {100 * MANY_LAPSES:.0f} % wrong in catch trials at full level, up to {PERCEIVED_BY_ALL_HZ:g} Hz, "
-        f"where inattention raises a threshold: {conjoin(lapsing)}."
+        f"where inattention raises a threshold: {conjoin(lapses)}."
     )
 
 
 def _warn_of_undetected(detection: Sequence[Threshold]) -> str:
-    guessed = _runs_at_chance(detection)
-    return f"Detection not shown to be better than chance: {conjoin(guessed)}." if guessed else ""
+    chance_runs = _list_runs_at_chance(detection)
+    return f"Detection not shown to be better than chance: {conjoin(chance_runs)}." if chance_runs else ""
 
 
-def _below_detection_warning(table: ThresholdTable, detection_table: ThresholdTable) -> str:
-    texts = [
+def _warn_of_below_detection(table: ThresholdTable, detection_table: ThresholdTable) -> str:
+    cells = [
         f"{case.subject} at {case.frequency_hz:g} Hz ({case.direction_n:.2f} N, detected from {case.detection_n:.2f} N)"
-        for case in directions_below_detection(table, detection_table)
+        for case in find_directions_below_detection(table, detection_table)
     ]
-    if not texts:
+    if not cells:
         return ""
     return (
-        f"The direction was identified at a level below the detection threshold of the vibration: {conjoin(texts)}. "
+        f"The direction was identified at a level below the detection threshold of the vibration: {conjoin(cells)}. "
         f"Two runs of one threshold differ by {REPEAT_SD_DB:g} dB (standard deviation); a difference of more than "
         "twice that suggests another cue than touch, or a lapse of attention in the detection run."
     )
 
 
-def _run_text(row: Threshold) -> str:
+def _describe_run(row: Threshold) -> str:
     return f"{row.subject} at {row.frequency_hz:g} Hz"
 
 
-def _count_text(items: Sequence[str], noun: str) -> str:
+def _format_count(items: Sequence[str], noun: str) -> str:
     return f"1 {noun} is" if len(items) == 1 else f"{len(items)} {noun}s are"

@@ -1,4 +1,6 @@
-"""Table of thresholds by participant and frequency; missing ones stay gaps."""
+"""Table of thresholds by participant and frequency, the input of the analyses of variance; missing ones are gaps.
+
+Made by `analysis.psychophysics.study_analysis` from the rows of `thresholds`."""
 
 import math
 from collections.abc import Sequence
@@ -28,10 +30,13 @@ class ThresholdTable:
     notes: tuple[str, ...]
     """What was left out, as sentences."""
 
-    def groups(self) -> dict[str, tuple[float | None, ...]]:
-        """The values of each frequency, named like "35 Hz", one entry per participant."""
+    def group_by_frequency(self) -> dict[str, tuple[float | None, ...]]:
+        """Group the values by frequency, named like "35 Hz", one entry per participant."""
         columns = zip(*self.values, strict=True) if self.values else ((),) * len(self.frequencies_hz)
-        return {frequency_name(f): column for f, column in zip(self.frequencies_hz, columns, strict=True)}
+        return {
+            format_frequency(frequency_hz): column
+            for frequency_hz, column in zip(self.frequencies_hz, columns, strict=True)
+        }
 
     @property
     def cut(self) -> int:
@@ -40,7 +45,8 @@ class ThresholdTable:
 
     @property
     def coverage(self) -> str:
-        """Why intervals and effect sizes of this table have no stated coverage; empty where nothing is cut."""
+        """Sentences on why intervals and effect sizes of this table have no stated coverage; empty where nothing is
+        cut."""
         missing_count = sum(map(sum, self.stopped))
         causes = [f"{self.cut} of the values {'is' if self.cut == 1 else 'are'} cut by the cap"] if self.cut else []
         causes += (
@@ -55,20 +61,20 @@ class ThresholdTable:
             "intervals and effect sizes does not hold."
         )
 
-    def gaps(self) -> tuple[tuple[str, float], ...]:
-        """Participant and frequency of every gap."""
+    def list_gaps(self) -> tuple[tuple[str, float], ...]:
+        """List participant and frequency of every gap."""
         return tuple(
-            (subject, frequency)
+            (subject, frequency_hz)
             for subject, row in zip(self.subjects, self.values, strict=True)
-            for frequency, value in zip(self.frequencies_hz, row, strict=True)
+            for frequency_hz, value in zip(self.frequencies_hz, row, strict=True)
             if value is None
         )
 
 
-def threshold_table(
+def tabulate_thresholds(
     rows: Sequence[Threshold], frequencies_hz: Sequence[float], quantity: Quantity = "threshold_n"
 ) -> ThresholdTable:
-    """The first completed run of each participant at each of the frequencies.
+    """Tabulate the first completed run of each participant at each of the frequencies.
 
     The first, because a run repeated after its result was seen must not replace it; later ones are named in the
     notes. Participants in the order of their first row; those without any completed run have a row of gaps.
@@ -78,33 +84,36 @@ def threshold_table(
     limited_cells = {(row.subject, row.frequency_hz) for row in rows if row.ended is RunEnd.TRIAL_LIMIT}
     notes = []
     for row in rows:
-        key = (row.subject, row.frequency_hz)
+        cell = (row.subject, row.frequency_hz)
         if row.frequency_hz not in frequencies_hz:
             notes.append(f"{row.subject} has a run at {row.frequency_hz:g} Hz, which the protocol does not name.")
-        elif row.complete and key in first_runs:
+        elif row.complete and cell in first_runs:
             notes.append(
                 f"{row.subject} completed more than one run at {row.frequency_hz:g} Hz; the first one counts "
-                f"(session {first_runs[key].session}), not run {row.run} of session {row.session}."
+                f"(session {first_runs[cell].session}), not run {row.run} of session {row.session}."
             )
         elif row.complete:
-            first_runs[key] = row
-    ordered = tuple(sorted(frequencies_hz))
+            first_runs[cell] = row
+    ordered_hz = tuple(sorted(frequencies_hz))
     return ThresholdTable(
         quantity=quantity,
         subjects=subjects,
-        frequencies_hz=ordered,
-        values=tuple(tuple(_value(first_runs.get((s, f)), quantity) for f in ordered) for s in subjects),
-        censored=tuple(tuple((s, f) in first_runs and first_runs[s, f].censored for f in ordered) for s in subjects),
-        stopped=tuple(tuple((s, f) in limited_cells and (s, f) not in first_runs for f in ordered) for s in subjects),
+        frequencies_hz=ordered_hz,
+        values=tuple(tuple(_read_finite_value(first_runs.get((s, f)), quantity) for f in ordered_hz) for s in subjects),
+        censored=tuple(tuple((s, f) in first_runs and first_runs[s, f].censored for f in ordered_hz) for s in subjects),
+        stopped=tuple(
+            tuple((s, f) in limited_cells and (s, f) not in first_runs for f in ordered_hz) for s in subjects
+        ),
         notes=tuple(notes),
     )
 
 
-def frequency_name(frequency_hz: float) -> str:
-    """Name of a frequency's group, such as "35 Hz"."""
+def format_frequency(frequency_hz: float) -> str:
+    """Format the name of a frequency's group, such as "35 Hz"."""
     return f"{frequency_hz:g} Hz"
 
 
-def _value(row: Threshold | None, quantity: Quantity) -> float | None:
+def _read_finite_value(row: Threshold | None, quantity: Quantity) -> float | None:
+    """Read a quantity of a run; None without a run, and for NaN."""
     value: float | None = None if row is None else getattr(row, quantity)
     return None if value is None or math.isnan(value) else value

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from statistics import fmean
 
-from analysis.psychophysics.bias import response_bias
+from analysis.psychophysics.bias import estimate_response_bias
 from analysis.psychophysics.repeated_trials import is_often
 from analysis.psychophysics.runs import Run, recompute_runs
 from protocols.definition.staircase_rule import StaircaseRule
@@ -24,7 +24,8 @@ class RunEnd(StrEnum):
     REVERSALS = "reversals"
     """The run reached all reversals of the rule: it has a threshold."""
     PSI = "psi"
-    """The run reached all trials of the Psi method, or its wanted posterior spread: it has a threshold."""
+    """The run reached all trials of the Psi method, or the posterior spread that the rule requires: it has a
+    threshold."""
     TRIAL_LIMIT = "trial_limit"
     """The protocol's `trial_limit` stopped the run, so that it has no threshold. This happens more often at high
     thresholds: under a limit of 100 trials to 58 % of guessers and 0.1 % of people with a threshold of 1 N."""
@@ -78,22 +79,22 @@ class Threshold:
     """Whether presentations were made void often: see `analysis.psychophysics.repeated_trials.is_often`."""
 
 
-def thresholds(trials: Iterable[Trial], rule: StaircaseRule, rove_db: float = 0.0) -> tuple[Threshold, ...]:
-    """The thresholds of all test runs, recomputed from the answers. rove_db: as for `recompute_runs`.
+def compute_thresholds(trials: Iterable[Trial], rule: StaircaseRule, rove_db: float = 0.0) -> tuple[Threshold, ...]:
+    """Compute the thresholds of all test runs, recomputed from the answers. rove_db: as for `recompute_runs`.
 
     Raises InconsistentTrialsError (a ValueError) naming subject, session, run and trial where the rows contradict
     the rule.
     """
-    return tuple(threshold_of(run, rule) for run in recompute_runs(trials, rule, Phase.TEST, rove_db))
+    return tuple(compute_run_threshold(run, rule) for run in recompute_runs(trials, rule, Phase.TEST, rove_db))
 
 
-def threshold_of(run: Run, rule: StaircaseRule) -> Threshold:
-    """Threshold of a run by its reversals or Psi's posterior, with response bias and counts. Where the run is not
-    complete, thresholds are None in every unit."""
+def compute_run_threshold(run: Run, rule: StaircaseRule) -> Threshold:
+    """Compute the threshold of a run by its reversals or Psi's posterior, with response bias and counts. Where the run
+    is not complete, thresholds are None in every unit."""
     run_estimate = _estimate_from_posterior(run, rule) if rule.is_bayesian else _estimate_from_reversals(run, rule)
     state = run.state
-    correct = [bool(trial.correct) for trial in run.answered]
-    bias = response_bias([trial.direction_shown for trial in run.answered], correct)
+    is_correct = [bool(trial.correct) for trial in run.answered]
+    bias = estimate_response_bias([trial.direction_shown for trial in run.answered], is_correct)
     return Threshold(
         subject=run.subject,
         frequency_hz=run.frequency_hz,
@@ -108,18 +109,22 @@ def threshold_of(run: Run, rule: StaircaseRule) -> Threshold:
         complete=run.complete,
         session=run.session,
         run=run.run,
-        percent_correct=100.0 * fmean(correct) if correct else None,
+        percent_correct=100.0 * fmean(is_correct) if is_correct else None,
         d_prime=bias.d_prime if bias else None,
         criterion=bias.criterion if bias else None,
         spoiled_trials=run.spoiled_trials,
-        threshold_mps2=_mean_of_measured([_scale_to_level(t, t.delivered_mps2, n) for t, n in run_estimate.measured])
+        threshold_mps2=_compute_measured_mean(
+            [_scale_to_level(t, t.delivered_mps2, level_n) for t, level_n in run_estimate.measured]
+        )
         if run.complete
         else None,
-        threshold_mm=_mean_of_measured([_scale_to_level(t, t.displacement_mm, n) for t, n in run_estimate.measured])
+        threshold_mm=_compute_measured_mean(
+            [_scale_to_level(t, t.displacement_mm, level_n) for t, level_n in run_estimate.measured]
+        )
         if run.complete
         else None,
         measured_reversals=sum(trial.delivered_mps2 is not None for trial, _ in run_estimate.measured),
-        ended=_run_end(run, rule),
+        ended=_find_run_end(run, rule),
         repeats_at_will=run.repeats_at_will,
         repeat_rate=run.repeats_at_will / run.presentations if run.presentations else 0.0,
         asked_often=is_often(run.repeats_at_will, run.presentations),
@@ -139,12 +144,12 @@ class _RunEstimate:
 
 
 def _estimate_from_reversals(run: Run, rule: StaircaseRule) -> _RunEstimate:
-    """Means of the last `averaged_reversals` reversal levels, in newtons and in dB."""
+    """Compute the means of the last `averaged_reversals` reversal levels, in newtons and in dB."""
     state = run.state
     averaged_db = state.reversal_levels_db[-rule.averaged_reversals :]
-    averaged_n = [min(to_newton(level), rule.cap_n) for level in averaged_db]
+    averaged_n = [min(to_newton(averaged_level), rule.cap_n) for averaged_level in averaged_db]
     averaged_trials = [run.answered[index] for index in state.reversal_trials[-rule.averaged_reversals :]]
-    cap_reversals = sum(level >= rule.cap_n * (1.0 - _SAME_LEVEL) for level in averaged_n)
+    cap_reversals = sum(averaged_level >= rule.cap_n * (1.0 - _LEVEL_TOLERANCE) for averaged_level in averaged_n)
     return _RunEstimate(
         newton=fmean(averaged_n) if averaged_n else None,
         db=fmean(averaged_db) if averaged_db else None,
@@ -155,22 +160,26 @@ def _estimate_from_reversals(run: Run, rule: StaircaseRule) -> _RunEstimate:
 
 
 def _estimate_from_posterior(run: Run, rule: StaircaseRule) -> _RunEstimate:
-    """Posterior mean, limited by the cap; cut where the posterior probability of a threshold above the cap exceeds
-    `CUT_PROBABILITY`."""
+    """Compute the posterior mean, limited by the cap; cut where the posterior probability of a threshold above the cap
+    exceeds `CUT_PROBABILITY`."""
     cap_db = to_db(rule.cap_n)
     posterior_estimate = estimate_threshold(compute_posterior(run.state.answered, cap_db), cap_db)
-    db = min(posterior_estimate.mean_db, cap_db)
+    threshold_db = min(posterior_estimate.mean_db, cap_db)
     last_trials = run.answered[-rule.averaged_reversals :]
-    newton = min(to_newton(db), rule.cap_n)
+    threshold_n = min(to_newton(threshold_db), rule.cap_n)
     return _RunEstimate(
-        newton, db, posterior_estimate.above_cap > CUT_PROBABILITY, 0, tuple((trial, newton) for trial in last_trials)
+        threshold_n,
+        threshold_db,
+        posterior_estimate.above_cap > CUT_PROBABILITY,
+        0,
+        tuple((trial, threshold_n) for trial in last_trials),
     )
 
 
-def _scale_to_level(trial: Trial, measured: float | None, level_n: float) -> float | None:
-    """Measured value of a trial, scaled in proportion from the level played to another level (N); None where nothing
+def _scale_to_level(trial: Trial, measured_value: float | None, level_n: float) -> float | None:
+    """Scale the measured value of a trial in proportion from the level played to another level (N); None where nothing
     was measured."""
-    return None if measured is None else measured * level_n / trial.level_n
+    return None if measured_value is None else measured_value * level_n / trial.level_n
 
 
 CUT_PROBABILITY = 0.1
@@ -192,18 +201,18 @@ def is_censored(cap_reversals: int) -> bool:
     return cap_reversals > 0
 
 
-def _run_end(run: Run, rule: StaircaseRule) -> RunEnd:
-    """Reason for the end of the run, from its state and rule."""
+def _find_run_end(run: Run, rule: StaircaseRule) -> RunEnd:
+    """Find the reason for the end of the run, from its state and rule."""
     if run.complete:
         return RunEnd.PSI if rule.is_bayesian else RunEnd.REVERSALS
     return RunEnd.TRIAL_LIMIT if is_finished(rule, run.state) else RunEnd.UNFINISHED
 
 
-def _mean_of_measured(values: Sequence[float | None]) -> float | None:
-    """Mean of the values that were measured; None without any."""
-    measured = [value for value in values if value is not None]
-    return fmean(measured) if measured else None
+def _compute_measured_mean(values: Sequence[float | None]) -> float | None:
+    """Compute the mean of the values that are not None; None without any."""
+    measured_values = [value for value in values if value is not None]
+    return fmean(measured_values) if measured_values else None
 
 
-_SAME_LEVEL = 1e-9
+_LEVEL_TOLERANCE = 1e-9
 """Relative difference below which a level counts as equal to the cap: rounding."""

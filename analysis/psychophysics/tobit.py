@@ -10,7 +10,7 @@ are biased low even without being cut. The model therefore removes only a part o
 the coverage that its intervals reach in simulations.
 
 Sources: J. Tobin, Econometrica 26 (1958), 24-36; quadrature: J. C. Pinheiro, D. M. Bates, J. Comput. Graph. Stat. 4
-(1995), 12-35.
+(1995), 12-35. Called by `analysis.psychophysics.study_analysis`.
 """
 
 import math
@@ -23,14 +23,14 @@ from scipy.optimize import minimize
 from scipy.special import log_ndtr, logsumexp
 from scipy.stats import t as student
 
-from analysis.psychophysics.group_contrasts import Contrast, holm_correction
+from analysis.psychophysics.group_contrasts import Contrast, apply_holm_correction
 from equalizer.signals.signal import FloatArray
 
-NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(25)
+QUADRATURE_NODES, QUADRATURE_WEIGHTS = np.polynomial.hermite_e.hermegauss(25)
 """Gauss-Hermite rule of the integral over a person's random effect: weight function exp(-x²/2), x = b / sd_people."""
-SD_BOUNDS_DB = (-4.0, 3.5)
+LOG_SD_BOUNDS = (-4.0, 3.5)
 """Bounds of the natural logarithm of both standard deviations: 0.018 dB to 33 dB."""
-STEP = 1e-3
+DIFFERENCE_STEP = 1e-3
 """Step of the finite differences of the log-likelihood's second derivatives: in dB for means, in natural logarithms for
 standard deviations."""
 
@@ -46,76 +46,101 @@ class TobitFit:
     log_likelihood: float
 
 
-def tobit_contrasts(
-    frequencies_hz: Sequence[float], values_db: FloatArray, cut: NDArray[np.bool_], confidence: float
+def compute_tobit_contrasts(
+    frequencies_hz: Sequence[float], values_db: FloatArray, is_cut: NDArray[np.bool_], confidence: float
 ) -> tuple[Contrast, ...]:
-    """Contrasts mu_j - mu_1 of each frequency with the first, with Wald intervals and p values of Student's t with
-    n - 1 degrees of freedom. values_db: (n, k), dB, NaN for a gap. cut: (n, k), whether the cap cut the run.
+    """Compute the contrasts mu_j - mu_1 of each frequency with the first, with Wald intervals and p values of Student's
+    t with n - 1 degrees of freedom. values_db: (n, k), dB, NaN for a gap. cut: (n, k), whether the cap cut the run.
 
     A frequency without an uncut run is left out, because its likelihood has no maximum. Empty where no run is cut (the
     analysis of the plain means then suffices), the first frequency is left out, or there are fewer than three people.
     """
     is_measured = np.isfinite(values_db)
-    has_uncut: NDArray[np.bool_] = np.asarray((is_measured & ~cut).any(axis=0))
-    if not (cut & is_measured).any() or len(values_db) < 3 or not has_uncut[0]:
+    has_uncut: NDArray[np.bool_] = np.asarray((is_measured & ~is_cut).any(axis=0))
+    if not (is_cut & is_measured).any() or len(values_db) < 3 or not has_uncut[0]:
         return ()
     frequencies_hz = [frequency_hz for frequency_hz, is_kept in zip(frequencies_hz, has_uncut, strict=True) if is_kept]
-    values_db, cut, is_measured = values_db[:, has_uncut], cut[:, has_uncut], is_measured[:, has_uncut]
-    fit = fit_tobit(values_db, cut)
-    k, df = len(frequencies_hz), len(values_db) - 1
-    sizes = fit.parameters[1:k] - fit.parameters[0]
-    errors = np.sqrt(np.diag(fit.covariance)[1:k] + fit.covariance[0, 0] - 2.0 * fit.covariance[0, 1:k])
-    half_widths = float(student.ppf(0.5 + confidence / 2, df)) * errors
-    p_values = [float(p) for p in 2.0 * student.sf(np.abs(sizes / errors), df)]
+    values_db, is_cut, is_measured = values_db[:, has_uncut], is_cut[:, has_uncut], is_measured[:, has_uncut]
+    fit = fit_tobit(values_db, is_cut)
+    frequency_count, df = len(frequencies_hz), len(values_db) - 1
+    differences_db = fit.parameters[1:frequency_count] - fit.parameters[0]
+    standard_errors_db = np.sqrt(
+        np.diag(fit.covariance)[1:frequency_count] + fit.covariance[0, 0] - 2.0 * fit.covariance[0, 1:frequency_count]
+    )
+    half_widths_db = float(student.ppf(0.5 + confidence / 2, df)) * standard_errors_db
+    p_values = [float(p) for p in 2.0 * student.sf(np.abs(differences_db / standard_errors_db), df)]
     pair_counts = (is_measured[:, 1:] & is_measured[:, :1]).sum(axis=0)
     return tuple(
         Contrast(
             frequency_hz=frequencies_hz[index + 1],
             against_hz=frequencies_hz[0],
             participants=int(pair_counts[index]),
-            difference_db=float(sizes[index]),
-            lower_db=float(sizes[index] - half_widths[index]),
-            upper_db=float(sizes[index] + half_widths[index]),
+            difference_db=float(differences_db[index]),
+            lower_db=float(differences_db[index] - half_widths_db[index]),
+            upper_db=float(differences_db[index] + half_widths_db[index]),
             p=p_values[index],
             p_holm=p_holm,
             effect_size=None,
             p_equivalence=None,
             p_spread=None,
         )
-        for index, p_holm in enumerate(holm_correction(p_values))
+        for index, p_holm in enumerate(apply_holm_correction(p_values))
     )
 
 
-def fit_tobit(values_db: FloatArray, cut: NDArray[np.bool_]) -> TobitFit:
-    """Maximum-likelihood fit of the Tobit model (L-BFGS-B). values_db: (n, k), dB, NaN for a gap; cut: (n, k). Each
+def fit_tobit(values_db: FloatArray, is_cut: NDArray[np.bool_]) -> TobitFit:
+    """Fit the Tobit model by maximum likelihood (L-BFGS-B). values_db: (n, k), dB, NaN for a gap; cut: (n, k). Each
     column needs a value that is not cut. Raises LinAlgError where the Hessian is singular."""
-    k = values_db.shape[1]
-    start = np.concatenate([np.nanmean(values_db, axis=0), [0.7, 0.7]])
+    frequency_count = values_db.shape[1]
+    start_parameters = np.concatenate([np.nanmean(values_db, axis=0), [0.7, 0.7]])
 
-    def cost(parameters: FloatArray) -> float:
-        return -_log_likelihood(parameters, values_db, cut)
+    def compute_cost(parameters: FloatArray) -> float:
+        return -_compute_log_likelihood(parameters, values_db, is_cut)
 
-    bounds = [(None, None)] * k + [SD_BOUNDS_DB] * 2
-    solution = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-12, "gtol": 1e-6})
-    steps = STEP * np.eye(k + 2)
-    curvature = np.array([[_second_difference(cost, solution.x, a, b) for b in steps] for a in steps]) / STEP**2
+    bounds = [(None, None)] * frequency_count + [LOG_SD_BOUNDS] * 2
+    solution = minimize(
+        compute_cost, start_parameters, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-12, "gtol": 1e-6}
+    )
+    steps = DIFFERENCE_STEP * np.eye(frequency_count + 2)
+    curvature = (
+        np.array(
+            [
+                [_compute_second_difference(compute_cost, solution.x, row_step, column_step) for column_step in steps]
+                for row_step in steps
+            ]
+        )
+        / DIFFERENCE_STEP**2
+    )
     # At a bound, the Hessian by a standard deviation is meaningless: that parameter is held fixed in the covariance.
-    free = np.array([True] * k + [SD_BOUNDS_DB[0] + STEP < value < SD_BOUNDS_DB[1] - STEP for value in solution.x[k:]])
-    covariance = np.zeros((k + 2, k + 2))
-    covariance[np.ix_(free, free)] = np.linalg.inv(curvature[np.ix_(free, free)])
+    is_free = np.array(
+        [True] * frequency_count
+        + [
+            LOG_SD_BOUNDS[0] + DIFFERENCE_STEP < value < LOG_SD_BOUNDS[1] - DIFFERENCE_STEP
+            for value in solution.x[frequency_count:]
+        ]
+    )
+    covariance = np.zeros((frequency_count + 2, frequency_count + 2))
+    covariance[np.ix_(is_free, is_free)] = np.linalg.inv(curvature[np.ix_(is_free, is_free)])
     return TobitFit(solution.x, covariance, -float(solution.fun))
 
 
-def _second_difference(cost: Callable[[FloatArray], float], centre: FloatArray, a: FloatArray, b: FloatArray) -> float:
-    """Central second difference of the cost along the steps a and b, not divided by their lengths."""
-    return (cost(centre + a + b) - cost(centre + a - b) - cost(centre - a + b) + cost(centre - a - b)) / 4.0
+def _compute_second_difference(
+    compute_cost: Callable[[FloatArray], float], centre: FloatArray, a: FloatArray, b: FloatArray
+) -> float:
+    """Compute the central second difference of the cost along the steps a and b, not divided by their lengths."""
+    return (
+        compute_cost(centre + a + b)
+        - compute_cost(centre + a - b)
+        - compute_cost(centre - a + b)
+        + compute_cost(centre - a - b)
+    ) / 4.0
 
 
-def _log_likelihood(parameters: FloatArray, values_db: FloatArray, cut: NDArray[np.bool_]) -> float:
-    """Log-likelihood of the module's model at `parameters` (k + 2,); gaps contribute nothing."""
-    k = values_db.shape[1]
-    person_sd, error_sd = math.exp(parameters[k]), math.exp(parameters[k + 1])
-    z = (values_db[:, :, None] - parameters[:k, None] - person_sd * NODES) / error_sd
-    exact = -0.5 * z**2 - math.log(error_sd) - 0.5 * math.log(2.0 * math.pi)
-    cells = np.where(np.isnan(z), 0.0, np.where(cut[:, :, None], log_ndtr(-z), exact))
-    return float(logsumexp(cells.sum(axis=1), b=WEIGHTS / math.sqrt(2.0 * math.pi), axis=1).sum())
+def _compute_log_likelihood(parameters: FloatArray, values_db: FloatArray, is_cut: NDArray[np.bool_]) -> float:
+    """Compute the log-likelihood of the module's model at `parameters` (k + 2,); gaps contribute nothing."""
+    frequency_count = values_db.shape[1]
+    person_sd, error_sd = math.exp(parameters[frequency_count]), math.exp(parameters[frequency_count + 1])
+    z = (values_db[:, :, None] - parameters[:frequency_count, None] - person_sd * QUADRATURE_NODES) / error_sd
+    log_density = -0.5 * z**2 - math.log(error_sd) - 0.5 * math.log(2.0 * math.pi)
+    log_likelihoods = np.where(np.isnan(z), 0.0, np.where(is_cut[:, :, None], log_ndtr(-z), log_density))
+    return float(logsumexp(log_likelihoods.sum(axis=1), b=QUADRATURE_WEIGHTS / math.sqrt(2.0 * math.pi), axis=1).sum())

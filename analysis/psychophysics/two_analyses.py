@@ -3,6 +3,7 @@
 The published analysis is a one-way analysis of variance of reversal means with Tukey's comparisons; the primary
 analysis is the hierarchical model of all answers. The text states which analysis the protocol declared, where estimates
 differ by 1 dB or more, where significance at the 5 % level differs, and the measured coverage near the cap.
+Called by `analysis.psychophysics.study_analysis` and the tables of `analysis.reports`.
 """
 
 from collections.abc import Sequence
@@ -12,22 +13,22 @@ from analysis.psychophysics.coverage.coverage_words import coverage_sentence
 from analysis.psychophysics.coverage.measured_coverage import MEASURED
 from analysis.psychophysics.group_contrasts import Contrast
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
-from analysis.psychophysics.threshold_table import ThresholdTable, frequency_name
+from analysis.psychophysics.threshold_table import ThresholdTable, format_frequency
 from analysis.threshold_words import threshold_words
 from analysis.wording import capitalise, conjoin, format_p_text, format_signed
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
 
-NOTABLE_DB = 1.0
+NOTABLE_DIFFERENCE_DB = 1.0
 """Least difference (dB) between the two analyses that is reported: the small step of the published staircase."""
 SIMULATED_RULE = StaircaseRule(1.0, 3.0, 1, 3, (StepPhase(4.0, 3), StepPhase(1.0, 10)), 13, 10)
 """The published staircase and cap, with which `measured_coverage` was simulated: its counts hold for no other rule."""
-NOTHING_DECLARED = (
+NOTHING_DECLARED_NOTE = (
     "The protocol declares no primary analysis, contrast, sample size or exclusions; the hierarchical model is given "
     "first because the cap distorts it least; a choice made after the data were seen is not a "
     "declaration."
 )
-NEAR_CAP = (
+NEAR_CAP_WARNING = (
     "Near the cap the published intervals do not have their stated coverage, and the published 'not significant' is "
     "weak evidence."
 )
@@ -37,52 +38,63 @@ _ANALYSIS_NOUNS = {
     "hierarchical": "the hierarchical model of all answers",
     "published": "the published one-way analysis",
 }
-_INTERVALS = {
+_INTERVAL_DESCRIPTIONS = {
     "hierarchical": "95 %, over people's pseudo-thresholds in dB, paired, t with n − 1 "
     "degrees of freedom; a single test, so uncorrected.",
     "published": "95 %, Tukey's of means of runs in newtons, which holds for all pairs together.",
 }
 
 
-def declaration_text(declared: AnalysisSettings) -> str:
-    """Text on what the protocol declares before the data (analysis, contrast, sample size, exclusions), and on what it
+def describe_declaration(declared: AnalysisSettings) -> str:
+    """Describe what the protocol declares before the data (analysis, contrast, sample size, exclusions), and what it
     does not declare."""
     if declared == AnalysisSettings():
-        return NOTHING_DECLARED
+        return NOTHING_DECLARED_NOTE
     if declared.primary == "undeclared":
-        primary = (
+        primary_sentences = (
             "The protocol declares no primary analysis. The hierarchical model is given first because the "
             "cap distorts it least; a choice made after the data were seen is not a declaration."
         )
     else:
-        interval_words = (
+        interval_label = (
             "Its interval" if declared.interval == "undeclared" else f"Declared interval ({declared.interval})"
         )
-        primary = (
+        primary_sentences = (
             f"Declared as primary in the protocol: {_ANALYSIS_NOUNS[declared.primary]}. "
-            f"{interval_words} of the contrast: {_INTERVALS[declared.primary]}"
+            f"{interval_label} of the contrast: {_INTERVAL_DESCRIPTIONS[declared.primary]}"
         )
     first, second = declared.contrast_hz or (0.0, 0.0)
-    parts = [
+    declared_sentences = [
         f"Primary contrast: {first:g} Hz minus {second:g} Hz." if declared.contrast_hz else "",
         f"Planned participants: {declared.participants}." if declared.participants else "",
         f"Exclusions: {' '.join(declared.exclusions)}" if declared.exclusions else "",
     ]
-    names = ("primary contrast", "sample size", "exclusions")
-    missing = [name for name, part in zip(names, parts, strict=True) if not part]
+    part_names = ("primary contrast", "sample size", "exclusions")
+    undeclared_parts = [
+        part_name for part_name, sentence in zip(part_names, declared_sentences, strict=True) if not sentence
+    ]
     if declared.primary == "undeclared":
-        missing.insert(0, "interval method")
-    return " ".join(filter(None, [primary, *parts, f"Not declared: {conjoin(missing)}." if missing else ""]))
+        undeclared_parts.insert(0, "interval method")
+    return " ".join(
+        filter(
+            None,
+            [
+                primary_sentences,
+                *declared_sentences,
+                f"Not declared: {conjoin(undeclared_parts)}." if undeclared_parts else "",
+            ],
+        )
+    )
 
 
-def comparison_text(
+def describe_comparison(
     primary: PrimaryAnalysis | None,
     means: Sequence[Contrast],
     comparisons: Comparisons,
     table: ThresholdTable,
     rule: StaircaseRule,
 ) -> str:
-    """Sentences on the differences between the published and the primary analysis. primary: None without a fit. means:
+    """Describe the differences between the published and the primary analysis. primary: None without a fit. means:
     contrasts of reversal means in dB, against the same frequency as those of the primary analysis. rule: the staircase
     of the study."""
     if primary is None:
@@ -90,61 +102,74 @@ def comparison_text(
             "The hierarchical model needs answers of two participants, at two frequencies; these data have fewer, so "
             "only the published analysis is given."
         )
-    missing = [f"{frequency_hz:g} Hz" for frequency_hz in primary.missing_hz]
-    missing_text = f"The model leaves {conjoin(missing)} out, where there is no answer yet." if missing else ""
-    cap_sentences = [NEAR_CAP, *coverage_notes(("means", "tukey", "one-way"), table, rule)] if table.cut else []
+    missing_frequencies = [f"{frequency_hz:g} Hz" for frequency_hz in primary.missing_hz]
+    missing_text = (
+        f"The model leaves {conjoin(missing_frequencies)} out, where there is no answer yet."
+        if missing_frequencies
+        else ""
+    )
+    cap_sentences = (
+        [NEAR_CAP_WARNING, *describe_measured_coverage(("means", "tukey", "one-way"), table, rule)] if table.cut else []
+    )
     return " ".join(
         filter(
-            None, [missing_text, _sizes_text(primary, means, rule), _verdict_text(primary, comparisons), *cap_sentences]
+            None,
+            [
+                missing_text,
+                _describe_differences(primary, means, rule),
+                _describe_significance(primary, comparisons),
+                *cap_sentences,
+            ],
         )
     )
 
 
-def coverage_notes(analyses: Sequence[str], table: ThresholdTable, rule: StaircaseRule) -> tuple[str, ...]:
-    """Sentences on the measured coverage of the intervals of these analyses (names of `coverage_words.NAMES`). Empty
+def describe_measured_coverage(analyses: Sequence[str], table: ThresholdTable, rule: StaircaseRule) -> tuple[str, ...]:
+    """Describe the measured coverage of the intervals of these analyses (names of `coverage_words.NAMES`). Empty
     where neither the cap nor the trial limit affected a threshold, and for a rule other than `SIMULATED_RULE`."""
     if not table.coverage or rule != SIMULATED_RULE:
         return ()
-    return tuple(filter(None, (coverage_sentence(MEASURED, name) for name in analyses)))
+    return tuple(filter(None, (coverage_sentence(MEASURED, analysis) for analysis in analyses)))
 
 
-def _sizes_text(primary: PrimaryAnalysis, means: Sequence[Contrast], rule: StaircaseRule) -> str:
-    """Sentence on the differences in dB by the model and by the thresholds of runs: equal within `NOTABLE_DB`, or where
-    not."""
+def _describe_differences(primary: PrimaryAnalysis, means: Sequence[Contrast], rule: StaircaseRule) -> str:
+    """Describe the differences in dB by the model and by the thresholds of runs: equal within `NOTABLE_DIFFERENCE_DB`,
+    or where not."""
     means_noun = threshold_words(rule).means
-    by_frequency = {contrast.frequency_hz: contrast for contrast in means}
+    means_by_frequency = {contrast.frequency_hz: contrast for contrast in means}
     reference = f"{primary.frequencies_hz[0]:g} Hz"
-    pairs = [(contrast, by_frequency.get(contrast.frequency_hz)) for contrast in primary.contrasts]
+    pairs = [(contrast, means_by_frequency.get(contrast.frequency_hz)) for contrast in primary.contrasts]
     if not pairs:
         return f"The model gives no difference to {reference}."
-    if not any(mean for _, mean in pairs):
+    if not any(means_contrast for _, means_contrast in pairs):
         return (
             f"{capitalise(means_noun)} give no difference to {reference} yet that could be compared with the model's."
         )
-    differing = [
+    differing_texts = [
         f"at {contrast.frequency_hz:g} Hz {format_signed(contrast.difference_db, 1)} dB compared with "
-        f"{format_signed(mean.difference_db, 1)} dB"
-        for contrast, mean in pairs
-        if mean is not None and abs(contrast.difference_db - mean.difference_db) >= NOTABLE_DB
+        f"{format_signed(means_contrast.difference_db, 1)} dB"
+        for contrast, means_contrast in pairs
+        if means_contrast is not None
+        and abs(contrast.difference_db - means_contrast.difference_db) >= NOTABLE_DIFFERENCE_DB
     ]
-    if differing:
-        return f"Differences to {reference} by the model and by {means_noun} differ: {conjoin(differing)}."
-    return f"Differences to {reference} by the model and by {means_noun} agree within {NOTABLE_DB:g} dB."
+    if differing_texts:
+        return f"Differences to {reference} by the model and by {means_noun} differ: {conjoin(differing_texts)}."
+    return f"Differences to {reference} by the model and by {means_noun} agree within {NOTABLE_DIFFERENCE_DB:g} dB."
 
 
-def _verdict_text(primary: PrimaryAnalysis, comparisons: Comparisons) -> str:
-    """Sentence on the frequencies at which only one analysis finds a difference at the 5 % level; empty where they have
+def _describe_significance(primary: PrimaryAnalysis, comparisons: Comparisons) -> str:
+    """Describe the frequencies at which only one analysis finds a difference at the 5 % level; empty where they have
     no pair in common."""
-    lowest = frequency_name(primary.frequencies_hz[0])
-    pairs = {pair.second: pair.p for pair in comparisons.pairs if pair.first == lowest}
-    disagreeing = [
-        f"{contrast.frequency_hz:g} Hz (Holm {format_p_text(contrast.p_holm)}, Tukey {format_p_text(tukey)})"
+    reference_name = format_frequency(primary.frequencies_hz[0])
+    tukey_p_values = {pair.second: pair.p for pair in comparisons.pairs if pair.first == reference_name}
+    disagreeing_texts = [
+        f"{contrast.frequency_hz:g} Hz (Holm {format_p_text(contrast.p_holm)}, Tukey {format_p_text(tukey_p)})"
         for contrast in primary.contrasts
-        if (tukey := pairs.get(frequency_name(contrast.frequency_hz))) is not None
-        and (tukey < 0.05) != (contrast.p_holm < 0.05)
+        if (tukey_p := tukey_p_values.get(format_frequency(contrast.frequency_hz))) is not None
+        and (tukey_p < 0.05) != (contrast.p_holm < 0.05)
     ]
-    if not any(frequency_name(contrast.frequency_hz) in pairs for contrast in primary.contrasts):
+    if not any(format_frequency(contrast.frequency_hz) in tukey_p_values for contrast in primary.contrasts):
         return ""
-    if not disagreeing:
-        return f"Both agree which frequencies differ from {lowest} at the 5 % level."
-    return f"At the 5 % level they disagree whether these differ from {lowest}: {conjoin(disagreeing)}."
+    if not disagreeing_texts:
+        return f"Both agree which frequencies differ from {reference_name} at the 5 % level."
+    return f"At the 5 % level they disagree whether these differ from {reference_name}: {conjoin(disagreeing_texts)}."

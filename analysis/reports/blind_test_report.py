@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from analysis.evaluation.blind_test.confidence_intervals import Figure
-from analysis.evaluation.blind_test.controlled import ControlOutcome
+from analysis.evaluation.blind_test.control_claims import ControlOutcome
 from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Outcome
 from analysis.evaluation.blind_test.score import Score

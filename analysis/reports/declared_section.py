@@ -1,74 +1,97 @@
 """First section of a study report: the contrast declared in the protocol, by both analyses, with sample and exclusions.
 
 The section shows the result that was fixed before the data were collected (`declared_result`), so that a reader can
-distinguish it from results chosen afterwards.
+distinguish it from results chosen afterwards. Called by `analysis.reports.study_report`.
 """
 
 from analysis.psychophysics.declared_result import ContrastResult, DeclaredResult
 from analysis.reports.page import Section, Table
 from analysis.wording import MISSING, format_p, format_p_text, format_signed
 
-NAMES = {"hierarchical": "hierarchical model of all answers", "published": "published one-way analysis"}
+ANALYSIS_NAMES = {"hierarchical": "hierarchical model of all answers", "published": "published one-way analysis"}
 
 
 def make_declared_section(declaration: str, result: DeclaredResult) -> Section:
-    """The section on the declared result. declaration: text on what was declared and what was not. Where nothing was
-    declared, the section consists of this text."""
+    """Make the section on the declared result. declaration: text on what was declared and what was not. Where nothing
+    was declared, the section consists of this text."""
     heading = "The declared result"
     if not _is_anything_declared(result):
         return Section(heading, paragraphs=(declaration,))
-    tables = (_contrast_table(result),) if result.results else ()
-    sentences = [_contrast_sentence(row, result) for row in result.results if row.declared]
-    return Section(heading, paragraphs=(declaration, *sentences), tables=(*tables, _sample_table(result)))
+    tables = (_tabulate_contrasts(result),) if result.results else ()
+    sentences = [_describe_contrast(contrast, result) for contrast in result.results if contrast.declared]
+    return Section(heading, paragraphs=(declaration, *sentences), tables=(*tables, _tabulate_sample(result)))
 
 
 def describe_declared(result: DeclaredResult) -> tuple[str, ...]:
-    """A sentence on the declared contrast per analysis, the declared analysis first; empty without a contrast."""
-    return tuple(_contrast_sentence(row, result) for row in result.results)
+    """Describe the declared contrast in a sentence per analysis, the declared analysis first; empty without a
+    contrast."""
+    return tuple(_describe_contrast(contrast, result) for contrast in result.results)
 
 
 def _is_anything_declared(result: DeclaredResult) -> bool:
+    """Whether the protocol declares an analysis, a contrast, a sample size or exclusions."""
     return result.primary != "undeclared" or bool(
         result.contrast_hz or result.participants_declared or result.exclusions
     )
 
 
-def _contrast_sentence(row: ContrastResult, result: DeclaredResult) -> str:
-    """Sentence on the contrast by one analysis, with interval, p and notes."""
-    first, second = result.contrast_hz
-    role = ", the declared analysis" if row.declared else ""
-    contrast_words = f"Declared contrast, {first:g} Hz minus {second:g} Hz, by the {NAMES[row.analysis]}{role}:"
-    if row.difference is None:
-        return f"{contrast_words} not known. {' '.join(row.notes)}"
-    digits, percent = _decimals(row), f"{100 * result.confidence:g} %"
+def _describe_contrast(contrast: ContrastResult, result: DeclaredResult) -> str:
+    """Describe the contrast by one analysis, with interval, p and notes."""
+    first_hz, second_hz = result.contrast_hz
+    role = ", the declared analysis" if contrast.declared else ""
+    opening = (
+        f"Declared contrast, {first_hz:g} Hz minus {second_hz:g} Hz, by the {ANALYSIS_NAMES[contrast.analysis]}{role}:"
+    )
+    if contrast.difference is None:
+        return f"{opening} not known. {' '.join(contrast.notes)}"
+    decimals, confidence_text = _choose_decimals(contrast), f"{100 * result.confidence:g} %"
     return (
-        f"{contrast_words} {format_signed(row.difference, digits)} {row.unit} "
-        f"({percent} interval {_interval_text(row)} {row.unit}, {format_p_text(row.p)}). {' '.join(row.notes)}"
+        f"{opening} {format_signed(contrast.difference, decimals)} {contrast.unit} "
+        f"({confidence_text} interval {_format_interval(contrast)} {contrast.unit}, "
+        f"{format_p_text(contrast.p)}). {' '.join(contrast.notes)}"
     ).strip()
 
 
-def _contrast_table(result: DeclaredResult) -> Table:
-    """Table of the contrast with a row per analysis."""
-    first, second = result.contrast_hz
+def _tabulate_contrasts(result: DeclaredResult) -> Table:
+    """Tabulate the contrast, a row per analysis."""
+    first_hz, second_hz = result.contrast_hz
     rows = []
-    for row in result.results:
-        role = " (declared)" if row.declared else ""
-        n, m = row.participants
-        size = MISSING if row.difference is None else f"{format_signed(row.difference, _decimals(row))} {row.unit}"
-        interval = MISSING if row.difference is None else f"{_interval_text(row)} {row.unit}"
-        people = str(n) if n == m else f"{n} and {m}"
-        rows.append((f"{NAMES[row.analysis]}{role}", people, size, interval, format_p(row.p)))
-    notes = tuple(f"{NAMES[row.analysis].capitalize()}: {note}" for row in result.results for note in row.notes)
+    for contrast in result.results:
+        role = " (declared)" if contrast.declared else ""
+        first_count, second_count = contrast.participants
+        difference_text = (
+            MISSING
+            if contrast.difference is None
+            else f"{format_signed(contrast.difference, _choose_decimals(contrast))} {contrast.unit}"
+        )
+        interval_text = MISSING if contrast.difference is None else f"{_format_interval(contrast)} {contrast.unit}"
+        participants_text = str(first_count) if first_count == second_count else f"{first_count} and {second_count}"
+        rows.append(
+            (
+                f"{ANALYSIS_NAMES[contrast.analysis]}{role}",
+                participants_text,
+                difference_text,
+                interval_text,
+                format_p(contrast.p),
+            )
+        )
+    notes = tuple(
+        f"{ANALYSIS_NAMES[contrast.analysis].capitalize()}: {note}"
+        for contrast in result.results
+        for note in contrast.notes
+    )
     return Table(
-        caption=f"Declared contrast: threshold at {first:g} Hz minus that at {second:g} Hz",
+        caption=f"Declared contrast: threshold at {first_hz:g} Hz minus that at {second_hz:g} Hz",
         header=("Analysis", "Participants", "Difference", f"{100 * result.confidence:g} % interval", "p"),
         rows=tuple(rows),
-        notes=notes if any(row.declared for row in result.results) else (*notes, "Which analysis decides: undeclared."),
+        notes=notes
+        if any(contrast.declared for contrast in result.results)
+        else (*notes, "Which analysis decides: undeclared."),
     )
 
 
-def _sample_table(result: DeclaredResult) -> Table:
-    """Table of sample size and exclusions, declared and actual."""
+def _tabulate_sample(result: DeclaredResult) -> Table:
+    """Tabulate sample size and exclusions, declared and actual."""
     return Table(
         caption="Participants and exclusions",
         header=("", "Declared", "In this analysis"),
@@ -87,12 +110,15 @@ def _sample_table(result: DeclaredResult) -> Table:
     )
 
 
-def _interval_text(row: ContrastResult) -> str:
-    """Limits of the interval as text without unit; `MISSING` for a limit that is not determined."""
-    ends = [MISSING if end is None else format_signed(end, _decimals(row)) for end in (row.lower, row.upper)]
-    return " to ".join(ends)
+def _format_interval(contrast: ContrastResult) -> str:
+    """Format the limits of the interval without unit; `MISSING` for a limit that is not determined."""
+    limit_texts = [
+        MISSING if limit is None else format_signed(limit, _choose_decimals(contrast))
+        for limit in (contrast.lower, contrast.upper)
+    ]
+    return " to ".join(limit_texts)
 
 
-def _decimals(row: ContrastResult) -> int:
-    """Decimals of a difference: one in dB, two in N."""
-    return 1 if row.unit == "dB" else 2
+def _choose_decimals(contrast: ContrastResult) -> int:
+    """Return the decimals of a difference: one in dB, two in N."""
+    return 1 if contrast.unit == "dB" else 2

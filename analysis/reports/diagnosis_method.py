@@ -1,6 +1,6 @@
 """Paragraphs of a diagnosis report on the method: how errors were measured, how the samples were split, how the noise
-was estimated, how the model was re-tuned and effects were chosen, how the map is tested. Figures are those of the
-diagnosis itself."""
+was estimated, how the model was re-tuned and effects were chosen, how the map is tested. Numbers are those of the
+diagnosis itself. Called by `analysis.reports.diagnosis_report`."""
 
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, MODEL_FLOOR, RETUNING_BOUND
@@ -20,8 +20,8 @@ _NOISE_SOURCES = {
     "rest": "from the signals while nothing is driven",
     "quiet band": "from the frequencies above the driven band",
 }
-"""How the noise was measured, by `NoiseFloor.how`."""
-_ROLES = (
+"""How the noise was measured, by `NoiseFloor.method`."""
+_SPLIT_USES = (
     ("fit", "were used for the fit"),
     ("choose", "were used to choose between explanations"),
     ("test", "were held out and used only for the final test"),
@@ -29,20 +29,20 @@ _ROLES = (
 """Use of each set of samples, by its key in `Findings.split_s`."""
 
 
-def method_paragraphs(findings: Findings) -> tuple[str, ...]:
-    """The paragraphs in this order: error measure, split of the samples, noise, re-tuning and choice of effects, map of
-    the mismatch. Paragraphs without data are left out."""
+def write_method_paragraphs(findings: Findings) -> tuple[str, ...]:
+    """Write the paragraphs in this order: error measure, split of the samples, noise, re-tuning and choice of effects,
+    map of the mismatch. Paragraphs without data are left out."""
     return (
-        _error_paragraph(findings),
-        *_split_paragraphs(findings),
-        *_noise_paragraphs(findings),
-        *_choice_paragraphs(findings),
-        _map_paragraph(),
+        _describe_error_measure(findings),
+        *_describe_sample_split(findings),
+        *_describe_noise_source(findings),
+        *_describe_effect_choice(findings),
+        _describe_mismatch_map(),
     )
 
 
-def _error_paragraph(findings: Findings) -> str:
-    """The error measure that was used, and the units of errors."""
+def _describe_error_measure(findings: Findings) -> str:
+    """Describe the error measure that was used, and the units of errors."""
     measure = findings.diagnosis.error
     if measure == "free simulation":
         measure_text = _FREE_SIMULATION
@@ -59,14 +59,17 @@ def _error_paragraph(findings: Findings) -> str:
     )
 
 
-def _split_paragraphs(findings: Findings) -> tuple[str, ...]:
-    """Seconds of the recordings that served for fitting, validation and test; none where no times are known."""
-    parts = [f"{findings.split_s[role]:.3g} s {use}" for role, use in _ROLES if findings.split_s.get(role)]
-    return (f"Of the recorded time, {conjoin(parts)}.",) if parts else ()
+def _describe_sample_split(findings: Findings) -> tuple[str, ...]:
+    """Describe the seconds of the recordings that served for fitting, validation and test; none where no times are
+    known."""
+    split_texts = [
+        f"{findings.split_s[role]:.3g} s {use_text}" for role, use_text in _SPLIT_USES if findings.split_s.get(role)
+    ]
+    return (f"Of the recorded time, {conjoin(split_texts)}.",) if split_texts else ()
 
 
-def _noise_paragraphs(findings: Findings) -> tuple[str, ...]:
-    """Source of the noise estimate, with its remarks; none without an estimate."""
+def _describe_noise_source(findings: Findings) -> tuple[str, ...]:
+    """Describe the source of the noise estimate, with its remarks; none without an estimate."""
     if findings.floor is None:
         return ()
     source_text = _NOISE_SOURCES.get(findings.floor.method)
@@ -78,14 +81,15 @@ def _noise_paragraphs(findings: Findings) -> tuple[str, ...]:
     return (" ".join([text, *findings.floor.remarks]),)
 
 
-def _choice_paragraphs(findings: Findings) -> tuple[str, ...]:
-    """Re-tuning within the calibration's tolerance, and the search for effects; none where nothing is missing."""
+def _describe_effect_choice(findings: Findings) -> tuple[str, ...]:
+    """Describe the re-tuning within the calibration's tolerance, and the search for effects; none where nothing is
+    missing."""
     if not findings.diagnosis.mismatch:
         return ()
-    bound = RETUNING_BOUND if findings.tuning is None else findings.tuning.bound
+    bound_sd = RETUNING_BOUND if findings.tuning is None else findings.tuning.bound
     return (
         "First the model's own parameters were re-tuned, each held by the stated standard deviation of its "
-        f"calibration and moved by at most {bound:g} of them. Then every effect of the catalogue was tried at every "
+        f"calibration and moved by at most {bound_sd:g} of them. Then every effect of the catalogue was tried at every "
         "possible place, with starting values from the residual; the most likely were fitted together with the "
         "model's parameters, and the best was kept if it lowered the error sufficiently on data to which it was not "
         f"fitted. This was repeated for further effects, at most three in all. A share of {100 * MODEL_FLOOR:g} % of "
@@ -93,8 +97,8 @@ def _choice_paragraphs(findings: Findings) -> tuple[str, ...]:
     )
 
 
-def _map_paragraph() -> str:
-    """Significance in the map of the mismatch: false discovery rate, closed testing."""
+def _describe_mismatch_map() -> str:
+    """Describe the significance tests in the map of the mismatch: false discovery rate, closed testing."""
     return (
         "In the map, an error that clean recordings (without missing physics) also have counts as no mismatch; the "
         "error of the most complete model on held-out data of the same channel, in the same octave and the "

@@ -3,15 +3,15 @@
 from collections.abc import Mapping, Sequence
 
 from analysis.diagnosis.document import NamedEffect
-from analysis.diagnosis.localisation.localisation_words import localisation_sentences
+from analysis.diagnosis.localisation.localisation_words import write_localisation_sentences
 from analysis.diagnosis.result.ceiling_wording import (
-    black_box_beats,
-    black_box_sentence,
-    confirmation_sentence,
+    describe_black_box,
     describe_ceiling,
+    describe_confirmation,
+    is_black_box_better,
 )
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.result.plausibility import implausible_sentences
+from analysis.diagnosis.result.plausibility import describe_doubts
 from analysis.diagnosis.result.retuned_parameters import describe_doubtful_parameters, describe_retuning
 from analysis.diagnosis.result.wording import (
     collect_signature_texts,
@@ -27,16 +27,16 @@ from analysis.diagnosis.result.wording import (
     write_answer,
 )
 from analysis.figures.picture import Picture
-from analysis.reports.diagnosis_distortion import distortion_sections
-from analysis.reports.diagnosis_method import method_paragraphs
+from analysis.reports.diagnosis_distortion import make_distortion_sections
+from analysis.reports.diagnosis_method import write_method_paragraphs
 from analysis.reports.diagnosis_tables import (
-    candidate_table,
-    channel_table,
-    error_table,
-    mismatch_table,
-    parameter_table,
-    rival_table,
+    tabulate_candidates,
+    tabulate_channel_errors,
+    tabulate_errors,
+    tabulate_mismatches,
+    tabulate_parameters,
     tabulate_retuned,
+    tabulate_rivals,
 )
 from analysis.reports.page import Page, Section, Table, render_page
 from analysis.wording import capitalise
@@ -51,7 +51,7 @@ def render_diagnosis_report(
     sections = [
         *_make_answer_sections(findings),
         _make_localisation_section(findings, pictures),
-        *distortion_sections(findings),
+        *make_distortion_sections(findings),
         *(_make_effect_section(findings, number, pictures) for number in range(len(diagnosis.effects))),
         *_make_candidate_sections(findings),
         *_make_rival_sections(pictures),
@@ -61,7 +61,7 @@ def render_diagnosis_report(
         *_make_black_box_sections(findings),
         *_make_sentence_sections("The next recording", describe_next_experiment(diagnosis)),
         *_make_remark_sections(findings),
-        Section("How this was done", paragraphs=method_paragraphs(findings)),
+        Section("How this was done", paragraphs=write_method_paragraphs(findings)),
     ]
     return render_page(
         Page(
@@ -78,9 +78,9 @@ def render_diagnosis_report(
 def _join_doubts(findings: Findings) -> str:
     """Doubts about the answer as one text; empty without doubts."""
     has_effects = bool(findings.diagnosis.effects)
-    doubts = [confirmation_sentence(findings.diagnosis.fit.fit, findings.diagnosis.fit.test)] if has_effects else []
-    if has_effects and findings.black_box is not None and black_box_beats(findings.black_box):
-        doubts.append(black_box_sentence(findings.black_box, has_effects))
+    doubts = [describe_confirmation(findings.diagnosis.fit.fit, findings.diagnosis.fit.test)] if has_effects else []
+    if has_effects and findings.black_box is not None and is_black_box_better(findings.black_box):
+        doubts.append(describe_black_box(findings.black_box, has_effects))
     return " ".join(doubt for doubt in doubts if doubt)
 
 
@@ -102,13 +102,13 @@ def _make_answer_sections(findings: Findings) -> list[Section]:
 
 def _make_candidate_sections(findings: Findings) -> list[Section]:
     """Section with the effects that may be missing but are not named; none without candidates."""
-    table = candidate_table(findings)
+    table = tabulate_candidates(findings)
     return [] if table is None else [Section("What else may be missing", tables=(table,))]
 
 
 def _make_black_box_sections(findings: Findings) -> list[Section]:
     """Section that compares the prediction with that of a black-box model; none without one."""
-    text = black_box_sentence(findings.black_box, bool(findings.diagnosis.effects))
+    text = describe_black_box(findings.black_box, bool(findings.diagnosis.effects))
     paragraphs = tuple(filter(None, (*describe_ceiling(findings.balance_errors), text)))
     return [Section("Comparison with a black box", paragraphs=paragraphs)] if paragraphs else []
 
@@ -117,8 +117,8 @@ _NO_MAP = "There is no map: the noise of this recording is not known."
 
 
 def _make_localisation_section(findings: Findings, pictures: Sequence[Picture]) -> Section:
-    sentences = localisation_sentences(findings.localisation) if findings.maps else (_NO_MAP,)
-    table = mismatch_table("The places that differ most, as given", findings.diagnosis.mismatch, findings.is_timed)
+    sentences = write_localisation_sentences(findings.localisation) if findings.maps else (_NO_MAP,)
+    table = tabulate_mismatches("The places that differ most, as given", findings.diagnosis.mismatch, findings.is_timed)
     return Section(
         "Where model and device disagree",
         paragraphs=sentences,
@@ -140,7 +140,7 @@ def _make_effect_section(findings: Findings, number: int, pictures: Sequence[Pic
         capitalise(format_effect_title(effect, _has_single_input(findings))),
         paragraphs=tuple(paragraphs),
         pictures=_select_signatures(findings, effect, pictures),
-        tables=(parameter_table(effect), *((rival_table(effect),) if effect.rivals else ())),
+        tables=(tabulate_parameters(effect), *((tabulate_rivals(effect),) if effect.rivals else ())),
     )
 
 
@@ -161,14 +161,14 @@ def _make_rival_sections(pictures: Sequence[Picture]) -> list[Section]:
 
 
 def _make_error_section(findings: Findings, pictures: Sequence[Picture]) -> Section:
-    tables: list[Table] = [error_table(findings)]
-    tables += [table for part in ("test", "fit") if (table := channel_table(findings, part)) is not None]
+    tables: list[Table] = [tabulate_errors(findings)]
+    tables += [table for part in ("test", "fit") if (table := tabulate_channel_errors(findings, part)) is not None]
     return Section("How well it predicts", pictures=_select_pictures(pictures, "held-out"), tables=tuple(tables))
 
 
 def _make_remainder_section(findings: Findings, pictures: Sequence[Picture]) -> Section:
     remainder = findings.diagnosis.remainder
-    tables = (mismatch_table("Remaining mismatch", remainder, findings.is_timed),) if remainder else ()
+    tables = (tabulate_mismatches("Remaining mismatch", remainder, findings.is_timed),) if remainder else ()
     return Section(
         "What is still unexplained",
         paragraphs=(describe_remainder(findings.diagnosis, extract_device(findings)),),
@@ -197,7 +197,7 @@ def _make_parameter_section(findings: Findings) -> Section:
 
 
 def _make_remark_sections(findings: Findings) -> list[Section]:
-    points = (*implausible_sentences(findings), *findings.remarks)
+    points = (*describe_doubts(findings), *findings.remarks)
     return [Section("Remarks", points=points)] if points else []
 
 

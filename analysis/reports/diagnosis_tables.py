@@ -8,44 +8,44 @@ from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from analysis.diagnosis.document import Errors, Estimate, Mismatch, NamedEffect
-from analysis.diagnosis.effect_words import estimate_text, noun_of, place_words
-from analysis.diagnosis.result.candidate_wording import candidate_parameters
+from analysis.diagnosis.effect_words import format_estimate, format_place, get_noun
+from analysis.diagnosis.result.candidate_wording import format_candidate_parameters
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.retuned_parameters import list_parameters
 from analysis.diagnosis.result.wording import extract_device
-from analysis.diagnosis.unit_wording import error_text, probability_text, share_text, value_text
+from analysis.diagnosis.unit_wording import format_error, format_probability, format_share, format_value
 from analysis.reports.page import Table
 from analysis.wording import MISSING, capitalise, end_sentence, format_p, format_signed
 
-_STAGES = (("before", "As given"), ("retuned", "Re-tuned"), ("after", "With the effects found"))
+_MODEL_STAGES = (("before", "As given"), ("retuned", "Re-tuned"), ("after", "With the effects found"))
 """Attribute of each stage of the model, and its heading."""
-_MOST_PLACES = 12
+_MOST_MISMATCH_ROWS = 12
 """Most rows of the table of mismatches."""
-_SHARE = (
+_SHARE_NOTE = (
     "In order of how much of the channel's whole signal is missing. Share: mismatch over signal there; where a state "
     "is named, the share of the mismatch's power that occurs in it."
 )
-_PARTS: Mapping[str, str] = {"fit": "the fitted data", "test": "held-out data"}
+_PART_NAMES: Mapping[str, str] = {"fit": "the fitted data", "test": "held-out data"}
 """Part of the data, and its text."""
 
 
-def parameter_table(effect: NamedEffect) -> Table:
-    """Table of an effect's parameters with their 95 % intervals."""
+def tabulate_parameters(effect: NamedEffect) -> Table:
+    """Tabulate an effect's parameters with their 95 % intervals."""
     rows = tuple(
-        (name.replace("_", " "), estimate_text(parameter).partition(" [")[0], _interval_text(parameter))
+        (name.replace("_", " "), format_estimate(parameter).partition(" [")[0], _format_interval(parameter))
         for name, parameter in effect.parameters.items()
     )
     return Table("Its parameters", ("Number", "Value", "95 % interval"), rows)
 
 
-def rival_table(effect: NamedEffect) -> Table:
-    """Table of a named effect and its rivals, with probabilities and reasons; rivals that cannot be distinguished come
+def tabulate_rivals(effect: NamedEffect) -> Table:
+    """Tabulate a named effect and its rivals, with probabilities and reasons; rivals that cannot be distinguished come
     first."""
-    rows = [(capitalise(noun_of(effect.effect)), probability_text(effect.probability), "named", "")]
+    rows = [(capitalise(get_noun(effect.effect)), format_probability(effect.probability), "named", "")]
     rows += [
         (
-            capitalise(noun_of(rival.effect)),
-            probability_text(rival.probability),
+            capitalise(get_noun(rival.effect)),
+            format_probability(rival.probability),
             "cannot be distinguished" if rival.inseparable else "passed over",
             end_sentence(rival.why_not),
         )
@@ -54,15 +54,15 @@ def rival_table(effect: NamedEffect) -> Table:
     return Table("It and its rivals", ("Effect", "Probability", "Verdict", "Why"), tuple(rows))
 
 
-def candidate_table(findings: Findings) -> Table | None:
-    """Table of candidate effects that were not confirmed, the best first; None without candidates."""
+def tabulate_candidates(findings: Findings) -> Table | None:
+    """Tabulate candidate effects that were not confirmed, the best first; None without candidates."""
     device = extract_device(findings)
     rows = tuple(
         (
-            f"{capitalise(noun_of(candidate.effect))} {place_words(candidate.place, candidate.axis, device.single)}",
-            candidate_parameters(candidate, device) or MISSING,
-            share_text(candidate.held_out_gain),
-            share_text(candidate.share_of_black_box),
+            f"{capitalise(get_noun(candidate.effect))} {format_place(candidate.place, candidate.axis, device.single)}",
+            format_candidate_parameters(candidate, device) or MISSING,
+            format_share(candidate.held_out_gain),
+            format_share(candidate.share_of_black_box),
             end_sentence(capitalise(candidate.why_not)),
         )
         for candidate in findings.diagnosis.candidates
@@ -78,50 +78,66 @@ def candidate_table(findings: Findings) -> Table | None:
     return Table("The best candidates, not confirmed", header, rows, (note,))
 
 
-def error_table(findings: Findings) -> Table:
-    """Table of root-mean-square errors over all channels as a share of the signal, on fitted and on held-out data, by
+def tabulate_errors(findings: Findings) -> Table:
+    """Tabulate root-mean-square errors over all channels as a share of the signal, on fitted and on held-out data, by
     stage of the model, with the noise."""
     rows = tuple(
-        (f"On {_PARTS[part]}", *(_stage_error_text(errors, stage) for stage, _ in _STAGES), error_text(errors.noise))
+        (
+            f"On {_PART_NAMES[part]}",
+            *(_format_stage_error(errors, stage) for stage, _ in _MODEL_STAGES),
+            format_error(errors.noise),
+        )
         for part, errors in (("fit", findings.diagnosis.fit.fit), ("test", findings.diagnosis.fit.test))
     )
-    header = ("Error, share of the signal", *(words for _, words in _STAGES), "Noise alone")
+    header = ("Error, share of the signal", *(heading for _, heading in _MODEL_STAGES), "Noise alone")
     return Table("Errors over all channels, root-mean-square", header, rows)
 
 
-def channel_table(findings: Findings, part: Literal["fit", "test"]) -> Table | None:
-    """Table of the rms error of each channel in its unit, with its ratio to the noise, by stage of the model; None
+def tabulate_channel_errors(findings: Findings, part: Literal["fit", "test"]) -> Table | None:
+    """Tabulate the rms error of each channel in its unit, with its ratio to the noise, by stage of the model; None
     where there are no time series. Where a statistic was fitted, its chance error takes the place of the noise."""
     if not findings.time_series:
         return None
-    names, units, noises = findings.time_series[0].channels, findings.time_series[0].units, findings.noise_rms
-    statistic, reference = findings.explanation.statistic, "noise"
+    names, units, noise_rms_by_channel = (
+        findings.time_series[0].channels,
+        findings.time_series[0].units,
+        findings.noise_rms,
+    )
+    statistic, reference_name = findings.explanation.statistic, "noise"
     if statistic is not None:
-        units, noises, reference = (
+        units, noise_rms_by_channel, reference_name = (
             ("1",) * len(names),
             dict(zip(names, statistic.chance.tolist(), strict=True)),
             "chance",
         )
-    scores = {stage: getattr(getattr(findings.explanation, stage).score, part) for stage, _ in _STAGES}
+    scores_by_stage = {stage: getattr(getattr(findings.explanation, stage).score, part) for stage, _ in _MODEL_STAGES}
     rows = []
-    for k, (name, unit) in enumerate(zip(names, units, strict=True)):
-        noise = noises.get(name)
-        if noise is None:
+    for channel_index, (name, unit) in enumerate(zip(names, units, strict=True)):
+        noise_rms = noise_rms_by_channel.get(name)
+        if noise_rms is None:
             continue
         ratios = [
-            float(findings.channel_errors.get(stage, {}).get(name, values[k]) if part == "test" else values[k])
-            for stage, values in scores.items()
+            float(
+                findings.channel_errors.get(stage, {}).get(name, channel_ratios[channel_index])
+                if part == "test"
+                else channel_ratios[channel_index]
+            )
+            for stage, channel_ratios in scores_by_stage.items()
         ]
-        rows.append((name, *(f"{value_text(ratio * noise, unit)} ({_ratio_text(ratio)})" for ratio in ratios),
-                     value_text(noise, unit)))  # fmt: skip
-    header = ("Channel", *(f"{words} (× {reference})" for _, words in _STAGES), capitalise(reference))
-    return Table(f"By channel, on {_PARTS[part]}, rms", header, tuple(rows), folded=part == "fit")
+        rows.append((name, *(f"{format_value(ratio * noise_rms, unit)} ({_format_ratio(ratio)})" for ratio in ratios),
+                     format_value(noise_rms, unit)))  # fmt: skip
+    header = (
+        "Channel",
+        *(f"{heading} (× {reference_name})" for _, heading in _MODEL_STAGES),
+        capitalise(reference_name),
+    )
+    return Table(f"By channel, on {_PART_NAMES[part]}, rms", header, tuple(rows), folded=part == "fit")
 
 
-def mismatch_table(caption: str, places: Sequence[Mismatch], is_timed: bool = True) -> Table:
-    """Folded table of the first `_MOST_PLACES` mismatches between model and device. is_timed: bands are in hertz; else
-    in cycles per sample."""
-    worst = places[:_MOST_PLACES]
+def tabulate_mismatches(caption: str, mismatches: Sequence[Mismatch], is_timed: bool = True) -> Table:
+    """Tabulate, folded, the first `_MOST_MISMATCH_ROWS` mismatches between model and device. is_timed: bands are in
+    hertz; else in cycles per sample."""
+    shown_mismatches = mismatches[:_MOST_MISMATCH_ROWS]
     rows = tuple(
         (
             mismatch.output,
@@ -129,25 +145,25 @@ def mismatch_table(caption: str, places: Sequence[Mismatch], is_timed: bool = Tr
             f"{mismatch.band_hz[0]:g} to {mismatch.band_hz[1]:g} {'Hz' if is_timed else 'cycles per sample'}",
             MISSING if mismatch.amplitude is None else f"{mismatch.amplitude:g}",
             mismatch.state or MISSING,
-            share_text(mismatch.share),
+            format_share(mismatch.share),
             format_p(mismatch.p_value),
         )
-        for mismatch in worst
+        for mismatch in shown_mismatches
     )
-    remaining_count = len(places) - len(worst)
+    remaining_count = len(mismatches) - len(shown_mismatches)
     notes: tuple[str, ...] = (
         (f"And {remaining_count} smaller {'place' if remaining_count == 1 else 'places'}.",)
         if remaining_count > 0
         else ()
     )
-    notes += (_SHARE,) if worst else ()
+    notes += (_SHARE_NOTE,) if shown_mismatches else ()
     header = ("Channel", "Driven by", "Band", "Level", "State", "Share", "p")
     return Table(caption, header, rows, notes, folded=True)
 
 
 def tabulate_retuned(findings: Findings) -> Table | None:
-    """Folded table of all re-tuned parameters, before and after the found effects were added, with their deviations in
-    standard deviations; None where nothing was re-tuned."""
+    """Tabulate, folded, all re-tuned parameters, before and after the found effects were added, with their deviations
+    in standard deviations; None where nothing was re-tuned."""
     if findings.tuning is None:
         return None
     retuned_parameters = list_parameters(findings.tuning, findings.explanation.retuned.fitted.deviations)
@@ -166,21 +182,21 @@ def tabulate_retuned(findings: Findings) -> Table | None:
     return Table("Every free parameter, by the size of its change", header, rows, folded=True)
 
 
-def _stage_error_text(errors: Errors, stage: str) -> str:
-    """Error of one stage of `_STAGES` as text."""
-    value: float | None = getattr(errors, stage)
-    return error_text(value)
+def _format_stage_error(errors: Errors, stage: str) -> str:
+    """Format the error of one stage of `_MODEL_STAGES` as text."""
+    error: float | None = getattr(errors, stage)
+    return format_error(error)
 
 
-def _ratio_text(ratio: float) -> str:
-    """Ratio of an error to the noise, such as 1.25×."""
+def _format_ratio(ratio: float) -> str:
+    """Format the ratio of an error to the noise, such as 1.25×."""
     return f"{ratio:.2f}×" if ratio < 10 else f"{ratio:.3g}×"
 
 
-def _interval_text(estimate: Estimate) -> str:
-    """95 % interval of an estimate with the digits of `value_text`; `MISSING` without an interval."""
+def _format_interval(estimate: Estimate) -> str:
+    """Format the 95 % interval of an estimate with the digits of `format_value`; `MISSING` without an interval."""
     if estimate.ci95 is None:
         return MISSING
-    text = value_text(estimate.value, estimate.unit, estimate.ci95)
-    low, high = text[text.index("[") + 1 : -1].split(", ")
-    return f"{low} to {high}"
+    text = format_value(estimate.value, estimate.unit, estimate.ci95)
+    lower_text, upper_text = text[text.index("[") + 1 : -1].split(", ")
+    return f"{lower_text} to {upper_text}"

@@ -12,7 +12,7 @@ import numpy as np
 from analysis.figures.frequency_bands import frequency_bands_picture
 from analysis.figures.model_order import model_order_picture
 from analysis.figures.picture import Picture
-from analysis.figures.transfer_functions import ResponseCurve, transfer_functions_picture
+from analysis.figures.transfer_functions import ResponseCurve, make_transfer_functions_picture
 from analysis.reports.page import Page, Section, Table, render_page
 from equalizer.identification.frequency_response.coupling_onset import CouplingOnset
 from equalizer.identification.frequency_response.frequency_bands import FrequencyBand
@@ -53,7 +53,7 @@ def identification_pictures(findings: IdentificationFindings) -> tuple[Picture, 
     low, high = findings.model.band_hz
     curve_hz = np.geomspace(low, high, CURVE_LINES)
     curve = ResponseCurve("model", curve_hz, model_response(findings.model, curve_hz))
-    pictures = [transfer_functions_picture(findings.estimate, curve, findings.model.band_hz)]
+    pictures = [make_transfer_functions_picture(findings.estimate, curve, findings.model.band_hz)]
     if findings.bands:
         pictures.append(
             frequency_bands_picture(findings.estimate, findings.onset, findings.bands, findings.direction_limit_hz)

@@ -6,7 +6,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from analysis.figures.look_pictures import look_pictures
+from analysis.figures.look_pictures import make_look_pictures
 from analysis.figures.picture import Picture
 from analysis.look.check import Check
 from analysis.look.overview import Overview
@@ -44,7 +44,7 @@ def render_look_report(
 
 def pictures_of(overviews: Sequence[Overview]) -> tuple[tuple[Picture, ...], ...]:
     """Pictures of each recording; recordings are numbered from 1."""
-    return tuple(look_pictures(overview, number) for number, overview in enumerate(overviews, start=1))
+    return tuple(make_look_pictures(overview, number) for number, overview in enumerate(overviews, start=1))
 
 
 def summarise_overview(overview: Overview) -> str:

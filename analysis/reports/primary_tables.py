@@ -13,9 +13,9 @@ from analysis.psychophysics.group_contrasts import EQUIVALENCE_DB, Contrast
 from analysis.psychophysics.hierarchy.inference import MedianThreshold
 from analysis.psychophysics.hierarchy.objective import LOG_SD_BOUNDS
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
-from analysis.psychophysics.hierarchy.run_likelihood import RunLikelihood, newton_or_none
+from analysis.psychophysics.hierarchy.run_likelihood import RunLikelihood, convert_to_newton
 from analysis.psychophysics.study_analysis import StudyAnalysis
-from analysis.psychophysics.two_analyses import coverage_notes
+from analysis.psychophysics.two_analyses import describe_measured_coverage
 from analysis.reports.page import Section, Table
 from analysis.threshold_words import threshold_words
 from analysis.wording import MISSING, conjoin, format_number, format_p, format_p_text, format_signed
@@ -86,8 +86,9 @@ def _single_section(analysis: StudyAnalysis) -> Section:
 
 
 def _coverage_notes(analysis: StudyAnalysis, name: str) -> tuple[str, ...]:
-    """Notes on the measured coverage of an analysis's intervals where the cap cut the data (`coverage_notes`)."""
-    return coverage_notes((name,), analysis.table, analysis.protocol.staircase)
+    """Notes on the measured coverage of an analysis's intervals where the cap cut the data
+    (`describe_measured_coverage`)."""
+    return describe_measured_coverage((name,), analysis.table, analysis.protocol.staircase)
 
 
 def _overall_paragraph(primary: PrimaryAnalysis) -> str:
@@ -237,11 +238,11 @@ def _run_table(runs: Sequence[RunLikelihood], confidence: float, notes: tuple[st
 
 def run_words(run: RunLikelihood) -> tuple[str, str]:
     """Threshold and likelihood interval in N; a dash for an interval that excludes no threshold."""
-    lower, upper = newton_or_none(run.lower_db), newton_or_none(run.upper_db)
+    lower, upper = convert_to_newton(run.lower_db), convert_to_newton(run.upper_db)
     if run.below:
         size = "below the levels played"
     else:
-        size = "above the cap" if run.db is None else format_number(newton_or_none(run.db))
+        size = "above the cap" if run.db is None else format_number(convert_to_newton(run.db))
     if lower is not None and upper is not None:
         return size, f"{format_number(lower)} to {format_number(upper)}"
     if upper is not None:

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from analysis.diagnosis.real_answer.real_answer import OwnParameter, PairOutcome, RealAnswer
-from analysis.diagnosis.unit_wording import error_text, value_text
+from analysis.diagnosis.unit_wording import format_error, format_value
 from analysis.evaluation.blind_test.injected import InjectedOutcome
-from analysis.figures.diagnosis.real_held_out import error_rows
+from analysis.figures.diagnosis.real_held_out import list_error_rows
 from analysis.figures.picture import Picture
 from analysis.reports.injected_section import make_injected_section
 from analysis.reports.page import Page, Section, Table, render_page
@@ -85,12 +85,12 @@ def overview_table(answers: Sequence[RealAnswer]) -> Table:
 def _overview_row(real_answer: RealAnswer) -> tuple[str, ...]:
     errors = real_answer.held_out
     error_texts = (
-        ("", "", "", "") if errors is None else tuple(map(error_text, (errors.before, errors.retuned, errors.noise)))
+        ("", "", "", "") if errors is None else tuple(map(format_error, (errors.before, errors.retuned, errors.noise)))
     )
     before_text, retuned_text, noise_text = error_texts[:3]
-    after_text = error_text(errors.after) if errors is not None and real_answer.effects else "-"
+    after_text = format_error(errors.after) if errors is not None and real_answer.effects else "-"
     effect_names = ", ".join(real_answer.effects) or _first_candidate(real_answer) or "-"
-    black_box_text = "-" if real_answer.black_box is None else error_text(real_answer.black_box)
+    black_box_text = "-" if real_answer.black_box is None else format_error(real_answer.black_box)
     return (
         _recording_title(real_answer), VERDICT_WORDS[real_answer.verdict], effect_names,
         before_text, retuned_text, after_text, black_box_text, noise_text, f"{real_answer.seconds:.0f}",
@@ -131,7 +131,7 @@ def _recording_section(real_answer: RealAnswer, picture: Picture | None) -> Sect
         _recording_title(real_answer),
         paragraphs=paragraphs,
         points=(*points, *real_answer.not_confirmed, *further_sentences, *real_answer.remarks, *objections),
-        pictures=(picture,) if picture is not None and error_rows(real_answer) else (),
+        pictures=(picture,) if picture is not None and list_error_rows(real_answer) else (),
         tables=_stretch_tables(real_answer),
     )
 
@@ -143,9 +143,9 @@ def _stretch_tables(real_answer: RealAnswer) -> tuple[Table, ...]:
     rows = tuple(
         (
             f"{stretch.record}, {stretch.channel}, {stretch.start_s:.4g} to {stretch.stop_s:.4g} s",
-            value_text(stretch.signal, stretch.unit),
-            value_text(stretch.retuned, stretch.unit),
-            value_text(stretch.after, stretch.unit),
+            format_value(stretch.signal, stretch.unit),
+            format_value(stretch.retuned, stretch.unit),
+            format_value(stretch.after, stretch.unit),
             f"{stretch.after / stretch.retuned:.2f}" if stretch.retuned > 0 else "-",
         )
         for stretch in stretches
@@ -158,12 +158,12 @@ def parameter_sentence(parameter: OwnParameter) -> str:
     """Sentence that compares a fitted parameter of the model with its value known by other means, where there is such a
     value."""
     interval = None if parameter.low is None or parameter.high is None else (parameter.low, parameter.high)
-    text = f"The model's {parameter.name} is {value_text(parameter.value, parameter.unit, interval)} after everything"
+    text = f"The model's {parameter.name} is {format_value(parameter.value, parameter.unit, interval)} after everything"
     if parameter.nominal is None:
         return f"{text}."
     deviation_percent = 100 * (parameter.value / parameter.nominal - 1)
     interval_words = {True: ", and the interval holds it", False: ", and the interval does not hold it", None: ""}
-    nominal_text = value_text(parameter.nominal, parameter.unit)
+    nominal_text = format_value(parameter.nominal, parameter.unit)
     return (
         f"{text}; known by other means is {nominal_text}, {typeset(f'{deviation_percent:+.2g}')} % off"
         f"{interval_words[parameter.holds_nominal]}."
@@ -176,10 +176,10 @@ def _pair_points(pair: PairOutcome | None) -> tuple[str, ...]:
     effect_names = ", ".join(pair.named) if pair.named else "no effect of the catalogue"
     return (
         f"A change that was really made: {pair.changed} ({pair.before}, then {pair.after}). What the model missed "
-        f"before the change, {error_text(pair.expected_left)} of the signal, counts as no mismatch.",
+        f"before the change, {format_error(pair.expected_left)} of the signal, counts as no mismatch.",
         f"Named as the change: {effect_names}. Errors after it on held-out data: the model of before as it is "
-        f"{error_text(pair.as_before)}, with one factor re-tuned {error_text(pair.gain)}, re-tuned within its "
-        f"tolerances {error_text(pair.retuned)}, with what is named {error_text(pair.with_effects)}.",
+        f"{format_error(pair.as_before)}, with one factor re-tuned {format_error(pair.gain)}, re-tuned within its "
+        f"tolerances {format_error(pair.retuned)}, with what is named {format_error(pair.with_effects)}.",
     )
 
 
@@ -191,8 +191,8 @@ def _further_sentence(recording: str, error: str, retuned: float | None, after: 
     if problem:
         return f"A further test, {recording}, could not be made: {problem}"
     return (
-        f"A further test, {recording}, nothing fitted to it, by {error}: re-tuned {error_text(retuned)}, with what was "
-        f"found {error_text(after)}."
+        f"A further test, {recording}, nothing fitted to it, by {error}: re-tuned {format_error(retuned)}, with what "
+        f"was found {format_error(after)}."
     )
 
 

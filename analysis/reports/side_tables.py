@@ -6,8 +6,8 @@ delivered to wanted acceleration whether the stimulus was as intended, catch tri
 
 from collections.abc import Iterator
 
-from analysis.psychophysics.bias import CRITERION_WORDS
-from analysis.psychophysics.equalized_delivery import deliveries
+from analysis.psychophysics.bias import CRITERION_DEFINITION
+from analysis.psychophysics.equalized_delivery import compute_deliveries
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.reports.methods_text import describe_levels
 from analysis.reports.page import Table
@@ -52,7 +52,7 @@ def detection_run_table(analysis: StudyAnalysis) -> Table:
             )
             for row in analysis.detection
         ),
-        notes=(f"d' of two intervals. Criterion: {CRITERION_WORDS}. Chance is 50 % right.",),
+        notes=(f"d' of two intervals. Criterion: {CRITERION_DEFINITION}. Chance is 50 % right.",),
         folded=True,
     )  # fmt: skip
 
@@ -66,7 +66,7 @@ def delivery_tables(analysis: StudyAnalysis) -> tuple[Table, ...]:
             *map(_percent_text, delivery.along),
             _percent_text(delivery.off_axis),
         )
-        for delivery in deliveries(analysis.trials)
+        for delivery in compute_deliveries(analysis.trials)
     )
     if not rows:
         return ()

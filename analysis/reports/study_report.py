@@ -13,7 +13,7 @@ from analysis.figures.picture import Picture
 from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.population import Population
 from analysis.psychophysics.study_analysis import StudyAnalysis
-from analysis.reports.cue_section import cue_section
+from analysis.reports.cue_section import make_cue_sections
 from analysis.reports.declared_section import make_declared_section
 from analysis.reports.methods_text import compose_methods_text
 from analysis.reports.page import Page, Section, render_page
@@ -67,7 +67,7 @@ def render_study_report(
         *_result_sections(analysis, by_name),
         *_side_sections(analysis),
         *_delivery_sections(analysis, by_name),
-        *cue_section(analysis.cues, analysis.cue_gaps, analysis.protocol.staircase),
+        *make_cue_sections(analysis.cues, analysis.cue_gaps, analysis.protocol.staircase),
         *_ellipsoid_sections(ellipsoids, by_name),
         *_run_sections(analysis, pictures),
         Section("Methods", paragraphs=compose_methods_text(analysis.protocol)),

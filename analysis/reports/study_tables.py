@@ -6,12 +6,12 @@ there. Each function takes the whole analysis and returns one `Table`. Forces ar
 
 from collections.abc import Callable, Sequence
 
-from analysis.psychophysics.bias import CRITERION_WORDS
+from analysis.psychophysics.bias import CRITERION_DEFINITION
 from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.repeated_trials import OFTEN_WORDS
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.thresholds import RunEnd, Threshold
-from analysis.psychophysics.two_analyses import coverage_notes
+from analysis.psychophysics.two_analyses import describe_measured_coverage
 from analysis.reports.page import Table
 from analysis.threshold_words import threshold_words
 from analysis.wording import MISSING, format_count, format_number, format_p, format_signed, mark_cut
@@ -110,7 +110,9 @@ def one_way_table(analysis: StudyAnalysis) -> Table:
         caption="One-way analysis of variance, as published",
         header=("Source", "Sum of squares", "df", "Mean square", "F", "p"),
         rows=rows,
-        notes=effect + anova.notes + coverage_notes(("one-way",), analysis.table, analysis.protocol.staircase),
+        notes=effect
+        + anova.notes
+        + describe_measured_coverage(("one-way",), analysis.table, analysis.protocol.staircase),
     )
 
 
@@ -133,7 +135,7 @@ def pair_table(analysis: StudyAnalysis) -> Table:
         notes=(
             *comparisons.notes,
             *_coverage_notes(analysis),
-            *coverage_notes(("tukey",), analysis.table, analysis.protocol.staircase),
+            *describe_measured_coverage(("tukey",), analysis.table, analysis.protocol.staircase),
         ),
     )
 
@@ -215,7 +217,7 @@ def run_table(analysis: StudyAnalysis) -> Table:
             f"m/s² and mm: as measured in {threshold_words(analysis.protocol.staircase).measured_in}.",
             f"At will: presentations that the participant made void (asked for again, paused, left, answered outside "
             f"the time), with their share; ! {OFTEN_WORDS}.",
-            f"Criterion: {CRITERION_WORDS}.",
+            f"Criterion: {CRITERION_DEFINITION}.",
         ),
         folded=True,
     )

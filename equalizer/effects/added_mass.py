@@ -12,7 +12,7 @@ import numpy as np
 from equalizer.effects.effect import ALL_SITES, Effect, Parameter, Structure, Values
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, quadratic_form
-from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 _INITIAL_MASS_SHARE = 0.1
@@ -20,7 +20,7 @@ _INITIAL_MASS_SHARE = 0.1
 
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
-    direction = driven_axes(model)[:, axis]
+    direction = compute_driven_axes(model)[:, axis]
     return replace(model, mass=model.mass + values["mass"] * np.outer(direction, direction))
 
 
@@ -34,7 +34,9 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
         nuisances = np.column_stack([motion.position, motion.velocity, np.ones_like(motion.force)])
         regression = PartialRegression(motion.force, nuisances)
         estimates.append(float(regression.fit(-motion.acceleration).strengths[0]))
-    model_mass = min(quadratic_form(evidence.model.mass, driven_axes(evidence.model)[:, site]) for site in sites)
+    model_mass = min(
+        quadratic_form(evidence.model.mass, compute_driven_axes(evidence.model)[:, site]) for site in sites
+    )
     candidates = (float(np.median(estimates)), _INITIAL_MASS_SHARE * model_mass)
     return tuple({"mass": mass} for mass in candidates if mass > 0)
 

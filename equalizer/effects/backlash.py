@@ -15,10 +15,10 @@ from equalizer.effects.simulation.instant import F_END, STEP_S, X_FREE, X_PER_N,
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import quadratic_form
-from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
-from equalizer.signals.spectral_density import spectral_density
+from equalizer.signals.spectral_density import estimate_spectral_density
 
 STEPS = 20
 """Integration steps per sample: a contact lasts only about a millisecond."""
@@ -56,7 +56,7 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 def _motor_and_contact(model: MechanicalModel, axis: int, values: Values) -> tuple[float, float, float]:
     """Mass of the motor (at most 0.9 of the mass along the axis), and stiffness and damping of the contact."""
-    axis_mass = quadratic_form(model.mass, driven_axes(model)[:, axis])
+    axis_mass = quadratic_form(model.mass, compute_driven_axes(model)[:, axis])
     mass = min(values.get("motor_mass", MOTOR_SHARE * axis_mass), 0.9 * axis_mass)
     stiffness = values.get("contact_stiffness", mass * (2 * np.pi * CONTACT_HZ) ** 2)
     return mass, stiffness, values.get("contact_damping", 2 * CONTACT_RATIO * float(np.sqrt(stiffness * mass)))
@@ -65,7 +65,7 @@ def _motor_and_contact(model: MechanicalModel, axis: int, values: Values) -> tup
 def _change(model: MechanicalModel, axis: int, values: Values) -> tuple[MechanicalModel, FloatArray]:
     """The model with the motor as a further coordinate, and the direction of motor minus handle, along which the
     contact acts. Without a gap: the unchanged model and a direction of zeros."""
-    direction = driven_axes(model)[:, axis]
+    direction = compute_driven_axes(model)[:, axis]
     if values["gap"] <= 0:
         return model, np.zeros_like(direction)
     motor_mass = _motor_and_contact(model, axis, values)[0]
@@ -147,7 +147,7 @@ def _simulate_excerpt(evidence: Evidence, axis: int, values: Values | None, exce
 def _spectrum(evidence: Evidence, signal: FloatArray) -> FloatArray:
     """(lines, p): power spectral density without the line at frequency zero."""
     window = max(int(SPECTRUM_WINDOW_S * evidence.sample_rate_hz), 16)
-    return spectral_density(signal, evidence.sample_rate_hz, window)[1][1:]
+    return estimate_spectral_density(signal, evidence.sample_rate_hz, window)[1][1:]
 
 
 EFFECT = Effect(

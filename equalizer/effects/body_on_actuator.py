@@ -9,7 +9,7 @@ import numpy as np
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
 from equalizer.effects.starts.attached_oscillator import likely_oscillators, missing_force_spectra, with_oscillator
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 DAMPING_RATIOS = (0.1, 0.3, 0.8, 2.0)
@@ -18,7 +18,7 @@ DAMPING_RATIOS = (0.1, 0.3, 0.8, 2.0)
 
 def _add_body(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
     """The model with the body, its damper and its spring attached to a driven axis."""
-    direction = driven_axes(model)[:, axis]
+    direction = compute_driven_axes(model)[:, axis]
     return with_oscillator(model, direction, values["mass"], values["damping"], values["stiffness"])
 
 

@@ -16,11 +16,11 @@ import numpy as np
 from equalizer.effects.effect import Action, AxisForce, Effect, OnCommand, OnResponse, Parameter, Values
 from equalizer.effects.simulation.law_kernel import PER_AXIS, law_force
 from equalizer.laws.evaluate import evaluate, evaluate_held
-from equalizer.laws.law import Law, Role, roles
-from equalizer.laws.parse import FUNCTIONS, MEMORY
+from equalizer.laws.law import Law, Role, find_parameter_roles
+from equalizer.laws.parse import FUNCTIONS, MEMORY_OPERATORS
 from equalizer.laws.program import STACK_SIZE, compile_program
 from equalizer.laws.tree import Apply, Node, Variable, iterate_nodes
-from equalizer.laws.units import DIMENSIONLESS, FORCE, SECOND, motion_dimension, units_of
+from equalizer.laws.units import DIMENSIONLESS, FORCE, SECOND, compute_motion_dimension, derive_units
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
 from equalizer.signals.recording import Recording
@@ -111,14 +111,14 @@ def law_units(law: Law, channels: Channels, system: UnitSystem) -> tuple[str, ..
     if law.units:
         return law.units
     order = DERIVATIVE_OF_QUANTITY.get(channels.quantity, 0)
-    orders = [motion_dimension(derivative) for derivative in range(len(DERIVATIVES))]
+    orders = [compute_motion_dimension(derivative) for derivative in range(len(DERIVATIVES))]
     signals = {"t": SECOND, **dict.fromkeys(channels.outputs, orders[order]), **dict.fromkeys(channels.inputs, FORCE)}
     for letter in LETTERS:
         signals |= {prefix + letter: orders[derivative] for derivative, prefix in enumerate(DERIVATIVES)}
         signals[COMMAND + letter] = FORCE
     # A formula divides a condition by its own unit, so conditions are counted in that unit.
     signals = dict.fromkeys(law.variables, DIMENSIONLESS) | signals
-    return units_of(law.tree, law.numbers, signals, orders[order] if law.acts_on == "response" else FORCE, system)
+    return derive_units(law.tree, law.numbers, signals, orders[order] if law.acts_on == "response" else FORCE, system)
 
 
 def law_values(law: Law) -> Values:
@@ -134,7 +134,7 @@ def law_with_values(law: Law, values: Values) -> Law:
 def law_parameters(law: Law) -> tuple[Parameter, ...]:
     """Parameters p0, p1, … for a fit: range and scale follow from each parameter's role in the formula, and its
     sign."""
-    parameter_roles = roles(law.tree)
+    parameter_roles = find_parameter_roles(law.tree)
     vanishing_value = 0.0 if law.acts_on == "force" or _adds_to_signal(law.tree) else None
     return tuple(
         _parameter(f"p{index}", value, parameter_roles[index], vanishing_value)
@@ -173,7 +173,7 @@ def _left_hand_side(law: Law) -> str:
 
 def has_memory(law: Law) -> bool:
     """Whether the formula has an operator with memory (lag, play, delay, integral): it depends on past signals."""
-    return any(isinstance(node, Apply) and node.name in MEMORY for node in iterate_nodes(law.tree))
+    return any(isinstance(node, Apply) and node.name in MEMORY_OPERATORS for node in iterate_nodes(law.tree))
 
 
 def axis_names(channels: tuple[str, ...]) -> tuple[str, ...]:

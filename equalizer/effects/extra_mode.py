@@ -17,7 +17,7 @@ from equalizer.effects.starts.attached_oscillator import (
     with_oscillator,
 )
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 LOWEST_HZ, STARTS = 2.0, 2
@@ -32,7 +32,7 @@ TILTS = ("tilt_next", "tilt_after_next")
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
     """The model with the oscillator attached along the tilted direction, a unit vector in the coordinates."""
-    axes, m = driven_axes(model), model.inputs
+    axes, m = compute_driven_axes(model), model.inputs
     direction = axes[:, axis].copy()
     for offset, tilt in enumerate(TILTS[: m - 1], start=1):
         direction += values.get(tilt, 0.0) * axes[:, (axis + offset) % m]

@@ -12,7 +12,7 @@ import numpy as np
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, quadratic_form
-from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 _INITIAL_SHARE = 0.1
@@ -21,7 +21,7 @@ replaces each value that the regression finds negative or zero."""
 
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
-    direction = driven_axes(model)[:, axis]
+    direction = compute_driven_axes(model)[:, axis]
     square = np.outer(direction, direction)
     return replace(
         model,
@@ -36,7 +36,7 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     motion = axis_motion(evidence, axis)
     regression = PartialRegression(motion.force, np.ones((len(motion.force), 1)))
     estimates = regression.fit(-motion.acceleration, -motion.velocity, -motion.position).strengths.tolist()
-    direction, model = driven_axes(evidence.model)[:, axis], evidence.model
+    direction, model = compute_driven_axes(evidence.model)[:, axis], evidence.model
     model_shares = [
         _INITIAL_SHARE * quadratic_form(matrix, direction) for matrix in (model.mass, model.damping, model.stiffness)
     ]

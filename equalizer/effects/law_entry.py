@@ -23,7 +23,7 @@ from equalizer.effects.effect import Effect, Values
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import axis_motion, regress_out_linear_terms
 from equalizer.laws.evaluate import evaluate
-from equalizer.laws.law import Law, roles
+from equalizer.laws.law import Law, find_parameter_roles
 from equalizer.laws.tree import Apply, Node, Variable, format_formula
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -91,7 +91,7 @@ def _rename_signals(node: Node, names: Mapping[str, str]) -> Node:
 def _make_starts(law: Law, site: int) -> Callable[[Evidence, int], tuple[Values, ...]]:
     """Function for starting values at axis `site`; empty at other axes. For a force: the law's factors by linear
     regression of the missing force, the other parameters as in the library. Otherwise all as in the library."""
-    factors = [index for index, role in roles(law.tree).items() if role == "factor"]
+    factors = [index for index, role in find_parameter_roles(law.tree).items() if role == "factor"]
 
     def starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
         if axis != site:

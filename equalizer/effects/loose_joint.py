@@ -24,7 +24,7 @@ from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.simulation.sensor_path import low_pass
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import quadratic_form
-from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
@@ -72,7 +72,7 @@ def joint_direction(model: MechanicalModel, axis: int) -> FloatArray:
     quasi-statically (mass times squared static displacement per displacement of the axis). Where no undriven body with
     a spring is coupled to the axis, the joint connects the axis to the ground.
     """
-    direction, axes = driven_axes(model)[:, axis], driven_axes(model)
+    direction, axes = compute_driven_axes(model)[:, axis], compute_driven_axes(model)
     undriven = np.linalg.norm(axes, axis=1) < 1e-9
     if not undriven.any():
         return direction

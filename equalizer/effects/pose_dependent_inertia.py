@@ -10,7 +10,7 @@ from equalizer.effects.simulation.instant import STEP_S, V_FREE, V_PER_N, X_FREE
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import axis_motion, quadratic_form, regress_out_linear_terms
-from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
@@ -33,7 +33,7 @@ def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
     """(2,): per_m times the mass along the axis, and speed_share."""
-    mass = quadratic_form(model.mass, driven_axes(model)[:, axis])
+    mass = quadratic_form(model.mass, compute_driven_axes(model)[:, axis])
     return np.array([values["per_m"] * mass, values.get("speed_share", LAGRANGE)])
 
 
@@ -41,7 +41,7 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """per_m by regression of the missing force: with both terms free where their ratio is plausible (below 1.5), and
     with the ratio of Lagrange's equation."""
     motion = axis_motion(evidence, axis)
-    mass = quadratic_form(evidence.model.mass, driven_axes(evidence.model)[:, axis])
+    mass = quadratic_form(evidence.model.mass, compute_driven_axes(evidence.model)[:, axis])
     by_place, by_speed = -mass * motion.position * motion.acceleration, -mass * motion.velocity**2
     regression = regress_out_linear_terms(motion)
     free, bound = regression.fit(by_place, by_speed), regression.fit(by_place + LAGRANGE * by_speed)

@@ -2,10 +2,12 @@
 
     y = step round(x / step)        step in the unit of the response
 
-Where the recorded values lie on such a lattice, noise was rounded with the signal. The value before rounding is then
-known to half a step, and the residual is the quantile of the noise (randomised quantile residual; Dunn and Smyth 1996,
-J. Comput. Graph. Stat. 5:236), so that rounded noise does not count as misfit. Where they do not, noise was added after
-rounding, and the prediction is rounded.
+If the recorded values lie on such a lattice, noise was rounded together with the signal. The value before rounding is
+then known to half a step, and the residual is the quantile of the noise (randomised quantile residual; Dunn and Smyth
+1996, J. Comput. Graph. Stat. 5:236), so that rounded noise does not count as misfit. If they do not, noise was added
+after rounding, and the prediction is rounded.
+
+`EFFECT` is listed in the catalogue of effects; sizes in the functions: n samples, p response channels.
 """
 
 import numpy as np
@@ -17,53 +19,61 @@ from equalizer.effects.starts.lattice import lattice_offset, lattice_step, stair
 from equalizer.effects.starts.response_starts import site_channels
 from equalizer.signals.signal import FloatArray
 
-LEAST_TAIL = 1e-12
+LEAST_TAIL_PROBABILITY = 1e-12
 """Least tail probability for which a quantile is computed; below it too few significant digits remain."""
 
 
 def _round_response(
     response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
-    read = response.copy()
+    """The response (n, p) with these channels rounded to multiples of the step; unchanged for a step of 0."""
+    rounded = response.copy()
     if values["step"] > 0:
-        read[:, channels] = values["step"] * np.round(response[:, channels] / values["step"])
-    return read
+        rounded[:, channels] = values["step"] * np.round(response[:, channels] / values["step"])
+    return rounded
 
 
-def _round_as_measured(
+def _condition_on_measurement(
     response: FloatArray, measured: FloatArray, noise: FloatArray, channels: tuple[int, ...], values: Values
 ) -> FloatArray:
-    """The prediction (n, p): by quantile residuals in channels that were recorded on the lattice, else rounded."""
-    read, step = _round_response(response, 0.0, channels, values), values["step"]
+    """The predicted response (n, p), conditioned on the measured one: by quantile residuals in channels that were
+    recorded on the lattice, else rounded. noise: (p,), rms before rounding."""
+    conditioned, step = _round_response(response, 0.0, channels, values), values["step"]
     for channel in channels:
         if lattice_offset(measured[:, channel], step) is not None:
-            read[:, channel] = _quantile_response(
+            conditioned[:, channel] = _compute_quantile_response(
                 response[:, channel], measured[:, channel], float(noise[channel]), step
             )
-    return read
+    return conditioned
 
 
-def _quantile_response(response: FloatArray, measured: FloatArray, noise: float, step: float) -> FloatArray:
+def _compute_quantile_response(response: FloatArray, measured: FloatArray, noise: float, step: float) -> FloatArray:
     """The prediction (n,) whose residual is the randomised quantile residual: the quantile of a uniformly random
-    probability between those of both ends of the rounding interval. noise: rms of the noise before rounding."""
-    missing = measured - response
-    # Probabilities of the lower tail keep their digits: residuals above zero are mirrored.
-    side = np.where(missing > 0, -1.0, 1.0)
-    low, high = ndtr((side * missing - step / 2) / noise), ndtr((side * missing + step / 2) / noise)
-    # Seeded with the length, so that a fit sees the same residual for the same prediction.
-    chance = np.random.default_rng(len(response)).random(len(response))
-    residual = side * noise * ndtri(np.clip(low + chance * (high - low), LEAST_TAIL, 1 - LEAST_TAIL))
+    probability between those of both ends of the rounding interval. response, measured: (n,); noise: rms of the noise
+    before rounding."""
+    deviation = measured - response
+    # Positive deviations are mirrored, because only small probabilities (the lower tail) keep their significant digits.
+    sign = np.where(deviation > 0, -1.0, 1.0)
+    low, high = ndtr((sign * deviation - step / 2) / noise), ndtr((sign * deviation + step / 2) / noise)
+    # Seeded with the length, so that the same prediction always has the same residual in a fit.
+    uniform_draws = np.random.default_rng(len(response)).random(len(response))
+    quantile_residual = (
+        sign
+        * noise
+        * ndtri(np.clip(low + uniform_draws * (high - low), LEAST_TAIL_PROBABILITY, 1 - LEAST_TAIL_PROBABILITY))
+    )
     # Too improbable for a quantile: the distance to the nearest end of the rounding interval.
-    is_extreme = high < LEAST_TAIL
-    residual[is_extreme] = (missing - np.sign(missing) * step / 2)[is_extreme]
-    return np.asarray(measured - residual)
+    is_extreme = high < LEAST_TAIL_PROBABILITY
+    quantile_residual[is_extreme] = (deviation - np.sign(deviation) * step / 2)[is_extreme]
+    return np.asarray(measured - quantile_residual)
 
 
-def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """The step of the lattice of measured values, or the step under added noise; empty where neither is found."""
-    used = evidence.used > 0
+def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    """The step of the lattice of the measured values, or else the step detected under added noise; empty if neither is
+    found."""
+    is_used = evidence.used > 0
     for column in site_channels(evidence, channel):
-        measured, noise = evidence.response[used, column], float(evidence.noise[column])
+        measured, noise = evidence.response[is_used, column], float(evidence.noise[column])
         step = lattice_step(measured) or staircase_step(measured, noise)
         if step is not None:
             return ({"step": step},)
@@ -77,7 +87,7 @@ EFFECT = Effect(
     signature="the response takes whole multiples of one step, with as much error at every level, while the position "
     "agrees",
     parameters=(Parameter("step", 1e-12, 1e9, none=0.0, fixed=True),),
-    action=OnResponse(_round_response, stage=3, conditioned=_round_as_measured),
-    starts=_starts,
+    action=OnResponse(_round_response, stage=3, conditioned=_condition_on_measurement),
+    starts=_find_starting_values,
     sites=("all", "one"),
 )

@@ -15,78 +15,80 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 RATE_SHARES = (0.3, 0.5, 0.75)
-"""Starting values for a limit that is rarely reached, as shares of the command's largest rate of change."""
+"""Starting values for a limit that is rarely reached, as shares of the command's largest rate of change: all for a
+limit common to all axes, the middle one for a single axis. Chosen by hand."""
 MISFIT_RATIO = 1.05
-"""Rms residual of a channel, over its noise, above which these starting values are tried."""
+"""Rms residual of a channel, over its noise, above which these starting values are tried. Chosen by hand."""
+
+_INPUT_ARRAY = types.Array(types.float64, 1, "A", readonly=True)
 
 
-_IN = types.Array(types.float64, 1, "A", readonly=True)
-
-
-@njit(types.void(_IN, types.float64, types.float64[::1], types.float64[::1]), cache=True, nogil=True)
-def limit_rate(commands: FloatArray, reach: float, mean: FloatArray, end: FloatArray) -> None:
-    """Fill mean (n,) and end (n,): the mean force over each step and the force at its end, for held commands (n,), from
-    zero. reach: largest change in one step, > 0."""
+@njit(types.void(_INPUT_ARRAY, types.float64, types.float64[::1], types.float64[::1]), cache=True, nogil=True)
+def simulate_slew_limit(commands: FloatArray, max_change: float, mean_force: FloatArray, end_force: FloatArray) -> None:
+    """Fill mean_force (n,) and end_force (n,): the mean over each step and the value at its end, for commands (n,) that
+    are constant within a step; the force starts at zero. max_change: largest change in one step, > 0."""
     force = 0.0
     for k in range(commands.shape[0]):
-        missing = commands[k] - force
-        if abs(missing) <= reach:
+        difference = commands[k] - force
+        if abs(difference) <= max_change:
             # Share of the step after which the ramp reaches the command; the mean of the step includes the ramp.
-            ramp_share = abs(missing) / reach
-            mean[k] = commands[k] - missing * ramp_share / 2
+            ramp_share = abs(difference) / max_change
+            mean_force[k] = commands[k] - difference * ramp_share / 2
             force = commands[k]
         else:
-            change = reach if missing > 0 else -reach
-            mean[k] = force + change / 2
+            change = max_change if difference > 0 else -max_change
+            mean_force[k] = force + change / 2
             force += change
-        end[k] = force
+        end_force[k] = force
 
 
 def limit_slew(
-    commands: FloatArray, step_s: float, rate: float, first: float = 0.0, at_end: bool = False
+    commands: FloatArray, step_s: float, rate: float, initial_force: float = 0.0, at_end: bool = False
 ) -> FloatArray:
-    """(n,): mean force over each step, or the force at its end, for commands (n,). first: force before the first step;
-    rate: in units of force per s."""
-    return np.asarray(first + _mean_and_end(commands - first, step_s, rate)[int(at_end)])
+    """Slew-limited force (n,) for commands (n,): mean over each step, or value at its end. step_s: length of a step
+    (s); rate: limit, in units of force per s; initial_force: force before the first step."""
+    return np.asarray(initial_force + _compute_mean_and_end_force(commands - initial_force, step_s, rate)[int(at_end)])
 
 
-def _limit_rate(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
+def _compute_mean_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
+    """Mean force (n,) over each step: `OnCommand.change` of this effect."""
     return limit_slew(commands, step_s, values["rate"])
 
 
-def _limit_rate_at_end(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
+def _compute_end_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
+    """Force (n,) at the end of each step: `OnCommand.at_end` of this effect."""
     return limit_slew(commands, step_s, values["rate"], at_end=True)
 
 
-def _mean_and_end(commands: FloatArray, step_s: float, rate: float) -> FloatArray:
+def _compute_mean_and_end_force(commands: FloatArray, step_s: float, rate: float) -> FloatArray:
     """(2, n): mean force over each step, and force at its end; the command itself for an infinite rate."""
     if math.isinf(rate):
         return np.array([commands, commands])
     forces = np.empty((2, len(commands)))
-    limit_rate(np.asarray(commands, dtype=np.float64), rate * step_s, forces[0], forces[1])
+    simulate_slew_limit(np.asarray(commands, dtype=np.float64), rate * step_s, forces[0], forces[1])
     return forces
 
 
 def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Likeliest rate by grid search; where the response errs by more than its noise, also fixed shares of the fastest
-    change."""
+    """Starting values: the likeliest rate on a grid from 1 to 100 % of the command's largest rate of change; where the
+    residual of the response exceeds its noise, also `RATE_SHARES` of that rate."""
     commanded = evidence.command if axis == ALL_SITES else evidence.command[:, axis]
-    fastest = float(np.abs(np.diff(commanded, axis=0)).max()) * evidence.sample_rate_hz
-    if fastest == 0:
+    largest_rate = float(np.abs(np.diff(commanded, axis=0)).max()) * evidence.sample_rate_hz
+    if largest_rate == 0:
         return ()
     rate = likeliest_value(
         evidence,
         axis,
-        lambda u, step_s, value: _limit_rate(u, step_s, {"rate": value}),
-        list(np.geomspace(0.01 * fastest, fastest, 12)),
+        lambda u, step_s, value: _compute_mean_force(u, step_s, {"rate": value}),
+        list(np.geomspace(0.01 * largest_rate, largest_rate, 12)),
         True,
     )
-    likeliest = () if rate is None else ({"rate": rate},)
+    likeliest_starts = () if rate is None else ({"rate": rate},)
     if not _has_unexplained_error(evidence):
-        return likeliest
+        return likeliest_starts
     # Re-tuning may have absorbed a limit that is rarely reached, so that the missing force does not show it.
-    return likeliest + tuple(
-        {"rate": share * fastest} for share in (RATE_SHARES if axis == ALL_SITES else RATE_SHARES[1:2])
+    return likeliest_starts + tuple(
+        {"rate": share * largest_rate} for share in (RATE_SHARES if axis == ALL_SITES else RATE_SHARES[1:2])
     )
 
 
@@ -102,7 +104,7 @@ EFFECT = Effect(
     source="Isermann, Mechatronic Systems, Springer 2005, ch. 10: limits of actuators",
     signature="force is missing where the command changes fast, more at high frequencies and high levels",
     parameters=(Parameter("rate", 1e-2, 1e7, none=math.inf),),
-    action=OnCommand(_limit_rate, fine=True, at_end=_limit_rate_at_end),
+    action=OnCommand(_compute_mean_force, fine=True, at_end=_compute_end_force),
     starts=_starts,
     sites=("one", "all"),
 )

@@ -15,7 +15,7 @@ from equalizer.effects.simulation.instant import STEP_S, TIME_S, V_FREE, V_PER_N
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, regress_out_linear_terms
-from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import ComplexArray, FloatArray
 
@@ -53,7 +53,7 @@ def value_to_ground(matrix: FloatArray, axes: FloatArray, axis: int) -> float:
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
     """(5,): the parameters of `_law`: rad/s, depth, phase in rad, D, and stiffness_share K."""
-    axes = driven_axes(model)
+    axes = compute_driven_axes(model)
     damping, stiffness = value_to_ground(model.damping, axes, axis), value_to_ground(model.stiffness, axes, axis)
     turning, share = 2 * np.pi * values["rate_hz"], values.get("stiffness_share", 0.0)
     return np.array([turning, values["depth"], values.get("phase", 0.0), damping, share * stiffness])
@@ -65,7 +65,7 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     n, rate = len(evidence.command), evidence.sample_rate_hz
     force, damping_force = np.zeros((n, len(sites))), np.zeros((n, len(sites)))
     spring_force = np.zeros((n, len(sites)))
-    axes, used = driven_axes(evidence.model), evidence.used > 0
+    axes, used = compute_driven_axes(evidence.model), evidence.used > 0
     for column, site in enumerate(sites):
         force[used, column] = regress_out_linear_terms(axis_motion(evidence, site)).force
         damping_force[used, column] = (

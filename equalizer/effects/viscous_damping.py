@@ -12,7 +12,7 @@ import numpy as np
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, quadratic_form
-from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
 _INITIAL_DAMPING_SHARE = 0.3
@@ -22,7 +22,7 @@ absorbed. Heuristic."""
 
 def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
     """The model with the damping matrix D + damping d d', d the unit vector of the driven axis."""
-    direction = driven_axes(model)[:, axis]
+    direction = compute_driven_axes(model)[:, axis]
     return replace(model, damping=model.damping + values["damping"] * np.outer(direction, direction))
 
 
@@ -33,7 +33,7 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     nuisances = np.column_stack([motion.position, motion.acceleration, np.ones_like(motion.position)])
     fit = PartialRegression(motion.force, nuisances).fit(-motion.velocity)
     regressed_damping = float(fit.strengths[0])
-    model_damping = quadratic_form(evidence.model.damping, driven_axes(evidence.model)[:, axis])
+    model_damping = quadratic_form(evidence.model.damping, compute_driven_axes(evidence.model)[:, axis])
     candidates = (regressed_damping, _INITIAL_DAMPING_SHARE * model_damping)
     return tuple({"damping": damping} for damping in candidates if damping > 0)
 

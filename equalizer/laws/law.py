@@ -1,4 +1,8 @@
-"""A law: a formula with free parameters, and what it acts on (force, command or response)."""
+"""A law: a formula with free parameters, and the quantity on which it acts (force, command or response).
+
+Model files (`plant.mechanical_model_toml`), the simulation of effects (`effects.discovered_law`) and the search for
+formulas use it.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,8 +17,8 @@ KINDS: tuple[ActsOn, ...] = get_args(ActsOn)
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """A formula with free parameters, and what it acts on. Raises LawError where the formula is not in the language, or
-    its parameters do not fit it."""
+    """A formula with free parameters, and the quantity on which it acts. Raises LawError where the formula is not in
+    the language, or its parameters do not fit it."""
 
     expression: str
     """Template with free parameters p0, p1, …: '-p0*abs(vy)**p1*sign(vy)'. Literal numbers in it are part of the
@@ -24,8 +28,8 @@ class Law:
     units: tuple[str, ...]
     """Units of the parameters; empty where not known."""
     acts_on: ActsOn
-    """What the law acts on. force: it is added to the force at the axis; command, response: it replaces that of the
-    axis."""
+    """Quantity on which the law acts. force: its value is added to the force at the axis; command, response: its value
+    replaces the command or the response of the axis."""
     axis: str
     """Letter of the axis ('y'), or name of the channel."""
 
@@ -34,16 +38,16 @@ class Law:
             raise LawError(f"a law acts on {', '.join(KINDS)}; not on '{self.acts_on}'")
         if not self.axis:
             raise LawError("the law does not state the axis on which it acts; state its axis")
-        used = {node.index for node in iterate_nodes(self.tree) if isinstance(node, Free)}
-        if used != set(range(len(self.numbers))):
-            names = ", ".join(f"p{place}" for place in sorted(used)) or "none"
-            raise LawError(f"the law names the free numbers {names}, but {len(self.numbers)} are given")
+        used_indices = {node.index for node in iterate_nodes(self.tree) if isinstance(node, Free)}
+        if used_indices != set(range(len(self.numbers))):
+            parameter_names = ", ".join(f"p{index}" for index in sorted(used_indices)) or "none"
+            raise LawError(f"the law names the free numbers {parameter_names}, but {len(self.numbers)} are given")
         if self.units and len(self.units) != len(self.numbers):
             raise LawError(f"the law has {len(self.numbers)} free numbers and {len(self.units)} units")
 
     @property
     def tree(self) -> Node:
-        """Syntax tree of the expression; its free parameters are nodes `Free` with their place."""
+        """Syntax tree of the expression; its free parameters are nodes `Free` with their index."""
         return parse_formula(self.expression, template=True)[0]
 
     @property
@@ -53,7 +57,7 @@ class Law:
 
     @property
     def exact_text(self) -> str:
-        """The formula with all digits: `law_of` reads the same values back."""
+        """The formula with all digits: `parse_law` gives the same parameter values."""
         return format_formula(self.tree, self.numbers, None)
 
     @property
@@ -66,17 +70,19 @@ class Law:
         return replace(self, numbers=tuple(float(number) for number in numbers))
 
 
-def law_of(text: str, acts_on: ActsOn, axis: str) -> Law:
-    """A law from a formula with numbers. Those with a point or an exponent become free: '-4.1*abs(vy)**1.5*sign(vy)' is
-    '-p0*abs(vy)**p1*sign(vy)' with 4.1 and 1.5; in '-4.1*vy**2' the 2 stays. Raises LawError."""
+def parse_law(text: str, acts_on: ActsOn, axis: str) -> Law:
+    """Parse a law from a formula with numbers. Those with a point or an exponent become free:
+    '-4.1*abs(vy)**1.5*sign(vy)' is '-p0*abs(vy)**p1*sign(vy)' with 4.1 and 1.5; in '-4.1*vy**2' the 2 stays. acts_on
+    and axis: as in `Law`. Raises LawError where the text is not a formula of the language, or acts_on or axis is
+    invalid."""
     tree, numbers = parse_formula(text)
     return Law(format_formula(tree), numbers, (), acts_on, axis)
 
 
 Role = Literal["factor", "exponent", "positive", "phase", "offset"]
-"""Role of a free parameter. factor: terms are proportional to it; positive: a width, a time, a pitch; phase: of a sine
-(rad); offset: any other."""
-_SECOND_ARGUMENT: dict[str, Role] = {
+"""Role of a free parameter. factor: terms are proportional to it; exponent: of a power; positive: a width, a time, a
+pitch; phase: of a sine (rad); offset: any other."""
+_SECOND_ARGUMENT_ROLES: dict[str, Role] = {
     "**": "exponent",
     "/": "positive",
     "lag": "positive",
@@ -85,31 +91,33 @@ _SECOND_ARGUMENT: dict[str, Role] = {
 }
 
 
-def roles(tree: Node) -> dict[int, Role]:
-    """Role of each free parameter, by its place; where one occurs several times, by its first occurrence."""
-    role_by_place: dict[int, Role] = {}
-    _collect_roles(tree, "factor", role_by_place)
-    return role_by_place
+def find_parameter_roles(tree: Node) -> dict[int, Role]:
+    """Find the role of each free parameter, by its index; of several occurrences, the first counts."""
+    role_by_index: dict[int, Role] = {}
+    _collect_roles(tree, "factor", role_by_index)
+    return role_by_index
 
 
-def _collect_roles(node: Node, role: Role, role_by_place: dict[int, Role]) -> None:
+def _collect_roles(node: Node, role: Role, role_by_index: dict[int, Role]) -> None:
+    """Add the roles of the parameters in an expression, which itself has the role `role`, to `role_by_index`."""
     if isinstance(node, Free):
-        role_by_place.setdefault(node.index, role)
+        role_by_index.setdefault(node.index, role)
         return
     if not isinstance(node, Apply):
         return
-    for place, part in enumerate(node.arguments):
+    for position, argument in enumerate(node.arguments):
         _collect_roles(
-            part,
-            _SECOND_ARGUMENT.get(node.name, _first_part_role(node.name, role))
-            if place
-            else _first_part_role(node.name, role),
-            role_by_place,
+            argument,
+            _SECOND_ARGUMENT_ROLES.get(node.name, _find_first_argument_role(node.name, role))
+            if position
+            else _find_first_argument_role(node.name, role),
+            role_by_index,
         )
 
 
-def _first_part_role(name: str, role: Role) -> Role:
-    """Role that an operator in the role `role` gives to its first argument; + - * to each."""
+def _find_first_argument_role(name: str, role: Role) -> Role:
+    """Role of the first argument of an operator or function `name` whose value has the role `role`; of + - * the role
+    of each argument."""
     if name in ("+", "-", "neg"):
         return role
     if name in ("*", "/"):

@@ -3,6 +3,7 @@ text is parsed to a syntax tree by Python's `ast` and never executed.
 
 Numbers with a point or an exponent (`4.1`, `1e-3`) are free parameters, which a fit may change. Whole numbers (`2`) and
 `pi` are part of the form. A template contains the names `p0`, `p1`, … of the free parameters instead of their values.
+Called by `laws.law`.
 """
 
 import ast
@@ -22,9 +23,9 @@ FUNCTIONS: Mapping[str, int] = {
     "lag": 2, "play": 2, "delay": 2, "integral": 1,
 }  # fmt: skip
 """Number of arguments of each function."""
-MEMORY = ("lag", "play", "delay", "integral")
+MEMORY_OPERATORS = ("lag", "play", "delay", "integral")
 """Operators with memory, of a signal s: lag(s, tau_s), play(s, half_width), delay(s, delay_s), integral(s)."""
-LONGEST, LARGEST = 2000, 200
+MOST_CHARACTERS, MOST_NODES = 2000, 200
 """Largest number of characters, and of nodes of the syntax tree, of a formula."""
 _OPERATORS: dict[type[ast.operator], str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"
@@ -44,17 +45,18 @@ class _Reader:
     text: str
     template: bool
     numbers: list[float] = field(default_factory=list)
-    count: int = 0
+    node_count: int = 0
 
     def read(self, node: ast.expr) -> Node:
-        self.count += 1
-        if self.count > LARGEST:
-            raise LawError(f"the law has more than {LARGEST} parts; shorten it")
+        """Convert a node of Python's syntax tree, with all nodes below it."""
+        self.node_count += 1
+        if self.node_count > MOST_NODES:
+            raise LawError(f"the law has more than {MOST_NODES} parts; shorten it")
         match node:
             case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
-                return self._number(node, value)
+                return self._read_number(node, value)
             case ast.Name(id=name):
-                return self._name(node, name)
+                return self._read_name(node, name)
             case ast.UnaryOp(op=ast.USub(), operand=inner):
                 return Apply("neg", (self.read(inner),))
             case ast.UnaryOp(op=ast.UAdd(), operand=inner):
@@ -62,49 +64,55 @@ class _Reader:
             case ast.BinOp(left=left, op=operator, right=right) if type(operator) in _OPERATORS:
                 return Apply(_OPERATORS[type(operator)], (self.read(left), self.read(right)))
             case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
-                return self._call(node, name, arguments)
-        raise LawError(f"{self._position_text(node)} is not part of the language of laws; {ALLOWED}")
+                return self._read_call(node, name, arguments)
+        raise LawError(f"{self._describe_position(node)} is not part of the language of laws; {ALLOWED}")
 
-    def _number(self, node: ast.expr, value: float) -> Node:
+    def _read_number(self, node: ast.expr, value: float) -> Node:
+        """A free parameter for a number with a point or an exponent outside a template; else a fixed number."""
         try:
             number = float(value)
         except OverflowError:
             number = np.inf
         if not np.isfinite(number):
-            raise LawError(f"{self._position_text(node)} is larger than any number")
+            raise LawError(f"{self._describe_position(node)} is larger than any number")
         if isinstance(value, int) or self.template:
             return Number(number)
         self.numbers.append(number)
         return Free(len(self.numbers) - 1)
 
-    def _name(self, node: ast.expr, name: str) -> Node:
+    def _read_name(self, node: ast.expr, name: str) -> Node:
+        """A signal, pi, or a free parameter (in a template only)."""
         if name == "pi":
             return Variable("pi")
-        if free := re.fullmatch(r"p(\d{1,3})", name):
+        if parameter_match := re.fullmatch(r"p(\d{1,3})", name):
             if not self.template:
-                raise LawError(f"{self._position_text(node)} stands for a free number; write the number itself")
-            return Free(int(free[1]))
+                raise LawError(f"{self._describe_position(node)} stands for a free number; write the number itself")
+            return Free(int(parameter_match[1]))
         if name in FUNCTIONS:
-            raise LawError(f"{self._position_text(node)} is a function; it takes its arguments in parentheses")
+            raise LawError(f"{self._describe_position(node)} is a function; it takes its arguments in parentheses")
         return Variable(name)
 
-    def _call(self, node: ast.expr, name: str, arguments: list[ast.expr]) -> Node:
+    def _read_call(self, node: ast.expr, name: str, arguments: list[ast.expr]) -> Node:
+        """A function of `FUNCTIONS` with its arguments; the second one of an operator with memory must be constant."""
         if name not in FUNCTIONS:
             matches = get_close_matches(name[:60], FUNCTIONS, n=1)
-            hint = f" (did you mean '{matches[0]}'?)" if matches else ""
-            raise LawError(f"{self._position_text(node)}: there is no function '{name}'{hint}; {ALLOWED}")
+            suggestion = f" (did you mean '{matches[0]}'?)" if matches else ""
+            raise LawError(f"{self._describe_position(node)}: there is no function '{name}'{suggestion}; {ALLOWED}")
         if len(arguments) != FUNCTIONS[name]:
-            expected = f"{FUNCTIONS[name]} argument{'s' if FUNCTIONS[name] > 1 else ''}"
-            raise LawError(f"{self._position_text(node)}: {name} takes {expected}, not {len(arguments)}")
-        parts = tuple(self.read(argument) for argument in arguments)
-        if name in MEMORY[:3] and any(isinstance(leaf, Variable) and leaf.name != "pi" for leaf in _leaves(parts[1])):
-            raise LawError(f"{self._position_text(arguments[1])}: the second argument of {name} must be a constant")
-        return Apply(name, parts)
+            expected_count = f"{FUNCTIONS[name]} argument{'s' if FUNCTIONS[name] > 1 else ''}"
+            raise LawError(f"{self._describe_position(node)}: {name} takes {expected_count}, not {len(arguments)}")
+        argument_trees = tuple(self.read(argument) for argument in arguments)
+        if name in MEMORY_OPERATORS[:3] and any(
+            isinstance(leaf, Variable) and leaf.name != "pi" for leaf in _list_leaves(argument_trees[1])
+        ):
+            raise LawError(f"{self._describe_position(arguments[1])}: the second argument of {name} must be a constant")
+        return Apply(name, argument_trees)
 
-    def _position_text(self, node: ast.expr) -> str:
-        part = ast.get_source_segment(self.text, node) or self.text
-        excerpt = part if len(part) <= 40 else f"{part[:40]}…"
-        return f"'{excerpt}' at character {_column(self.text, node) + 1}"
+    def _describe_position(self, node: ast.expr) -> str:
+        """The text of a node, to 40 characters, and its position from 1, for an error message."""
+        source = ast.get_source_segment(self.text, node) or self.text
+        excerpt = source if len(source) <= 40 else f"{source[:40]}…"
+        return f"'{excerpt}' at character {_find_column(self.text, node) + 1}"
 
 
 @lru_cache(maxsize=4096)
@@ -114,12 +122,12 @@ def parse_formula(text: str, template: bool = False) -> tuple[Node, tuple[float,
     text = text.strip()
     if not text:
         raise LawError("the law is empty")
-    if len(text) > LONGEST:
-        raise LawError(f"the law has {len(text)} characters; up to {LONGEST} are read")
+    if len(text) > MOST_CHARACTERS:
+        raise LawError(f"the law has {len(text)} characters; up to {MOST_CHARACTERS} are read")
     try:
         body = ast.parse(text, mode="eval").body
     except (SyntaxError, ValueError, MemoryError, RecursionError, SyntaxWarning) as error:
-        raise LawError(_not_python(text, error)) from error
+        raise LawError(_describe_syntax_error(text, error)) from error
     reader = _Reader(text, template)
     try:
         return reader.read(body), tuple(reader.numbers)
@@ -127,14 +135,15 @@ def parse_formula(text: str, template: bool = False) -> tuple[Node, tuple[float,
         raise LawError("the law is nested too deeply; write it with fewer brackets") from error
 
 
-def _not_python(text: str, error: BaseException) -> str:
+def _describe_syntax_error(text: str, error: BaseException) -> str:
+    """Error message for a text that is no Python expression, with the position where the error has one."""
     excerpt = text if len(text) <= 40 else f"{text[:40]}…"
     if isinstance(error, SyntaxError) and error.offset:
         return f"'{excerpt}' cannot be read at character {error.offset}: {error.msg}; {ALLOWED}"
     return f"'{excerpt}' cannot be read; {ALLOWED}"
 
 
-def _column(text: str, node: ast.expr) -> int:
+def _find_column(text: str, node: ast.expr) -> int:
     """Position of a node in the text in characters, from 0; Python's syntax tree counts lines, and bytes of UTF-8 in
     each line."""
     lines = text.splitlines(keepends=True)
@@ -142,5 +151,8 @@ def _column(text: str, node: ast.expr) -> int:
     return characters + len(lines[node.lineno - 1].encode()[: node.col_offset].decode(errors="replace"))
 
 
-def _leaves(tree: Node) -> list[Node]:
-    return [leaf for part in tree.arguments for leaf in _leaves(part)] if isinstance(tree, Apply) else [tree]
+def _list_leaves(tree: Node) -> list[Node]:
+    """Numbers, parameters and signals of an expression tree, from left to right."""
+    return (
+        [leaf for argument in tree.arguments for leaf in _list_leaves(argument)] if isinstance(tree, Apply) else [tree]
+    )

@@ -79,7 +79,7 @@ def _format_node(tree: Node, numbers: Sequence[float] | None, digits: int | None
 
 
 def _format_free_number(value: float, digits: int | None) -> str:
-    """The value with a point or an exponent, which mark it as a free parameter; see `equalizer.laws.law.law_of`."""
+    """The value with a point or an exponent, which mark it as a free parameter; see `equalizer.laws.law.parse_law`."""
     return repr(float(value) if digits is None else float(f"{value:.{digits}g}"))
 
 

@@ -1,8 +1,8 @@
 """Dimensional analysis: units of a law's free parameters from the units of its signals and of its value.
 
 Terms of a sum have the same dimension, in a product the exponents of the dimensions add, and arguments of functions
-such as sin and exp are dimensionless. The dimension wanted of the value is passed down the expression tree to each
-parameter.
+such as sin and exp are dimensionless. The required dimension of the value is passed down the expression tree to each
+parameter. Called by `equalizer.effects.discovered_law`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,60 +13,73 @@ from equalizer.signals.unit_system import LINEAR, UnitSystem
 Dimension = tuple[float, float, float]
 """Exponents of force, of length (or angle) and of time."""
 DIMENSIONLESS: Dimension = (0.0, 0.0, 0.0)
-"""Dimensionless."""
+"""Dimension of angles in functions, exponents and ratios."""
 FORCE: Dimension = (1.0, 0.0, 0.0)
 SECOND: Dimension = (0.0, 0.0, 1.0)
 
 
-def motion_dimension(order: int) -> Dimension:
+def compute_motion_dimension(order: int) -> Dimension:
     """Dimension of the time derivative of the position of this order: 0 position, 1 velocity, 2 acceleration."""
     return 0.0, 1.0, -float(order)
 
 
-def units_of(
+def derive_units(
     tree: Node,
     numbers: Sequence[float],
     signals: Mapping[str, Dimension],
     dimension: Dimension,
     system: UnitSystem = LINEAR,
 ) -> tuple[str, ...]:
-    """Units of p0, p1, …; `?` where the formula does not determine the unit, as of two parameters that are factors of
-    each other. numbers: values of the parameters; dimension: dimension of the law's value."""
+    """Derive the units of p0, p1, …; `?` where the formula does not determine the unit, as of two parameters that are
+    factors of each other. numbers: values of the parameters; signals: dimension of each signal; dimension: that of the
+    law's value; system: symbols of force, length and time."""
     solver = _DimensionSolver(numbers, signals)
     for _ in range(2):  # Two passes: a parameter found on the right of an operator may determine another on the left.
-        solver.assign(tree, dimension)
+        solver.assign_dimension(tree, dimension)
     symbols = (system.force, system.length, system.time)
     return tuple(
-        _format_dimension(solver.dimensions[place], symbols) if place in solver.dimensions else "?"
-        for place in range(len(numbers))
+        _format_dimension(solver.dimensions[index], symbols) if index in solver.dimensions else "?"
+        for index in range(len(numbers))
     )
 
 
 def _format_dimension(dimension: Dimension, symbols: tuple[str, str, str]) -> str:
-    above = [
-        _format_power(name, power) for name, power in zip(symbols, dimension, strict=True) if power > 0 and name != "1"
+    """Unit of a dimension as text, such as `N s/m`. symbols: of force, length and time."""
+    positive_powers = [
+        _format_power(symbol, power)
+        for symbol, power in zip(symbols, dimension, strict=True)
+        if power > 0 and symbol != "1"
     ]
-    below = [
-        _format_power(name, -power) for name, power in zip(symbols, dimension, strict=True) if power < 0 and name != "1"
+    negative_powers = [
+        _format_power(symbol, -power)
+        for symbol, power in zip(symbols, dimension, strict=True)
+        if power < 0 and symbol != "1"
     ]
-    numerator = " ".join(above) or "1"
-    denominator = " ".join(below)
-    return f"{numerator}/{f'({denominator})' if len(below) > 1 else denominator}" if below else numerator
+    numerator = " ".join(positive_powers) or "1"
+    denominator = " ".join(negative_powers)
+    return (
+        f"{numerator}/{f'({denominator})' if len(negative_powers) > 1 else denominator}"
+        if negative_powers
+        else numerator
+    )
 
 
-def _format_power(name: str, power: float) -> str:
+def _format_power(symbol: str, power: float) -> str:
+    """A unit's symbol with its exponent, in brackets where it is a product."""
     if power == 1:
-        return name
-    return f"{f'({name})' if ' ' in name else name}^{power:.3g}"
+        return symbol
+    return f"{f'({symbol})' if ' ' in symbol else symbol}^{power:.3g}"
 
 
 def _add_dimensions(first: Dimension | None, second: Dimension | None, sign: float = 1.0) -> Dimension | None:
+    """Dimension of a product (sign 1) or quotient (sign -1); None where a factor's is not known."""
     if first is None or second is None:
         return None
     return first[0] + sign * second[0], first[1] + sign * second[1], first[2] + sign * second[2]
 
 
 def _scale_dimension(dimension: Dimension | None, factor: float | None) -> Dimension | None:
+    """Dimension of a power with the exponent `factor`; None where either is not known."""
     return (
         None
         if dimension is None or factor is None
@@ -75,94 +88,97 @@ def _scale_dimension(dimension: Dimension | None, factor: float | None) -> Dimen
 
 
 class _DimensionSolver:
-    """Dimensions of a formula's parameters, collected in `found` by index; the first dimension found counts."""
+    """Derives the dimensions of a formula's parameters, in `dimensions` by index; the first derived dimension
+    counts."""
 
     def __init__(self, numbers: Sequence[float], signals: Mapping[str, Dimension]) -> None:
         self.numbers = numbers
         self.signals = signals
         self.dimensions: dict[int, Dimension] = {}
 
-    def dimension_of(self, node: Node, literal: Dimension | None = DIMENSIONLESS) -> Dimension | None:
+    def find_dimension(self, node: Node, literal: Dimension | None = DIMENSIONLESS) -> Dimension | None:
         """Dimension of an expression; None where it is not known. literal: dimension of the numbers that are part of
         the formula; None = not known, because such a number may have a unit."""
         match node:
             case Number() | Variable("pi"):
                 return literal
-            case Free(place):
-                return self.dimensions.get(place)
+            case Free(index):
+                return self.dimensions.get(index)
             case Variable(name):
                 return self.signals.get(name)
             case Apply("+" | "-" | "minimum" | "maximum" | "neg" | "abs", parts):
                 return next(
-                    (dimension for part in parts if (dimension := self.dimension_of(part, literal)) is not None), None
+                    (dimension for part in parts if (dimension := self.find_dimension(part, literal)) is not None), None
                 )
             case Apply("lag" | "play" | "delay", (signal, _)):
-                return self.dimension_of(signal, literal)
+                return self.find_dimension(signal, literal)
             case Apply("*" | "/" as name, (left, right)):
                 return _add_dimensions(
-                    self.dimension_of(left, literal), self.dimension_of(right, literal), 1.0 if name == "*" else -1.0
+                    self.find_dimension(left, literal),
+                    self.find_dimension(right, literal),
+                    1.0 if name == "*" else -1.0,
                 )
             case Apply("**", (base, exponent)):
-                return _scale_dimension(self.dimension_of(base, literal), self._value(exponent))
+                return _scale_dimension(self.find_dimension(base, literal), self._evaluate_exponent(exponent))
             case Apply("sqrt", (inner,)):
-                return _scale_dimension(self.dimension_of(inner, literal), 0.5)
+                return _scale_dimension(self.find_dimension(inner, literal), 0.5)
             case Apply("integral", (inner,)):
-                return _add_dimensions(self.dimension_of(inner, literal), SECOND)
+                return _add_dimensions(self.find_dimension(inner, literal), SECOND)
         return DIMENSIONLESS
 
-    def _value(self, node: Node) -> float | None:
+    def _evaluate_exponent(self, node: Node) -> float | None:
         """Value of an exponent that is a number or a parameter, with or without sign; None for any other expression."""
         match node:
             case Number(value):
                 return value
-            case Free(place):
-                return self.numbers[place]
+            case Free(index):
+                return self.numbers[index]
             case Apply("neg", (inner,)):
-                positive = self._value(inner)
-                return None if positive is None else -positive
+                magnitude = self._evaluate_exponent(inner)
+                return None if magnitude is None else -magnitude
         return None
 
-    def assign(self, node: Node, dimension: Dimension | None) -> None:
-        """Pass the dimension that an expression must have (None: not known) down to its parameters."""
+    def assign_dimension(self, node: Node, dimension: Dimension | None) -> None:
+        """Pass the required dimension of an expression (None: not known) down to its parameters."""
         match node:
-            case Free(place):
+            case Free(index):
                 if dimension is not None:
-                    self.dimensions.setdefault(place, dimension)
+                    self.dimensions.setdefault(index, dimension)
             case Apply("+" | "-" | "minimum" | "maximum" | "neg" | "abs", parts):
                 for part in parts:
-                    self.assign(part, self.dimension_of(node) if dimension is None else dimension)
+                    self.assign_dimension(part, self.find_dimension(node) if dimension is None else dimension)
             case Apply("*" | "/" as name, (left, right)):
                 sign = 1.0 if name == "*" else -1.0
-                left_dimension = _add_dimensions(dimension, self.dimension_of(right), -sign)
-                right_dimension = _scale_dimension(_add_dimensions(dimension, self.dimension_of(left), -1.0), sign)
-                self.assign(left, None if self._determines_itself(left, right) else left_dimension)
-                self.assign(right, None if self._determines_itself(right, left) else right_dimension)
+                left_dimension = _add_dimensions(dimension, self.find_dimension(right), -sign)
+                right_dimension = _scale_dimension(_add_dimensions(dimension, self.find_dimension(left), -1.0), sign)
+                self.assign_dimension(left, None if self._has_own_dimension(left, right) else left_dimension)
+                self.assign_dimension(right, None if self._has_own_dimension(right, left) else right_dimension)
             case Apply("**", (base, exponent)):
-                power = self._value(exponent)
-                self.assign(exponent, DIMENSIONLESS)
-                self.assign(base, _scale_dimension(dimension, 1 / power if power else None))
+                power = self._evaluate_exponent(exponent)
+                self.assign_dimension(exponent, DIMENSIONLESS)
+                self.assign_dimension(base, _scale_dimension(dimension, 1 / power if power else None))
             case Apply(name, parts):
                 self._assign_arguments(name, parts, dimension)
 
-    def _determines_itself(self, part: Node, factor: Node) -> bool:
-        """Whether the signals in a sum (or power) determine its dimension better than the dimension wanted of the
-        product: the other factor is a number that is part of the form, and may have a unit."""
+    def _has_own_dimension(self, part: Node, factor: Node) -> bool:
+        """Whether the dimension of a sum (or power) follows from its own signals and not from the product: the other
+        factor is a number that is part of the form, and may have a unit."""
         is_sum = isinstance(part, Apply) and part.name in ("+", "-", "minimum", "maximum", "**")
-        has_unknown_unit = self.dimension_of(factor, None) is None and self.dimension_of(factor) is not None
-        return is_sum and has_unknown_unit and self.dimension_of(part, None) is not None
+        has_unknown_unit = self.find_dimension(factor, None) is None and self.find_dimension(factor) is not None
+        return is_sum and has_unknown_unit and self.find_dimension(part, None) is not None
 
     def _assign_arguments(self, name: str, parts: tuple[Node, ...], dimension: Dimension | None) -> None:
         """Pass dimensions to a function's arguments; those of functions such as sin and exp are dimensionless."""
         first = parts[0]
         match name:
             case "lag" | "delay" | "play":
-                self.assign(first, dimension)
-                self.assign(parts[1], self.dimension_of(first) if name == "play" else SECOND)
+                self.assign_dimension(first, dimension)
+                self.assign_dimension(parts[1], self.find_dimension(first) if name == "play" else SECOND)
             case "integral":
-                self.assign(first, _add_dimensions(dimension, SECOND, -1.0))
+                self.assign_dimension(first, _add_dimensions(dimension, SECOND, -1.0))
             case "sqrt":
-                self.assign(first, _scale_dimension(dimension, 2.0))
+                self.assign_dimension(first, _scale_dimension(dimension, 2.0))
             case "sign":
-                self.assign(first, None)
+                self.assign_dimension(first, None)
             case _:
-                self.assign(first, DIMENSIONLESS)
+                self.assign_dimension(first, DIMENSIONLESS)

@@ -1,5 +1,5 @@
 """Calibration of a linkage: the Jacobian, inertia and gravity that a device reports over a grid of positions, and the
-conditions under which such readings are refused.
+plausibility checks of these readings. `hapteq calibrate` makes it, `hapteq twin` uses it.
 
 J is the Jacobian of the forward kinematics: handle velocity = J joint speeds, joint torques = J^T handle force (Spong,
 Hutchinson, Vidyasagar, Robot Modeling and Control, chapter 4). Inertia M(x) is that at the handle (operational space).
@@ -15,26 +15,28 @@ import numpy as np
 from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.signal import FloatArray
 
-MOST_CONDITION = 50.0
+LARGEST_CONDITION = 50.0
 """Largest condition number of J. At usable positions of a delta device it is a few units; that of the simulated omega.3
 stays below 2.2."""
-MOST_SKEW = 1e-3
-"""Upper limit of the largest entry of |M - M^T| over that of |M|; rounding errors are smaller."""
-MASSES_KG = (1e-3, 20.0)
+LARGEST_ASYMMETRY = 1e-3
+"""Upper limit of the largest entry of |M - M^T| over that of |M|; the asymmetry by rounding errors is smaller."""
+PLAUSIBLE_MASSES_KG = (1e-3, 20.0)
 """Range of plausible effective masses (kg) of the handle of a desktop device, along any direction. Heuristic."""
-MOST_DIFFERENCE = 0.05
-"""Largest relative difference of J from finite differences. Another unit or convention gives at least 40 %, a neglected
+LARGEST_DIFFERENCE = 0.05
+"""Largest relative difference of J from finite differences. A wrong unit or convention gives at least 40 %, a neglected
 arm's length some 10 %."""
 
-DEGREES = (4, 3, 2, 1)
-"""Degrees of the polynomial, tried from the highest: the first that the positions determine is used."""
-SPARE = 2
+POLYNOMIAL_DEGREES = (4, 3, 2, 1)
+"""Degrees of the polynomial of `estimate_local_inertia`, tried from the highest: the first that the positions determine
+is used."""
+POSITIONS_PER_TERM = 2
 """Least ratio of positions to terms of the polynomial; below it a lower degree is used."""
-NEAR_SHARE = 0.3
-"""Standard deviation of the Gaussian weight around a position, relative to the calibration's reach. Without a weight,
-far positions change the slope at the centre of the simulated omega.3 by 20 %; with it, by 2 %."""
-MOST_LISTED = 10
-"""Largest number of problems at positions that are listed one by one; further ones are only counted."""
+WEIGHT_SD_RATIO = 0.3
+"""Standard deviation of the Gaussian that multiplies the residuals by their distance from a position, relative to the
+largest distance of a calibrated position from the origin. Without it, far positions change the slope at the centre of
+the simulated omega.3 by 20 %; with it, by 2 %."""
+LISTED_PROBLEMS = 10
+"""Largest number of problems at single positions that are listed; further ones are only counted."""
 
 
 class CalibrationError(ListedProblemsError):
@@ -46,20 +48,21 @@ class LinkageReading:
     """Readings of a device's linkage at a position of the handle."""
 
     position_m: FloatArray
-    """(3,)"""
+    """(3,), of the handle: x from the base towards the operator, y to the right, z up."""
     joint_angle_rad: FloatArray
-    """(3,)"""
+    """(3,), in the order of the arms"""
     jacobian: FloatArray
     """(3, 3), m/rad"""
     inertia_kg: FloatArray
     """(3, 3), at the handle: force = inertia times acceleration, without gravity and velocity terms."""
     gravity_n: FloatArray
-    """(3,), force at the handle that holds it against gravity."""
+    """(3,), force at the handle that balances gravity."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkageCalibration:
-    """Readings at n positions. Raises CalibrationError for values that cannot be those of a linkage."""
+    """Readings at n positions. Raises CalibrationError for values that cannot be those of a linkage. Arrays without a
+    description are those of `LinkageReading`, stacked."""
 
     device: str
     details: str
@@ -87,87 +90,94 @@ class LinkageCalibration:
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if problems := tuple(calibration_problems(self)):
+        if problems := tuple(find_calibration_problems(self)):
             raise CalibrationError(problems)
 
 
-def calibration_problems(calibration: LinkageCalibration) -> Iterator[str]:
-    """Problems of a calibration, a sentence for each; none for a calibration that can be used."""
-    count = len(calibration.position_m)
+def find_calibration_problems(calibration: LinkageCalibration) -> Iterator[str]:
+    """Find the problems of a calibration, a sentence for each; none for a calibration that can be used."""
+    positions = len(calibration.position_m)
     shapes = {"position_m": (3,), "joint_angle_rad": (3,), "jacobian": (3, 3), "inertia_kg": (3, 3), "gravity_n": (3,)}
-    wrong = [name for name, shape in shapes.items() if getattr(calibration, name).shape != (count, *shape)]
-    if wrong or calibration.filled.shape != (count,) or count == 0:
-        yield f"{', '.join(wrong) or 'filled'} does not have one entry for each of the {count} positions"
+    wrong_arrays = [name for name, shape in shapes.items() if getattr(calibration, name).shape != (positions, *shape)]
+    if wrong_arrays or calibration.filled.shape != (positions,) or positions == 0:
+        yield f"{', '.join(wrong_arrays) or 'filled'} does not have one entry for each of the {positions} positions"
         return
-    at_places = [
+    reading_problems = [
         problem
-        for number, filled in enumerate(calibration.filled)
+        for index, is_filled in enumerate(calibration.filled)
         for problem in check_reading(
-            LinkageReading(*(getattr(calibration, name)[number] for name in shapes)), gravity_known=not filled
+            LinkageReading(*(getattr(calibration, name)[index] for name in shapes)), gravity_known=not is_filled
         )
     ]
-    yield from at_places[:MOST_LISTED]
-    if len(at_places) > MOST_LISTED:
-        yield f"and {len(at_places) - MOST_LISTED} more of this kind at other positions"
+    yield from reading_problems[:LISTED_PROBLEMS]
+    if len(reading_problems) > LISTED_PROBLEMS:
+        yield f"and {len(reading_problems) - LISTED_PROBLEMS} more of this kind at other positions"
     shared_values = calibration.line_deg, calibration.asymmetry, np.atleast_1d(calibration.difference)
     if any(values.shape not in ((3,), (1,)) or not np.isfinite(values).all() for values in shared_values):
         yield "mirror lines, asymmetries or differences are not finite numbers"
     else:
-        yield from difference_problems(calibration.difference)
+        yield from check_difference(calibration.difference)
 
 
-def difference_problems(difference: float) -> Iterator[str]:
-    """Problem of a Jacobian that differs from finite differences of positions, as a sentence. difference: relative."""
-    if not 0 <= difference <= MOST_DIFFERENCE:
+def check_difference(difference: float) -> Iterator[str]:
+    """Check the relative difference of a Jacobian from finite differences of positions; a sentence if it is too
+    large."""
+    if not 0 <= difference <= LARGEST_DIFFERENCE:
         yield (
             f"the Jacobian differs from finite differences of its own positions by {difference:.0%}; "
-            f"{MOST_DIFFERENCE:.0%} is the most"
+            f"{LARGEST_DIFFERENCE:.0%} is the most"
         )
 
 
 def check_reading(reading: LinkageReading, gravity_known: bool = True) -> Iterator[str]:
-    """Problems of a reading, a sentence for each: values that are not finite, a singular Jacobian, an inertia that is
-    not symmetric, not positive definite or not plausible. gravity_known: whether the gravity force must be a number."""
-    place = "(" + ", ".join(f"{1000 * coordinate:.0f}" for coordinate in reading.position_m) + ") mm"
+    """Check a reading and yield its problems, a sentence for each: values that are not finite, a singular Jacobian, an
+    inertia that is not symmetric, not positive definite or not plausible. gravity_known: whether the gravity force must
+    be a number."""
+    position_text = "(" + ", ".join(f"{1000 * coordinate:.0f}" for coordinate in reading.position_m) + ") mm"
     jacobian, inertia = reading.jacobian, reading.inertia_kg
-    vectors = {"position": reading.position_m, "joint angles": reading.joint_angle_rad}
-    for name, values in (vectors | {"Jacobian": jacobian, "inertia": inertia}).items():
+    position_and_angles = {"position": reading.position_m, "joint angles": reading.joint_angle_rad}
+    for name, values in (position_and_angles | {"Jacobian": jacobian, "inertia": inertia}).items():
         if not np.isfinite(values).all():
-            yield f"at {place} the {name} contains a value that is not a number"
+            yield f"at {position_text} the {name} contains a value that is not a number"
     if not (np.isfinite(jacobian).all() and np.isfinite(inertia).all()):
         return
     if np.isinf(reading.gravity_n).any() or (gravity_known and np.isnan(reading.gravity_n).any()):
-        yield f"at {place} the gravity force is not a number"
-    condition = float(np.linalg.cond(jacobian))
-    if not condition <= MOST_CONDITION:
-        yield f"at {place} the Jacobian is singular, or nearly so (condition {condition:.3g})"
-    if np.abs(inertia - inertia.T).max() > MOST_SKEW * np.abs(inertia).max():
-        yield f"at {place} the inertia is not symmetric"
+        yield f"at {position_text} the gravity force is not a number"
+    condition_number = float(np.linalg.cond(jacobian))
+    if not condition_number <= LARGEST_CONDITION:
+        yield f"at {position_text} the Jacobian is singular, or nearly so (condition {condition_number:.3g})"
+    if np.abs(inertia - inertia.T).max() > LARGEST_ASYMMETRY * np.abs(inertia).max():
+        yield f"at {position_text} the inertia is not symmetric"
         return
-    masses = np.linalg.eigvalsh(0.5 * (inertia + inertia.T))
-    if masses[0] <= 0:
-        yield f"at {place} the inertia is not positive definite: {masses[0]:.3g} kg along a direction"
-    elif not MASSES_KG[0] <= masses[0] <= masses[-1] <= MASSES_KG[1]:
-        yield f"at {place} the inertia is {masses[0]:.3g} to {masses[-1]:.3g} kg, which is not plausible for a handle"
+    masses_kg = np.linalg.eigvalsh(0.5 * (inertia + inertia.T))
+    if masses_kg[0] <= 0:
+        yield f"at {position_text} the inertia is not positive definite: {masses_kg[0]:.3g} kg along a direction"
+    elif not PLAUSIBLE_MASSES_KG[0] <= masses_kg[0] <= masses_kg[-1] <= PLAUSIBLE_MASSES_KG[1]:
+        yield (
+            f"at {position_text} the inertia is {masses_kg[0]:.3g} to {masses_kg[-1]:.3g} kg, which is not plausible "
+            "for a handle"
+        )
 
 
-def inertia_about(calibration: LinkageCalibration, place_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Inertia (3, 3) at a position place_m (3,), kg, and its derivatives (3, 3, 3), kg/m: entry [a] is that along axis
-    a.
+def estimate_local_inertia(calibration: LinkageCalibration, position_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Estimate the inertia (3, 3) at position_m (3,), kg, and its derivatives (3, 3, 3), kg/m: entry [a] is that along
+    axis a.
 
-    A polynomial of the position is fitted by least squares with weights that fall with the distance (local regression).
-    Raises ValueError for fewer than eight positions, or for positions in a plane.
+    A polynomial of the position is fitted by weighted least squares, with weights that fall with the distance (local
+    regression; `WEIGHT_SD_RATIO`). Raises ValueError for fewer than eight positions, or for positions in a plane.
     """
     reach_m = float(np.linalg.norm(calibration.position_m, axis=1).max())
-    offsets = (calibration.position_m - place_m) / (reach_m or 1.0)
-    weights = np.exp(-0.5 * np.sum((offsets / NEAR_SHARE) ** 2, axis=1))[:, None]
-    for degree in DEGREES:
-        powers = [p for p in itertools.product(range(degree + 1), repeat=3) if sum(p) <= degree]
-        terms = weights * np.stack([np.prod(offsets ** np.array(power), axis=1) for power in powers], axis=1)
-        if len(offsets) >= SPARE * len(powers) and np.linalg.matrix_rank(terms) == len(powers):
+    offsets = (calibration.position_m - position_m) / (reach_m or 1.0)
+    weights = np.exp(-0.5 * np.sum((offsets / WEIGHT_SD_RATIO) ** 2, axis=1))[:, None]
+    for degree in POLYNOMIAL_DEGREES:
+        exponents = [powers for powers in itertools.product(range(degree + 1), repeat=3) if sum(powers) <= degree]
+        terms = weights * np.stack([np.prod(offsets ** np.array(triple), axis=1) for triple in exponents], axis=1)
+        if len(offsets) >= POSITIONS_PER_TERM * len(exponents) and np.linalg.matrix_rank(terms) == len(exponents):
             coefficients = np.linalg.lstsq(terms, weights * calibration.inertia_kg.reshape(-1, 9), rcond=None)[0]
-            linear = [powers.index((axis == 0, axis == 1, axis == 2)) for axis in range(3)]
-            return coefficients[powers.index((0, 0, 0))].reshape(3, 3), coefficients[linear].reshape(3, 3, 3) / reach_m
+            linear_rows = [exponents.index((axis == 0, axis == 1, axis == 2)) for axis in range(3)]
+            return coefficients[exponents.index((0, 0, 0))].reshape(3, 3), coefficients[linear_rows].reshape(
+                3, 3, 3
+            ) / reach_m
     raise ValueError(
         f"{len(offsets)} positions do not determine how the inertia changes: read at least eight, not in one plane"
     )

@@ -1,9 +1,9 @@
-"""Mirror symmetry of a delta linkage: a test of calibration readings, and a way to complete them.
+"""Mirror symmetry of a delta linkage: test of calibration readings, and their completion by reflection.
 
 The plane of each arm, which contains the base's axis x, is a plane of symmetry with the reflection R: at the mirrored
 position the inertia is R M R, the Jacobian R J P and the joint angles P q, where P swaps the other two joints. A mirror
 line is where such a plane meets the plane y-z. At a position in the plane, two directions that are mirror images have
-the same apparent mass; the study's two directions were chosen so.
+the same apparent mass; the study's two directions are such a pair. Called by `calibrate_linkage`.
 """
 
 import numpy as np
@@ -11,42 +11,44 @@ import numpy as np
 from equalizer.linkage.calibration import LinkageReading
 from equalizer.signals.signal import FloatArray
 
-WARN_FROM = 0.02
+LEAST_WARNED_ASYMMETRY = 0.02
 """Relative difference of inertia from which a warning is given. It changes an acceleration by 2 % (0.17 dB), a small
 part of the staircases' finest step (1 dB)."""
 
-NEAR_M = 1e-6
+SAME_POSITION_M = 1e-6
 """Distance (m) below which two positions count as the same."""
-ODD_SHARE = 0.5
+VALID_LINE_SHARE = 0.5
 """Fraction of the other lines' asymmetry below which a mirror line counts as valid; the arm in that line is then the
-arm that differs from the others."""
-UPRIGHT = 1e-3
-"""Largest y component of a line's direction for it to count as upright: gravity then lies in its mirror plane."""
+arm that differs from the others. Heuristic."""
+LARGEST_UPRIGHT_COMPONENT = 1e-3
+"""Largest magnitude of the y component of a line's direction for it to count as upright; its mirror plane then contains
+the direction of gravity."""
 
 
-def reflection(azimuth_rad: float) -> FloatArray:
+def compute_reflection(azimuth_rad: float) -> FloatArray:
     """(3, 3): reflection about the plane that contains the axis x and has this azimuth, from y towards z."""
     normal = np.array([0.0, -np.sin(azimuth_rad), np.cos(azimuth_rad)])
     mirror: FloatArray = np.eye(3) - 2 * np.outer(normal, normal)
     return mirror
 
 
-def line_asymmetry(readings: list[LinkageReading], azimuths: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Asymmetry of the inertia about each line, (3,): largest |M(R p) - R M(p) R| / |M(p)| (spectral norms) over the
-    readings whose mirrored position was read too, 0 without any; and the positions (3, 3), m, where it is largest."""
-    worst, worst_positions = np.zeros(3), np.zeros((3, 3))
+def measure_line_asymmetry(readings: list[LinkageReading], azimuths: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Measure the asymmetry of the inertia about each line, (3,): largest |M(R p) - R M(p) R| / |M(p)| (spectral norms)
+    over the readings whose mirrored position was read too, 0 without any; and the positions (3, 3), m, where it is
+    largest."""
+    largest_asymmetry, worst_positions = np.zeros(3), np.zeros((3, 3))
     positions = np.array([reading.position_m for reading in readings])
     for line, azimuth in enumerate(azimuths):
-        mirror = reflection(float(azimuth))
+        mirror = compute_reflection(float(azimuth))
         for reading in readings:
-            mirrored = _nearest(positions, mirror @ reading.position_m)
-            if mirrored is None:
+            mirrored_index = _find_same_position(positions, mirror @ reading.position_m)
+            if mirrored_index is None:
                 continue
-            difference = readings[mirrored].inertia_kg - mirror @ reading.inertia_kg @ mirror
-            share = float(np.linalg.norm(difference, 2) / np.linalg.norm(reading.inertia_kg, 2))
-            if share > worst[line]:
-                worst[line], worst_positions[line] = share, reading.position_m
-    return worst, worst_positions
+            difference = readings[mirrored_index].inertia_kg - mirror @ reading.inertia_kg @ mirror
+            asymmetry = float(np.linalg.norm(difference, 2) / np.linalg.norm(reading.inertia_kg, 2))
+            if asymmetry > largest_asymmetry[line]:
+                largest_asymmetry[line], worst_positions[line] = asymmetry, reading.position_m
+    return largest_asymmetry, worst_positions
 
 
 def complete_by_symmetry(
@@ -59,60 +61,64 @@ def complete_by_symmetry(
     positions = np.array([reading.position_m for reading in readings])
     single_reflections = [(line,) for line in range(3)]
     for position in unread:
-        for lines in (
+        for reflected_lines in (
             *single_reflections,
             *((first, second) for first in range(3) for second in range(3) if first != second),
         ):
             image_position = position
-            for line in lines:
-                image_position = reflection(float(azimuths[line])) @ image_position
-            source = _nearest(positions, image_position)
-            if source is not None:
-                image = readings[source]
-                for line in reversed(lines):
-                    image = _mirror_reading(image, line, float(azimuths[line]))
-                completed.append(image)
+            for line in reflected_lines:
+                image_position = compute_reflection(float(azimuths[line])) @ image_position
+            source_index = _find_same_position(positions, image_position)
+            if source_index is not None:
+                image_reading = readings[source_index]
+                for line in reversed(reflected_lines):
+                    image_reading = _mirror_reading(image_reading, line, float(azimuths[line]))
+                completed.append(image_reading)
                 break
         else:
             remaining.append(position)
     return completed, np.array(remaining).reshape(-1, 3)
 
 
-def asymmetry_words(asymmetry: FloatArray, where_m: FloatArray, line_deg: FloatArray) -> tuple[str, ...]:
-    """Warnings for lines whose asymmetry exceeds `WARN_FROM`; empty if there are none."""
+def write_asymmetry_warnings(
+    asymmetry: FloatArray, worst_position_m: FloatArray, line_deg: FloatArray
+) -> tuple[str, ...]:
+    """Write warnings, a sentence each, for lines whose asymmetry (3,) exceeds `LEAST_WARNED_ASYMMETRY`; empty if there
+    are none. worst_position_m: (3, 3), where each line's asymmetry is largest; line_deg: (3,), azimuths of the
+    lines."""
     warnings = [
         f"Mirrored about the line at {line_deg[line]:.0f} degrees the inertia differs by up to {asymmetry[line]:.1%}, "
-        f"most at ({', '.join(f'{1000 * x:.0f}' for x in where_m[line])}) mm; up to {WARN_FROM:.0%} is rounding "
-        "and assembly."
+        f"most at ({', '.join(f'{1000 * x:.0f}' for x in worst_position_m[line])}) mm; "
+        f"up to {LEAST_WARNED_ASYMMETRY:.0%} is rounding and assembly."
         for line in range(3)
-        if asymmetry[line] > WARN_FROM
+        if asymmetry[line] > LEAST_WARNED_ASYMMETRY
     ]
-    order = np.argsort(asymmetry)
-    if len(warnings) == 2 and asymmetry[order[0]] < ODD_SHARE * asymmetry[order[1]]:
+    ascending_order = np.argsort(asymmetry)
+    if len(warnings) == 2 and asymmetry[ascending_order[0]] < VALID_LINE_SHARE * asymmetry[ascending_order[1]]:
         warnings.append(
-            f"The line at {line_deg[order[0]]:.0f} degrees is a line of symmetry and the other two are not: the arm "
-            "in that line differs from the others. Directions mirrored about that line still have the same apparent "
-            "mass."
+            f"The line at {line_deg[ascending_order[0]]:.0f} degrees is a line of symmetry and "
+            "the other two are not: the arm in that line differs from the others. "
+            "Directions mirrored about that line still have the same apparent mass."
         )
     return tuple(warnings)
 
 
-def _nearest(positions: FloatArray, target: FloatArray) -> int | None:
-    """Index of the position that equals `target` within `NEAR_M`; None without one."""
+def _find_same_position(positions: FloatArray, target: FloatArray) -> int | None:
+    """Index of the position that equals `target` within `SAME_POSITION_M`; None without one."""
     distances = np.linalg.norm(positions - target, axis=1)
     nearest = int(np.argmin(distances))
-    return nearest if distances[nearest] < NEAR_M else None
+    return nearest if distances[nearest] < SAME_POSITION_M else None
 
 
 def _mirror_reading(reading: LinkageReading, line: int, azimuth_rad: float) -> LinkageReading:
-    """The reading at the position mirrored about this line."""
-    mirror = reflection(azimuth_rad)
+    """The reading reflected about a mirror line, as at the mirrored position. line: index of the arm in that plane."""
+    mirror = compute_reflection(azimuth_rad)
     joint_order = [line if joint == line else 3 - line - joint for joint in range(3)]
-    upright = abs(np.cos(azimuth_rad)) < UPRIGHT
+    is_upright = abs(np.cos(azimuth_rad)) < LARGEST_UPRIGHT_COMPONENT
     return LinkageReading(
         position_m=mirror @ reading.position_m,
         joint_angle_rad=reading.joint_angle_rad[joint_order],
         jacobian=(mirror @ reading.jacobian)[:, joint_order],
         inertia_kg=mirror @ reading.inertia_kg @ mirror,
-        gravity_n=mirror @ reading.gravity_n if upright else np.full(3, np.nan),
+        gravity_n=mirror @ reading.gravity_n if is_upright else np.full(3, np.nan),
     )

@@ -1,4 +1,4 @@
-"""Vocabulary of physical effects that a model may lack: their names, places, parameters and units, as in model files.
+"""Vocabulary of the physical effects in model files: their names, places, parameters and units.
 
 The equations are in `equalizer.effects`, a file for each effect. Meanings of parameters: `gap` is the total play,
 `width` half the dead band, `gain` a factor (1 = no effect), `degrees` the total rotation angle; `ppm` > 0 takes the
@@ -30,8 +30,8 @@ class EffectParameter:
     optional: bool = False
     """Whether a file may omit it; it is needed to reproduce an effect exactly as it was fitted."""
 
-    def unit_in(self, system: UnitSystem, response_unit: str) -> str:
-        """Unit of the parameter in a model with this unit system whose response is in `response_unit`."""
+    def find_unit(self, system: UnitSystem, response_unit: str) -> str:
+        """Unit of the parameter in a model with this unit system; response_unit: unit of the model's response."""
         unit = {False: self.unit, True: self.rotational_unit, None: system.express(self.unit)}[system.rotational]
         if system.rotational is None and self.unit == ROTATIONAL.force:
             unit = system.force
@@ -55,144 +55,174 @@ class EffectName:
         return self.parameters[0]
 
 
-def _required(name: str, unit: str, rotational: str = "") -> EffectParameter:
-    """A parameter that a file must state. rotational: its unit in a rotational model, empty where it is the same."""
+def _make_required(name: str, unit: str, rotational: str = "") -> EffectParameter:
+    """Make a parameter that a file must state. rotational: its unit in a rotational model, empty where it is the
+    same."""
     return EffectParameter(name, unit, rotational or unit)
 
 
-def _optional(name: str, unit: str, rotational: str = "") -> EffectParameter:
+def _make_optional(name: str, unit: str, rotational: str = "") -> EffectParameter:
+    """Make a parameter that a file may omit. rotational: as in `_make_required`."""
     return EffectParameter(name, unit, rotational or unit, optional=True)
 
 
-def _level(name: str) -> EffectParameter:
-    return _required(name, "N", "N m")
+def _make_level(name: str) -> EffectParameter:
+    """Make a required parameter that is a force, or a torque in a rotational model."""
+    return _make_required(name, "N", "N m")
 
 
-def _stiffness(name: str) -> EffectParameter:
-    return _required(name, "N/m", "N m/rad")
+def _make_stiffness(name: str) -> EffectParameter:
+    """Make a required parameter that is a stiffness."""
+    return _make_required(name, "N/m", "N m/rad")
 
 
-def _damping(name: str) -> EffectParameter:
-    return _required(name, "N s/m", "N m s/rad")
+def _make_damping(name: str) -> EffectParameter:
+    """Make a required parameter that is a viscous damping."""
+    return _make_required(name, "N s/m", "N m s/rad")
 
 
-def _mass(name: str) -> EffectParameter:
-    return _required(name, "kg", "kg m^2")
+def _make_mass(name: str) -> EffectParameter:
+    """Make a required parameter that is a mass, or a moment of inertia in a rotational model."""
+    return _make_required(name, "kg", "kg m^2")
 
 
-MATRIX_UNITS = {"mass": _mass("mass"), "damping": _damping("damping"), "stiffness": _stiffness("stiffness")}
+MATRIX_UNITS = {
+    "mass": _make_mass("mass"),
+    "damping": _make_damping("damping"),
+    "stiffness": _make_stiffness("stiffness"),
+}
 """Units of the entries of a model's matrices."""
 
 
-def matrix_unit(part: str, system: UnitSystem) -> str:
-    """Unit of a model's mass, damping or stiffness matrix. part: mass, damping or stiffness."""
-    return MATRIX_UNITS[part].unit_in(system, "1")
+def find_matrix_unit(part: str, system: UnitSystem) -> str:
+    """Unit of the entries of a matrix of a model. part: mass, damping or stiffness; raises KeyError for any other."""
+    return MATRIX_UNITS[part].find_unit(system, "1")
 
 
-# Units are SI; `_level` is a force or a torque.
+# Units are SI; `_make_level` is a force or a torque.
 EFFECT_NAMES: tuple[EffectName, ...] = (
-    EffectName("coulomb_friction", "mechanism", (_level("level"),)),
-    EffectName("asymmetric_friction", "mechanism", (_level("level_positive"), _level("level_negative"))),
+    EffectName("coulomb_friction", "mechanism", (_make_level("level"),)),
+    EffectName("asymmetric_friction", "mechanism", (_make_level("level_positive"), _make_level("level_negative"))),
     EffectName(
-        "stribeck_friction", "mechanism", (_level("coulomb"), _level("static"), _required("speed", "m/s", "rad/s"))
+        "stribeck_friction",
+        "mechanism",
+        (_make_level("coulomb"), _make_level("static"), _make_required("speed", "m/s", "rad/s")),
     ),
     EffectName(
         "position_dependent_friction",
         "mechanism",
-        (_level("level"), _required("slope_per_m", "1/m", "1/rad"), _required("bend_per_m2", "1/m^2", "1/rad^2")),
+        (
+            _make_level("level"),
+            _make_required("slope_per_m", "1/m", "1/rad"),
+            _make_required("bend_per_m2", "1/m^2", "1/rad^2"),
+        ),
     ),
-    EffectName("presliding_hysteresis", "mechanism", (_level("level"), _stiffness("stiffness"))),
-    EffectName("viscous_damping", "mechanism", (_damping("damping"),)),
-    EffectName("quadratic_damping", "mechanism", (_required("coefficient", "N s^2/m^2", "N m s^2/rad^2"),)),
-    EffectName("hardening_stiffness", "mechanism", (_required("k3", "N/m^3", "N m/rad^3"),)),
-    EffectName("asymmetric_stiffness", "mechanism", (_required("k2", "N/m^2", "N m/rad^2"),)),
-    EffectName("constant_force", "mechanism", (_level("force"),)),
-    EffectName("gravity_torque", "mechanism", (_required("torque", "N m"), _required("angle", "rad"))),
+    EffectName("presliding_hysteresis", "mechanism", (_make_level("level"), _make_stiffness("stiffness"))),
+    EffectName("viscous_damping", "mechanism", (_make_damping("damping"),)),
+    EffectName("quadratic_damping", "mechanism", (_make_required("coefficient", "N s^2/m^2", "N m s^2/rad^2"),)),
+    EffectName("hardening_stiffness", "mechanism", (_make_required("k3", "N/m^3", "N m/rad^3"),)),
+    EffectName("asymmetric_stiffness", "mechanism", (_make_required("k2", "N/m^2", "N m/rad^2"),)),
+    EffectName("constant_force", "mechanism", (_make_level("force"),)),
+    EffectName("gravity_torque", "mechanism", (_make_required("torque", "N m"), _make_required("angle", "rad"))),
     EffectName(
-        "cogging", "mechanism", (_level("amplitude"), _required("pitch", "m", "rad"), _optional("phase", "rad"))
+        "cogging",
+        "mechanism",
+        (_make_level("amplitude"), _make_required("pitch", "m", "rad"), _make_optional("phase", "rad")),
     ),
     EffectName(
         "backlash",
         "mechanism",
         (
-            _required("gap", "m", "rad"),
-            _optional("motor_mass", "kg", "kg m^2"),
-            _optional("contact_stiffness", "N/m", "N m/rad"),
-            _optional("contact_damping", "N s/m", "N m s/rad"),
+            _make_required("gap", "m", "rad"),
+            _make_optional("motor_mass", "kg", "kg m^2"),
+            _make_optional("contact_stiffness", "N/m", "N m/rad"),
+            _make_optional("contact_damping", "N s/m", "N m s/rad"),
         ),
     ),
-    EffectName("loose_joint", "mechanism", (_required("gap", "m", "rad"), _stiffness("stiffness"), _level("slip"))),
+    EffectName(
+        "loose_joint",
+        "mechanism",
+        (_make_required("gap", "m", "rad"), _make_stiffness("stiffness"), _make_level("slip")),
+    ),
     EffectName(
         "end_stop",
         "mechanism",
         (
-            _required("position", "m", "rad"),
-            _stiffness("stiffness"),
-            _optional("opposite", "1"),
-            _optional("side", "1"),
+            _make_required("position", "m", "rad"),
+            _make_stiffness("stiffness"),
+            _make_optional("opposite", "1"),
+            _make_optional("side", "1"),
         ),
     ),
     EffectName(
-        "pose_dependent_inertia", "mechanism", (_required("per_m", "1/m", "1/rad"), _optional("speed_share", "1"))
+        "pose_dependent_inertia",
+        "mechanism",
+        (_make_required("per_m", "1/m", "1/rad"), _make_optional("speed_share", "1")),
     ),
     EffectName(
         "extra_mode",
         "mechanism",
         (
-            _required("frequency", "Hz"),
-            _mass("mass"),
-            _required("damping_ratio", "1"),
-            _optional("tilt_next", "1"),
-            _optional("tilt_after_next", "1"),
+            _make_required("frequency", "Hz"),
+            _make_mass("mass"),
+            _make_required("damping_ratio", "1"),
+            _make_optional("tilt_next", "1"),
+            _make_optional("tilt_after_next", "1"),
         ),
     ),
-    EffectName("added_mass", "mechanism", (_mass("mass"),)),
-    EffectName("hand_impedance", "hand", (_mass("mass"), _damping("damping"), _stiffness("stiffness"))),
+    EffectName("added_mass", "mechanism", (_make_mass("mass"),)),
+    EffectName("hand_impedance", "hand", (_make_mass("mass"), _make_damping("damping"), _make_stiffness("stiffness"))),
     EffectName(
         "time_varying_grip",
         "hand",
         (
-            _required("rate_hz", "Hz"),
-            _required("depth", "1"),
-            _optional("phase", "rad"),
-            _optional("stiffness_share", "1"),
+            _make_required("rate_hz", "Hz"),
+            _make_required("depth", "1"),
+            _make_optional("phase", "rad"),
+            _make_optional("stiffness_share", "1"),
         ),
     ),
-    EffectName("body_on_actuator", "actuator", (_mass("mass"), _damping("damping"), _stiffness("stiffness"))),
-    EffectName("force_saturation", "actuator", (_level("limit"),)),
-    EffectName("force_deadband", "actuator", (_level("width"), _optional("jump", "1"))),
-    EffectName("slew_limit", "actuator", (_required("rate", "N/s", "N m/s"),)),
-    EffectName("amplifier_lag", "actuator", (_required("time_constant", "s"),)),
-    EffectName("transport_delay", "actuator", (_required("delay", "s"),)),
-    EffectName("force_gain", "actuator", (_required("gain", "1"),)),
-    EffectName("force_nonlinearity", "actuator", (_required("square", "1"), _level("reference"))),
-    EffectName("sensor_lag", "sensor", (_required("bandwidth", "Hz"),)),
-    EffectName("sensor_clipping", "sensor", (_required("limit", RESPONSE),)),
+    EffectName(
+        "body_on_actuator", "actuator", (_make_mass("mass"), _make_damping("damping"), _make_stiffness("stiffness"))
+    ),
+    EffectName("force_saturation", "actuator", (_make_level("limit"),)),
+    EffectName("force_deadband", "actuator", (_make_level("width"), _make_optional("jump", "1"))),
+    EffectName("slew_limit", "actuator", (_make_required("rate", "N/s", "N m/s"),)),
+    EffectName("amplifier_lag", "actuator", (_make_required("time_constant", "s"),)),
+    EffectName("transport_delay", "actuator", (_make_required("delay", "s"),)),
+    EffectName("force_gain", "actuator", (_make_required("gain", "1"),)),
+    EffectName("force_nonlinearity", "actuator", (_make_required("square", "1"), _make_level("reference"))),
+    EffectName("sensor_lag", "sensor", (_make_required("bandwidth", "Hz"),)),
+    EffectName("sensor_clipping", "sensor", (_make_required("limit", RESPONSE),)),
     EffectName(
         "sensor_misalignment",
         "sensor",
-        (_required("degrees", "deg"), *(_optional(f"about_{axis}", "deg") for axis in "xyz")),
+        (_make_required("degrees", "deg"), *(_make_optional(f"about_{axis}", "deg") for axis in "xyz")),
     ),
-    EffectName("cross_axis_sensitivity", "sensor", (_required("from_next", "1"), _required("from_after_next", "1"))),
-    EffectName("sensor_gain", "sensor", (_required("gain", "1"),)),
-    EffectName("sensor_nonlinearity", "sensor", (_required("cubic", f"1/{RESPONSE}^2"),)),
-    EffectName("sensor_offset", "sensor", (_required("offset", RESPONSE),)),
     EffectName(
-        "sensor_drift", "sensor", (_required("total", RESPONSE), _optional("bend", "1"), _optional("start", "1"))
+        "cross_axis_sensitivity", "sensor", (_make_required("from_next", "1"), _make_required("from_after_next", "1"))
     ),
-    EffectName("quantization", "sensor", (_required("step", RESPONSE),)),
+    EffectName("sensor_gain", "sensor", (_make_required("gain", "1"),)),
+    EffectName("sensor_nonlinearity", "sensor", (_make_required("cubic", f"1/{RESPONSE}^2"),)),
+    EffectName("sensor_offset", "sensor", (_make_required("offset", RESPONSE),)),
+    EffectName(
+        "sensor_drift",
+        "sensor",
+        (_make_required("total", RESPONSE), _make_optional("bend", "1"), _make_optional("start", "1")),
+    ),
+    EffectName("quantization", "sensor", (_make_required("step", RESPONSE),)),
     EffectName(
         "mains_hum",
         "sensor",
-        (_required("amplitude", RESPONSE), _required("frequency", "Hz"), _optional("phase", "rad")),
+        (_make_required("amplitude", RESPONSE), _make_required("frequency", "Hz"), _make_optional("phase", "rad")),
     ),
     EffectName(
         "clock_drift",
         "sensor",
-        (_required("ppm", "ppm"), _optional("interpolated", "1"), _optional("with_position", "1")),
+        (_make_required("ppm", "ppm"), _make_optional("interpolated", "1"), _make_optional("with_position", "1")),
     ),
-    EffectName("logger_offset", "sensor", (_required("offset", "s"), _optional("interpolated", "1"))),
-    EffectName("lost_samples", "sensor", (_required("fraction", "1"),)),
+    EffectName("logger_offset", "sensor", (_make_required("offset", "s"), _make_optional("interpolated", "1"))),
+    EffectName("lost_samples", "sensor", (_make_required("fraction", "1"),)),
 )
 
 DISCOVERED_LAW = "discovered_law"

@@ -1,8 +1,8 @@
-"""A discrete linear state-space model fitted to recordings, with its validity and uncertainty:
+"""A discrete-time linear state-space model fitted to recordings, with its band of validity and its uncertainty:
 
     x[k+1] = A x[k] + B u[k],    y[k] = C x[k] + D u[k]         x (n,), u (m,) commands, y (p,) responses
 
-`equalizer.identification.state_space` makes such models.
+`equalizer.identification.state_space` fits such models; `equalizer.tracking` computes feedforward forces from them.
 """
 
 from collections.abc import Iterator, Mapping
@@ -14,18 +14,18 @@ import numpy as np
 from equalizer.plant.model_quality import ModelQuality
 from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.signal import FloatArray
-from equalizer.signals.summary import Summarised, Summary, span_text
+from equalizer.signals.summary import Summary, SummaryDisplay, format_range
 from equalizer.signals.units import UnknownUnitError, parse_unit
 
 
 class IdentifiedModelError(ListedProblemsError):
-    """Values of a model that are inconsistent. `problems`: a sentence for each."""
+    """A model's values are inconsistent. `problems`: a sentence for each inconsistency."""
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
-class IdentifiedModel(Summarised):
-    """A discrete state-space model in SI units. As in recordings, y[k] is taken just before u[k] is written, so that D
-    is zero for a causal device.
+class IdentifiedModel(SummaryDisplay):
+    """A discrete-time state-space model in SI units. As in recordings, y[k] is sampled just before u[k] is written, so
+    that D is zero for a causal device, unless D approximates the modes outside the band.
 
     Raises IdentifiedModelError for inconsistent values. An unstable model is permitted; see `spectral_radius`.
     """
@@ -37,10 +37,10 @@ class IdentifiedModel(Summarised):
     C: FloatArray
     """(p, n)"""
     D: FloatArray
-    """(p, m); not zero in a model of a limited band, where it represents the modes outside."""
+    """(p, m): not zero in a model of a limited band, where it approximates the modes outside the band."""
     sample_rate_hz: float
     band_hz: tuple[float, float]
-    """Band of the fit in Hz; the model is not valid outside."""
+    """Frequency band of the fit (Hz), lower and upper limit; the model is not valid outside it."""
     input_unit: str | tuple[str, ...]
     """SI unit of all commands, or the units channel by channel."""
     output_unit: str | tuple[str, ...]
@@ -48,17 +48,18 @@ class IdentifiedModel(Summarised):
     input_channels: tuple[str, ...]
     output_channels: tuple[str, ...]
     delay_samples: float = 0.0
-    """Samples from a command to the first response that it can change. For information: A, B, C, D include the
-    delay."""
+    """Delay in samples from a command to the first response that it can change. For information only: A, B, C, D
+    include it."""
     place_m: tuple[float, float, float] | None = None
     """Position of the handle in the workspace (m); None = not known."""
     covariance: FloatArray | None = None
-    """(k, k), covariance of `parameters`."""
+    """(k, k): covariance matrix of `parameters`; None = not known."""
     samples: FloatArray | None = None
-    """(draws, k): draws of `parameters` from their uncertainty."""
+    """(draws, k): random draws of `parameters` from the distribution of their errors; None = not known."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    """JSON values: versions, command, seeds, parents."""
     quality: ModelQuality | None = None
-    """Errors of the model, by what was measured; None = not known."""
+    """Relative errors of the model: misfit, scatter and held-out error; None = not known."""
 
     def __post_init__(self) -> None:
         for name in ("A", "B", "C", "D", "covariance", "samples"):
@@ -66,7 +67,7 @@ class IdentifiedModel(Summarised):
                 matrix = np.array(getattr(self, name), dtype=np.float64, ndmin=1)
                 matrix.flags.writeable = False
                 object.__setattr__(self, name, matrix)
-        problems = tuple(_problems(self))
+        problems = tuple(_list_problems(self))
         if problems:
             raise IdentifiedModelError(problems)
 
@@ -81,16 +82,16 @@ class IdentifiedModel(Summarised):
         return np.concatenate([matrix.ravel() for matrix in (self.A, self.B, self.C, self.D)])
 
     def with_parameters(self, parameters: FloatArray) -> Self:
-        """The model with other values (k,) of A, B, C, D, in the order of `parameters`."""
+        """A copy of the model with other entries of A, B, C, D. parameters: (k,), in the order of `parameters`."""
         shapes = [matrix.shape for matrix in (self.A, self.B, self.C, self.D)]
-        stops = np.cumsum([rows * columns for rows, columns in shapes])[:-1]
-        parts = np.split(np.asarray(parameters, dtype=np.float64), stops)
-        A, B, C, D = (part.reshape(shape) for part, shape in zip(parts, shapes, strict=True))
+        split_indices = np.cumsum([rows * columns for rows, columns in shapes])[:-1]
+        flat_matrices = np.split(np.asarray(parameters, dtype=np.float64), split_indices)
+        A, B, C, D = (flat_matrix.reshape(shape) for flat_matrix, shape in zip(flat_matrices, shapes, strict=True))
         return replace(self, A=A, B=B, C=C, D=D)
 
     @property
     def spectral_radius(self) -> float:
-        """Largest magnitude of A's eigenvalues; below 1 the model is stable."""
+        """Largest magnitude of the eigenvalues of A; below 1 the model is stable. 0 for a model without states."""
         return float(np.abs(np.linalg.eigvals(self.A)).max()) if self.order else 0.0
 
     def summary(self) -> Summary:
@@ -102,33 +103,35 @@ class IdentifiedModel(Summarised):
                 ("order", str(len(self.A))),
                 ("from", ", ".join(self.input_channels)),
                 ("to", ", ".join(self.output_channels)),
-                ("band", span_text(low_hz, high_hz, "Hz")),
+                ("band", format_range(low_hz, high_hz, "Hz")),
                 ("sample rate", f"{self.sample_rate_hz:g} Hz"),
                 ("spectral radius", f"{self.spectral_radius:.6f}"),
             ),
         )
 
 
-def _problems(model: IdentifiedModel) -> Iterator[str]:
-    """Inconsistencies of a model, a sentence for each."""
-    shape_problems = tuple(_shape_problems(model))
+def _list_problems(model: IdentifiedModel) -> Iterator[str]:
+    """Sentences on all inconsistencies of a model."""
+    shape_problems = tuple(_list_shape_problems(model))
     yield from shape_problems
-    yield from _channel_problems("input", model.input_channels, model.input_unit, model.B.shape[-1])
-    yield from _channel_problems("output", model.output_channels, model.output_unit, model.C.shape[0])
-    rate, (low, high) = model.sample_rate_hz, model.band_hz
-    if not (np.isfinite(rate) and rate > 0):
-        yield f"sample_rate_hz is {rate}; it must be a positive number"
-    elif not 0 <= low < high <= rate / 2:
-        yield f"band_hz is {low:g} to {high:g}; it must rise within 0 and half the sample rate, {rate / 2:g} Hz"
+    yield from _list_channel_problems("input", model.input_channels, model.input_unit, model.B.shape[-1])
+    yield from _list_channel_problems("output", model.output_channels, model.output_unit, model.C.shape[0])
+    rate_hz, (low_hz, high_hz) = model.sample_rate_hz, model.band_hz
+    if not (np.isfinite(rate_hz) and rate_hz > 0):
+        yield f"sample_rate_hz is {rate_hz}; it must be a positive number"
+    elif not 0 <= low_hz < high_hz <= rate_hz / 2:
+        yield (
+            f"band_hz is {low_hz:g} to {high_hz:g}; it must rise within 0 and half the sample rate, {rate_hz / 2:g} Hz"
+        )
     if not (np.isfinite(model.delay_samples) and model.delay_samples >= 0):
         yield f"delay_samples is {model.delay_samples}; it must be a number that is not negative"
     if model.place_m is not None and (np.shape(model.place_m) != (3,) or not np.isfinite(model.place_m).all()):
         yield f"place_m is {model.place_m}; it must be three numbers, x, y, z in metres"
     if not shape_problems:
-        yield from _uncertainty_problems(model)
+        yield from _list_uncertainty_problems(model)
 
 
-def _shape_problems(model: IdentifiedModel) -> Iterator[str]:
+def _list_shape_problems(model: IdentifiedModel) -> Iterator[str]:
     n, m, p = model.A.shape[0], model.B.shape[-1], model.C.shape[0]
     for name, shape in {"A": (n, n), "B": (n, m), "C": (p, n), "D": (p, m)}.items():
         matrix: FloatArray = getattr(model, name)
@@ -138,7 +141,9 @@ def _shape_problems(model: IdentifiedModel) -> Iterator[str]:
             yield f"{name} holds values that are not finite numbers"
 
 
-def _channel_problems(side: str, channels: tuple[str, ...], unit: str | tuple[str, ...], count: int) -> Iterator[str]:
+def _list_channel_problems(
+    side: str, channels: tuple[str, ...], unit: str | tuple[str, ...], count: int
+) -> Iterator[str]:
     if len(channels) != count:
         yield f"{side}_channels names {len(channels)} channels, but the matrices have {count}"
     if len(set(channels)) != len(channels):
@@ -146,17 +151,17 @@ def _channel_problems(side: str, channels: tuple[str, ...], unit: str | tuple[st
     units = (unit,) if isinstance(unit, str) else unit
     if len(units) not in (1, count):
         yield f"{side}_unit holds {len(units)} units for {count} channels; one for all, or one per channel"
-    for text in units:
+    for unit_text in units:
         try:
-            parsed = parse_unit(text)
+            parsed = parse_unit(unit_text)
         except UnknownUnitError as error:
             yield f"{side}_unit: {error}"
         else:
-            if parsed.si != text:
-                yield f"{side}_unit is '{text}'; a model is in SI units, here {parsed.si}"
+            if parsed.si != unit_text:
+                yield f"{side}_unit is '{unit_text}'; a model is in SI units, here {parsed.si}"
 
 
-def _uncertainty_problems(model: IdentifiedModel) -> Iterator[str]:
+def _list_uncertainty_problems(model: IdentifiedModel) -> Iterator[str]:
     k = model.parameters.size
     covariance, samples = model.covariance, model.samples
     if covariance is not None:

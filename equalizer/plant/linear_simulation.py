@@ -1,8 +1,9 @@
-"""Linear part of a mechanical model: exact zero-order-hold discretisation by the matrix exponential, and its poles.
+"""Linear part of a mechanical model: zero-order-hold discretisation for simulations, driven axes, and poles.
 
 M q'' + D q' + K q = B u + P f has the state x = (q, v) and x' = F x + G (u, f), with commands u and forces f at the
-ports P. With both held constant over a step T, x[k+1] = A x[k] + H (u, f)[k], where [A H] are the upper rows of
-exp([[F, G], [0, 0]] T) (Van Loan, IEEE Trans. Autom. Control 23:395, 1978). SI units.
+ports P. With both held constant over a step T, x[k+1] = A x[k] + H (u, f)[k] exactly, where [A H] are the upper rows of
+exp([[F, G], [0, 0]] T) (Van Loan, IEEE Trans. Autom. Control 23:395, 1978). SI units. The simulation itself is in
+`equalizer.effects.simulation.stepping`.
 """
 
 from dataclasses import dataclass
@@ -15,59 +16,63 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LinearSteps:
-    """Matrices of one step. The state (q, v) has 2n numbers for n coordinates; inputs are the m commands and the forces
-    at r ports, both held during the step. There are p responses."""
+class DiscreteModel:
+    """Discrete-time state-space matrices of one step. The state (q, v) has 2n elements for n coordinates; inputs are
+    the m commands and the forces at r ports, both held during the step. There are p responses."""
 
     step_s: float
-    advance: FloatArray
-    """(2n, 2n): the state after the step by the state before."""
+    transition: FloatArray
+    """(2n, 2n): state transition matrix A."""
     by_command: FloatArray
-    """(2n, m): the state after the step by the commands."""
+    """(2n, m): input matrix of the commands, the columns u of H."""
     by_axis_force: FloatArray
-    """(2n, r): the state after the step by a force of 1 N (torque of 1 N m) at each port."""
+    """(2n, r): input matrix of the port forces, the columns f of H; per N, or per N m for a torque."""
     motion: FloatArray
-    """(3 r, 2n): first the positions of all ports, then their velocities, then their accelerations, by the state."""
+    """(3 r, 2n): output matrix of the ports: rows of all positions, then velocities, then accelerations."""
     motion_by_command: FloatArray
-    """(3 r, m): direct effect of the commands on them; not zero for accelerations only."""
+    """(3 r, m): feedthrough from the commands to `motion`; not zero for accelerations only."""
     motion_by_axis_force: FloatArray
-    """(3 r, r): direct effect of the port forces on them."""
+    """(3 r, r): feedthrough from the port forces to `motion`."""
     response: FloatArray
-    """(p, 2n): the response, in the quantity of the model."""
+    """(p, 2n): output matrix of the responses, in the quantity of the model."""
     response_by_command: FloatArray
-    """(p, m): direct effect of the commands on the response; not zero for an acceleration only."""
+    """(p, m): feedthrough from the commands to the responses; not zero for an acceleration only."""
     response_by_axis_force: FloatArray
-    """(p, r): direct effect of the port forces on the response."""
+    """(p, r): feedthrough from the port forces to the responses."""
     position: FloatArray
-    """(p, 2n): the response's position by the state, independent of the quantity of the model."""
+    """(p, 2n): output matrix of the positions at the responses, for any quantity of the model."""
 
 
-def driven_axes(model: MechanicalModel) -> FloatArray:
-    """(n, m): unit vector in the coordinates along which each command drives; 0 for a command that drives nothing."""
+def compute_driven_axes(model: MechanicalModel) -> FloatArray:
+    """(n, m): per command, the unit vector in the coordinates along which it drives; 0 for a command without effect."""
     length = np.linalg.norm(model.input, axis=0)
     return np.asarray(model.input / np.where(length > 0, length, 1.0))
 
 
-def discretise_model(model: MechanicalModel, step_s: float, ports: FloatArray | None = None) -> LinearSteps:
-    """Discretise the structure without actuator, sensor and effects, with a step in s. ports: (n, r), the directions in
-    the coordinates along which forces act and motion is output; None = the driven axes."""
+def discretise_model(model: MechanicalModel, step_s: float, ports: FloatArray | None = None) -> DiscreteModel:
+    """Discretise the structure, without actuator, sensor and effects, with a step of `step_s`. ports: (n, r),
+    directions in the coordinates along which forces act and motion is output; None = the driven axes."""
     n, m = model.coordinates, model.inputs
-    axes = driven_axes(model) if ports is None else ports
-    input_matrix = np.asarray(np.linalg.solve(model.mass, np.hstack([model.input, axes])), dtype=np.float64)
+    axes = compute_driven_axes(model) if ports is None else ports
+    acceleration_by_input = np.asarray(np.linalg.solve(model.mass, np.hstack([model.input, axes])), dtype=np.float64)
     restoring = np.hstack([model.stiffness, model.damping])
-    from_state = -np.asarray(np.linalg.solve(model.mass, restoring), dtype=np.float64)
+    acceleration_by_state = -np.asarray(np.linalg.solve(model.mass, restoring), dtype=np.float64)
     state_count, input_count = 2 * n, m + axes.shape[1]
     generator_matrix = np.zeros((state_count + input_count, state_count + input_count))
     generator_matrix[:n, n:state_count] = np.eye(n)
-    generator_matrix[n:state_count, :state_count] = from_state
-    generator_matrix[n:state_count, state_count:] = input_matrix
+    generator_matrix[n:state_count, :state_count] = acceleration_by_state
+    generator_matrix[n:state_count, state_count:] = acceleration_by_input
     step_matrices = expm(generator_matrix * step_s)
     derivative_order = DERIVATIVE_OF_QUANTITY[model.quantity]
-    response, response_by_input = _output_rows(model.output, derivative_order, from_state, input_matrix)
-    motion = [_output_rows(axes.T, derivative, from_state, input_matrix) for derivative in range(3)]
-    return LinearSteps(
+    response, response_by_input = _build_output_rows(
+        model.output, derivative_order, acceleration_by_state, acceleration_by_input
+    )
+    motion = [
+        _build_output_rows(axes.T, derivative, acceleration_by_state, acceleration_by_input) for derivative in range(3)
+    ]
+    return DiscreteModel(
         step_s=step_s,
-        advance=step_matrices[:state_count, :state_count],
+        transition=step_matrices[:state_count, :state_count],
         by_command=step_matrices[:state_count, state_count : state_count + m],
         by_axis_force=step_matrices[:state_count, state_count + m :],
         motion=np.vstack([rows for rows, _ in motion]),
@@ -76,25 +81,26 @@ def discretise_model(model: MechanicalModel, step_s: float, ports: FloatArray | 
         response=response,
         response_by_command=response_by_input[:, :m],
         response_by_axis_force=response_by_input[:, m:],
-        position=_output_rows(model.output, 0, from_state, input_matrix)[0],
+        position=_build_output_rows(model.output, 0, acceleration_by_state, acceleration_by_input)[0],
     )
 
 
-def _output_rows(
-    output: FloatArray, derivative_order: int, from_state: FloatArray, input_matrix: FloatArray
+def _build_output_rows(
+    output: FloatArray, derivative_order: int, acceleration_by_state: FloatArray, acceleration_by_input: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Rows of the time derivative of an order (0 to 2) of the outputs (p, n) of the coordinates: for the state,
-    (p, 2n), and for the inputs, (p, m + r). Only the acceleration depends on the inputs directly."""
-    zeros, direct = np.zeros_like(output), np.zeros((len(output), input_matrix.shape[1]))
+    """Output matrix (p, 2n) and feedthrough (p, m + r) of a time derivative of the outputs. output: (p, n), outputs by
+    the coordinates. derivative_order: 0 position, 1 velocity, 2 acceleration, which alone depends on the inputs
+    directly."""
+    zeros, direct = np.zeros_like(output), np.zeros((len(output), acceleration_by_input.shape[1]))
     if derivative_order == 0:
         return np.hstack([output, zeros]), direct
     if derivative_order == 1:
         return np.hstack([zeros, output]), direct
-    return output @ from_state, output @ input_matrix
+    return output @ acceleration_by_state, output @ acceleration_by_input
 
 
-def free_motion_rates(model: MechanicalModel) -> ComplexArray:
-    """(2n,): eigenvalues of the continuous-time state matrix (poles), 1/s; complex ones come in conjugate pairs."""
+def compute_poles(model: MechanicalModel) -> ComplexArray:
+    """(2n,): poles, the eigenvalues of the continuous-time state matrix, 1/s; complex ones come in conjugate pairs."""
     n = model.coordinates
     state_matrix = np.block(
         [
@@ -105,6 +111,6 @@ def free_motion_rates(model: MechanicalModel) -> ComplexArray:
     return np.asarray(np.linalg.eigvals(state_matrix), dtype=np.complex128)
 
 
-def growth_rate(model: MechanicalModel) -> float:
+def compute_growth_rate(model: MechanicalModel) -> float:
     """Largest real part of the model's poles, 1/s; negative where all free motion decays."""
-    return float(free_motion_rates(model).real.max())
+    return float(compute_poles(model).real.max())

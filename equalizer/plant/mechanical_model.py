@@ -1,9 +1,10 @@
-"""A mechanical model: masses, dampers and springs between a driving force and a sensor, with known effects.
+"""A mechanical model of a device: masses, dampers and springs between a driving force and a sensor.
 
     M a + D v + K q = B u,     y = C q, C v or C a, by `quantity`
 
 q (n,) are the coordinates, v and a their first and second time derivatives, u (m,) the forces, y (p,) the responses.
 Limits of sensor and actuator, and nonlinear effects of `effect_vocabulary`, are stated in addition.
+`mechanical_model_toml` reads and writes the model as text; `effects.simulation` simulates it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,7 +18,7 @@ from equalizer.laws.law import Law
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME
 from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.signal import FloatArray
-from equalizer.signals.summary import Summarised, Summary
+from equalizer.signals.summary import Summary, SummaryDisplay
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL, UnitSystem, system_of
 
 DERIVATIVE_OF_QUANTITY = {
@@ -78,7 +79,7 @@ class ModelEffect:
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
-class MechanicalModel(Summarised):
+class MechanicalModel(SummaryDisplay):
     """A mechanical model. Raises MechanicalModelError for inconsistent values."""
 
     name: str
@@ -109,7 +110,7 @@ class MechanicalModel(Summarised):
             matrix = np.array(getattr(self, name), dtype=np.float64, ndmin=1)
             matrix.flags.writeable = False
             object.__setattr__(self, name, matrix)
-        problems = tuple(_problems(self))
+        problems = tuple(_find_problems(self))
         if problems:
             raise MechanicalModelError(problems)
 
@@ -146,11 +147,12 @@ class MechanicalModel(Summarised):
         )
 
 
-def with_units_of(
+def adopt_recording_units(
     model: MechanicalModel, commands: Sequence[str], responses: Sequence[str], time: str = "s"
 ) -> MechanicalModel:
-    """The model with the unit system of its recordings, where that is not SI and the input and output matrices (entries
-    of magnitude 0 or 1) do not convert units. commands, responses: units of the recordings' channels."""
+    """The model with the unit system of its recordings; unchanged if it states its own units, if those of the
+    recordings are SI, or if its input or output matrix converts units (has entries other than 0, 1 and -1). commands,
+    responses: units of the recordings' channels."""
     is_unit_free = all(np.isin(np.abs(matrix), (0.0, 1.0)).all() for matrix in (model.input, model.output))
     system = system_of(commands, responses, time)
     if model.units is not None or not is_unit_free or system.rotational is not None:
@@ -165,76 +167,80 @@ def suggest_word(word: str, allowed: tuple[str, ...]) -> str:
     return f" (did you mean '{matches[0]}'?)" if matches else ""
 
 
-def _problems(model: MechanicalModel) -> Iterator[str]:
+def _find_problems(model: MechanicalModel) -> Iterator[str]:
+    """A sentence for each inconsistent value of the model."""
     if model.quantity not in DERIVATIVE_OF_QUANTITY:
         yield f"model.quantity is '{model.quantity}'; allowed are {', '.join(DERIVATIVE_OF_QUANTITY)}"
-    yield from _matrix_problems(model)
-    for place, limits in (("sensor", model.sensor), ("actuator", model.actuator), ("tolerance", model.tolerance)):
+    yield from _find_matrix_problems(model)
+    for section, limits in (("sensor", model.sensor), ("actuator", model.actuator), ("tolerance", model.tolerance)):
         for name in () if limits is None else limits.__dataclass_fields__:
             value = getattr(limits, name)
             if value is not None and not (np.isfinite(value) and value >= 0):
-                yield f"{place}.{name} is {value}; it must be a number that is not negative"
+                yield f"{section}.{name} is {value}; it must be a number that is not negative"
     for number, effect in enumerate(model.effects, start=1):
-        for problem in effect_problems(effect):
+        for problem in find_effect_problems(effect):
             yield f"effect {number}: {problem}"
 
 
-def _matrix_problems(model: MechanicalModel) -> Iterator[str]:
+def _find_matrix_problems(model: MechanicalModel) -> Iterator[str]:
+    """Shapes that do not agree with the mass matrix, values that are not finite, and an invalid mass matrix."""
     n = model.mass.shape[0]
     shapes = {
         "mass": (n, n), "damping": (n, n), "stiffness": (n, n),
         "input": (n, *model.input.shape[1:2]), "output": (model.output.shape[0], n),
     }  # fmt: skip
-    valid = True
+    is_valid = True
     for name, shape in shapes.items():
         matrix: FloatArray = getattr(model, name)
         if matrix.ndim != 2 or matrix.shape != shape or 0 in matrix.shape:
             expected = {"input": f"({n}, inputs)", "output": f"(outputs, {n})"}.get(name, f"({n}, {n})")
             yield f"model.{name} has shape {matrix.shape}, but must have {expected}: mass is {n} rows high"
-            valid = False
+            is_valid = False
         elif not np.isfinite(matrix).all():
             yield f"model.{name} holds values that are not finite numbers"
-            valid = False
-    if valid:
-        yield from _mass_problems(model.mass)
+            is_valid = False
+    if is_valid:
+        yield from _find_mass_problems(model.mass)
 
 
-def _mass_problems(mass: FloatArray) -> Iterator[str]:
+def _find_mass_problems(mass: FloatArray) -> Iterator[str]:
+    """Asymmetry of the mass matrix (n, n), or an eigenvalue that is not positive."""
     # Most matrices are exactly symmetric, and the exact comparison takes a tenth of the time of the approximate one.
-    exact = np.array_equal(mass, mass.T)
-    if not exact and not np.allclose(mass, mass.T, rtol=1e-6, atol=1e-9 * float(np.abs(mass).max())):
+    is_exactly_symmetric = np.array_equal(mass, mass.T)
+    if not is_exactly_symmetric and not np.allclose(mass, mass.T, rtol=1e-6, atol=1e-9 * float(np.abs(mass).max())):
         yield "model.mass is not symmetric; inertia acts alike both ways, so m[i][j] must equal m[j][i]"
     elif (lowest := float(np.linalg.eigvalsh(mass)[0])) <= 0:
         yield f"model.mass is not positive definite (its lowest eigenvalue is {lowest:.3g}); every motion needs a mass"
 
 
-def effect_problems(effect: ModelEffect) -> Iterator[str]:
+def find_effect_problems(effect: ModelEffect) -> Iterator[str]:
     """Deviations of an effect from the vocabulary (unknown or missing names, values that are not finite), a sentence
     for each."""
     if effect.kind == DISCOVERED_LAW:
-        yield from _law_problems(effect)
+        yield from _find_law_problems(effect)
         return
-    entry = EFFECTS_BY_NAME.get(effect.kind)
-    if entry is None:
+    vocabulary_entry = EFFECTS_BY_NAME.get(effect.kind)
+    if vocabulary_entry is None:
         names = (*EFFECTS_BY_NAME, DISCOVERED_LAW)
         yield f"unknown kind '{effect.kind}'{suggest_word(effect.kind, names)}; allowed are {', '.join(names)}"
         return
-    names = tuple(parameter.name for parameter in entry.parameters)
+    names = tuple(parameter.name for parameter in vocabulary_entry.parameters)
     for name, value in effect.parameters.items():
         if name not in names:
             yield f"{effect.kind} has no parameter '{name}'{suggest_word(name, names)}; allowed are {', '.join(names)}"
         elif not np.isfinite(value):
             yield f"{effect.kind}.{name} is {value}; it must be a finite number"
     missing = [
-        f"{part.name} ({part.unit})"
-        for part in entry.parameters
-        if not (part.optional or part.name in effect.parameters)
+        f"{definition.name} ({definition.unit})"
+        for definition in vocabulary_entry.parameters
+        if not (definition.optional or definition.name in effect.parameters)
     ]
     if missing:
         yield f"{effect.kind} lacks {', '.join(missing)}"
 
 
-def _law_problems(effect: ModelEffect) -> Iterator[str]:
+def _find_law_problems(effect: ModelEffect) -> Iterator[str]:
+    """A discovered law that is missing, or parameters outside its expression."""
     if effect.law is None:
         yield f"{effect.kind} lacks expression, acts_on or axis"
     if effect.parameters:

@@ -1,7 +1,8 @@
 """Reads and writes mechanical models as TOML text.
 
 Tables: [model] (name, quantity, matrices as lists of rows), [sensor], [actuator], [[effect]] (kind, axis, parameters),
-[tolerance], [provenance]. The reader collects all problems of format before it raises an error.
+[tolerance], [provenance]. The reader collects all problems of format before it raises an error. Called by
+`study.store.formats.mechanical_model_file`.
 """
 
 import re
@@ -13,7 +14,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from equalizer.laws.law import Law, law_of
+from equalizer.laws.law import Law, parse_law
 from equalizer.laws.parse import LawError
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.plant.mechanical_model import (
@@ -50,7 +51,7 @@ def parse_mechanical_model(text: str) -> MechanicalModel:
     model = _read_table(document, "model", problems)
     problems += _find_unknown_keys(model, _MODEL_KEYS, "model.")
     matrices = {name: _read_matrix(model, name, problems) for name in MATRICES}
-    words = {name: _read_word(model, name, problems) for name in ("name", "quantity")}
+    texts = {name: _read_text(model, name, problems) for name in ("name", "quantity")}
     sensor = _read_numbers(document, "sensor", SensorLimits, problems)
     actuator = _read_numbers(document, "actuator", ActuatorLimits, problems)
     tolerance = _read_numbers(document, "tolerance", Tolerance, problems) if "tolerance" in document else None
@@ -58,12 +59,12 @@ def parse_mechanical_model(text: str) -> MechanicalModel:
     rotational = model.get("rotational", document.get("rotational", False))
     if not isinstance(rotational, bool):
         problems.append(f"rotational is {_quote_value(rotational)}; it must be true or false")
-    origin = _dates_as_text(_read_table(document, "provenance", problems))
+    provenance = _convert_dates_to_text(_read_table(document, "provenance", problems))
     if problems:
         raise MechanicalModelError(tuple(problems))
     return MechanicalModel(
-        name=words["name"],
-        quantity=words["quantity"],
+        name=texts["name"],
+        quantity=texts["quantity"],
         mass=matrices["mass"],
         damping=matrices["damping"],
         stiffness=matrices["stiffness"],
@@ -74,12 +75,12 @@ def parse_mechanical_model(text: str) -> MechanicalModel:
         effects=effects,
         tolerance=tolerance,
         rotational=rotational,
-        provenance=origin,
-        units=_read_units(origin),
+        provenance=provenance,
+        units=_read_units(provenance),
     )
 
 
-def mechanical_model_toml(model: MechanicalModel) -> str:
+def format_mechanical_model(model: MechanicalModel) -> str:
     """The model as TOML text, from which `parse_mechanical_model` reads the same values."""
     lines = ["[model]", f"name = {_format_value(model.name)}", f"quantity = {_format_value(model.quantity)}"]
     if model.rotational:
@@ -91,38 +92,43 @@ def mechanical_model_toml(model: MechanicalModel) -> str:
     lines += _format_section("[actuator]", asdict(model.actuator))
     for effect in model.effects:
         lines += _format_section(
-            "[[effect]]", {"kind": effect.kind, "axis": effect.axis, **_law_entries(effect), **effect.parameters}
+            "[[effect]]", {"kind": effect.kind, "axis": effect.axis, **_list_law_entries(effect), **effect.parameters}
         )
     if model.tolerance is not None:
         lines += _format_section("[tolerance]", asdict(model.tolerance))
-    origin = {**model.provenance, **({} if model.units is None else {UNITS: asdict(model.units)})}
-    if origin:
-        lines += _format_section("[provenance]", origin)
+    provenance = {**model.provenance, **({} if model.units is None else {UNITS: asdict(model.units)})}
+    if provenance:
+        lines += _format_section("[provenance]", provenance)
     return "\n".join(lines) + "\n"
 
 
-def _dates_as_text(value: Any) -> Any:
+def _convert_dates_to_text(value: Any) -> Any:
     """The value with dates and times as ISO 8601 text: TOML has them, but results quote the provenance in JSON."""
     if isinstance(value, dict):
-        return {key: _dates_as_text(entry) for key, entry in value.items()}
+        return {key: _convert_dates_to_text(entry) for key, entry in value.items()}
     if isinstance(value, list):
-        return [_dates_as_text(entry) for entry in value]
+        return [_convert_dates_to_text(entry) for entry in value]
     return value.isoformat() if isinstance(value, date | time) else value
 
 
-def _read_units(origin: Mapping[str, Any]) -> UnitSystem | None:
-    """The unit system in the provenance, as `mechanical_model_toml` writes it; None where there is none, that is for
+def _read_units(provenance: Mapping[str, Any]) -> UnitSystem | None:
+    """The unit system in the provenance, as `format_mechanical_model` writes it; None where there is none, that is for
     SI."""
-    stored = origin.get(UNITS)
-    words = {key: value for key, value in stored.items() if isinstance(value, str)} if isinstance(stored, dict) else {}
+    stored_units = provenance.get(UNITS)
+    stored_texts = (
+        {key: value for key, value in stored_units.items() if isinstance(value, str)}
+        if isinstance(stored_units, dict)
+        else {}
+    )
     return (
-        UnitSystem(words["force"], words["length"], words.get("time", "s"))
-        if {"force", "length"} <= set(words)
+        UnitSystem(stored_texts["force"], stored_texts["length"], stored_texts.get("time", "s"))
+        if {"force", "length"} <= set(stored_texts)
         else None
     )
 
 
 def _find_unknown_keys(table: Mapping[str, Any], allowed: tuple[str, ...], prefix: str) -> list[str]:
+    """A problem (sentence) for each key that is not allowed. prefix: path of the table, such as `model.`."""
     return [
         f"unknown key '{prefix}{key}'{suggest_word(key, allowed)}; allowed are {', '.join(allowed)}"
         for key in table
@@ -131,6 +137,7 @@ def _find_unknown_keys(table: Mapping[str, Any], allowed: tuple[str, ...], prefi
 
 
 def _read_table(document: Mapping[str, Any], name: str, problems: list[str]) -> dict[str, Any]:
+    """A table of the document; empty where it is missing (for [model] a problem) or not a table (a problem)."""
     table = document.get(name, {})
     if not isinstance(table, dict):
         problems.append(f"{name} must be a table: [{name}]")
@@ -140,14 +147,14 @@ def _read_table(document: Mapping[str, Any], name: str, problems: list[str]) -> 
     return table
 
 
-def _read_word(table: Mapping[str, Any], name: str, problems: list[str]) -> Any:
+def _read_text(table: Mapping[str, Any], name: str, problems: list[str]) -> Any:
     """Text of a required key; a missing, empty or other value adds to `problems`."""
-    word = table.get(name)
-    if not isinstance(word, str) or not word:
+    text = table.get(name)
+    if not isinstance(text, str) or not text:
         problems.append(
-            f"model.{name} {'is missing' if word is None else f'is {_quote_value(word)}'}; it must be a text"
+            f"model.{name} {'is missing' if text is None else f'is {_quote_value(text)}'}; it must be a text"
         )
-    return word
+    return text
 
 
 def _read_matrix(table: Mapping[str, Any], name: str, problems: list[str]) -> FloatArray:
@@ -159,44 +166,47 @@ def _read_matrix(table: Mapping[str, Any], name: str, problems: list[str]) -> Fl
         problems.append(f"model.{name} must be a list of rows, as in [[1, 0], [0, 1]]")
     elif len({len(row) for row in rows}) != 1:
         problems.append(f"model.{name} has rows of different lengths: {', '.join(str(len(row)) for row in rows)}")
-    elif wrong := [value for row in rows for value in row if not _is_number(value)]:
-        problems.append(f"model.{name} holds {_quote_value(wrong[0])}, which is not a number")
+    elif wrong_values := [value for row in rows for value in row if not _is_number(value)]:
+        problems.append(f"model.{name} holds {_quote_value(wrong_values[0])}, which is not a number")
     else:
         return np.array(rows, dtype=np.float64)
     return np.empty((0, 0))
 
 
-def _read_numbers(document: Mapping[str, Any], name: str, kind: type[Numbers], problems: list[str]) -> Numbers:
+def _read_numbers(document: Mapping[str, Any], name: str, limits_class: type[Numbers], problems: list[str]) -> Numbers:
+    """A table of numbers as `limits_class`; unknown keys and values that are not numbers add to `problems`."""
     table = _read_table(document, name, problems)
-    allowed = tuple(part.name for part in fields(kind))
+    allowed = tuple(limit.name for limit in fields(limits_class))
     problems += _find_unknown_keys(table, allowed, f"{name}.")
     values = {key: value for key, value in table.items() if key in allowed}
     for key, value in values.items():
         if not _is_number(value):
             problems.append(f"{name}.{key} is {_quote_value(value)}; it must be a number")
-    return kind(**{key: float(value) for key, value in values.items() if _is_number(value)})
+    return limits_class(**{key: float(value) for key, value in values.items() if _is_number(value)})
 
 
 def _read_effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
-    """Effects from the tables [[effect]]; all entries that are not kind, axis or of a law must be numbers."""
+    """Effects from the tables [[effect]]; entries other than kind, axis and those of a law must be numbers. Empty where
+    there is any problem."""
     if not (isinstance(entries, list) and all(isinstance(entry, dict) for entry in entries)):
         problems.append("effects are written as tables: [[effect]]")
         return ()
     effects = []
-    for number, entry in enumerate(entries, start=1):
-        law = _read_law(entry, number, problems) if entry.get("kind") == DISCOVERED_LAW else None
-        words = ("kind", "axis") if law is None else ("kind", "axis", *_LAW_KEYS)
-        numbers = {key: value for key, value in entry.items() if key not in words}
-        wrong = [f"{key} = {_quote_value(value)}" for key, value in numbers.items() if not _is_number(value)]
-        if wrong:
-            problems.append(f"effect {number} holds {', '.join(wrong)}; parameters are numbers")
+    for effect_number, entry in enumerate(entries, start=1):
+        law = _read_law(entry, effect_number, problems) if entry.get("kind") == DISCOVERED_LAW else None
+        text_keys = ("kind", "axis") if law is None else ("kind", "axis", *_LAW_KEYS)
+        numbers = {key: value for key, value in entry.items() if key not in text_keys}
+        wrong_entries = [f"{key} = {_quote_value(value)}" for key, value in numbers.items() if not _is_number(value)]
+        if wrong_entries:
+            problems.append(f"effect {effect_number} holds {', '.join(wrong_entries)}; parameters are numbers")
         kind = entry.get("kind")
         if not isinstance(kind, str):
-            problems.append(f"effect {number} has no kind")
+            problems.append(f"effect {effect_number} has no kind")
             continue
         if not isinstance(entry.get("axis", ""), str):
             problems.append(
-                f"effect {number}: axis is {_quote_value(entry['axis'])}; it must be a text, or left out for all axes"
+                f"effect {effect_number}: axis is {_quote_value(entry['axis'])}; it must be a text, "
+                "or left out for all axes"
             )
         effects.append(ModelEffect(kind, entry.get("axis") or None, numbers, law))
     return () if problems else tuple(_with_float_parameters(effect) for effect in effects)
@@ -205,23 +215,26 @@ def _read_effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
 _LAW_KEYS = ("acts_on", "expression")
 
 
-def _read_law(entry: Mapping[str, Any], number: int, problems: list[str]) -> Law | None:
-    missing = [key for key in (*_LAW_KEYS, "axis") if not isinstance(entry.get(key), str)]
-    if missing:
-        problems.append(f"effect {number}: {DISCOVERED_LAW} lacks {', '.join(missing)} (texts)")
+def _read_law(entry: Mapping[str, Any], effect_number: int, problems: list[str]) -> Law | None:
+    """The law of a discovered effect; None, with an entry in `problems`, where a key is missing or the law is wrong."""
+    missing_keys = [key for key in (*_LAW_KEYS, "axis") if not isinstance(entry.get(key), str)]
+    if missing_keys:
+        problems.append(f"effect {effect_number}: {DISCOVERED_LAW} lacks {', '.join(missing_keys)} (texts)")
         return None
     try:
-        return law_of(entry["expression"], entry["acts_on"], entry["axis"])
+        return parse_law(entry["expression"], entry["acts_on"], entry["axis"])
     except LawError as error:
-        problems.append(f"effect {number}: {error}")
+        problems.append(f"effect {effect_number}: {error}")
         return None
 
 
-def _law_entries(effect: ModelEffect) -> dict[str, str]:
+def _list_law_entries(effect: ModelEffect) -> dict[str, str]:
+    """Keys and values of a discovered law in a table [[effect]]; empty for an effect of the catalogue."""
     return {} if effect.law is None else {"acts_on": effect.law.acts_on, "expression": effect.law.exact_text}
 
 
 def _with_float_parameters(effect: ModelEffect) -> ModelEffect:
+    """The effect with whole-number parameters converted to float."""
     numbers = {key: float(value) for key, value in effect.parameters.items()}
     return ModelEffect(effect.kind, effect.axis, numbers, effect.law)
 
@@ -233,6 +246,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _quote_value(value: Any) -> str:
+    """A value as text for an error message, to 80 characters."""
     try:
         text = repr(value)
     except (ValueError, RecursionError):  # Python does not print integers of more than 4300 digits
@@ -241,6 +255,7 @@ def _quote_value(value: Any) -> str:
 
 
 def _format_section(heading: str, table: Mapping[str, Any]) -> list[str]:
+    """Lines of a table, after an empty line; values that are None are left out."""
     return [
         "",
         heading,
@@ -249,6 +264,7 @@ def _format_section(heading: str, table: Mapping[str, Any]) -> list[str]:
 
 
 def _format_key(key: str) -> str:
+    """A bare TOML key where possible, else a quoted one."""
     return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _format_text(key)
 
 
@@ -258,6 +274,7 @@ def _format_text(text: str) -> str:
 
 
 def _format_value(value: Any) -> str:
+    """A value in TOML syntax. Raises TypeError for a type that TOML does not have."""
     match value:
         case bool():
             return "true" if value else "false"

@@ -1,5 +1,5 @@
-"""Quality of an identified model: its errors against measurements. Stored with the model, and stated before any figure
-that the model predicts about itself."""
+"""Quality of an identified model: its errors against measurements. Stored with the model by `identify_model`, and
+stated in reports before any figure that the model predicts about itself."""
 
 from dataclasses import asdict, dataclass, fields
 from typing import Any
@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 NOT_STORED = "Quality not stored: the model file is of an earlier version; identify it again to know its error."
+"""Sentence for a model whose file states no quality."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,23 +39,23 @@ class ModelQuality:
                 raise ValueError(f"{name} is {value}; it must be a number that is not negative")
 
 
-def model_quality(
+def summarise_quality(
     misfit_error: float,
     scatter_error: float | None,
     held_out: tuple[float, float | None, float] | None,
     remarks: tuple[str, ...] = (),
     most_misfit: float = 0.0,
 ) -> ModelQuality:
-    """The quality of a model. The expected error is the root of the summed squares of misfit and scatter, and at least
-    the held-out error. held_out: error, noise, and length of the record (s). most_misfit: misfit that the noise of the
-    fitted lines may hide; used in place of a smaller misfit_error."""
+    """Summarise the errors of a model. The expected error is the root of the summed squares of misfit and scatter, and
+    at least the held-out error. held_out: error, noise, and length of the record (s). most_misfit: misfit that the
+    noise of the fitted lines may hide; used in place of a smaller misfit_error."""
     model_error = float(np.hypot(max(misfit_error, most_misfit), scatter_error or 0.0))
-    error, noise, seconds = held_out or (None, None, None)
-    return ModelQuality(max(model_error, error or 0.0), misfit_error, scatter_error, error, noise, seconds, remarks)
+    error, noise, held_out_s = held_out or (None, None, None)
+    return ModelQuality(max(model_error, error or 0.0), misfit_error, scatter_error, error, noise, held_out_s, remarks)
 
 
-def quality_sentence(quality: ModelQuality | None) -> str:
-    """Sentence to print before every figure that a model predicts about itself."""
+def write_quality_sentence(quality: ModelQuality | None) -> str:
+    """Write the sentence to print before every figure that a model predicts about itself. None: quality not stored."""
     if quality is None:
         return NOT_STORED
     if quality.held_out_error is None:
@@ -70,13 +71,13 @@ def quality_sentence(quality: ModelQuality | None) -> str:
     )
 
 
-def quality_document(quality: ModelQuality | None) -> dict[str, Any] | None:
-    """The quality as values for JSON output; None = not stored."""
+def convert_quality_to_json(quality: ModelQuality | None) -> dict[str, Any] | None:
+    """Convert the quality to values for JSON output; None = not stored."""
     return None if quality is None else asdict(quality) | {"remarks": list(quality.remarks)}
 
 
-def quality_brief(quality: ModelQuality | None) -> str:
-    """Short form for a list of models."""
+def write_quality_brief(quality: ModelQuality | None) -> str:
+    """Write a short form for a list of models: the held-out error, or the misfit where no record was held out."""
     if quality is None:
         return "quality not stored"
     if quality.held_out_error is None:
@@ -84,7 +85,11 @@ def quality_brief(quality: ModelQuality | None) -> str:
     return f"held-out error {100 * quality.held_out_error:.2g} %"
 
 
-def worst_quality(qualities: tuple[ModelQuality | None, ...]) -> ModelQuality | None:
+def find_worst_quality(qualities: tuple[ModelQuality | None, ...]) -> ModelQuality | None:
     """The quality with the largest expected error of several models; None if there are none or a quality is unknown."""
-    stored = [quality for quality in qualities if quality is not None]
-    return max(stored, key=lambda quality: quality.expected_error) if len(stored) == len(qualities) and stored else None
+    stored_qualities = [quality for quality in qualities if quality is not None]
+    return (
+        max(stored_qualities, key=lambda quality: quality.expected_error)
+        if len(stored_qualities) == len(qualities) and stored_qualities
+        else None
+    )

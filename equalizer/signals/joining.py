@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from equalizer.signals.recording import Recording, Segment
-from equalizer.signals.recording_checks import signals_of
+from equalizer.signals.recording_checks import collect_signals
 from equalizer.signals.signal import Signal
 
 
@@ -52,7 +52,7 @@ def join(parts: Sequence[Recording], meta: Mapping[str, Any]) -> Recording:
 
 def signals_left_out(parts: Sequence[Recording]) -> tuple[str, ...]:
     """Names of the signals that some parts have and others lack, so that `join` drops them."""
-    names = [set(signals_of(part)) for part in parts]
+    names = [set(collect_signals(part)) for part in parts]
     return tuple(sorted(set().union(*names) - names[0].intersection(*names))) if names else ()
 
 

@@ -7,7 +7,8 @@ scaled to a given peak. Phases are random, not optimised for a low peak as Schro
 averages out of an estimate only over random phases. The crest factor (peak over rms) is kept low by taking the best of
 several draws. With m axes driven at once, every m experiments form a group that is orthogonal at every line
 (Dobrowiecki, Schoukens and Guillaume, IEEE Transactions on Instrumentation and Measurement 55 (2006)): each axis has
-its own random phases, and in experiment e (from 0) the phases of axis a (from 0) are advanced by 2 pi e a / m.
+its own random phases, and in experiment e (from 0) the phases of axis a (from 0) are advanced by 2 pi e a / m. Called
+by `study.session.stimulus` for recordings and probes.
 """
 
 from collections.abc import Callable
@@ -20,13 +21,13 @@ from equalizer.signals.signal import FloatArray
 IntArray = npt.NDArray[np.int64]
 """Numbers k of spectral lines, (lines,)."""
 
-DRAWS = 32
+PHASE_DRAWS = 32
 """Number of draws of the phases, of which the draw with the lowest peak is kept. Crest factor on one axis with 76 or
 239 odd lines, 60 seeds each: 2.5 to 3.0; with a single draw 2.6 to 4.9."""
 
 
-def lines_between(from_hz: float, to_hz: float, n: int, sample_rate_hz: float, *, odd_only: bool) -> IntArray:
-    """Numbers k of the lines k / period from `from_hz` to `to_hz`, both included, below half the sample rate.
+def list_lines_between(from_hz: float, to_hz: float, n: int, sample_rate_hz: float, *, odd_only: bool) -> IntArray:
+    """List the numbers k of the lines k / period from `from_hz` to `to_hz`, both included, below half the sample rate.
 
     n: samples per period. odd_only: odd k only, which leaves the even lines to even distortion. Raises ValueError where
     the band is not within 0 to half the rate, or holds no line.
@@ -48,10 +49,10 @@ def lines_between(from_hz: float, to_hz: float, n: int, sample_rate_hz: float, *
     return lines
 
 
-def multisines(
+def make_multisines(
     lines: IntArray, n: int, amplitude: float, axes: int, realisations: int, seed: int
 ) -> tuple[FloatArray, ...]:
-    """One period, (n, axes), for each of `realisations` experiments; it may be repeated without a discontinuity.
+    """Make one period, (n, axes), for each of `realisations` experiments; it may be repeated without a discontinuity.
 
     The norm over the axes peaks at `amplitude` in each experiment, in the unit of `amplitude`. Every `axes` experiments
     are a group, orthogonal at every line. An experiment depends on the seed and its own number only, not on the number
@@ -68,16 +69,16 @@ def _draw_group(lines: IntArray, n: int, axes: int, random: np.random.Generator)
     """One group, (experiments, n, axes), with as many experiments as axes: the draw whose highest peak over all its
     experiments is lowest."""
     # (experiments, axes): phase factors exp(2 pi i e a / m), a discrete Fourier matrix, whose rows are orthogonal.
-    turns = np.exp(2j * np.pi * np.outer(np.arange(axes), np.arange(axes)) / axes)
+    phase_factors = np.exp(2j * np.pi * np.outer(np.arange(axes), np.arange(axes)) / axes)
 
-    def draw() -> FloatArray:
+    def draw_period() -> FloatArray:
         """One group with random phases, not scaled."""
         phases = random.uniform(0, 2 * np.pi, (len(lines), axes))
         spectrum = np.zeros((axes, n // 2 + 1, axes), dtype=complex)
-        spectrum[:, lines] = np.exp(1j * phases) * turns[:, None, :]
+        spectrum[:, lines] = np.exp(1j * phases) * phase_factors[:, None, :]
         return np.fft.irfft(spectrum, n, axis=1)
 
-    return _best_of_draws(draw)
+    return _choose_lowest_peak(draw_period)
 
 
 def make_interleaved_multisine(lines: IntArray, n: int, axes: int, seed: int) -> FloatArray:
@@ -85,16 +86,16 @@ def make_interleaved_multisine(lines: IntArray, n: int, axes: int, seed: int) ->
     a + axes, a + 2 axes, … of `lines`), so that one experiment measures the response to every axis."""
     random, axis = np.random.default_rng(seed), np.arange(len(lines)) % axes
 
-    def draw() -> FloatArray:
+    def draw_period() -> FloatArray:
         """One period with random phases, not scaled."""
         spectrum = np.zeros((n // 2 + 1, axes), dtype=complex)
         spectrum[lines, axis] = np.exp(2j * np.pi * random.uniform(size=len(lines)))
         return np.fft.irfft(spectrum, n, axis=0)
 
-    wave = _best_of_draws(draw)
+    wave = _choose_lowest_peak(draw_period)
     return np.asarray(wave / np.linalg.norm(wave, axis=1).max())
 
 
-def _best_of_draws(draw: Callable[[], FloatArray]) -> FloatArray:
-    """The draw, of `DRAWS`, whose norm over its last dimension (the axes) has the lowest peak."""
-    return min((draw() for _ in range(DRAWS)), key=lambda waves: float(np.linalg.norm(waves, axis=-1).max()))
+def _choose_lowest_peak(draw: Callable[[], FloatArray]) -> FloatArray:
+    """The draw, of `PHASE_DRAWS`, whose norm over its last dimension (the axes) has the lowest peak."""
+    return min((draw() for _ in range(PHASE_DRAWS)), key=lambda waves: float(np.linalg.norm(waves, axis=-1).max()))

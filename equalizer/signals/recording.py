@@ -10,7 +10,7 @@ from enum import Enum
 from typing import Any
 
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.signals.summary import Summarised, Summary
+from equalizer.signals.summary import Summary, SummaryDisplay
 
 
 class Hold(Enum):
@@ -53,7 +53,7 @@ class Segment:
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
-class Recording(Summarised):
+class Recording(SummaryDisplay):
     """One recording of a device: n samples. All signals have the same sample rate and length, and their own units."""
 
     device: str
@@ -81,7 +81,7 @@ class Recording(Summarised):
 
     @property
     def is_timed(self) -> bool:
-        """Whether time is known. If not, samples are only numbered, and the sample rate of 1 Hz is a placeholder."""
+        """Whether the sample rate is known. If not, it is set to 1 Hz as a placeholder: time is counted in samples."""
         return self.meta.get("time") != "unknown"
 
     @property
@@ -104,12 +104,12 @@ class Recording(Summarised):
             f"Recording of {self.device or 'a device'}",
             (
                 ("length", f"{len(self)} samples at {self.sample_rate_hz:g} Hz"),
-                *((name, _channels_text(signal)) for name, signal in signals.items() if signal is not None),
+                *((name, _format_channels(signal)) for name, signal in signals.items() if signal is not None),
                 ("segments", str(len(self.segments))),
             ),
         )
 
 
-def _channels_text(signal: Signal) -> str:
-    """Channel names with their units, such as "fx [N], fy [N]"."""
+def _format_channels(signal: Signal) -> str:
+    """Text of the channel names with their units, such as "fx [N], fy [N]"."""
     return ", ".join(f"{name} [{unit}]" for name, unit in zip(signal.channels, signal.units, strict=True))

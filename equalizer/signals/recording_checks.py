@@ -1,4 +1,6 @@
-"""Consistency checks of a recording: lengths, rates, channels, segments and time stamps."""
+"""Consistency checks of a recording, made when it is read or imported: lengths, rates, channels, segments, time
+stamps.
+"""
 
 from collections.abc import Iterator, Sequence
 
@@ -9,16 +11,16 @@ from equalizer.signals.signal import FloatArray, Signal
 
 
 def check_recording(recording: Recording) -> tuple[str, ...]:
-    """Sentences, one for everything that contradicts the format. Empty = consistent. NaN counts as missing, not as
-    wrong."""
-    problems = [*_signal_problems(recording), *segment_problems(recording.segments, len(recording))]
+    """Check a recording against the format. Returns a sentence per problem; empty if there is none. NaN means a missing
+    sample, which is allowed."""
+    problem_sentences = [*_check_signals(recording), *find_segment_problems(recording.segments, len(recording))]
     if recording.time_s is not None:
-        problems.extend(_time_problems(recording.time_s, len(recording)))
-    return tuple(problems)
+        problem_sentences.extend(_check_time_stamps(recording.time_s, len(recording)))
+    return tuple(problem_sentences)
 
 
-def signals_of(recording: Recording) -> dict[str, Signal]:
-    """The signals that the recording has, by their names in the file format."""
+def collect_signals(recording: Recording) -> dict[str, Signal]:
+    """The signals of the recording, by their names in the file format; absent ones are left out."""
     signals = {
         "command": recording.command,
         "response": recording.response,
@@ -29,47 +31,48 @@ def signals_of(recording: Recording) -> dict[str, Signal]:
     return {name: signal for name, signal in signals.items() if signal is not None}
 
 
-def channels_text(signal: Signal) -> str:
-    """The channels with their units: "fx (N), fy (N)"."""
+def format_channels(signal: Signal) -> str:
+    """Format the channels of a signal with their units: "fx (N), fy (N)"."""
     return ", ".join(f"{name} ({unit})" for name, unit in zip(signal.channels, signal.units, strict=True))
 
 
-def unusable_channels(signals: Sequence[Signal]) -> Iterator[tuple[str, bool]]:
-    """Channels that hold no number in any of the signals, or that never change: name, and whether it holds none.
-    signals: of the same channels."""
-    for channel, name in enumerate(signals[0].channels if signals else ()):
-        columns = [signal.samples[:, channel] for signal in signals]
-        finite = [column[np.isfinite(column)] for column in columns]
-        if not any(len(column) for column in finite):
+def find_unusable_channels(signals: Sequence[Signal]) -> Iterator[tuple[str, bool]]:
+    """Find channels without a finite value in any of the signals, or constant in each. Yields the channel's name and
+    whether it has no finite value. signals: all with the same channels."""
+    for index, name in enumerate(signals[0].channels if signals else ()):
+        columns = [signal.samples[:, index] for signal in signals]
+        finite_columns = [column[np.isfinite(column)] for column in columns]
+        if not any(len(column) for column in finite_columns):
             yield name, True
-        elif all(not len(column) or np.ptp(column) == 0 for column in finite):
+        elif all(not len(column) or np.ptp(column) == 0 for column in finite_columns):
             yield name, False
 
 
-def segment_problems(segments: Sequence[Segment], samples: int) -> Iterator[str]:
-    """Sentences on segments outside the recording, with unknown kinds or roles, with an amplitude or period out of
-    range, and on overlaps. samples: length of the recording."""
+def find_segment_problems(segments: Sequence[Segment], sample_count: int) -> Iterator[str]:
+    """Find segments outside the recording, with unknown kind or role, with an amplitude or period out of range, and
+    overlapping segments. Yields a sentence per problem. sample_count: length of the recording."""
     for number, segment in enumerate(segments, start=1):
-        for problem in _problems_of_segment(segment, samples):
+        for problem in _check_segment(segment, sample_count):
             yield f"segment {number} {problem}"
-    ordered = sorted(enumerate(segments, start=1), key=lambda item: item[1].start)
-    last = ordered[:1]  # of the earlier segments, the one that stops last, with its number
-    for number, segment in ordered[1:]:
-        earlier_number, earlier = last[0]
+    segments_by_start = sorted(enumerate(segments, start=1), key=lambda numbered_segment: numbered_segment[1].start)
+    latest_ending = segments_by_start[:1]  # the earlier segment that stops last, with its number; a list of at most 1
+    for number, segment in segments_by_start[1:]:
+        earlier_number, earlier = latest_ending[0]
         if segment.start < earlier.stop:
             yield (
                 f"segments {earlier_number} and {number} overlap (one stops at {earlier.stop}, the other starts at "
                 f"{segment.start})"
             )
         if segment.stop > earlier.stop:
-            last = [(number, segment)]
+            latest_ending = [(number, segment)]
 
 
-def _problems_of_segment(segment: Segment, samples: int) -> Iterator[str]:
+def _check_segment(segment: Segment, sample_count: int) -> Iterator[str]:
+    """Yields predicates such as "stops at 12, but ...", to follow the segment's name in a sentence."""
     if not 0 <= segment.start < segment.stop:
         yield f"goes from {segment.start} to {segment.stop}; start must be at least 0 and below stop"
-    elif segment.stop > samples:
-        yield f"stops at {segment.stop}, but the recording has {samples} samples"
+    elif segment.stop > sample_count:
+        yield f"stops at {segment.stop}, but the recording has {sample_count} samples"
     if segment.kind not in SEGMENT_KINDS:
         yield f"has the unknown kind '{segment.kind}'; allowed are {', '.join(SEGMENT_KINDS)}"
     if segment.role not in SEGMENT_ROLES:
@@ -80,10 +83,11 @@ def _problems_of_segment(segment: Segment, samples: int) -> Iterator[str]:
         yield f"has the period {segment.period}; it counts samples, and 0 means not periodic"
 
 
-def _signal_problems(recording: Recording) -> Iterator[str]:
+def _check_signals(recording: Recording) -> Iterator[str]:
+    """Lengths, rates and channels of all signals against those of the response. Yields a sentence per problem."""
     if len(recording) == 0:
         yield "response holds no samples"
-    for name, signal in signals_of(recording).items():
+    for name, signal in collect_signals(recording).items():
         if len(signal) != len(recording):
             yield f"{name} has {len(signal)} samples, but response has {len(recording)}; all must be equally long"
         if signal.sample_rate_hz != recording.sample_rate_hz:
@@ -101,9 +105,10 @@ def _signal_problems(recording: Recording) -> Iterator[str]:
         )
 
 
-def _time_problems(time_s: FloatArray, samples: int) -> Iterator[str]:
-    if time_s.shape != (samples,):
-        yield f"time_s has shape {time_s.shape}, but must be ({samples},), one stamp per sample"
+def _check_time_stamps(time_s: FloatArray, sample_count: int) -> Iterator[str]:
+    """Time stamps (s): one per sample, finite, strictly increasing. Yields a sentence per problem."""
+    if time_s.shape != (sample_count,):
+        yield f"time_s has shape {time_s.shape}, but must be ({sample_count},), one stamp per sample"
     elif not np.isfinite(time_s).all():
         yield "time_s holds values that are not numbers; leave it out if the stamps are not known"
     elif (np.diff(time_s) <= 0).any():

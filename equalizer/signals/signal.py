@@ -1,4 +1,5 @@
-"""A signal: uniformly sampled channels with sample rate, quantity, unit and channel names. Immutable."""
+"""A signal: uniformly sampled channels with sample rate, quantity, unit and channel names. Immutable.
+Recordings (`signals.recording`) consist of signals."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +14,7 @@ ComplexArray = npt.NDArray[np.complex128]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Signal:
-    """Samples with their meaning; the array is read-only. Units inside the program are SI.
+    """Samples with quantity, unit and channel names; the array is read-only. Units inside the program are SI.
 
     Raises ValueError for samples that are not (n, channels), numbers of names, units or quantities that do not match
     the channels, and a sample rate that is not a positive number.
@@ -63,11 +64,11 @@ class Signal:
         """Number of samples over the sample rate, in s: from the first sample to one period after the last."""
         return len(self) / self.sample_rate_hz
 
-    def times_s(self) -> FloatArray:
+    def compute_times_s(self) -> FloatArray:
         """(n,): time of each sample (s), 0 at the first."""
         return np.arange(len(self), dtype=np.float64) / self.sample_rate_hz
 
-    def part(self, start: int, stop: int) -> Self:
+    def select_samples(self, start: int, stop: int) -> Self:
         """The signal from sample `start` (included) to `stop` (excluded)."""
         return replace(self, samples=self.samples[start:stop])
 
@@ -94,7 +95,7 @@ def _fold_equal_words(name: str, words: str | tuple[str, ...], channels: int) ->
     return words[0] if len(set(words)) == 1 else tuple(words)
 
 
-def runs_of(mask: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Start (included) and stop (excluded) of each run of true values in a mask (n,)."""
+def find_runs(mask: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Find start (included) and stop (excluded) of each run of true values in a mask (n,)."""
     edges = np.flatnonzero(np.diff(mask, prepend=False, append=False)).tolist()
     return list(zip(edges[::2], edges[1::2], strict=True))

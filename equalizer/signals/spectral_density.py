@@ -1,7 +1,7 @@
 """Spectral density by Welch's method: averaged windowed segments (Welch 1967, IEEE Trans. Audio Electroacoust. 15:70).
 
 The results equal those of SciPy's `welch` and `csd` at their defaults. `scipy.signal` is not used because its import
-takes longer than the computation of most spectra.
+takes longer than the computation of most spectra. Called by identification and diagnosis.
 """
 
 import numpy as np
@@ -9,36 +9,38 @@ import numpy as np
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 
-def spectral_density(signal: FloatArray, rate_hz: float, length: int) -> tuple[FloatArray, FloatArray]:
+def estimate_spectral_density(signal: FloatArray, rate_hz: float, length: int) -> tuple[FloatArray, FloatArray]:
     """Frequencies (lines,) and the one-sided power spectral density of (n,) or (n, c), in units squared per hertz.
 
     length: samples of a segment, at most n. The mean of each segment is removed; segments are Hann-windowed and overlap
     by half.
     """
-    frequency_hz, power = _welch_average(signal, signal, rate_hz, length)
+    frequency_hz, power = _average_segments(signal, signal, rate_hz, length)
     return frequency_hz, np.asarray(power.real)
 
 
-def cross_density(first: FloatArray, other: FloatArray, rate_hz: float, length: int) -> tuple[FloatArray, ComplexArray]:
+def estimate_cross_density(
+    first: FloatArray, second: FloatArray, rate_hz: float, length: int
+) -> tuple[FloatArray, ComplexArray]:
     """Frequencies (lines,) and the one-sided cross-spectral density of two signals of the same shape: the mean of
-    conj(first) * other, per hertz. rate_hz, length: as in `spectral_density`."""
-    return _welch_average(first, other, rate_hz, length)
+    conj(first) * second, per hertz. rate_hz, length: as in `estimate_spectral_density`."""
+    return _average_segments(first, second, rate_hz, length)
 
 
 def hann(length: int) -> FloatArray:
-    """Periodic Hann window, (length,)."""
+    """Periodic Hann window, (length,): 0 at the first sample, 1 in the middle."""
     return np.asarray(0.5 - 0.5 * np.cos(2 * np.pi * np.arange(length) / length))
 
 
-def line_spectra(periods: FloatArray) -> ComplexArray:
+def compute_line_spectra(periods: FloatArray) -> ComplexArray:
     """Spectra (periods, lines, channels) of samples (periods, length, channels): rfft / length, without the lines at
     zero and at half the sample rate. White noise of variance s² has the mean power s² / length per line."""
     length = periods.shape[1]
     return np.asarray(np.fft.rfft(periods, axis=1)[:, 1 : (length + 1) // 2] / length, dtype=np.complex128)
 
 
-def _welch_average(
-    first: FloatArray, other: FloatArray, rate_hz: float, length: int
+def _average_segments(
+    first: FloatArray, second: FloatArray, rate_hz: float, length: int
 ) -> tuple[FloatArray, ComplexArray]:
     """Frequencies (lines,) and one-sided density, averaged over windowed segments; (lines,) or (lines, c)."""
     length = min(length, len(first))
@@ -46,9 +48,9 @@ def _welch_average(
     starts = range(0, len(first) - length + 1, length - length // 2)
     total = np.zeros((length // 2 + 1, *first.shape[1:]), dtype=np.complex128)
     for start in starts:
-        lines = _transform_windowed(first[start : start + length], window)
-        total += lines.conj() * (
-            lines if other is first else _transform_windowed(other[start : start + length], window)
+        first_spectrum = _transform_windowed(first[start : start + length], window)
+        total += first_spectrum.conj() * (
+            first_spectrum if second is first else _transform_windowed(second[start : start + length], window)
         )
     density = total / (len(starts) * rate_hz * float(np.sum(window**2)))
     # One-sided: each line except those at zero and at half the sample rate includes the power at its negative
@@ -57,6 +59,6 @@ def _welch_average(
     return np.asarray(np.fft.rfftfreq(length, 1 / rate_hz), dtype=np.float64), np.asarray(density)
 
 
-def _transform_windowed(stretch: FloatArray, window: FloatArray) -> ComplexArray:
+def _transform_windowed(segment: FloatArray, window: FloatArray) -> ComplexArray:
     """Spectrum of one segment, without its mean and windowed."""
-    return np.asarray(np.fft.rfft(window * (stretch - stretch.mean(axis=0)), axis=0))
+    return np.asarray(np.fft.rfft(window * (segment - segment.mean(axis=0)), axis=0))

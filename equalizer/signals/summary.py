@@ -1,5 +1,6 @@
 """Short summaries of results: a title and a few rows, printed as text in a terminal (`__repr__`) and as an HTML table
-in a notebook (`_repr_html_`), because a dataclass of long arrays has no readable default."""
+in a notebook (`_repr_html_`). Models, recordings and results inherit from `SummaryDisplay`, because the default output
+of a dataclass with long arrays is unreadable."""
 
 from dataclasses import dataclass
 from html import escape
@@ -7,7 +8,7 @@ from html import escape
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """Title and rows of a result, as plain text by `str` and as an HTML table by `html`."""
+    """Title and rows of a result; `str` gives plain text, `html` an HTML table."""
 
     title: str
     rows: tuple[tuple[str, str], ...]
@@ -24,8 +25,8 @@ class Summary:
         return f"<table><caption>{escape(self.title)}</caption>{rows}</table>"
 
 
-class Summarised:
-    """Base class of results that print as their summary, because their fields hold arrays too long to print."""
+class SummaryDisplay:
+    """Base class of results that display their summary in place of their fields, which hold long arrays."""
 
     __slots__ = ()
 
@@ -41,6 +42,6 @@ class Summarised:
         return self.summary().html
 
 
-def span_text(low: float, high: float, unit: str) -> str:
-    """Text of a range with its unit, such as "0.3 to 45 Hz"; four significant digits."""
+def format_range(low: float, high: float, unit: str) -> str:
+    """Format a range with its unit, such as "0.3 to 45 Hz"; four significant digits."""
     return f"{low:.4g} to {high:.4g} {unit}"

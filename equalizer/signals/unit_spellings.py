@@ -1,7 +1,7 @@
 """Other spellings of units, as recordings of other laboratories use them: `RPM`, `m/sec2`, `°/s`, `kgf·cm`, `oz-in`, `A
 (peak)`.
 
-A spelling is rewritten, never interpreted: what is not listed stays as it is.
+A spelling is rewritten, never interpreted: what is not listed stays as it is. Called by `signals.units`.
 """
 
 import re
@@ -9,12 +9,12 @@ import unicodedata
 from collections.abc import Collection
 from difflib import get_close_matches
 
-_LETTERS = {
+_ASCII_BY_SIGN = {
     "º": "°", "˚": "°", "μ": "u", "µ": "u", "°": "deg", "Ω": "ohm", "·": " ", "•": " ", "∙": " ", "⋅": " ", "×": " ",
     "*": " ", "−": "-", "–": "-",
 }  # fmt: skip
-"""Signs of other alphabets, and the sign or symbol that is meant."""
-_WORDS = {
+"""Signs outside ASCII, each with its ASCII replacement."""
+_SPELLINGS = {
     "s": "sec secs sek second seconds",
     "ms": "msec msecs millisec millisecond milliseconds",
     "us": "usec usecs microsec microsecond microseconds",
@@ -51,10 +51,10 @@ _WORDS = {
     "degF": "fahrenheit",
 }
 """Symbols, each with its other spellings."""
-_SPELLED = {word: unit for unit, words in _WORDS.items() for word in words.split()} | {
-    unit.lower(): unit for unit in _WORDS if len(unit) > 2
+_SYMBOL_BY_SPELLING = {word: unit for unit, words in _SPELLINGS.items() for word in words.split()} | {
+    unit.lower(): unit for unit in _SPELLINGS if len(unit) > 2
 }
-_WHOLE_UNITS = {
+_UNIT_BY_SPELLING = {
     "dps": "deg/s", "mps": "m/s", "mps2": "m/s^2", "r/min": "rpm", "U/min": "rpm", "deg C": "degC", "deg F": "degF",
     "deg. C": "degC", "degree C": "degC", "degrees C": "degC", "% RH": "%", "%RH": "%", "%rh": "%",
     "ozin": "ozf in", "inoz": "ozf in", "lbin": "lbf in", "inlb": "lbf in", "lbft": "lbf ft", "ftlb": "lbf ft",
@@ -62,7 +62,7 @@ _WHOLE_UNITS = {
     "gcm": "gf cm", "N_m": "N m", "kg f": "kgf", "lb f": "lbf", "g f": "gf",
 }  # fmt: skip
 """Units that are looked up as a whole, because their parts have other meanings."""
-_TORQUES = {
+_TORQUE_BY_SPELLING = {
     "oz in": "ozf in", "in oz": "ozf in", "lb in": "lbf in", "in lb": "lbf in", "lb ft": "lbf ft", "ft lb": "lbf ft",
     "kg cm": "kgf cm", "g cm": "gf cm",
 }  # fmt: skip
@@ -74,63 +74,73 @@ too, and a capital is another symbol than a small letter."""
 _LEAST_SIMILARITY, _LEAST_SIMILARITY_IN_PRODUCT = 0.8, 0.9
 """Least similarity (0 to 1, `difflib`) of a suggested symbol that is the whole unit, and of one within a product. By
 hand."""
-_RATE = re.compile(r"(m|mm|cm|um|rad|mrad|deg|rev)s\^-([12])")
+_POWER_OF_SECOND = re.compile(r"(m|mm|cm|um|rad|mrad|deg|rev)s\^-([12])")
 """`ms-2` is written for m/s^2, never for one over milliseconds squared."""
-_PEAK = re.compile(r"(?P<unit>m?[AV])\s*[_ ]?\(?(?:peak|pk|rms)\.?\)?", re.IGNORECASE)
+_AMPLITUDE = re.compile(r"(?P<unit>m?[AV])\s*[_ ]?\(?(?:peak|pk|rms)\.?\)?", re.IGNORECASE)
 """Volts and amperes with how they were measured, which is no unit."""
 
 
 def respell(text: str, known_symbols: Collection[str]) -> str:
-    """Spell a unit as this project does; `known_symbols` are its symbols, which stay as they are."""
+    """Rewrite a unit in the spelling of `signals.units`. known_symbols: symbols of that spelling, which are not
+    changed."""
     spelling = text.strip()
-    if match := _PEAK.fullmatch(spelling):
-        return match["unit"]
-    spelling = _in_ascii(unicodedata.normalize("NFKC", _in_ascii(spelling.replace("**", "^").replace("⁻", "-"))))
+    if amplitude_match := _AMPLITUDE.fullmatch(spelling):
+        return amplitude_match["unit"]
+    spelling = _convert_to_ascii(
+        unicodedata.normalize("NFKC", _convert_to_ascii(spelling.replace("**", "^").replace("⁻", "-")))
+    )
     spelling = re.sub(r"\s*/\s*", "/", spelling.strip().rstrip("."))
     spelling = re.sub(r"(?<=[A-Za-z])(-[1-9]|[2-9])(?![A-Za-z0-9])", r"^\1", spelling)
-    spelling = _RATE.sub(lambda rate: f"{rate[1]}/s" + ("^2" if rate[2] == "2" else ""), spelling)
-    spelling = _WHOLE_UNITS.get(spelling.replace("lbs", "lb"), spelling)
+    spelling = _POWER_OF_SECOND.sub(
+        lambda power_match: f"{power_match[1]}/s" + ("^2" if power_match[2] == "2" else ""), spelling
+    )
+    spelling = _UNIT_BY_SPELLING.get(spelling.replace("lbs", "lb"), spelling)
     spelling = re.sub(r"(?<=[A-Za-z0-9])[.-](?=[A-Za-z])", " ", spelling)
     spelling = re.sub(r"[A-Za-z]+", lambda word: _respell_symbol(word[0], known_symbols), spelling)
-    return _TORQUES.get(spelling, spelling)
+    return _TORQUE_BY_SPELLING.get(spelling, spelling)
 
 
-def nearest_unit(text: str, known_symbols: Collection[str]) -> str:
-    """The unit with each unknown symbol replaced by the nearest known one, and without a minus behind a slash; empty
-    where a symbol has none."""
+def find_nearest_unit(text: str, known_symbols: Collection[str]) -> str:
+    """Find the unit with each unknown symbol replaced by the nearest known one, and without a minus behind a slash;
+    empty where a symbol has none."""
     spelling = re.sub(
         r"(/[A-Za-z]+)\^-([1-9])",
-        lambda under: under[1] + f"^{under[2]}".removesuffix("^1"),
+        lambda match: match[1] + f"^{match[2]}".removesuffix("^1"),
         respell(text, known_symbols),
     )
     words = re.findall(r"[A-Za-z%]+", spelling)
-    replacements = {word: _nearest(word, known_symbols, len(words) == 1) for word in words}
+    replacements = {word: _find_nearest_symbol(word, known_symbols, len(words) == 1) for word in words}
     return re.sub(r"[A-Za-z%]+", lambda word: replacements[word[0]], spelling) if all(replacements.values()) else ""
 
 
-def _in_ascii(text: str) -> str:
-    """The text with the signs of `_LETTERS` replaced."""
-    return "".join(_LETTERS.get(letter, letter) for letter in text)
+def _convert_to_ascii(text: str) -> str:
+    """The text with the signs of `_ASCII_BY_SIGN` replaced."""
+    return "".join(_ASCII_BY_SIGN.get(letter, letter) for letter in text)
 
 
 def _respell_symbol(word: str, known_symbols: Collection[str]) -> str:
     """Spell a unit's symbol as it is known. In words of two letters the case is kept, because it tells units apart
     (`mS`, `MM`)."""
-    return word if word in known_symbols else _SPELLED.get(word.lower() if len(word) > 2 else word, word)
+    return word if word in known_symbols else _SYMBOL_BY_SPELLING.get(word.lower() if len(word) > 2 else word, word)
 
 
-def _nearest(word: str, known_symbols: Collection[str], is_whole_unit: bool) -> str:
-    """The known symbol with the most similar spelling; empty where none is similar. is_whole_unit: whether the word is
-    the whole unit."""
+def _find_nearest_symbol(word: str, known_symbols: Collection[str], is_whole_unit: bool) -> str:
+    """Find the known symbol with the most similar spelling; empty where none is similar. is_whole_unit: whether the
+    word is the whole unit."""
     if word in known_symbols:
         return word
     if len(word) == 1 and word.isupper():
         return _SUGGESTED_ALONE.get(word.lower(), "") if is_whole_unit else ""
-    by_size = sorted(known_symbols, key=lambda symbol: (len(symbol), symbol.islower(), symbol[0] == word[0], symbol))
-    # The last of a spelling counts: `mm` for `MM`, not `Mm`; `MPa` for `Mpa`.
-    spelled = {**_SPELLED, **{symbol.lower(): symbol for symbol in by_size}, **_SUGGESTED}
-    spelled |= _SUGGESTED_ALONE if is_whole_unit else {}
-    matches = get_close_matches(
-        word.lower(), spelled, n=1, cutoff=_LEAST_SIMILARITY if is_whole_unit else _LEAST_SIMILARITY_IN_PRODUCT
+    ordered_symbols = sorted(
+        known_symbols, key=lambda symbol: (len(symbol), symbol.islower(), symbol[0] == word[0], symbol)
     )
-    return spelled[matches[0]] if matches else ""
+    # The last of a spelling counts: `mm` for `MM`, not `Mm`; `MPa` for `Mpa`.
+    symbol_by_spelling = {**_SYMBOL_BY_SPELLING, **{symbol.lower(): symbol for symbol in ordered_symbols}, **_SUGGESTED}
+    symbol_by_spelling |= _SUGGESTED_ALONE if is_whole_unit else {}
+    matches = get_close_matches(
+        word.lower(),
+        symbol_by_spelling,
+        n=1,
+        cutoff=_LEAST_SIMILARITY if is_whole_unit else _LEAST_SIMILARITY_IN_PRODUCT,
+    )
+    return symbol_by_spelling[matches[0]] if matches else ""

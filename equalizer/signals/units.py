@@ -1,7 +1,7 @@
 """Parses ASCII units and converts them to SI: `N`, `m/s^2`, `N m`, `mm/s`, `deg`, `in`, `g` (standard gravity).
 
 A unit is a product of symbols with exponents; each symbol after a slash divides. Factors are exact by definition: inch,
-pound, standard gravity (9.80665 m/s^2), and angles as multiples of pi.
+pound, standard gravity (9.80665 m/s^2), and angles as multiples of pi. Called by the readers of recordings and maps.
 """
 
 import math
@@ -17,7 +17,8 @@ class UnknownUnitError(ValueError):
 
 
 class _NotAUnitError(UnknownUnitError):
-    """Arguments: the text and the reason. The suggestion takes long, so that it is computed only for display."""
+    """A text that is not a unit. Arguments: the text and the reason. The message suggests a similar unit; as that
+    search is slow, it is made only when the message is displayed."""
 
     def __str__(self) -> str:
         text, reason = self.args
@@ -152,36 +153,38 @@ def parse_unit(text: str) -> Unit:
         unit = _parse_symbol(symbol, text)
         factor *= unit.factor**power
         dimension = tuple(
-            exponent_sum + power * added for exponent_sum, added in zip(dimension, unit.dimension, strict=True)
+            exponent_sum + power * added_exponent
+            for exponent_sum, added_exponent in zip(dimension, unit.dimension, strict=True)
         )
-        for part, exponent in _parse_factors(unit.si):
-            symbols[part] = symbols.get(part, 0) + power * exponent
+        for base_symbol, exponent in _parse_factors(unit.si):
+            symbols[base_symbol] = symbols.get(base_symbol, 0) + power * exponent
     return Unit(_PREFERRED.get(dimension) or _format_symbols(symbols), factor, dimension)
 
 
 def check_quantity(quantity: str, unit: Unit) -> None:
     """Check that the unit fits the quantity. Raises UnknownUnitError where a quantity of `QUANTITY_UNITS` has a unit
     that is not listed there. The unit 1 (unknown scale) fits every quantity."""
-    fitting = QUANTITY_UNITS.get(quantity)
-    if fitting and unit.si not in (*fitting, UNSTATED):
+    allowed_units = QUANTITY_UNITS.get(quantity)
+    if allowed_units and unit.si not in (*allowed_units, UNSTATED):
         raise UnknownUnitError(
-            f"the quantity '{quantity}' cannot be in {unit.si}; it is in {' or '.join(fitting)}"
-            f"{force_hint(quantity, unit)}"
+            f"the quantity '{quantity}' cannot be in {unit.si}; it is in {' or '.join(allowed_units)}"
+            f"{suggest_force_unit(quantity, unit)}"
         )
 
 
-def force_hint(quantity: str, unit: Unit) -> str:
-    """Advice for a force or torque that is stated in units of mass, or in `g`; empty for other units."""
-    grams = unit.si == "m/s^2" and unit.factor == _FIXED["g"].factor
-    if quantity == "force" and (grams or unit.si == "kg"):
-        return "; grams as a force are written gf" if grams else "; as a force write lbf, ozf or kgf"
-    if quantity == "torque" and (grams or unit.si in ("kg", "kg m")):
+def suggest_force_unit(quantity: str, unit: Unit) -> str:
+    """Suggest a unit for a force or torque that is stated in units of mass, or in `g`, as a clause after the error;
+    empty for other units."""
+    is_gravity = unit.si == "m/s^2" and unit.factor == _FIXED["g"].factor
+    if quantity == "force" and (is_gravity or unit.si == "kg"):
+        return "; grams as a force are written gf" if is_gravity else "; as a force write lbf, ozf or kgf"
+    if quantity == "torque" and (is_gravity or unit.si in ("kg", "kg m")):
         return "; as a torque write ozf in, lbf ft, gf cm or kgf cm"
     return ""
 
 
-def quantity_of(si: str) -> str:
-    """The usual quantity of an SI unit, such as "force" for N; the unit itself where there is none."""
+def find_quantity(si: str) -> str:
+    """Find the usual quantity of an SI unit, such as "force" for N; the unit itself where there is none."""
     return _QUANTITY_OF.get(si, si)
 
 
@@ -196,12 +199,12 @@ def _parse_factors(text: str) -> list[tuple[str, int]]:
     """Symbols with their exponents; a symbol after a slash has a negative exponent. Raises UnknownUnitError."""
     numerator, *denominators = text.replace("*", " ").split("/")
     factors = [_parse_power(factor, 1, text) for factor in numerator.split()]
-    for part in denominators:
-        if len(part.split()) != 1:
+    for denominator in denominators:
+        if len(denominator.split()) != 1:
             raise _NotAUnitError(text, " (each slash must be followed by exactly one symbol, as in N m s/rad or m/s/V)")
-        if "-" in part:
+        if "-" in denominator:
             raise _NotAUnitError(text, " (an exponent after a slash must not be negative, as in m/s^2)")
-        factors.append(_parse_power(part.strip(), -1, text))
+        factors.append(_parse_power(denominator.strip(), -1, text))
     if not numerator.strip():
         raise _NotAUnitError(text, "")
     return factors
@@ -230,9 +233,9 @@ def _parse_symbol(symbol: str, text: str) -> Unit:
 
 def _format_symbols(symbols: dict[str, int]) -> str:
     """Text of a product from the exponents of its symbols."""
-    above = [_format_power(symbol, power) for symbol, power in symbols.items() if power > 0 and symbol != "1"]
-    below = [_format_power(symbol, -power) for symbol, power in symbols.items() if power < 0 and symbol != "1"]
-    return "/".join([" ".join(above) or "1", *below])
+    numerator = [_format_power(symbol, power) for symbol, power in symbols.items() if power > 0 and symbol != "1"]
+    denominators = [_format_power(symbol, -power) for symbol, power in symbols.items() if power < 0 and symbol != "1"]
+    return "/".join([" ".join(numerator) or "1", *denominators])
 
 
 def _format_power(symbol: str, power: int) -> str:
@@ -241,16 +244,16 @@ def _format_power(symbol: str, power: int) -> str:
 
 def suggest_unit(text: str) -> str:
     """The accepted unit nearest to an unknown text; empty where none is near."""
-    rewritten = plain_unit(text)
+    rewritten = normalise_unit(text)
     if rewritten != text:
         return rewritten
-    from equalizer.signals.unit_spellings import nearest_unit
+    from equalizer.signals.unit_spellings import find_nearest_unit
 
-    nearest = nearest_unit(text, _SYMBOLS) if len(text) <= LONGEST_UNIT else text
+    nearest = find_nearest_unit(text, _SYMBOLS) if len(text) <= LONGEST_UNIT else text
     return nearest if nearest != text and _is_accepted(nearest) else ""
 
 
-def plain_unit(text: str) -> str:
+def normalise_unit(text: str) -> str:
     """Rewrite a unit in the spelling of this module (`m/s^2` for `m/s²` and `m/sec2`, `rpm` for `RPM`); text that is
     not a unit is returned unchanged."""
     if len(text) > LONGEST_UNIT:

@@ -1,4 +1,4 @@
-"""Kinds of values that several tables of a protocol share."""
+"""Pydantic types with validation for values that occur in several tables of a protocol file: names and frequencies."""
 
 from typing import Annotated
 
@@ -7,7 +7,8 @@ from pydantic import AfterValidator, Field
 from protocols.definition.problem import Problem, refuse
 
 
-def _whole_tenths(frequency_hz: float) -> float:
+def _require_whole_tenths(frequency_hz: float) -> float:
+    """Return the frequency (Hz). Raises InconsistentError unless it is a multiple of 0.1 Hz, apart from rounding."""
     if abs(frequency_hz * 10 - round(frequency_hz * 10)) > 1e-9:
         allowed = "whole tenths of a hertz, so that whole periods can be looped"
         refuse([Problem("", f"is {frequency_hz} Hz", allowed)])
@@ -27,5 +28,6 @@ Source = Annotated[
     Field(max_length=1000, description="Source of the numbers. Default: empty, for numbers of your own choice."),
 ]
 Frequency = Annotated[float, Field(ge=0.5, le=500.0)]
-StimulusFrequency = Annotated[float, Field(ge=0.5, le=250.0), AfterValidator(_whole_tenths)]
-"""Up to 250 Hz, so that a period has four samples at 1 kHz at the least."""
+"""Frequency of a recording's excitation (Hz): up to the Nyquist frequency at a sample rate of 1 kHz."""
+StimulusFrequency = Annotated[float, Field(ge=0.5, le=250.0), AfterValidator(_require_whole_tenths)]
+"""Frequency of a trial's stimulus (Hz): up to 250 Hz, so that a period has at least four samples at 1 kHz."""

@@ -1,4 +1,4 @@
-"""Recording of a trial: what is kept, and the conditions under which its measurement is valid."""
+"""Settings of the recording of a trial: what is kept, and the conditions under which the trial is valid."""
 
 from typing import Annotated
 
@@ -10,7 +10,8 @@ from protocols.definition.staircase_rule import STRICT
 
 @dataclass(frozen=True, config=STRICT)
 class MeasurementSettings:
-    """Recording of every trial, and the conditions under which a trial is void because of the device."""
+    """Settings of the recording of every trial (table `measurement` of a protocol), and the conditions under which a
+    trial is void because of the device."""
 
     keep_s: Annotated[
         float,

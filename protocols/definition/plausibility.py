@@ -1,7 +1,7 @@
-"""Plausible range of the handle's position readings. A reading beyond it is a sensor fault: the force is released.
+"""Bounds of plausible position readings of the handle. A reading beyond them is a sensor fault: the force is released.
 
-Checked at every tick by `study/devices/governor`. A bound that is too narrow ends valid trials; one that is too wide
-lets spring and damper answer a false position with force, up to the feedback's cap.
+`study/devices/governor` checks them at every tick. A bound that is too narrow ends valid trials. One that is too wide
+lets the virtual spring and damper respond to a false position with a force, up to the limit of the feedback force.
 """
 
 from dataclasses import asdict
@@ -15,8 +15,9 @@ from protocols.definition.staircase_rule import STRICT
 
 @dataclass(frozen=True, config=STRICT)
 class PlausibilitySettings:
-    """Bounds of the position's readings. Each default is several times what a hand and the shipped forces cause. A
-    stated measurement is the maximum on the simulated omega.3 over all shipped protocols, with and without a hand."""
+    """Bounds of the position readings (table `safety.plausibility` of a protocol). Each default is several times what a
+    hand and the forces of the shipped protocols cause. "Largest measured" in a description: the maximum on the
+    simulated omega.3 over all shipped protocols, with and without a hand."""
 
     workspace_m: Annotated[
         float,
@@ -96,5 +97,5 @@ class PlausibilitySettings:
     ] = 1.0
 
 
-UNTOUCHED = asdict(PlausibilitySettings())
-"""The default values, with which a protocol has the hash that it had before this table existed."""
+DEFAULT_VALUES = asdict(PlausibilitySettings())
+"""The default values. A protocol with these values has the same hash as one without this table."""

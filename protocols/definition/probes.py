@@ -1,4 +1,9 @@
-"""Short known forces between trials, and a reference without a hand: what the device and the grip are at the time."""
+"""Settings of probes: short known forces, played between trials, that measure how device and grip change in a session.
+
+A probe is a multisine on all three axes. It shows the response of the device with the hand; a reference, the same
+without a hand, shows that of the device alone. `[probes]` of a protocol (`study_protocol`); the forces are made by
+`study.session.stimulus.probe_stimulus`.
+"""
 
 from __future__ import annotations
 
@@ -14,21 +19,23 @@ from protocols.definition.staircase_rule import STRICT
 if TYPE_CHECKING:
     from protocols.definition.study_protocol import StudyProtocol
 
-REFERENCE_TO_HZ = 45.0
-"""Least highest line with a reference: lines from 30 Hz on show whether the handle is free, and several are needed."""
+LEAST_REFERENCE_TO_HZ = 45.0
+"""Least `to_hz` with a reference: several lines above 30 Hz are needed to recognise whether the handle is free."""
 
 PERIOD_S = 1.0
-"""Period of a probe's multisine: its odd lines lie 2 Hz apart, and each of them drives a single axis."""
+"""Period (s) of a probe's multisine: its odd lines are 2 Hz apart, and each of them drives a single axis."""
 
-FROM_HZ = 3.0
-"""Lowest line: below it, forces that are hardly felt give accelerations below the sensor's noise."""
+LOWEST_LINE_HZ = 3.0
+"""Lowest line (Hz): below it, the acceleration due to forces that are hardly felt is below the sensor's noise."""
 
 LevelN = Annotated[float, Field(gt=0, le=1.5)]
+"""Peak force of a probe, N."""
 
 
 @dataclass(frozen=True, config=STRICT)
 class ProbeSettings:
-    """Odd multisines on all three axes at once, between trials. No trial asks about these forces."""
+    """Settings of probes and references: odd multisines on all three axes at once, which the participant is not asked
+    about."""
 
     levels_n: Annotated[
         tuple[LevelN, ...],
@@ -77,45 +84,52 @@ class ProbeSettings:
     ] = 120.0
 
     @model_validator(mode="after")
-    def _within_the_cap(self) -> Self:
+    def _check_limits(self) -> Self:
+        """Check levels against their cap, and the settings that a reference needs. Raises through `refuse`."""
         if self.levels_n and max(self.levels_n) > self.probe_cap_n:
-            wrong = f"holds {max(self.levels_n):g} N, above probe_cap_n"
-            refuse([Problem("levels_n", wrong, f"at most {self.probe_cap_n:g} N each")])
+            violation = f"holds {max(self.levels_n):g} N, above probe_cap_n"
+            refuse([Problem("levels_n", violation, f"at most {self.probe_cap_n:g} N each")])
         if self.reference_s and not self.levels_n:
-            wrong = (
+            violation = (
                 "is set without levels_n: only by comparison with a probe with a hand can a free handle be recognised"
             )
-            refuse([Problem("reference_s", wrong, "0, or levels_n in addition")])
-        if self.reference_s and self.to_hz < REFERENCE_TO_HZ:
-            wrong = f"is {self.to_hz:g} Hz: too low to see by a probe whether the handle is free for the reference"
-            refuse([Problem("to_hz", wrong, f"at least {REFERENCE_TO_HZ:g} Hz, or reference_s = 0")])
+            refuse([Problem("reference_s", violation, "0, or levels_n in addition")])
+        if self.reference_s and self.to_hz < LEAST_REFERENCE_TO_HZ:
+            violation = f"is {self.to_hz:g} Hz: too low to see by a probe whether the handle is free for the reference"
+            refuse([Problem("to_hz", violation, f"at least {LEAST_REFERENCE_TO_HZ:g} Hz, or reference_s = 0")])
         return self
 
     @property
-    def played(self) -> bool:
-        """Whether there are probes, with or without references."""
+    def is_enabled(self) -> bool:
+        """Whether probes are played, with or without references."""
         return bool(self.levels_n)
 
 
 def find_probe_contradictions(protocol: StudyProtocol) -> list[Problem]:
-    """Problems of the probes beside the rest of the protocol: strength, steepness, and what is kept of them."""
+    """Contradictions of the probes with other settings of the protocol: forces above the cap of the trials, a slope
+    above the slew limit, and recordings that are shorter than a period. Called by `study_contradictions`."""
     probes, cap_n = protocol.probes, protocol.staircase.cap_n
-    if not probes.played:
+    if not probes.is_enabled:
         return []
     problems = []
     if probes.probe_cap_n >= cap_n:
-        wrong = f"is {probes.probe_cap_n:g} N, not below staircase.cap_n"
-        problems.append(Problem("probes.probe_cap_n", wrong, f"less than {cap_n:g} N"))
+        violation = f"is {probes.probe_cap_n:g} N, not below staircase.cap_n"
+        problems.append(Problem("probes.probe_cap_n", violation, f"less than {cap_n:g} N"))
     if probes.reference_s and probes.reference_n > cap_n:
-        wrong = f"is {probes.reference_n:g} N, above staircase.cap_n"
-        problems.append(Problem("probes.reference_n", wrong, f"at most {cap_n:g} N"))
+        violation = f"is {probes.reference_n:g} N, above staircase.cap_n"
+        problems.append(Problem("probes.reference_n", violation, f"at most {cap_n:g} N"))
     if protocol.measurement.keep_s < PERIOD_S:
-        wrong = f"is {protocol.measurement.keep_s:g} s, less than the period of a probe"
-        problems.append(Problem("measurement.keep_s", wrong, f"at least {PERIOD_S:g} s"))
-    # A bound of a multisine's slope beside that of the steepest stimulus, which the slew limit leaves room for.
-    highest_n = max((*probes.levels_n, probes.reference_n if probes.reference_s else 0.0))
-    room_hz = cap_n * max(protocol.all_frequencies_hz, default=0.0) / (math.sqrt(2) * highest_n)
-    if probes.to_hz > room_hz:
-        wrong = f"is {probes.to_hz:g} Hz: at {highest_n:g} N a probe might change faster than the steepest stimulus"
-        problems.append(Problem("probes.to_hz", wrong, f"at most {math.floor(room_hz):g} Hz, or lower forces"))
+        violation = f"is {protocol.measurement.keep_s:g} s, less than the period of a probe"
+        problems.append(Problem("measurement.keep_s", violation, f"at least {PERIOD_S:g} s"))
+    # The slope of a multisine is below 2 pi f_max sqrt(2) peak (`study.session.stimulus.limits.BETWEEN_SAMPLES`); the
+    # slew limit permits at least that of the steepest stimulus, 2 pi f cap.
+    largest_force_n = max((*probes.levels_n, probes.reference_n if probes.reference_s else 0.0))
+    highest_allowed_hz = cap_n * max(protocol.all_frequencies_hz, default=0.0) / (math.sqrt(2) * largest_force_n)
+    if probes.to_hz > highest_allowed_hz:
+        violation = (
+            f"is {probes.to_hz:g} Hz: at {largest_force_n:g} N a probe might change faster than the steepest stimulus"
+        )
+        problems.append(
+            Problem("probes.to_hz", violation, f"at most {math.floor(highest_allowed_hz):g} Hz, or lower forces")
+        )
     return problems

@@ -1,4 +1,7 @@
-"""A recording as data: which excitations are played, where, and what holds the handle meanwhile."""
+"""Definition of a recording protocol: excitations, their directions, the virtual spring, safety limits and timing.
+
+A protocol file of kind "recording" is read into `RecordingProtocol`, which validates it; `hapteq record` plays it.
+"""
 
 from typing import Annotated, Literal, Self
 
@@ -14,7 +17,8 @@ from protocols.definition.staircase_rule import STRICT
 
 @dataclass(frozen=True, config=STRICT)
 class RecordingProtocol:
-    """Excitations that `hapteq record` plays in sequence into one recording."""
+    """Excitations that `hapteq record` plays in sequence into one recording. Raises ValueError for values outside their
+    limits."""
 
     name: Name
     kind: Annotated[
@@ -76,7 +80,8 @@ class RecordingProtocol:
     ] = 0.2
 
     @model_validator(mode="after")
-    def _within_caps(self) -> Self:
+    def _require_amplitudes_within_cap(self) -> Self:
+        """Refuse a segment whose amplitude is above the cap of the stimulus."""
         cap_n = self.safety.stimulus_cap_n
         refuse(
             [

@@ -1,4 +1,5 @@
-"""List of all fields of a protocol: value, default, the reason for the default, and the allowed values.
+"""List of all fields of a protocol: value, default, the reason for the default, and the allowed values; shown by
+`hapteq protocol`.
 
 The texts come from the JSON Schema of the protocol (`protocols.document.schema`), so that they are written only once,
 in `protocols.definition`.
@@ -15,7 +16,7 @@ from protocols.document.schema import Node, Place, describe_allowed, find_node, 
 from protocols.document.validation_messages import format_key_path
 
 TomlValue = str | int | float | bool | list[Any] | dict[str, str]
-"""Value of a field as TOML has it. A table of texts (key to text) counts as a single value."""
+"""Value of a field in TOML. A table of texts (key to text) counts as a single value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,28 +34,29 @@ class ExplainedField:
     """Allowed values, in words."""
 
 
-def explain(protocol: StudyProtocol | RecordingProtocol) -> tuple[ExplainedField, ...]:
-    """All fields of a protocol, in the order of its values, with nested tables flattened to dotted keys."""
-    root = protocol_schema(protocol.kind)
-    return tuple(_explain_fields(root, protocol_values(protocol), ()))
+def explain_protocol(protocol: StudyProtocol | RecordingProtocol) -> tuple[ExplainedField, ...]:
+    """Explain all fields of a protocol, in the order of its values, with nested tables flattened to dotted keys."""
+    schema = protocol_schema(protocol.kind)
+    return tuple(_explain_fields(schema, protocol_values(protocol), ()))
 
 
-def _explain_fields(root: Node, value: Any, place: Place) -> Iterator[ExplainedField]:
-    """Fields of a value at its place: of a table key by key, of a list of tables entry by entry, else the value."""
-    node = resolve_reference(root, find_node(root, place) or {})
-    if isinstance(value, dict) and ("properties" in node or "oneOf" in node):
-        # An entry of a mixed list: its kind picks the schema.
-        tag = (value[node["discriminator"]["propertyName"]],) if "oneOf" in node else ()
-        for key, item in value.items():
-            yield from _explain_fields(root, item, (*place, *tag, key))
+def _explain_fields(schema: Node, value: Any, path: Place) -> Iterator[ExplainedField]:
+    """Explain the value at a path: a table key by key, a list of tables entry by entry, other values as one field.
+    schema: JSON Schema of the whole protocol. path: keys and list indices from the top of the protocol."""
+    field_schema = resolve_reference(schema, find_node(schema, path) or {})
+    if isinstance(value, dict) and ("properties" in field_schema or "oneOf" in field_schema):
+        # An entry of a list of several kinds of tables: the value of its discriminator (`kind`) selects the schema.
+        kind_key = (value[field_schema["discriminator"]["propertyName"]],) if "oneOf" in field_schema else ()
+        for key, child_value in value.items():
+            yield from _explain_fields(schema, child_value, (*path, *kind_key, key))
     elif isinstance(value, list) and value and isinstance(value[0], dict):
-        for index, item in enumerate(value):
-            yield from _explain_fields(root, item, (*place, index))
+        for index, child_value in enumerate(value):
+            yield from _explain_fields(schema, child_value, (*path, index))
     else:
         yield ExplainedField(
-            key=format_key_path(root, place),
+            key=format_key_path(schema, path),
             value=value,
-            default=node.get("default"),
-            description=node.get("description", ""),
-            allowed=describe_allowed(root, node, str(place[-1])),
+            default=field_schema.get("default"),
+            description=field_schema.get("description", ""),
+            allowed=describe_allowed(schema, field_schema, str(path[-1])),
         )

@@ -11,7 +11,7 @@ from typing import Any
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.exposure import CatchSettings, DetectionSettings, GateSettings, SittingLimits
 from protocols.definition.participant_text import TextSettings
-from protocols.definition.plausibility import UNTOUCHED
+from protocols.definition.plausibility import DEFAULT_VALUES
 from protocols.definition.preparation import (
     ConsentSettings,
     DemoSettings,
@@ -46,7 +46,7 @@ TABLES_SINCE = {
 """Tables added after the first locks and sessions, with their default values. A table at its defaults is left out of
 the hash, so that old hashes stay valid."""
 
-SAFETY_SINCE: dict[str, DefaultValue] = {"safety.feedback_cap_n": 1.5, "safety.plausibility": UNTOUCHED}
+SAFETY_SINCE: dict[str, DefaultValue] = {"safety.feedback_cap_n": 1.5, "safety.plausibility": DEFAULT_VALUES}
 """Safety settings added later, in study and recording protocols, by path, with their defaults. Force in N."""
 
 ROVE_SINCE: dict[str, DefaultValue] = {"demo.rove_db": 0.0, "practice.rove_db": 0.0, "stimulus.rove_db": 0.0}

@@ -34,8 +34,8 @@ LAPSE_RATE = 0.02
 `analysis.psychophysics.hierarchy.curve`. By hand: without it a single lapse at a high level could never be undone."""
 TARGET = 0.5 ** (1 / 3)
 """Share of right answers at the threshold, lapses apart: that to which the published staircase converges."""
-SAME_BITS = 1e-9
-"""Entropies closer than this are equal, and the lower level is played: rounding must not choose."""
+ENTROPY_TOLERANCE_NATS = 1e-9
+"""Entropies (nats) closer than this are equal, and the lower level is played: rounding must not choose."""
 
 Answered = tuple[float, bool]
 """Level in dB re 1 N, and whether the answer was right."""
@@ -99,7 +99,7 @@ def next_level_db(probability: FloatArray, cap_db: float) -> float:
         chance = joint.sum(axis=(1, 2))
         # Entropy of the posterior times its chance: -sum of joint log(joint / chance).
         expected_entropy -= (joint * np.log(np.maximum(joint, 1e-300))).sum(axis=(1, 2)) - chance * np.log(chance)
-    return float(levels[int(np.flatnonzero(expected_entropy <= expected_entropy.min() + SAME_BITS)[0])])
+    return float(levels[int(np.flatnonzero(expected_entropy <= expected_entropy.min() + ENTROPY_TOLERANCE_NATS)[0])])
 
 
 def estimate_threshold(probability: FloatArray, cap_db: float) -> Estimate:

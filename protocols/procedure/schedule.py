@@ -1,8 +1,9 @@
-"""Order of the runs and random draw of every trial, each from its own key (counter-based random numbers).
+"""Order of a session's runs and random draws of its trials, each from its own key (counter-based random numbers).
 
 A draw depends only on the seed and its key (run, trial, attempt), not on earlier draws: a repeated trial, a resumed
-session or a replay changes no later draw. The random words come directly from numpy's SeedSequence, whose output is
-guaranteed never to change, so that a session can be checked years later.
+session or a replay changes no later draw. The random 64-bit words come directly from numpy's SeedSequence, whose output
+is guaranteed never to change, so that a session can be checked years later. Called by the session (`study.session`)
+and by `study_plan`.
 """
 
 from dataclasses import dataclass
@@ -30,10 +31,10 @@ def make_williams_rows(conditions: int) -> tuple[tuple[int, ...], ...]:
         raise ValueError(f"a Williams design needs one condition at the least, not {conditions}")
     # 0, 1, n-1, 2, n-2, …: for an even n all successive differences modulo n are different, so that the shifted rows
     # contain each ordered pair of neighbours once. For an odd n the reversed rows supply the missing pairs.
-    first = [0]
-    for place in range(1, conditions):
-        first.append((place + 1) // 2 if place % 2 else conditions - place // 2)
-    rows = tuple(tuple((place + shift) % conditions for place in first) for shift in range(conditions))
+    first_row = [0]
+    for position in range(1, conditions):
+        first_row.append((position + 1) // 2 if position % 2 else conditions - position // 2)
+    rows = tuple(tuple((condition + shift) % conditions for condition in first_row) for shift in range(conditions))
     if conditions % 2 == 0:
         return rows
     return rows + tuple(row[::-1] for row in rows)
@@ -66,8 +67,8 @@ class Draw:
 
 
 def schedule_runs(protocol: StudyProtocol, seed: int, participant_number: int) -> tuple[Run, ...]:
-    """All runs of a session: training and practice as listed, the test runs in the order of the schedule, then
-    detection."""
+    """All runs of a session: training and practice as listed in the protocol, the test runs in the order of
+    `order_frequencies`, then detection as listed. participant_number: from 0."""
     order = order_frequencies(protocol.schedule, protocol.stimulus.frequencies_hz, seed, participant_number)
     planned = [
         *((Phase.TRAINING, frequency_hz, False) for frequency_hz in protocol.training.frequencies_hz),
@@ -81,67 +82,68 @@ def schedule_runs(protocol: StudyProtocol, seed: int, participant_number: int) -
 def order_frequencies(
     settings: ScheduleSettings, frequencies_hz: tuple[float, ...], seed: int, participant_number: int
 ) -> tuple[float, ...]:
-    """Order of the test frequencies. participant_number counts from 0; only the Williams design uses it."""
+    """Test frequencies in the order of their runs. participant_number: from 0; only the Williams design uses it."""
     match settings.order:
         case "as_listed":
             return frequencies_hz
         case "random":
-            return tuple(frequencies_hz[place] for place in _permutation(seed, (), len(frequencies_hz)))
+            return tuple(frequencies_hz[index] for index in _draw_permutation(seed, (), len(frequencies_hz)))
         case "williams":
             if not frequencies_hz:
                 return ()
             rows = make_williams_rows(len(frequencies_hz))
-            return tuple(frequencies_hz[place] for place in rows[participant_number % len(rows)])
+            return tuple(frequencies_hz[index] for index in rows[participant_number % len(rows)])
 
 
 def draw_trial(settings: ScheduleSettings, onset_polarity: str, seed: int, run: int, trial: int, attempt: int) -> Draw:
-    """Direction and polarity of one presentation. onset_polarity: "random" or "positive"."""
-    side, sign = (int(word) >> 63 for word in draw_words(seed, (run, trial, attempt), 2))
-    direction = 1 + side
+    """Draw direction and polarity of one presentation. onset_polarity: "random" or "positive"."""
+    direction_bit, polarity_bit = (int(word) >> 63 for word in draw_words(seed, (run, trial, attempt), 2))
+    direction = 1 + direction_bit
     if settings.directions == "balanced" and attempt == 0:
         # A repeated trial (attempt > 0, only in sessions under version 1 of `study.session.state.rules`) is drawn
         # independently of the block: otherwise its direction would be that of the first attempt, already felt.
-        block, place = divmod(trial, BLOCK)
-        direction = 1 + _permutation(seed, (run, block), BLOCK)[place] % 2
-    return Draw(direction, 1 if onset_polarity == "positive" else 1 - 2 * sign)
+        block, position = divmod(trial, BLOCK)
+        direction = 1 + _draw_permutation(seed, (run, block), BLOCK)[position] % 2
+    return Draw(direction, 1 if onset_polarity == "positive" else 1 - 2 * polarity_bit)
 
 
 def is_catch_trial(settings: CatchSettings, seed: int, run: int, trial: int) -> bool:
-    """Whether this trial of a test run is a catch trial: one in each block of `one_in` trials, at a random place; none
-    where `one_in` is 0."""
+    """Whether this trial of a test run is a catch trial: one in each block of `one_in` trials, at a random position;
+    none where `one_in` is 0."""
     if not settings.one_in:
         return False
-    block, place = divmod(trial, settings.one_in)
-    return draw_words(seed, (run, block, _CATCH_KEY, 0), 1)[0] % settings.one_in == place
+    block, position = divmod(trial, settings.one_in)
+    return draw_words(seed, (run, block, _CATCH_KEY, 0), 1)[0] % settings.one_in == position
 
 
-def detection_direction(seed: int, run: int, trial: int, attempt: int) -> int:
-    """Direction, 1 or 2, of a detection trial's stimulus. The interval that contains it is drawn separately."""
+def draw_detection_direction(seed: int, run: int, trial: int, attempt: int) -> int:
+    """Draw the direction, 1 or 2, of a detection trial's stimulus. The interval that contains it is drawn by
+    `draw_trial`."""
     return 1 + (draw_words(seed, (run, trial, attempt, _DETECTION_KEY), 1)[0] >> 63)
 
 
-def practice_level_n(settings: PracticeSettings, seed: int, run: int, trial: int, attempt: int) -> float:
-    """Amplitude (N) of a practice trial, drawn independently of the direction."""
+def draw_practice_level_n(settings: PracticeSettings, seed: int, run: int, trial: int, attempt: int) -> float:
+    """Draw the amplitude (N) of a practice trial, independently of the direction."""
     return _draw_level_n(settings.level_n, settings.rove_db, seed, (run, trial, attempt, _ROVE_KEY))
 
 
 def rove_level_n(nominal_n: float, rove_db: float, seed: int, run: int, trial: int, attempt: int) -> float:
-    """Amplitude (N) of a staircase trial around the level of its staircase, drawn independently of the direction."""
+    """Draw the amplitude (N) of a staircase trial around its level `nominal_n`, independently of the direction."""
     return _draw_level_n(nominal_n, rove_db, seed, (run, trial, attempt, _ROVE_KEY))
 
 
-def demo_level_n(settings: DemoSettings, seed: int, earlier_demos: int) -> float:
-    """Amplitude (N) of a demonstration. earlier_demos: number of earlier ones in the session."""
+def draw_demo_level_n(settings: DemoSettings, seed: int, earlier_demos: int) -> float:
+    """Draw the amplitude (N) of a demonstration. earlier_demos: number of earlier demonstrations in the session."""
     return _draw_level_n(settings.level_n, settings.rove_db, seed, (earlier_demos,))
 
 
 def _draw_level_n(level_n: float, rove_db: float, seed: int, key: tuple[int, ...]) -> float:
-    """Roved level (N): uniform in dB over a range of `rove_db`, centred on `level_n` (N)."""
+    """Draw a roved level (N): uniform in dB over a range of width `rove_db`, centred on `level_n` (N)."""
     if rove_db == 0:
         return level_n
     # The upper 53 bits, as a number in the open interval (0, 1).
-    share = ((draw_words(seed, key, 1)[0] >> 11) + 0.5) * 2.0**-53
-    return to_newton(to_db(level_n) + rove_db * (share - 0.5))
+    uniform = ((draw_words(seed, key, 1)[0] >> 11) + 0.5) * 2.0**-53
+    return to_newton(to_db(level_n) + rove_db * (uniform - 0.5))
 
 
 _CATCH_KEY, _DETECTION_KEY, _ROVE_KEY = 0, 1, 2
@@ -178,7 +180,7 @@ def draw_words(seed: int, key: tuple[int, ...], count: int) -> tuple[int, ...]:
     return tuple(int(word) for word in sequence.generate_state(count, np.uint64))
 
 
-def _permutation(seed: int, key: tuple[int, ...], size: int) -> tuple[int, ...]:
+def _draw_permutation(seed: int, key: tuple[int, ...], size: int) -> tuple[int, ...]:
     """Random permutation by sorting independent 64-bit words; the probability of a tie is below size² / 2^65."""
     words = draw_words(seed, key, size)
     return tuple(sorted(range(size), key=words.__getitem__))

@@ -1,8 +1,8 @@
-"""English texts by key for sentences that a session composes itself: requests, reasons for void trials, notices.
+"""English texts, by key, of the sentences ("facts") that a session generates: requests, causes of void trials, notices.
 
-The log contains these sentences in English; the participant reads them in the language of the protocol, whose table of
-texts (`de.toml`, `es.toml`) has the same keys. A name in braces is replaced by a value, such as {seconds}. Sentences
-for the experimenter alone are not listed here.
+The event log contains these sentences in English. The participant reads them in the language of the protocol, whose
+table of texts (`de.toml`, `es.toml`) has the same keys: `words.Words.fact` recognises a sentence and translates it. A
+name in braces, such as {seconds}, is replaced by a value. Sentences for the experimenter alone are not listed.
 """
 
 FACTS: dict[str, str] = {

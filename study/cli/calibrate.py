@@ -27,14 +27,14 @@ def calibrate(
     from study.workflows.recording.calibrate_linkage import (
         CalibrationPlan,
         calibrate_linkage,
-        calibration_lines,
-        calibration_summary,
+        format_calibration_lines,
+        summarise_calibration,
     )
 
     plan = CalibrationPlan(out, device, radius, depth)
     with show_late_bar("Calibration (%)", total=100) as show:
         calibration = calibrate_linkage(plan, lambda share: show(round(100 * share)))
-    summary = json.dumps(calibration_summary(calibration), indent=2)
-    typer.echo(summary if as_json else "\n".join((str(out), *calibration_lines(calibration))))
+    summary = json.dumps(summarise_calibration(calibration), indent=2)
+    typer.echo(summary if as_json else "\n".join((str(out), *format_calibration_lines(calibration))))
     for warning in calibration.warnings:
         typer.echo(f"Note: {warning}", err=True)

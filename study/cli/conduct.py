@@ -16,14 +16,14 @@ from study.devices.clock import Clock, RealClock, VirtualClock
 from study.devices.opening import REAL, needs_real_time
 from study.errors import WrongUseError
 from study.session.views.forms import make_words
-from study.store.disk.privacy import data_folder_warning
+from study.store.disk.privacy import format_data_folder_warning
 from study.store.sessions.archive import check_subject, find_session
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.line_mode.line_input import LineInput
 from study.tui.line_mode.plain_display import PlainDisplay
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed
-from study.workflows.session.end_sitting import end_sitting, finish_closed
+from study.workflows.session.end_sitting import end_sitting, write_missing_results
 from study.workflows.session.plan_sitting import plan_sitting
 from study.workflows.session.simulated_participant import make_simulated_participant
 from study.workflows.trial.display import PersonsHand
@@ -81,12 +81,12 @@ def run_resumed_session(
 ) -> None:
     """Resume a session in line mode or simulated, and print its results. Raises StudyError."""
     folder = find_session(session, data)
-    if warning := data_folder_warning(folder.path.parent):
+    if warning := format_data_folder_warning(folder.path.parent):
         typer.echo(f"Note: {warning}", err=True)
     folded_session = fold_session(folder)
     state, opened = folded_session.state, folded_session.state.opened
     if state.closed:
-        print_results(finish_closed(folder, folded_session), as_json)
+        print_results(write_missing_results(folder, folded_session), as_json)
         return
     _confirm_free_handle(opened.observer, device, hands_off)
     in_real_time = opened.observer is None or needs_real_time(device)

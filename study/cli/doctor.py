@@ -73,7 +73,7 @@ def doctor(
     from contextlib import nullcontext
 
     from study.cli.progress import show_bar
-    from study.workflows.checks.check_installation import this_terminal
+    from study.workflows.checks.check_installation import detect_terminal
     from study.workflows.checks.examine_setup import examine_setup
 
     if calibrate_sensor is not None:
@@ -81,7 +81,7 @@ def doctor(
         return
     _prepare(device, calibrate, daily, daily or accept is not None, hands_off)
     with show_bar("Timing the loop (s)", total=timing) if timing else nullcontext(lambda result: None) as show:
-        examination = examine_setup(device, data, timing, this_terminal(), on_progress=show)
+        examination = examine_setup(device, data, timing, detect_terminal(), on_progress=show)
     if as_json:
         typer.echo(json.dumps(_make_document(examination), indent=2))
     else:
@@ -99,9 +99,9 @@ def _prepare(device: str, calibrate: bool, daily: bool, moves: bool, hands_off: 
     from study.devices.opening import needs_real_time
 
     if daily:
-        from study.workflows.checks.daily_check import require_real
+        from study.workflows.checks.daily_check import require_acceptable_device
 
-        require_real(device)
+        require_acceptable_device(device)
     if moves and needs_real_time(device):
         require_confirmation(hands_off)
     if calibrate:
@@ -139,9 +139,9 @@ def _show_motion(hands_off: bool) -> "Iterator[MotionCallbacks]":
     from functools import partial
 
     from study.cli.progress import show_late_bar
-    from study.workflows.checks.daily_check import MotionCallbacks, seconds_of_play
+    from study.workflows.checks.daily_check import MotionCallbacks, compute_play_duration_s
 
-    with show_late_bar("The device moves (s)", total=round(seconds_of_play())) as show:
+    with show_late_bar("The device moves (s)", total=round(compute_play_duration_s())) as show:
         yield MotionCallbacks(partial(announce, hands_off=hands_off), show)
 
 

@@ -84,10 +84,10 @@ def _check_arguments(files: list[Path], repeat: int | None, device: str | None, 
 
 def _equalize_once(plan: "EqualizePlan") -> "tuple[dict[str, Any], tuple[str, ...]]":
     from study.workflows.equalizer.equalize_trajectory import equalize_trajectory
-    from study.workflows.equalizer.equalized_summary import summary, summary_lines
+    from study.workflows.equalizer.equalized_summary import format_equalization_lines, summarise_equalization
 
     equalized = equalize_trajectory(plan)
-    return summary(equalized), summary_lines(equalized)
+    return summarise_equalization(equalized), format_equalization_lines(equalized)
 
 
 def _play_repeatedly(
@@ -97,12 +97,12 @@ def _play_repeatedly(
 
     from study.cli.progress import show_late_bar
     from study.workflows.equalizer.repeat_trajectory import (
-        repeat_lines,
-        repeat_summary,
+        format_repeat_lines,
         repeat_trajectory,
+        summarise_repeats,
     )
 
     ask = partial(announce, hands_off=hands_off)
     with show_late_bar("Plays", total=order.repeats + 1) as show:
         repeated = repeat_trajectory(plan, order, lambda number, share: show(number + share), ask)
-    return repeat_summary(repeated), repeat_lines(repeated)
+    return summarise_repeats(repeated), format_repeat_lines(repeated)

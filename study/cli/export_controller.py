@@ -29,14 +29,14 @@ def export_controller(
     """
     from study.workflows.equalizer.controller.export_controller import (
         ControllerPlan,
-        controller_settings,
         describe_export,
         export_controller,
+        make_controller_settings,
         summarise_export,
         warn_of_export,
     )
 
-    settings = controller_settings(weight, preview / 1000, cap)
+    settings = make_controller_settings(weight, preview / 1000, cap)
     exported = export_controller(ControllerPlan(model, out, transient, settings))
     for warning in warn_of_export(exported):
         typer.echo(f"Note: {warning}", err=True)

@@ -55,14 +55,14 @@ def look_lines(overview: "Overview", everything: bool) -> Iterable[str]:
 
 def draw_recording_lines(overview: "Overview") -> Iterable[str]:
     """Time series, spectra, and tables of channels and segments."""
-    from study.tui.drawing.recording_drawing import spectrum_lines, time_series_lines
+    from study.tui.drawing.recording_drawing import draw_spectra, draw_time_series
 
     yield ""
     for channel in overview.channels:
-        yield from time_series_lines(channel)
+        yield from draw_time_series(channel)
     if overview.spectra is not None:
         yield ""
-        yield from spectrum_lines(overview)
+        yield from draw_spectra(overview)
     yield from ("", *_tables(overview))
 
 
@@ -95,7 +95,7 @@ MOST_SEGMENTS = 20
 
 def print_lines(lines: Iterable[str]) -> None:
     """Print lines; control characters from a file are removed."""
-    from study.session.views.printable import printable_text
+    from study.session.views.printable import replace_unprintable
 
     for line in lines:
-        typer.echo(printable_text(line))
+        typer.echo(replace_unprintable(line))

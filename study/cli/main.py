@@ -1,7 +1,7 @@
-"""The command `hapteq`: one file per subcommand, and the only place that turns errors into words and exit codes.
+"""Entry point of the command `hapteq`: runs a subcommand, and maps errors to messages and exit codes.
 
-Results go to stdout, talk and progress to stderr. Imports are light, so that `--help` is instant: a command's body
-imports what it needs.
+The subcommands are listed in `command_table`, a file for each. Results are written to stdout, messages and progress to
+stderr. Modules are imported in the bodies of the commands, so that `--help` is fast.
 """
 
 import io
@@ -29,8 +29,9 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-WrongCommandLine: Any = next(kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException")
-"""What typer raises for an unknown command or a bad option; its module differs between versions of typer."""
+CommandLineError: Any = next(base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException")
+"""Exception class that typer raises for an unknown command or an invalid option: click's ClickException, whose module
+differs between versions of typer."""
 
 
 INTERRUPTED = StudyError(
@@ -39,10 +40,11 @@ INTERRUPTED = StudyError(
     "Run it again.",
     saved="Files that it had written are complete.",
 )
-"""Said after Ctrl-C where a command says nothing better."""
+"""Message after Ctrl-C, unless the command raises a more specific error."""
 
 
-def _version(is_requested: bool) -> None:
+def _print_version(is_requested: bool) -> None:
+    """Callback of --version: print the version and exit."""
     if is_requested:
         from importlib.metadata import version
 
@@ -50,18 +52,19 @@ def _version(is_requested: bool) -> None:
         raise typer.Exit
 
 
+# Without a docstring, which typer would show as help.
 @app.callback()
 def options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     return None
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run one command; returns its exit code."""
-    _settle_in()
+    """Run a command; returns its exit code (`ExitCode`). arguments: None = those of the process."""
+    _configure_process()
     try:
         code = app(args=arguments, standalone_mode=False)
         if code == ExitCode.INTERRUPTED:  # some versions of typer return exit codes that others raise
@@ -70,7 +73,7 @@ def main(arguments: list[str] | None = None) -> int:
     except StudyError as error:
         print_error(error)
         return error.exit_code
-    except WrongCommandLine as error:
+    except CommandLineError as error:
         error.show()
         return ExitCode.WRONG_USE
     except (KeyboardInterrupt, typer.Abort):
@@ -79,43 +82,45 @@ def main(arguments: list[str] | None = None) -> int:
     except BrokenPipeError:
         return ExitCode.ERROR
     except OSError as problem:
-        print_error(_system_error(problem))
+        print_error(_describe_system_error(problem))
         return ExitCode.ERROR
 
 
-def _settle_in() -> None:
-    """Configure streams, signals and libraries of this process."""
+def _configure_process() -> None:
+    """Configure output streams, signal handlers and thread counts of numerical libraries for this process."""
     for output in (sys.stdout, sys.stderr):
         if isinstance(output, io.TextIOWrapper):
             output.reconfigure(errors="replace")  # a terminal without braille shows question marks, not a traceback
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
-            signal.signal(getattr(signal, name), _exit_on_signal)
+            signal.signal(getattr(signal, name), _interrupt_on_signal)
     for library in ("OPENBLAS", "OMP", "MKL"):
-        # Matrices here are small: threads would cost more in waiting than they save. Read when numpy is loaded.
+        # For small matrices, threads cost more time than they save. The libraries read this when numpy is imported.
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
 
 def print_error(error: StudyError) -> None:
     """Print an error on stderr: title, what happened, what is saved, what to do."""
-    parts = [spell_commands(part) for part in (error.happened, error.saved, error.do_now)]
+    sentences = [qualify_commands(sentence) for sentence in (error.happened, error.saved, error.do_now)]
     try:
-        sys.stderr.write(f"{error.title}\n" + "".join(f"  {part}\n" for part in parts if part))
+        sys.stderr.write(f"{error.title}\n" + "".join(f"  {sentence}\n" for sentence in sentences if sentence))
         sys.stderr.flush()
     except OSError:  # a closed terminal receives nothing, and Python must not try to flush to it again at exit
         sys.stderr = io.StringIO()
 
 
-def spell_commands(sentence: str) -> str:
-    """Command names as they can be typed here: after `make study`, hapteq is not on the path."""
-    started_as = Path(sys.argv[0])
-    if shutil.which("hapteq") or started_as.name != "hapteq":
-        return sentence
-    return re.sub(r"\bhapteq (?=[a-z]+ )", f"{started_as} ", sentence)
+def qualify_commands(text: str) -> str:
+    """The text with `hapteq` in its commands replaced by the path of the executable, if the shell would not find it:
+    after `make study`, hapteq is not on the PATH."""
+    executable = Path(sys.argv[0])
+    if shutil.which("hapteq") or executable.name != "hapteq":
+        return text
+    return re.sub(r"\bhapteq (?=[a-z]+ )", f"{executable} ", text)
 
 
-def _system_error(problem: OSError) -> StudyError:
-    """The error for operating-system errors without a named one: missing rights, a full disk, a closed terminal."""
+def _describe_system_error(problem: OSError) -> StudyError:
+    """The error to report for an operating-system error without a more specific one, such as missing permissions or a
+    full disk."""
     file_note = f" ({problem.filename})" if problem.filename else ""
     return StudyError(
         "The system refused",
@@ -125,6 +130,6 @@ def _system_error(problem: OSError) -> StudyError:
     )
 
 
-def _exit_on_signal(number: int, frame: FrameType | None) -> None:
-    """SIGTERM or a closed terminal: leave like Ctrl-C, with the device released and the log closed."""
+def _interrupt_on_signal(signal_number: int, frame: FrameType | None) -> None:
+    """Handle SIGTERM and SIGHUP (closed terminal) like Ctrl-C, so that the device is released and the log closed."""
     raise KeyboardInterrupt

@@ -1,4 +1,7 @@
-"""`hapteq note`: a note into a session's log, whether it runs or not."""
+"""`hapteq note`: writes a note into the log of a session, whether it runs or has ended.
+
+`hapteq watch` uses `write_note` too.
+"""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -19,18 +22,19 @@ def note(
     ] = False,
     data: DataOption = Path("data"),
 ) -> None:
-    """Write a note into a session's log. Nothing that is in the log is changed."""
+    """Write a note into a session's log. Earlier entries are not changed; only an incomplete last line, left by a
+    crash, is removed."""
     from study.store.sessions.archive import find_session
 
     write_note(find_session(session, data), text, adverse)
 
 
 def write_note(folder: "SessionFolder", text: str, adverse: bool) -> None:
-    """Write the note and say where it is."""
+    """Write the note, or send it to the running session, and print which of the two happened."""
     from study.devices.clock import RealClock
     from study.session.watching.requests import NoteAsked
     from study.workflows.views.take_note import take_note
 
-    is_written = take_note(folder, NoteAsked("experimenter", text, adverse), RealClock())
-    waits = f"The session writes it into the log of {folder.name} as soon as it looks."
-    typer.echo(f"Noted in {folder.name}." if is_written else waits, err=True)
+    in_log = take_note(folder, NoteAsked("experimenter", text, adverse), RealClock())
+    waiting_text = f"The session writes it into the log of {folder.name} as soon as it looks."
+    typer.echo(f"Noted in {folder.name}." if in_log else waiting_text, err=True)

@@ -81,7 +81,7 @@ def power(
     """Simulate whole studies and count how often each analysis finds the difference. Run again, it continues."""
     from study.cli.progress import show_bar
     from study.store.formats.protocol_files import read_study_protocol
-    from study.workflows.cluster import cluster_workers
+    from study.workflows.cluster import open_cluster_workers
     from study.workflows.planning.simulate_power import PowerPlan, simulate_power
     from study.workflows.worker_processes import worker_processes
 
@@ -95,7 +95,7 @@ def power(
     sizes = parse_sample_sizes(subjects)
     plan = PowerPlan(crowd, loaded.staircase, sizes, studies, seed, loaded.analysis.contrast_hz)
     title = f"{studies} studies of each of {len(sizes)} sizes"
-    executor = worker_processes(workers) if scheduler is None else cluster_workers(scheduler)
+    executor = worker_processes(workers) if scheduler is None else open_cluster_workers(scheduler)
     with executor as pool, show_bar(title, total=studies * len(sizes)) as advance:
         points = simulate_power(plan, out, pool, advance)
     if as_json:
@@ -148,7 +148,7 @@ def _make_crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float)
 
 def _format_table(points: Sequence["PowerPoint"], plan: "PowerPlan") -> list[str]:
     from analysis.threshold_words import threshold_words
-    from study.workflows.planning.simulate_power import power_lines
+    from study.workflows.planning.simulate_power import format_power_lines
 
     first_hz, second_hz = plan.pair_hz
     contrast_text = (
@@ -156,7 +156,7 @@ def _format_table(points: Sequence["PowerPoint"], plan: "PowerPlan") -> list[str
     )
     compared = f"Compared: {first_hz:g} Hz minus {second_hz:g} Hz, {contrast_text}."
     roved = [f"Levels roved by {plan.crowd.rove_db:g} dB, as the protocol says."] if plan.crowd.rove_db else []
-    return [*power_lines(points, threshold_words(plan.rule).means), "", compared, *roved]
+    return [*format_power_lines(points, threshold_words(plan.rule).means), "", compared, *roved]
 
 
 def _read_delivery(data: Path | None, frequencies_hz: tuple[float, ...]) -> "FeltDelivery | None":
@@ -164,14 +164,14 @@ def _read_delivery(data: Path | None, frequencies_hz: tuple[float, ...]) -> "Fel
     determine the threshold at a frequency."""
     if data is None:
         return None
-    from analysis.psychophysics.power.felt_delivery import felt_delivery
+    from analysis.psychophysics.power.felt_delivery import tabulate_felt_delivery
     from study.participants.delivered_feeler import MPS2_PER_N
-    from study.participants.psychometric_curve import threshold_at
+    from study.participants.psychometric_curve import interpolate_threshold_n
     from study.workflows.results.collect_sessions import collect_sessions
 
-    ideal_thresholds = [threshold_at(MPS2_PER_N, frequency_hz) for frequency_hz in frequencies_hz]
+    ideal_thresholds = [interpolate_threshold_n(MPS2_PER_N, frequency_hz) for frequency_hz in frequencies_hz]
     try:
-        return felt_delivery(collect_sessions(data).trials, frequencies_hz, ideal_thresholds)
+        return tabulate_felt_delivery(collect_sessions(data).trials, frequencies_hz, ideal_thresholds)
     except ValueError as problem:
         raise WrongUseError(
             "It is not known what the device delivers",

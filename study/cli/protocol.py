@@ -37,7 +37,7 @@ def show(
     as_json: Annotated[bool, typer.Option("--json", help="One JSON document on stdout.")] = False,
 ) -> None:
     """Every key of a protocol with its value, its default and the reason for it."""
-    from protocols.document.explain import explain
+    from protocols.document.explain import explain_protocol
     from protocols.document.hashing import protocol_hash
     from study.session.stimulus.limits import describe_forces
     from study.store.formats.protocol_files import read_protocol
@@ -46,7 +46,7 @@ def show(
     if text:
         typer.echo(file.text, nl=False)
         return
-    fields = explain(file.protocol)
+    fields = explain_protocol(file.protocol)
     if as_json:
         rows = [{"key": f.key, "value": f.value, "default": f.default, "reason": f.description} for f in fields]
         typer.echo(json.dumps({"hash": protocol_hash(file.protocol), "fields": rows}, indent=2, default=str))
@@ -77,7 +77,7 @@ def lock(name: NameArgument, data: DataOption = Path("data")) -> None:
     """
     from importlib.metadata import version
 
-    from analysis.psychophysics.two_analyses import declaration_text
+    from analysis.psychophysics.two_analyses import describe_declaration
     from protocols.definition.study_protocol import StudyProtocol
     from study.devices.clock import RealClock
     from study.store.disk.privacy import make_folder
@@ -88,4 +88,4 @@ def lock(name: NameArgument, data: DataOption = Path("data")) -> None:
     path = lock_protocol(file, data, RealClock().utc(), version("hapteq"))
     typer.echo(str(path))
     if isinstance(file.protocol, StudyProtocol):
-        typer.echo(f"Fixed with all else: {declaration_text(file.protocol.analysis)}", err=True)
+        typer.echo(f"Fixed with all else: {describe_declaration(file.protocol.analysis)}", err=True)

@@ -40,7 +40,7 @@ def prove(
 
     Writes proof.json, proof.csv and report.html. Interrupted, the same command continues.
     """
-    from study.evaluation.bank.proof_summary import blind_test_lines, summary
+    from study.evaluation.bank.proof_summary import format_blind_test, summarise_blind_test
     from study.evaluation.bank.prove import prove as run_blind_test
     from study.evaluation.bank.seal_cases import BankPlan
     from study.evaluation.bank.sealed_bank import BankOptions
@@ -58,15 +58,20 @@ def prove(
     write_proof(proof)
     if table is not None:
         write_table(table, proof)
-    typer.echo(json.dumps(summary(proof), indent=2) if as_json else "\n".join(blind_test_lines(proof)))
+    typer.echo(json.dumps(summarise_blind_test(proof), indent=2) if as_json else "\n".join(format_blind_test(proof)))
 
 
 def _prove_laws(out: Path, plan: "BankPlan", options: "BankOptions", table: Path | None, as_json: bool) -> None:
     from study.evaluation.bank.laws.prove_laws import prove_laws
-    from study.evaluation.bank.laws.write_laws import format_law_lines, format_law_summary, write_law_table, write_laws
+    from study.evaluation.bank.laws.write_law_proof import (
+        format_law_lines,
+        format_law_summary,
+        write_law_proof,
+        write_law_table,
+    )
 
     law_proof = _run_with_steps(lambda on_step: prove_laws(out, plan, options, on_step))
-    write_laws(law_proof)
+    write_law_proof(law_proof)
     if table is not None:
         write_law_table(table, law_proof)
     typer.echo(format_law_summary(law_proof) if as_json else "\n".join(format_law_lines(law_proof)))

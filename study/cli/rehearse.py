@@ -34,11 +34,11 @@ def rehearse(
     from study.store.formats.protocol_files import read_study_protocol
     from study.workflows.results.analysis_files import ANALYSIS_NAME
     from study.workflows.results.analyze_data import analyze_data
-    from study.workflows.session.equalize_stimuli import check_playable
+    from study.workflows.session.equalize_stimuli import check_model_for_protocol
     from study.workflows.session.rehearse_study import Rehearsal, make_rehearsed_observer, rehearse_study
 
     source = read_study_protocol(protocol_or_default(protocol, model), out)
-    check_playable(source.protocol, model)
+    check_model_for_protocol(source.protocol, model)
     rehearsal = Rehearsal(
         source.protocol, source.text, subjects, seed, data=out, model=model, observer=observer, locked=source.locked
     )

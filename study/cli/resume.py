@@ -1,4 +1,4 @@
-"""`hapteq resume`: go on with a session after a crash or a pause."""
+"""`hapteq resume`: continue an unfinished session, for example after a crash or a pause."""
 
 import json
 from pathlib import Path
@@ -11,7 +11,8 @@ from study.cli.session_options import DataOption, DeviceOption, HandsOffOption, 
 from study.tui.keys.answer_keys import parse_keys
 
 LOG_NAME = "events.jsonl"
-"""As `study.store.sessions.event_log.LOG_NAME`, which is too heavy to load before the first frame."""
+"""Name of a session's event log. A copy of `study.store.sessions.event_log.LOG_NAME`: importing that module would delay
+the first display of the screen."""
 
 
 def resume(
@@ -27,7 +28,7 @@ def resume(
     from study.cli.screen import has_screen, open_screen
 
     answer_keys = parse_keys(keys)
-    if not plain and has_screen() and not _is_simulated(session, data):
+    if not plain and has_screen() and not _has_simulated_participant(session, data):
         from study.tui.app.app_start import AppStart
         from study.tui.engine.to_engine import Resume
 
@@ -38,8 +39,9 @@ def resume(
     run_resumed_session(session, device=device, data=data, as_json=as_json, keys=answer_keys, hands_off=hands_off)
 
 
-def _is_simulated(session: str, data: Path) -> bool:
-    """Whether its first line says that a simulated participant takes it: that one needs no screen."""
+def _has_simulated_participant(session: str, data: Path) -> bool:
+    """Whether the first event of the session's log states a simulated participant, for whom no screen is opened. False
+    if no log can be read."""
     from study.regular_file import DOCUMENT_BYTES, open_regular
 
     for folder in (Path(session), data / session):

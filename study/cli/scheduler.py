@@ -24,7 +24,7 @@ def connect_cluster(scheduler: str | None) -> Iterator[Executor | None]:
     if scheduler is None:
         yield None
         return
-    from study.workflows.cluster import cluster_workers
+    from study.workflows.cluster import open_cluster_workers
 
-    with cluster_workers(scheduler, one_thread=True) as executor:
+    with open_cluster_workers(scheduler, one_thread=True) as executor:
         yield executor

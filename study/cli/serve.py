@@ -72,7 +72,7 @@ def _serve(command: list[str], host: str, port: int) -> None:
     from study.tui.web_server import ScreenServer
 
     try:
-        ScreenServer(command, host, port, say=lambda sentence: typer.echo(sentence, err=True)).serve()
+        ScreenServer(command, host, port, print_line=lambda sentence: typer.echo(sentence, err=True)).serve()
     except OSError as problem:
         raise StudyError(
             "The page cannot be served",

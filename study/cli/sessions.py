@@ -22,9 +22,9 @@ def sessions(
     as_json: JsonOption = False,
 ) -> None:
     """List all sessions, latest first: their status and progress."""
-    from study.workflows.views.view_home import session_lines
+    from study.workflows.views.view_home import list_session_lines
 
-    lines = session_lines(data)
+    lines = list_session_lines(data)
     if as_json:
         typer.echo(json.dumps([asdict(line) for line in lines], indent=2))
         return
@@ -37,16 +37,16 @@ def sessions(
 
 def _format_table(lines: "tuple[SessionLine, ...]", remarks: bool, width: int | None) -> Iterator[str]:
     from study.local_clock import machine_zone
-    from study.session.views.local_time import local_column
-    from study.tui.session_status import status_text
+    from study.session.views.local_time import format_times_in_zone
+    from study.tui.session_status import format_status
     from study.tui.text_rows import align_row_lines
 
-    offset, begun_texts = local_column([line.begun_utc for line in lines], machine_zone)
+    offset, begun_texts = format_times_in_zone([line.begun_utc for line in lines], machine_zone)
     header = ("session", "standing", f"begun ({offset})" if offset else "begun", "runs", "answers", "protocol")
     rows = [
         (
             line.name,
-            status_text(line.standing),
+            format_status(line.standing),
             begun_text,
             f"{line.runs_done}/{line.runs}" if line.runs else "",
             str(line.answers) if line.runs else "",

@@ -43,16 +43,16 @@ def show(
         return
     document = Path(target) / "diagnosis.json" if (Path(target) / "diagnosis.json").is_file() else Path(target)
     if document.is_file():
-        from study.workflows.views.view_diagnosis import diagnosis_view
+        from study.workflows.views.view_diagnosis import make_diagnosis_view
 
-        diagnosis = diagnosis_view(document)
+        diagnosis = make_diagnosis_view(document)
         _print_lines([json.dumps(asdict(diagnosis), indent=2)] if as_json else _diagnosis_lines(diagnosis))
         return
     from study.local_clock import machine_zone
-    from study.session.views.local_time import in_utc
-    from study.workflows.views.view_session import session_view
+    from study.session.views.local_time import to_utc
+    from study.workflows.views.view_session import make_session_view
 
-    session = session_view(_folder(target, data), in_utc if as_json else machine_zone)
+    session = make_session_view(_folder(target, data), to_utc if as_json else machine_zone)
     _print_lines([json.dumps(asdict(session), indent=2)] if as_json else _session_lines(session, log))
 
 
@@ -89,10 +89,10 @@ def _folder(target: str, data: Path) -> Path:
 
 def _session_lines(view: "SessionView", log: bool) -> Iterable[str]:
     from study.tui.drawing.staircase_drawing import LEGEND
-    from study.tui.session_status import describe
+    from study.tui.session_status import describe_session
     from study.tui.text_rows import align_rows
 
-    yield describe(view.line)
+    yield describe_session(view.line)
     yield ""
     yield from align_rows(view.facts, columns())
     if view.thresholds:
@@ -110,11 +110,11 @@ def _session_lines(view: "SessionView", log: bool) -> Iterable[str]:
 
 
 def _draw_plot(staircase: "Staircase") -> Iterable[str]:
-    from study.tui.drawing.staircase_drawing import staircase_lines, summary
+    from study.tui.drawing.staircase_drawing import draw_staircase, summarize_staircase
 
     yield f"\n{staircase.title}"
-    yield from staircase_lines(staircase, PLOT_COLUMNS, PLOT_ROWS)
-    yield summary(staircase)
+    yield from draw_staircase(staircase, PLOT_COLUMNS, PLOT_ROWS)
+    yield summarize_staircase(staircase)
 
 
 def _diagnosis_lines(view: "DiagnosisView") -> Iterable[str]:

@@ -1,4 +1,4 @@
-"""`hapteq stream`: a running session's facts, forces and motion for the lab streaming layer."""
+"""`hapteq stream`: sends a running session's events, forces and motion to the lab streaming layer (LSL)."""
 
 import contextlib
 import time
@@ -14,8 +14,8 @@ def stream(
     session: Annotated[str, typer.Argument(help="Session folder, or its name in the data folder.")],
     data: DataOption = Path("data"),
 ) -> None:
-    """Follow a running session from a second terminal and send each of its facts as an LSL marker, with force,
-    acceleration and motion of each tick in further streams, until it is finished or Ctrl-C.
+    """Follow a running session from a second terminal and send each of its events as an LSL marker, and force,
+    acceleration and motion of each control tick in further streams, until the session is finished or Ctrl-C is pressed.
     Needs pip install '.[lsl]'."""
     from study.errors import StudyError
     from study.session.watching.requests import NoteAsked
@@ -29,11 +29,13 @@ def stream(
     outlet, inbox = MarkerOutlet(folder.log), RequestInbox(folder.path)
     signals = SignalStreams(folder.path, outlet.signal_outlet)
 
-    def note(offset_s: float) -> None:
-        text = f"LSL's clock was {offset_s:.6f} s ahead of the session's when that said {time.monotonic():.3f} s."
+    def log_clock_offset(offset_s: float) -> None:
+        note_text = f"LSL's clock was {offset_s:.6f} s ahead of the session's when that said {time.monotonic():.3f} s."
         with contextlib.suppress(StudyError):  # the markers report it too
-            inbox.send(NoteAsked("program", text))
+            inbox.send(NoteAsked("program", note_text))
 
     typer.echo(f"Streaming {folder.name}; Ctrl-C ends it, and not the session.", err=True)
-    marker_count = stream_session(folder.log, outlet, on_marker=typer.echo, side_tasks=SideTasks(note, signals.push))
+    marker_count = stream_session(
+        folder.log, outlet, on_marker=typer.echo, side_tasks=SideTasks(log_clock_offset, signals.push)
+    )
     typer.echo(f"{marker_count} markers and {signals.sent} ticks; the session is finished.", err=True)

@@ -28,11 +28,11 @@ def study_plan(
 
     Planned is what analysis.participants of the protocol declares.
     """
-    from study.workflows.views.plan_study import document, list_planned_studies
+    from study.workflows.views.plan_study import list_planned_studies, summarise_plans
 
     studies = list_planned_studies(data, protocol, simulated)
     if as_json:
-        typer.echo(json.dumps(document(studies), indent=2))
+        typer.echo(json.dumps(summarise_plans(studies), indent=2))
         return
     for number, study in enumerate(studies):
         for line in (*[""] * (number > 0), *_plan_lines(study, columns())):
@@ -41,14 +41,14 @@ def study_plan(
 
 def _plan_lines(study: "PlannedStudy", width: int | None) -> Iterator[str]:
     from study.tui.text_rows import align_rows, wrap_hanging
-    from study.workflows.views.plan_study import lines, order_words
+    from study.workflows.views.plan_study import describe_order, format_plan_lines
 
-    for line in lines(study):
+    for line in format_plan_lines(study):
         yield from wrap_hanging(line, 2, width)
     if study.plan.cells:
         header = ("order", "frequencies", "wanted", "done", "begun", "needed")
         rows = [
-            (str(place), order_words(cell), *map(str, (cell.required, cell.done, cell.begun, cell.needed)))
+            (str(place), describe_order(cell), *map(str, (cell.required, cell.done, cell.begun, cell.needed)))
             for place, cell in enumerate(study.plan.cells, start=1)
         ]
         yield from align_rows((header, *rows), width)

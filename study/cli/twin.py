@@ -37,7 +37,7 @@ def twin(
     from functools import partial
 
     from study.cli.progress import show_late_bar
-    from study.workflows.diagnosis.twin_summary import twin_lines, twin_summary
+    from study.workflows.diagnosis.twin_summary import format_twin_lines, summarise_twin
     from study.workflows.diagnosis.write_twin import TwinPlan, check_output_and_band, write_twin
 
     plan = TwinPlan(out, device, seed, protocol, band, calibration)
@@ -45,7 +45,9 @@ def twin(
     with show_late_bar("Twin (%)", total=100) as show:
         fitted_twin = write_twin(plan, lambda share: show(round(100 * share)), partial(announce, hands_off=hands_off))
     typer.echo(
-        json.dumps(twin_summary(fitted_twin), indent=2) if as_json else "\n".join((str(out), *twin_lines(fitted_twin)))
+        json.dumps(summarise_twin(fitted_twin), indent=2)
+        if as_json
+        else "\n".join((str(out), *format_twin_lines(fitted_twin)))
     )
     for note in fitted_twin.notes:
         typer.echo(f"Note: {note}", err=True)

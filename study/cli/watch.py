@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 LOG_NAME = "events.jsonl"
 """Same as `study.store.sessions.event_log.LOG_NAME`, whose import would delay the first frame."""
-PLAIN_EVERY_S = 0.2
-"""Interval between two updates in plain lines (s)."""
+PLAIN_UPDATE_INTERVAL_S = 0.2
+"""Interval (s) between two updates of the output as plain lines."""
 
 
 def watch(
@@ -70,6 +70,7 @@ def _find_last_changed(data: Path) -> str:
 
 
 def _show_screen(folder: Path) -> None:
+    """Show the full-screen view until it is closed; the log is read in a separate process."""
     from study.store.sessions.request_inbox import RequestInbox
     from study.tui.engine.watch_feed import WatchFeed
     from study.tui.watch.watch_app import WatchApp
@@ -89,7 +90,7 @@ def _print_once(folder: Path, as_json: bool) -> None:
     from study.devices.clock import RealClock
     from study.errors import StudyError
     from study.tui.text_rows import wrap_hanging
-    from study.tui.watch.watch_lines import LABEL_CELLS, changes
+    from study.tui.watch.watch_lines import LABEL_CELLS, format_changes
     from study.workflows.views.watch_session import follow
 
     view = follow(folder).look(RealClock().utc())
@@ -98,26 +99,26 @@ def _print_once(folder: Path, as_json: bool) -> None:
     if as_json:
         typer.echo(json.dumps(asdict(view), indent=2))
         return
-    for line in changes(None, view):
-        for text in wrap_hanging(line, LABEL_CELLS, columns()):
-            typer.echo(text)
+    for line in format_changes(None, view):
+        for terminal_line in wrap_hanging(line, LABEL_CELLS, columns()):
+            typer.echo(terminal_line)
 
 
 def _follow_in_lines(folder: Path) -> None:
-    """Print changes as lines until the sitting is over."""
+    """Print each change as a line until the session no longer runs."""
     from study.devices.clock import RealClock
     from study.session.watching.watch_view import RUNNING_STATUSES
-    from study.tui.watch.watch_lines import changes
+    from study.tui.watch.watch_lines import format_changes
     from study.workflows.views.watch_session import follow
 
     clock, follower, previous_view = RealClock(), follow(folder), None
     while previous_view is None or previous_view.standing in RUNNING_STATUSES:
         view = follower.look(clock.utc())
         if view is not None:
-            for line in changes(previous_view, view):
+            for line in format_changes(previous_view, view):
                 typer.echo(line)
             previous_view = view
-        clock.sleep(PLAIN_EVERY_S)
+        clock.sleep(PLAIN_UPDATE_INTERVAL_S)
 
 
 def _send_requests(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str, bool], ...]) -> None:
@@ -128,8 +129,8 @@ def _send_requests(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str
 
     session = SessionFolder(folder)
     if stop:
-        sentence = f"The force is off and the sitting ends. Continue with: hapteq resume {folder}"
-        _send_request(session, StopAsked("experimenter"), sentence)
+        confirmation = f"The force is off and the sitting ends. Continue with: hapteq resume {folder}"
+        _send_request(session, StopAsked("experimenter"), confirmation)
     for text, adverse in notes:
         if text:
             write_note(session, text, adverse)
@@ -137,9 +138,10 @@ def _send_requests(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str
         _send_request(session, PauseAsked("experimenter"), "Paused. The participant continues at their own screen.")
 
 
-def _send_request(session: "SessionFolder", request: "Request", text: str) -> None:
+def _send_request(session: "SessionFolder", request: "Request", confirmation: str) -> None:
+    """Send a request, then print the confirmation on stderr."""
     from study.devices.clock import RealClock
     from study.workflows.views.send_request import send_request
 
     send_request(session, request, RealClock())
-    typer.echo(text, err=True)
+    typer.echo(confirmation, err=True)

@@ -19,10 +19,14 @@ def withdraw(
     are listed.
     """
     from study.devices.clock import RealClock
-    from study.workflows.session.withdraw_participant import copies_elsewhere, plan_withdrawal, session_to_withdraw
+    from study.workflows.session.withdraw_participant import (
+        find_session_to_withdraw,
+        list_remaining_copies,
+        plan_withdrawal,
+    )
     from study.workflows.session.withdraw_participant import withdraw as erase
 
-    folder = session_to_withdraw(session, data)
+    folder = find_session_to_withdraw(session, data)
     place = folder.path.parent
     plan = plan_withdrawal(folder)
     derived_paths = ", ".join(str(place / name) for name in plan.derived_roots)
@@ -33,7 +37,7 @@ def withdraw(
     if not yes and not typer.confirm("Erase them?", err=True):
         typer.echo("Nothing was erased.", err=True)
         return
-    copy_notes = copies_elsewhere(place, plan)
+    copy_notes = list_remaining_copies(place, plan)
     erase(place, plan, RealClock().utc())
     typer.echo(f"Erased: {', '.join(plan.sessions)}")
     if derived_paths:

@@ -16,7 +16,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from study.devices.governor.compiling import part
+from study.devices.governor.compiling import njit_inline
 
 Addresses = npt.NDArray[np.int64]
 """Addresses of C functions and objects, as 64-bit integers."""
@@ -98,7 +98,7 @@ def write_word(context: Any, address: Any, index: Any, value: Any) -> Any:
     return types.void(types.int64, types.int64, types.int64), generate_code
 
 
-@part
+@njit_inline
 def now_s(system: Addresses) -> float:
     """Monotonic time (s), bit for bit equal to `time.monotonic`."""
     if system[CLOCK] == 0:
@@ -111,7 +111,7 @@ def now_s(system: Addresses) -> float:
     return float(seconds * 1_000_000_000 + nanoseconds) / 1e9
 
 
-@part
+@njit_inline
 def sleep_until(system: Addresses, until_s: float) -> None:
     """Sleep until until_s (s, by `now_s`); resumed after interruptions by signals. To be called only where
     `system[SLEEP]` is not 0."""
@@ -124,14 +124,14 @@ def sleep_until(system: Addresses, until_s: float) -> None:
         pass
 
 
-@part
+@njit_inline
 def acquire(system: Addresses, patience_s: float) -> bool:
     """Take the lock at `system[LOCK]`. Returns False where it was not free within patience_s (s)."""
     arguments = (system[LOCK], np.int64(patience_s * 1e6), np.int32(0))
     return bool(call_int(system[ACQUIRE], arguments) == 1)
 
 
-@part
+@njit_inline
 def release(system: Addresses) -> None:
     """Release the lock at `system[LOCK]`."""
     call_int(system[RELEASE], (system[LOCK],))

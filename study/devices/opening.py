@@ -249,9 +249,9 @@ def find_accepted_baseline(info: DeviceInfo, today: date) -> tuple[str, str]:
 
 def limit_test_force_n() -> float:
     """Force with which `accept_device` pushes the handle (N)."""
-    from study.devices.force_dimension.force_limit_check import FORCE_N
+    from study.devices.force_dimension.force_limit_check import TEST_FORCE_N
 
-    return FORCE_N
+    return TEST_FORCE_N
 
 
 def accept_device(
@@ -263,8 +263,8 @@ def accept_device(
     and SHA-256 of the recording for the daily check."""
     from study.devices.force_dimension.acceptance import Acceptance, write_acceptance
     from study.devices.force_dimension.force_limit_check import (
-        COMMANDED_TO_CAP,
-        FORCE_N,
+        COMMAND_TO_CAP_RATIO,
+        TEST_FORCE_N,
         check_cap_holds,
         check_force_vanishes,
         require_testable,
@@ -272,7 +272,7 @@ def accept_device(
     from study.devices.rigs_by_name import RIGS_BY_NAME
     from study.devices.safe import SafeDevice
 
-    limits = replace(settings.limits, stimulus_cap_n=FORCE_N, total_cap_n=FORCE_N)
+    limits = replace(settings.limits, stimulus_cap_n=TEST_FORCE_N, total_cap_n=TEST_FORCE_N)
     settings = replace(settings, hand_on_handle=False, limits=limits)
     rig: Any = RIGS_BY_NAME[name](settings, 0)
     try:
@@ -284,10 +284,10 @@ def accept_device(
     finally:
         rig.close()
     today, info = clock.utc()[:10], device.info
-    test_results = FORCE_N, force_off_after_s, COMMANDED_TO_CAP * FORCE_N, largest_force_n
+    test_results = TEST_FORCE_N, force_off_after_s, COMMAND_TO_CAP_RATIO * TEST_FORCE_N, largest_force_n
     path = write_acceptance(Acceptance(info.name, info.details, operator, today, *test_results, *baseline))
     return (
-        f"{info.name}: of {COMMANDED_TO_CAP * FORCE_N:g} N that were commanded with a cap of {FORCE_N:g} N it gave "
-        f"{largest_force_n:.2g} N; a force of {FORCE_N:g} N was gone {1000 * force_off_after_s:.0f} ms after the loop; "
-        f"{path}"
+        f"{info.name}: of {COMMAND_TO_CAP_RATIO * TEST_FORCE_N:g} N that were commanded with a cap of "
+        f"{TEST_FORCE_N:g} N it gave {largest_force_n:.2g} N; a force of {TEST_FORCE_N:g} N was gone "
+        f"{1000 * force_off_after_s:.0f} ms after the loop; {path}"
     )

@@ -1,4 +1,5 @@
 """Safety layer: implements the `Device` port over any rig, compiled or driven from Python, in real or virtual time.
+Made by `study.devices.opening`, for every device that a session or a recording drives.
 
 `governor.govern` limits the force at each tick; `admission` refuses unsafe settings and stimuli before anything moves;
 `drive.virtual_drive` and `drive.realtime_drive` decide when ticks run. The limits and their reasons: docs/safety.md.
@@ -27,7 +28,7 @@ from study.devices.telemetry import Ring
 from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
 
-BLOCK_S = 0.05
+REALTIME_BLOCK_S = 0.05
 """Longest block of a compiled rig's ticks in real time, and longest keep-alive interval in `play` (s)."""
 
 VIRTUAL_BLOCK_S = 5.0
@@ -39,7 +40,7 @@ CLOSING_UNCONFIRMED = (
 )
 """Written to stderr where the device did not confirm that it was closed."""
 
-PATIENCE_S = 1.0
+STOP_TIMEOUT_S = 1.0
 """Timeout (s) after the end of all fades; a device that still moves then counts as lost."""
 
 
@@ -61,8 +62,8 @@ class SafeDevice:
         self._hand_on_handle = settings.hand_on_handle
         self._clock = clock
         self._ring = ring
-        rows = ring.rows(rig.info.sample_rate_hz) if ring is not None else None
-        self._governor = Governor(rig.info, settings, rows)
+        telemetry_rows = ring.map_rows(rig.info.sample_rate_hz) if ring is not None else None
+        self._governor = Governor(rig.info, settings, telemetry_rows)
         self._runner = self._make_runner(rig)
         self._drive = self._make_drive(clock)
         self._held_stimulus: HeldStimulus | None = None
@@ -89,7 +90,7 @@ class SafeDevice:
         """Hold a stimulus of valid shape that `hold` refuses, to test that the caps hold at each tick. Raises
         `DeviceError` with a hand on the handle."""
         if self._hand_on_handle:
-            raise _usage_error("A hand is on the handle.", "Open it without.")
+            raise _make_usage_error("A hand is on the handle.", "Open it without.")
         self._require_idle()
         self._start(lambda: self._governor.begin_hold(stimulus))
         self._held_stimulus = stimulus
@@ -116,7 +117,7 @@ class SafeDevice:
     def release(self) -> PlaybackResult:
         stimulus = self._held_stimulus
         if stimulus is None:
-            raise _usage_error("Nothing is held, so nothing can be released.", "Call hold first.")
+            raise _make_usage_error("Nothing is held, so nothing can be released.", "Call hold first.")
         self._governor.request_release()
         self._wait_until_still(stimulus.fade_out_s)
         self._held_stimulus = None
@@ -186,10 +187,10 @@ class SafeDevice:
                 continue
 
     def _wait_for_playback(self, duration_s: float, on_progress: Callable[[float], None] | None) -> None:
-        """Wait until the commands are played, at most `PATIENCE_S` longer than duration_s; send keep-alives."""
-        interval_s = min(BLOCK_S, self._limits.watchdog_s / 4)
+        """Wait until the commands are played, at most `STOP_TIMEOUT_S` longer than duration_s; send keep-alives."""
+        interval_s = min(REALTIME_BLOCK_S, self._limits.watchdog_s / 4)
         started_s = self._clock.now_s()
-        while self._governor.playing and (elapsed_s := self._clock.now_s() - started_s) < duration_s + PATIENCE_S:
+        while self._governor.playing and (elapsed_s := self._clock.now_s() - started_s) < duration_s + STOP_TIMEOUT_S:
             if on_progress is not None:
                 on_progress(min(1.0, elapsed_s / duration_s))
             self.keep_alive()
@@ -208,7 +209,7 @@ class SafeDevice:
 
     def _wait_until_still(self, fade_out_s: float) -> None:
         """Wait until no force is commanded; a device that takes too long counts as lost."""
-        timeout_s = fade_out_s + self._limits.release_s + self._limits.watchdog_s + PATIENCE_S
+        timeout_s = fade_out_s + self._limits.release_s + self._limits.watchdog_s + STOP_TIMEOUT_S
         deadline_s = self._clock.now_s() + timeout_s
         interval_s = 5 / self._info.sample_rate_hz
         while self._runner.moving:
@@ -221,18 +222,18 @@ class SafeDevice:
     def _require_idle(self) -> None:
         """Raises `DeviceError` where the device is closed, lost, stopped or holds a stimulus."""
         if self._closing:
-            raise _usage_error("The device is closed.", "Open it again.")
+            raise _make_usage_error("The device is closed.", "Open it again.")
         self._require_connected()
         if self._governor.stop_requested:
-            raise _usage_error(
+            raise _make_usage_error(
                 "The emergency stop was pressed.", "Make sure that all is well, then open the device again."
             )
         if self._held_stimulus is not None:
-            raise _playing_error()
+            raise _make_playing_error()
 
     def _start(self, begin_stimulus: Callable[[], None]) -> None:
-        """Start the ticks of a stimulus. begin_stimulus: passes it to the governor. Raises `DeviceError` for a lost
-        device, or one that still moves."""
+        """Start the ticks of a stimulus. begin_stimulus: hands the stimulus to the governor. Raises `DeviceError` for a
+        lost device, or one that still moves."""
 
         def begin_and_prepare() -> None:
             try:
@@ -245,7 +246,7 @@ class SafeDevice:
         started = self._drive.start(begin_and_prepare)
         self._require_connected()
         if not started:
-            raise _playing_error()
+            raise _make_playing_error()
 
     def _require_connected(self) -> None:
         """Raises `DeviceError` for a lost device; the message says whether its force may still be on."""
@@ -263,24 +264,28 @@ class SafeDevice:
         ) from failure
 
     def _make_runner(self, rig: Rig | CompiledRig) -> Runner:
-        virtual = self._clock.virtual
+        """Runner of the rig's ticks: in blocks for a compiled rig, tick by tick otherwise."""
+        is_virtual = self._clock.virtual
         if isinstance(rig, CompiledRig):
-            block_ticks = round((VIRTUAL_BLOCK_S if virtual else BLOCK_S) * rig.info.sample_rate_hz)
+            block_ticks = round((VIRTUAL_BLOCK_S if is_virtual else REALTIME_BLOCK_S) * rig.info.sample_rate_hz)
             return CompiledRunner(rig, self._governor, block_ticks)
-        now_s, monotonic = None if virtual else self._clock.now_s, type(self._clock) is RealClock
-        return SteppedRunner(rig, self._governor, virtual, now_s, monotonic)
+        read_time_s, is_monotonic = None if is_virtual else self._clock.now_s, type(self._clock) is RealClock
+        return SteppedRunner(rig, self._governor, is_virtual, read_time_s, is_monotonic)
 
     def _make_drive(self, clock: Clock) -> VirtualDrive | RealtimeDrive:
+        """Drive that decides when ticks run: at once in virtual time, at the sample rate in real time."""
         rate_hz = self._info.sample_rate_hz
         if isinstance(clock, VirtualClock):
             return VirtualDrive(self._runner, self._governor, clock, rate_hz)
-        first = not self._info.simulated
-        return RealtimeDrive(self._runner, self._governor, clock, rate_hz, self._limits.watchdog_s, first)
+        in_realtime_class = not self._info.simulated
+        return RealtimeDrive(self._runner, self._governor, clock, rate_hz, self._limits.watchdog_s, in_realtime_class)
 
 
-def _playing_error() -> DeviceError:
-    return _usage_error("It is still playing.", "Call release first.")
+def _make_playing_error() -> DeviceError:
+    """Error of a call that needs a device at rest, while a stimulus is held."""
+    return _make_usage_error("It is still playing.", "Call release first.")
 
 
-def _usage_error(problem: str, remedy: str) -> DeviceError:
+def _make_usage_error(problem: str, remedy: str) -> DeviceError:
+    """Error of a call that the device cannot carry out in its present state."""
     return DeviceError("The device cannot do this now", problem, remedy)

@@ -1,9 +1,10 @@
-"""Telemetry ring: the readings and forces of each tick of a device's loop, in memory that other programs can read.
+"""Telemetry ring buffer: the readings and forces of each tick of a device's loop, in memory that other programs can
+read.
 
-One writer, the loop (`governor.telemetry_row`), any number of readers. The writer never waits and knows of no reader;
-a reader that is too slow can see how many rows it lost. The ring is a file in memory (Linux: /dev/shm; elsewhere the
-folder for temporary files), made and removed by the program that opened the device, so that no file remains when the
-loop's process is killed.
+One writer, the loop (`governor.telemetry_row`), any number of readers. The writer never waits for a reader; a reader
+that is too slow counts the rows that it lost. The ring is a file in memory (Linux: /dev/shm; elsewhere the folder for
+temporary files), made and removed by the program that opened the device, so that no file remains when the loop's
+process is killed.
 
 The first row is a header: format, rate, number of rows written so far. Row k of the loop is in row 1 + k mod size, with
 its own number k and a checksum: a reader recognises by them a row that is being overwritten.
@@ -25,26 +26,26 @@ from study.devices.governor import cells
 from study.errors import StudyError
 from study.regular_file import open_regular
 
-ROWS = 16384
+RING_ROWS = 16384
 """Rows of a ring: 16 s at 1 kHz, for which a reader may pause and loses nothing."""
 
-FORMAT = 2.0
+FORMAT_VERSION = 2.0
 """Version of the rows. In version 1 the checksum was the exclusive or of the cells' bits, which does not detect equal
 changes in two cells."""
 PREFIX, SUFFIX = "hapteq-", ".ring"
 """Beginning and end of a ring's file name."""
 ROW_BYTES = 8 * cells.RING_WIDTH
 """Size of a row, of 64-bit floats."""
-ABANDONED_AFTER_S = 60.0
-"""Least age (s) of a ring without a lock that is removed: a younger one may just be made by another program. By
-hand."""
+MIN_ABANDONED_AGE_S = 60.0
+"""Least age (s) of a ring without a lock that is removed: another program may be about to lock a younger one. Chosen
+by hand."""
 
 
 class Ring:
-    """Writer's side of a ring. path: empty to make one, which `remove` removes; else the ring of another program. The
-    attribute `path` is empty where the system gave no memory: then nothing is written, and the device works without."""
+    """Writer's side of a ring. path: empty to make one of `rows` rows, which `remove` removes; else the ring of another
+    program. The attribute `path` is empty where the system gave no memory: then the device works without a ring."""
 
-    def __init__(self, path: str = "", rows: int = ROWS) -> None:
+    def __init__(self, path: str = "", rows: int = RING_ROWS) -> None:
         self.path = path
         self._descriptor: int | None = None
         if not path:
@@ -52,9 +53,9 @@ class Ring:
             with contextlib.suppress(OSError):
                 self._make(rows)
 
-    def rows(self, rate_hz: float) -> FloatArray | None:
-        """The ring for the loop, (1 + rows, RING_WIDTH), with every page in memory before the first tick needs it. None
-        where there is no ring."""
+    def map_rows(self, rate_hz: float) -> FloatArray | None:
+        """Map the ring into memory for the loop, (1 + rows, RING_WIDTH), with every page present before the first tick
+        needs it, and write the rate into its header. None where there is no ring, or it cannot be mapped."""
         if not self.path:
             return None
         try:
@@ -76,13 +77,16 @@ class Ring:
             self.path = ""
 
     def _make(self, rows: int) -> None:
+        """Make, lock and fill the ring's file; without memory for all rows, no ring is made."""
         # Kept open: as long as it is locked, the ring is in use.
-        self._descriptor, self.path = tempfile.mkstemp(SUFFIX, PREFIX, _ring_folder())
-        blank = np.zeros((1 + rows, cells.RING_WIDTH))
-        blank[0, cells.RING_FORMAT] = FORMAT
+        self._descriptor, self.path = tempfile.mkstemp(SUFFIX, PREFIX, _choose_ring_folder())
+        empty_rows = np.zeros((1 + rows, cells.RING_WIDTH))
+        empty_rows[0, cells.RING_FORMAT] = FORMAT_VERSION
         try:
             # Written, not reserved: a page that the system cannot give must fail here and not in the loop.
-            is_complete = _lock_file(self._descriptor) and Path(self.path).write_bytes(blank.tobytes()) == blank.nbytes
+            is_complete = (
+                _lock_file(self._descriptor) and Path(self.path).write_bytes(empty_rows.tobytes()) == empty_rows.nbytes
+            )
         except OSError:
             is_complete = False
         if not is_complete:
@@ -135,19 +139,19 @@ class TelemetryReader:
 
     def read(self) -> Telemetry:
         """The rows since the last call. Rows that were overwritten before are counted in `lost`."""
-        size = len(self._rows) - 1
-        count = int(self._rows[0, cells.RING_COUNT])
-        first = max(self._next_row, count - size)
-        row_numbers = np.arange(first, count)
-        rows = self._rows[1 + row_numbers % size]  # a copy
+        ring_rows = len(self._rows) - 1
+        end_row = int(self._rows[0, cells.RING_COUNT])
+        first_row = max(self._next_row, end_row - ring_rows)
+        row_numbers = np.arange(first_row, end_row)
+        rows = self._rows[1 + row_numbers % ring_rows]  # a copy
         intact = _is_consistent(rows) & (rows[:, cells.RING_INDEX] == row_numbers)
         # An inconsistent row was overwritten meanwhile, and is lost, or is being written, and is left to the next call.
-        too_new = row_numbers[~intact & (row_numbers > int(self._rows[0, cells.RING_COUNT]) - size)]
-        if len(too_new):
-            count = int(too_new[0])
-        readable = intact & (row_numbers < count)
-        self.lost += count - self._next_row - int(np.count_nonzero(readable))
-        self._next_row = count
+        unfinished_rows = row_numbers[~intact & (row_numbers > int(self._rows[0, cells.RING_COUNT]) - ring_rows)]
+        if len(unfinished_rows):
+            end_row = int(unfinished_rows[0])
+        readable = intact & (row_numbers < end_row)
+        self.lost += end_row - self._next_row - int(np.count_nonzero(readable))
+        self._next_row = end_row
         return _make_telemetry(rows[readable])
 
 
@@ -155,24 +159,27 @@ def _is_consistent(rows: FloatArray) -> np.ndarray:
     """Mask (n,) of the rows whose checksum is right: sum of (bits ^ (bits >> RING_FOLD)) RING_FACTORS over the cells,
     modulo 2^64."""
     bits = rows.view(np.int64)
-    checked = bits[:, : cells.RING_CHECK]
-    checks = np.sum((checked ^ (checked >> cells.RING_FOLD)) * cells.RING_FACTORS, axis=1)
-    consistent: np.ndarray = checks == bits[:, cells.RING_CHECK]
+    checked_bits = bits[:, : cells.RING_CHECK]
+    checksums = np.sum((checked_bits ^ (checked_bits >> cells.RING_FOLD)) * cells.RING_FACTORS, axis=1)
+    consistent: np.ndarray = checksums == bits[:, cells.RING_CHECK]
     return consistent
 
 
 def _make_telemetry(rows: FloatArray) -> Telemetry:
-    def vector(first: int) -> FloatArray:
-        return rows[:, first : first + 3]
+    """Readings and forces of the rows (n, RING_WIDTH)."""
+
+    def select_vector(first_column: int) -> FloatArray:
+        """Three columns from this one on, (n, 3)."""
+        return rows[:, first_column : first_column + 3]
 
     return Telemetry(
         time_s=rows[:, cells.RING_TIME_S],
         tick=rows[:, cells.RING_TICK],
-        position_m=vector(cells.RING_POSITION),
-        velocity_m_per_s=vector(cells.RING_VELOCITY),
-        acceleration_mps2=vector(cells.RING_ACCELERATION),
-        commanded_n=vector(cells.RING_COMMANDED),
-        applied_n=vector(cells.RING_APPLIED),
+        position_m=select_vector(cells.RING_POSITION),
+        velocity_m_per_s=select_vector(cells.RING_VELOCITY),
+        acceleration_mps2=select_vector(cells.RING_ACCELERATION),
+        commanded_n=select_vector(cells.RING_COMMANDED),
+        applied_n=select_vector(cells.RING_APPLIED),
         phase=rows[:, cells.RING_PHASE],
         fault=rows[:, cells.RING_FAULT],
         missed=rows[:, cells.RING_MISSED],
@@ -188,14 +195,15 @@ def _map_rows(path: Path, access: int) -> FloatArray:
     if len(memory) < 2 * ROW_BYTES or len(memory) % ROW_BYTES:
         raise ValueError("it is no telemetry ring")
     rows = np.frombuffer(memory, dtype=np.float64).reshape(-1, cells.RING_WIDTH)
-    if rows[0, cells.RING_FORMAT] != FORMAT:
+    if rows[0, cells.RING_FORMAT] != FORMAT_VERSION:
         raise ValueError("it is a telemetry ring of another version")
     return rows
 
 
-def _ring_folder() -> str:
-    memory = Path("/dev/shm")
-    return str(memory) if memory.is_dir() else tempfile.gettempdir()
+def _choose_ring_folder() -> str:
+    """Folder of the rings: /dev/shm where it exists, else the folder for temporary files."""
+    memory_folder = Path("/dev/shm")
+    return str(memory_folder) if memory_folder.is_dir() else tempfile.gettempdir()
 
 
 def _lock_file(descriptor: int) -> bool:
@@ -216,14 +224,14 @@ def _remove_abandoned_rings() -> None:
     no lock, they remain."""
     if sys.platform == "win32":
         return
-    for path in Path(_ring_folder()).glob(f"{PREFIX}*{SUFFIX}"):
+    for path in Path(_choose_ring_folder()).glob(f"{PREFIX}*{SUFFIX}"):
         with contextlib.suppress(OSError):
             descriptor = os.open(path, os.O_RDWR | os.O_NOFOLLOW)
             try:
                 has_same_owner = os.fstat(descriptor).st_uid == os.getuid()
                 if (
                     has_same_owner
-                    and time.time() - os.fstat(descriptor).st_mtime > ABANDONED_AFTER_S
+                    and time.time() - os.fstat(descriptor).st_mtime > MIN_ABANDONED_AGE_S
                     and _lock_file(descriptor)
                 ):
                     path.unlink()

@@ -27,7 +27,7 @@ class Logger:
     def line(self, text: str) -> Value:
         """Values (n,) of an expression. Raises ImportProblemError for another shape, or a length other than that of the
         stamps."""
-        values = self.names.value_of(text, self.base)
+        values = self.names.compute_value(text, self.base)
         if values.ndim != 1:
             raise ImportProblemError(f"clock '{self.clock.name}': {text} has the shape {values.shape}, not one row")
         if self.base.stamps_s is not None and len(values) != len(self.base.stamps_s):
@@ -62,8 +62,8 @@ def _align_by_correlation(first: Logger, logger: Logger) -> tuple[float, str]:
     """Offset (s) from the cross-correlation of one motion on both clocks, and how it was found, in words. Raises
     ImportProblemError."""
     clock = logger.clock
-    reference = first.base.samples(first.line(clock.align_to))
-    aligned = logger.base.samples(logger.line(clock.align))
+    reference = first.base.make_samples(first.line(clock.align_to))
+    aligned = logger.base.make_samples(logger.line(clock.align))
     try:
         match = offset_by_correlation(reference, aligned, clock.offset_s, clock.align_within_s)
     except ValueError as error:

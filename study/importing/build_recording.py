@@ -2,7 +2,7 @@
 
 For each part (one file, or one run in it): arrays are read, the clocks of its loggers aligned, and its channels put
 onto one time grid (`part_signals`). The parts are then concatenated and converted to SI units, and segments are found
-if the map states none.
+if the map states none. Called by `study.workflows.recording.import_recording` and `diagnose_real`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -13,23 +13,23 @@ from typing import Any
 import numpy as np
 
 from analysis.diagnosis.data.find_segments import find_segments
-from analysis.look.clock import rate_objection
+from analysis.look.clock import describe_implausible_rate
 from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.recording_checks import check_recording
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, parse_unit, quantity_of
+from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, find_quantity, parse_unit
 from study.importing.alignment import Logger, align_signals
 from study.importing.arrays.arrays import Arrays, read_arrays
 from study.importing.expressions.budget import Budget
-from study.importing.expressions.namespace import namespace_of
+from study.importing.expressions.namespace import make_namespace
 from study.importing.map_format.import_map import ChannelMap, ComputedMap, ImportMap
 from study.importing.map_format.map_errors import ImportProblemError, ImportRefusedError
-from study.importing.map_format.map_files import PartFiles, part_files
+from study.importing.map_format.map_files import PartFiles, assign_files
 from study.importing.map_format.map_segments import place_segments
 from study.importing.part_signals import Key, PartSignals, part_signals
-from study.importing.time_base import NUMBERED_HZ, drop_doubled_rows, time_base
+from study.importing.time_base import NUMBERED_HZ, drop_doubled_rows, make_time_base
 
-_MAX_PARTS_NAMED = 3
+_MAX_LISTED_PARTS = 3
 """Most parts that a sentence names."""
 
 
@@ -45,19 +45,19 @@ class ImportNotes:
         if part not in parts:  # channels of the same name, with several roles
             parts.append(part)
 
-    def sentences(self, every_part: Sequence[str]) -> tuple[str, ...]:
+    def list_sentences(self, all_parts: Sequence[str]) -> tuple[str, ...]:
         """All sentences; a sentence that does not hold for all parts begins with its parts. every_part: labels of all
         parts."""
         return tuple(
-            sentence if len(parts) == len(every_part) else f"{_abbreviate_list(parts)}: {sentence}"
+            sentence if len(parts) == len(all_parts) else f"{_abbreviate_list(parts)}: {sentence}"
             for sentence, parts in self._parts.items()
         )
 
 
 def _abbreviate_list(parts: Sequence[str]) -> str:
     """The first parts, and the number of further ones."""
-    text = ", ".join(parts[:_MAX_PARTS_NAMED])
-    return text + (f" and {len(parts) - _MAX_PARTS_NAMED} more" if len(parts) > _MAX_PARTS_NAMED else "")
+    text = ", ".join(parts[:_MAX_LISTED_PARTS])
+    return text + (f" and {len(parts) - _MAX_LISTED_PARTS} more" if len(parts) > _MAX_LISTED_PARTS else "")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,25 +86,26 @@ def build_recording(
     import_notes = ImportNotes()
     try:
         units = _parse_units(import_map)
-        planned_parts = part_files(import_map, files)
-        steps = len(planned_parts) * (len(import_map.channel) + len(import_map.computed))
+        planned_parts = assign_files(import_map, files)
+        step_count = len(planned_parts) * (len(import_map.channel) + len(import_map.computed))
         parts = []
         budget = Budget()
         for number, part in enumerate(planned_parts):
-            counter = _Counter(number * steps / len(planned_parts), steps, on_progress)
+            counter = _ProgressCounter(number * step_count / len(planned_parts), step_count, on_progress)
             parts.append(_build_part(import_map, part, import_notes, counter, budget))
         recording, repeats = find_segments(_concatenate(import_map, parts, units))
     except ImportProblemError as error:
         raise ImportRefusedError(subject, str(error)) from error
     if problems := check_recording(recording):
         raise ImportRefusedError(subject, "; ".join(problems))
-    notes = import_notes.sentences([part.label for part in planned_parts])
+    notes = import_notes.list_sentences([part.label for part in planned_parts])
     return BuiltRecording(
-        recording, (*notes, *_unit_remark(import_map), *filter(None, (_rate_remark(recording), repeats)))
+        recording,
+        (*notes, *_list_unit_remarks(import_map), *filter(None, (_describe_rate_problem(recording), repeats))),
     )
 
 
-class _Counter:
+class _ProgressCounter:
     """Progress: channels done, out of those of all parts."""
 
     def __init__(self, done: float, steps: int, on_progress: Callable[[float], None]) -> None:
@@ -113,12 +114,13 @@ class _Counter:
         self.on_progress = on_progress
 
     def step(self) -> None:
+        """Count a channel as done, and report the fraction of all."""
         self.done += 1
         self.on_progress(min(1.0, self.done / self.steps))
 
 
 def _build_part(
-    import_map: ImportMap, files: PartFiles, import_notes: ImportNotes, counter: _Counter, budget: Budget
+    import_map: ImportMap, files: PartFiles, import_notes: ImportNotes, counter: _ProgressCounter, budget: Budget
 ) -> _Part:
     """Read one part, and put its channels onto its time grid. Raises ImportProblemError, ImportRefusedError,
     CannotReadError."""
@@ -128,10 +130,12 @@ def _build_part(
     for clock in import_map.clock:
         path = files.by_clock[clock.name]
         arrays_by_path[path] = arrays_by_path.get(path) or read_arrays(path, import_map.csv)
-        namespace = namespace_of(arrays_by_path[path], {**import_map.let, **files.part.let}, files.part.prefix, budget)
+        namespace = make_namespace(
+            arrays_by_path[path], {**import_map.let, **files.part.let}, files.part.prefix, budget
+        )
         names, remark = drop_doubled_rows(clock, namespace)
         notes += [remark] if remark else []
-        loggers.append(Logger(clock, names, time_base(clock, names)))
+        loggers.append(Logger(clock, names, make_time_base(clock, names)))
 
     def report(sentence: str) -> None:
         import_notes.add(files.label, sentence)
@@ -140,7 +144,7 @@ def _build_part(
         report(note)
     aligned = align_signals(tuple(loggers), report)
     signals = part_signals(import_map, files.part, aligned, report, counter.step)
-    numbers = {name: aligned[0].names.number(text) for name, text in import_map.numbers.items()}
+    numbers = {name: aligned[0].names.compute_number(text) for name, text in import_map.numbers.items()}
     facts = {"file": files.file.name, "prefix": files.part.prefix, "clock_start_s": signals.grid.start_s, **numbers}
     offsets = {logger.clock.name: logger.base.offset_s for logger in aligned[1:]}
     return _Part(signals, {**facts, **({"clock_offsets_s": offsets} if offsets else {})})
@@ -171,10 +175,10 @@ def _parse_channel_unit(channel: ChannelMap | ComputedMap) -> _ChannelUnit:
         check_quantity(channel.quantity, unit)
     except UnknownUnitError as error:
         raise ImportProblemError(f"channel '{channel.name}': {error}") from error
-    return _ChannelUnit(unit.si, unit.factor, unit.offset, channel.quantity or quantity_of(unit.si))
+    return _ChannelUnit(unit.si, unit.factor, unit.offset, channel.quantity or find_quantity(unit.si))
 
 
-def _unit_remark(import_map: ImportMap) -> Iterator[str]:
+def _list_unit_remarks(import_map: ImportMap) -> Iterator[str]:
     """Remarks on what cannot be verified: units of computed channels, channels without a unit, an unknown time."""
     for computed in (entry for entry in import_map.computed if entry.role != "helper"):
         yield f"Computed: {computed.role} '{computed.name}' = {computed.value}, in {computed.unit.strip() or UNSTATED}."
@@ -196,7 +200,7 @@ def _concatenate(import_map: ImportMap, parts: Sequence[_Part], units: dict[Key,
     response = _join_signal("response", import_map, parts, units)
     if command is None or response is None:
         raise ImportProblemError("a recording needs both a command and a response")
-    facts, segments = _facts_and_segments(import_map, parts, units)
+    facts, segments = _collect_facts_and_segments(import_map, parts, units)
     return Recording(
         device=import_map.device,
         command=command,
@@ -206,16 +210,16 @@ def _concatenate(import_map: ImportMap, parts: Sequence[_Part], units: dict[Key,
         condition=_join_signal("condition", import_map, parts, units),
         hold=Hold(import_map.hold),
         segments=segments,
-        meta={**import_map.meta, **_time_facts(import_map), "title": import_map.title, "parts": facts},
+        meta={**import_map.meta, **_describe_time_origin(import_map), "title": import_map.title, "parts": facts},
     )
 
 
-def _rate_remark(recording: Recording) -> str:
+def _describe_rate_problem(recording: Recording) -> str:
     """A sentence on an implausible sample rate; empty for a plausible or unknown one."""
-    return "" if recording.meta.get("time") == "unknown" else rate_objection(recording.sample_rate_hz)
+    return "" if recording.meta.get("time") == "unknown" else describe_implausible_rate(recording.sample_rate_hz)
 
 
-def _time_facts(import_map: ImportMap) -> dict[str, str]:
+def _describe_time_origin(import_map: ImportMap) -> dict[str, str]:
     """Origin of the times, for the metadata: `unknown`, `stamps`, or nothing for a stated rate."""
     if any(clock.unknown for clock in import_map.clock):
         return {"time": "unknown"}
@@ -255,7 +259,7 @@ def _join_signal(
     )
 
 
-def _facts_and_segments(
+def _collect_facts_and_segments(
     import_map: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]
 ) -> tuple[list[dict[str, Any]], tuple[Segment, ...]]:
     """Facts of each part with its range of samples, and segments of all parts by samples of the recording. Amplitudes

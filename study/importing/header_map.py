@@ -1,8 +1,8 @@
 """Make a map from the header of a table, or from names of arrays of equal length, that state quantities and units, as
 in `time [s], force [N], displacement_mm`.
 
-`header_problems` lists what the names leave open; without problems, `header_map` makes the map and `header_notes`
-reports the choices.
+`find_header_problems` lists what the names leave open; without problems, `make_header_map` makes the map and
+`describe_header_choices` reports the choices. Called by `import_recording` and `map_library`.
 """
 
 import re
@@ -13,7 +13,7 @@ from pathlib import Path
 from study.importing.arrays.array_groups import groups_in
 from study.importing.arrays.arrays import MEND, WORKBOOKS, Array, Arrays, read_arrays, unread_reason
 from study.importing.arrays.csv_arrays import FaultyColumn
-from study.importing.arrays.mat_arrays import conversion_advice
+from study.importing.arrays.mat_arrays import suggest_conversion
 from study.importing.imposed_roles import IMPOSED_REMARK, NOT_IMPOSED_REMARK, swap_imposed_roles
 from study.importing.map_format.import_map import ChannelMap, ClockMap, CsvMap, ImportMap, PartMap
 from study.importing.map_format.map_errors import ImportRefusedError
@@ -29,17 +29,17 @@ from study.importing.map_format.signal_words import (
     split_unit_at_end,
     strip_units,
 )
-from study.importing.surplus_arrays import CLOCK_WORDS, LEAST_SAMPLES, rates_in, surplus_arrays
+from study.importing.surplus_arrays import CLOCK_WORDS, LEAST_SAMPLES, find_rates, find_surplus_arrays
 
-_TIME = re.compile(
+_TIME_NAME = re.compile(
     rf"((elapsed|running|test|total|relative|absolute|system|sample)[ _]?)?({'|'.join(sorted(CLOCK_WORDS))}|time stamp)"
     r"(_?(s|ms|us))?",
     re.IGNORECASE,
 )
 """Name of a time column, with or without a unit."""
-_NUMBER = re.compile(r"\d+")
+_NUMBER_PATTERN = re.compile(r"\d+")
 """A number in a prefix: prefixes that differ only by their numbers are runs of one measurement."""
-_MAX_NAMED = 3
+_MAX_LISTED_NAMES = 3
 """Most names that a message lists."""
 
 
@@ -62,13 +62,15 @@ def _find_fault(array: Array) -> str:
     return reason if isinstance(reason, FaultyColumn) else ""
 
 
-def header_map(arrays: Arrays) -> ImportMap | None:
-    """The map; None where `header_problems` lists any problem."""
-    if header_problems(arrays):
+def make_header_map(arrays: Arrays) -> ImportMap | None:
+    """Make the import map from the names; None where `find_header_problems` lists any problem."""
+    if find_header_problems(arrays):
         return None
     table, prefixes = _select_table(arrays)
     times, columns = _split_columns(table)
-    clock = ClockMap(time=times[0].header, time_unit=times[0].unit) if times else ClockMap(rate=_find_rates(arrays)[0])
+    clock = (
+        ClockMap(time=times[0].header, time_unit=times[0].unit) if times else ClockMap(rate=_select_rates(arrays)[0])
+    )
     roles = swap_imposed_roles(columns, table.by_name, assign_roles(columns) or ())
     channels = tuple(
         ChannelMap(
@@ -85,32 +87,36 @@ def header_map(arrays: Arrays) -> ImportMap | None:
     return ImportMap(channel=channels, device="unknown", title=arrays.path.stem, clock=(clock,), part=parts)
 
 
-def header_notes(arrays: Arrays, import_map: ImportMap) -> tuple[str, ...]:
+def describe_header_choices(arrays: Arrays, import_map: ImportMap) -> tuple[str, ...]:
     """Sentences about what was taken from the header, what was left out, and what the names leave open."""
     table, _ = _select_table(arrays)
-    text = ", ".join(f"{channel.name} as {channel.role}" for channel in import_map.channel)
+    channels_text = ", ".join(f"{channel.name} as {channel.role}" for channel in import_map.channel)
     parts = ", ".join(f"'{part.prefix.rstrip('/_')}'" for part in import_map.part)
     notes = [f"Put one after another, as parts of one recording: {parts}."] if parts else []
-    omissions = [f"Left out: '{name}' {reason}." for name, reason in surplus_arrays(table).items()]
-    rate = rates_in(arrays).get(import_map.clock[0].rate, "")
-    notes += [f"The sample rate is taken from '{rate}'."] if rate else []
+    omissions = [f"Left out: '{name}' {reason}." for name, reason in find_surplus_arrays(table).items()]
+    rate_name = find_rates(arrays).get(import_map.clock[0].rate, "")
+    notes += [f"The sample rate is taken from '{rate_name}'."] if rate_name else []
     single_values = [
         name
         for name, array in arrays.by_name.items()
-        if not array.ndim and name != rate and not _find_fault(array)  # a faulty column has a separate remark
+        if not array.ndim and name != rate_name and not _find_fault(array)  # a faulty column has a separate remark
     ]
     omissions += [f"Left out: '{name}' is no column." for name in single_values]
-    peaks = [f"'{channel.value}'" for channel in import_map.channel if is_peak_value(_text_in_brackets(channel.value))]
-    notes += [f"Rms or peak values by their unit, kept as they are: {', '.join(peaks)}."] if peaks else []
-    return (f"Taken from the header: {text}.", *notes, *omissions, *_direction_notes(table, import_map))
+    peak_channels = [
+        f"'{channel.value}'" for channel in import_map.channel if is_peak_value(_extract_bracketed_unit(channel.value))
+    ]
+    notes += (
+        [f"Rms or peak values by their unit, kept as they are: {', '.join(peak_channels)}."] if peak_channels else []
+    )
+    return (f"Taken from the header: {channels_text}.", *notes, *omissions, *_describe_direction(table, import_map))
 
 
-def _text_in_brackets(header: str) -> str:
+def _extract_bracketed_unit(header: str) -> str:
     """Unit in the brackets of a header, as in the file."""
     return header.partition("[")[2].removesuffix("]") or header.partition("(")[2].removesuffix(")")
 
 
-def _direction_notes(table: Arrays, import_map: ImportMap) -> tuple[str, ...]:
+def _describe_direction(table: Arrays, import_map: ImportMap) -> tuple[str, ...]:
     """A sentence where names leave open whether the force or the motion was commanded."""
     _, columns = _split_columns(table)
     roles = {channel.value: channel.role for channel in import_map.channel}
@@ -126,28 +132,28 @@ def _select_table(arrays: Arrays) -> tuple[Arrays, tuple[str, ...]]:
     of the first, and the prefixes of all."""
     columns = {name: array for name, array in arrays.by_name.items() if array.ndim}
     groups = groups_in(columns, LEAST_SAMPLES)
-    members = len(groups.prefixes) * len(groups.names)
-    if members != len(columns) or not all(prefix.endswith(("/", "__")) for prefix in groups.prefixes):
+    member_count = len(groups.prefixes) * len(groups.names)
+    if member_count != len(columns) or not all(prefix.endswith(("/", "__")) for prefix in groups.prefixes):
         return Arrays(arrays.path, columns, arrays.clocks), ()
-    first = {name: columns[full] for name, full in groups.names.items()}
-    clocks = tuple(name for name, full in groups.names.items() if full in arrays.clocks)
-    return Arrays(arrays.path, first, clocks), groups.prefixes
+    first_table = {name: columns[full_name] for name, full_name in groups.names.items()}
+    clocks = tuple(name for name, full_name in groups.names.items() if full_name in arrays.clocks)
+    return Arrays(arrays.path, first_table, clocks), groups.prefixes
 
 
-def header_problems(arrays: Arrays) -> tuple[str, ...]:
-    """What the names leave open, as clauses that name the column; empty if `header_map` gives a map."""
+def find_header_problems(arrays: Arrays) -> tuple[str, ...]:
+    """What the names leave open, as clauses that name the column; empty if `make_header_map` makes a map."""
     if not any(array.dtype.kind in "fiub" and array.ndim for array in arrays.by_name.values()):
         reasons = {name: kind for name, array in arrays.by_name.items() if (kind := unread_reason(array))}
         kinds = ", ".join(f"'{name}' is {kind}" for name, kind in reasons.items())
-        advice = [text for name, kind in reasons.items() if (text := conversion_advice(name, kind))][:1]
+        advice = [text for name, kind in reasons.items() if (text := suggest_conversion(name, kind))][:1]
         return ("; ".join((f"it holds no arrays of numbers{f' ({kinds})' if kinds else ''}", *advice)),)
     table, prefixes = _select_table(arrays)
-    if len({_NUMBER.sub("", prefix) for prefix in prefixes}) > 1:
-        names = " and ".join(f"'{prefix.rstrip('/_')}'" for prefix in prefixes[:_MAX_NAMED])
-        sheet = ", or name its sheet, as in sheet = ... under [csv]" if arrays.path.suffix in WORKBOOKS else ""
+    if len({_NUMBER_PATTERN.sub("", prefix) for prefix in prefixes}) > 1:
+        names = " and ".join(f"'{prefix.rstrip('/_')}'" for prefix in prefixes[:_MAX_LISTED_NAMES])
+        sheet_advice = ", or name its sheet, as in sheet = ... under [csv]" if arrays.path.suffix in WORKBOOKS else ""
         return (
             f"its {len(prefixes)} parts are alike ({names}), but not numbered as repeats are: keep the [[part]] of one "
-            f"in the map{sheet}",
+            f"in the map{sheet_advice}",
         )
     if len({array.shape for array in table.by_name.values()}) != 1:
         return ("its arrays have several lengths",)
@@ -167,8 +173,8 @@ def header_problems(arrays: Arrays) -> tuple[str, ...]:
 
 
 def _split_columns(arrays: Arrays) -> tuple[list[ParsedName], list[ParsedName]]:
-    """Time columns with a unit, and all others. Arrays that `surplus_arrays` finds are left out."""
-    surplus = surplus_arrays(arrays)
+    """Time columns with a unit, and all others. Arrays that `find_surplus_arrays` finds are left out."""
+    surplus = find_surplus_arrays(arrays)
     columns = [parse_signal_name(header) for header in arrays.by_name if header not in surplus]
     times = [
         column
@@ -180,12 +186,12 @@ def _split_columns(arrays: Arrays) -> tuple[list[ParsedName], list[ParsedName]]:
 
 def _is_time(column: ParsedName) -> bool:
     """Whether a column is named as a time, with or without a unit."""
-    return bool(_TIME.fullmatch(column.name) or _TIME.fullmatch(split_unit_at_end(column.name)[0]))
+    return bool(_TIME_NAME.fullmatch(column.name) or _TIME_NAME.fullmatch(split_unit_at_end(column.name)[0]))
 
 
-def _find_rates(arrays: Arrays) -> list[str]:
+def _select_rates(arrays: Arrays) -> list[str]:
     """Expressions for the sample rate (Hz): single numbers in hertz, or else the inverse of a step in seconds."""
-    rate_names = rates_in(arrays)
+    rate_names = find_rates(arrays)
     units = {rate: split_bracketed_unit(name)[1] or split_unit_at_end(name)[1] for rate, name in rate_names.items()}
     rates = [rate for rate, name in rate_names.items() if rate == name and units[rate] == "Hz"]
     return rates or [rate for rate, name in rate_names.items() if rate != name and units[rate] == "s"]
@@ -193,7 +199,7 @@ def _find_rates(arrays: Arrays) -> list[str]:
 
 def _find_time_problems(times: Sequence[ParsedName], columns: Sequence[ParsedName], arrays: Arrays) -> Iterator[str]:
     """A clause where time column, unit of the time, or sample rate are missing or ambiguous."""
-    rate_names, rates = rates_in(arrays), _find_rates(arrays)
+    rate_names, rates = find_rates(arrays), _select_rates(arrays)
     unitless = [column.header for column in columns if _is_time(column)]
     if len(times) > 1:
         yield f"which of {' and '.join(repr(column.header) for column in times)} is the time is ambiguous"

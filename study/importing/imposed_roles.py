@@ -1,6 +1,7 @@
-"""Decide which of force and position was commanded, where names leave it open, by a test for imposed motions.
+"""Roles (command or response) of forces and positions in a data file whose column names do not state them.
 
-A motion that follows ramps or sines, while the force does not, was imposed (`analysis.look.imposed_motion`).
+A motion that follows ramps or sines, while the force does not, was imposed and is the command
+(`analysis.look.imposed_motion`). `header_map` and `map_skeleton` call this when they propose a map for an import.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,36 +17,40 @@ IMPOSED_REMARK = (
     "force does not. If the force was commanded, import by a map with the roles the other way round: role = "
     '"command" for the force, role = "response" for the motion'
 )
-"""Remark where the test finds that the motion was imposed."""
+"""Remark in the import's report if the test finds that the motion was imposed."""
 NOT_IMPOSED_REMARK = (
     "The force is taken for the command. If the motion was imposed and the force was measured, as on a testing "
     'machine, import by a map with the roles the other way round: role = "command" for the motion, role = "response" '
     "for the force"
 )
-"""Remark where the test does not find an imposed motion."""
+"""Remark in the import's report if the test does not find an imposed motion."""
 _ROLE_IF_IMPOSED: dict[str, SignalRole] = {"command": "response", "response": "command", "position": "command"}
-"""Role of a signal where the motion was imposed, by its role where the force is the command."""
+"""Role of a signal if the motion was imposed, by its proposed role, which assumes that the force is the command."""
 
 Role = SignalRole | Literal[""]
-"""Role of a signal; empty: not known yet."""
+"""Role of a signal; an empty text means that it is not known yet."""
 
 
 def swap_imposed_roles(
-    columns: Sequence[ParsedName], by_name: Mapping[str, Array], roles: Sequence[Role]
+    columns: Sequence[ParsedName], arrays_by_header: Mapping[str, Array], roles: Sequence[Role]
 ) -> list[Role]:
-    """The roles; where the data show that each motion was imposed, motions become commands and forces responses. roles:
-    one per column. by_name: arrays by header; roles are unchanged unless the arrays are one-dimensional and of equal
-    length."""
+    """Return the roles (one per column), changed to motion = command and force = response if the data show that every
+    motion was imposed.
+
+    columns: the parsed headers. arrays_by_header: data by column header. roles: the proposed roles, in the order of
+    `columns`; they are returned unchanged if the headers exclude an imposed motion (`may_be_imposed_motion`), if the
+    arrays are not one-dimensional and of equal length, or if a motion does not pass the test against each force.
+    """
     unchanged = list(roles)
     if not may_be_imposed_motion(columns):
         return unchanged
     forces = [column for column in columns if column.quantity in ("force", "torque")]
     positions = [column for column in columns if column.quantity in ("position", "angle")]
-    arrays = [by_name[column.header] for column in (*forces, *positions)]
+    arrays = [arrays_by_header[column.header] for column in (*forces, *positions)]
     if len({array.shape for array in arrays}) > 1 or arrays[0].ndim != 1:
         return unchanged
     if not all(
-        is_imposed(by_name[position.header].astype(float), by_name[force.header].astype(float))
+        is_imposed(arrays_by_header[position.header].astype(float), arrays_by_header[force.header].astype(float))
         for position in positions
         for force in forces
     ):

@@ -15,13 +15,13 @@ from study.errors import StudyError, WrongUseError
 from study.importing.arrays.arrays import read_arrays
 from study.importing.expressions.budget import Budget
 from study.importing.expressions.expression import find_names
-from study.importing.expressions.namespace import namespace_of
-from study.importing.header_map import header_map, header_problems, read_without_map
+from study.importing.expressions.namespace import make_namespace
+from study.importing.header_map import find_header_problems, make_header_map, read_without_map
 from study.importing.map_format.import_map import ImportMap
 from study.importing.map_format.map_errors import NOTHING_WRITTEN, ImportProblemError, MapNeededError, suggestion
-from study.importing.map_format.map_files import part_files
+from study.importing.map_format.map_files import assign_files
 from study.importing.map_format.map_toml import KIND, is_map, parse_map
-from study.importing.map_skeleton import map_skeleton
+from study.importing.map_skeleton import make_map_skeleton
 from study.store.disk.hdf5_file import is_hdf5, read_format
 from study.store.disk.text_file import read_toml_text
 from study.store.formats.recording_layout import FORMAT
@@ -128,9 +128,11 @@ def map_by_header(folder: Path) -> FoundMap:
             "Give the files that belong together, in their order; or a map with --map.",
         )
     arrays = read_without_map(data[0])
-    import_map = header_map(arrays)
+    import_map = make_header_map(arrays)
     if import_map is None:
-        raise MapNeededError(folder.name, f"{no_map_text}; {'; '.join(header_problems(arrays))}", map_skeleton(arrays))
+        raise MapNeededError(
+            folder.name, f"{no_map_text}; {'; '.join(find_header_problems(arrays))}", make_map_skeleton(arrays)
+        )
     return FoundMap(MapFile(folder.name, import_map, "", folder), tuple(data))
 
 
@@ -169,11 +171,11 @@ def _fits(found_map: FoundMap) -> bool:
     """Whether the first part of a recording has all arrays that the map names."""
     import_map = found_map.source.map
     try:
-        part = part_files(import_map, found_map.files)[0]
+        part = assign_files(import_map, found_map.files)[0]
         definitions = {**import_map.let, **part.part.let}
         budget = Budget()
         namespaces = {
-            clock: namespace_of(read_arrays(path, import_map.csv), definitions, part.part.prefix, budget)
+            clock: make_namespace(read_arrays(path, import_map.csv), definitions, part.part.prefix, budget)
             for clock, path in part.by_clock.items()
         }
         first = import_map.clock[0].name

@@ -1,7 +1,7 @@
 """Make an incomplete map for a file of which only the arrays are known, to be completed by the owner of the file.
 
 Clocks, channels and runs are proposed from names, units, shapes and data. What is not known is left empty or described
-in a comment.
+in a comment. Called by `import_recording` and `map_library` where a map is missing.
 """
 
 import json
@@ -14,7 +14,7 @@ from textwrap import wrap
 from study.importing.arrays.array_groups import Groups, groups_in
 from study.importing.arrays.arrays import Array, Arrays, unread_reason
 from study.importing.arrays.csv_arrays import FaultyColumn
-from study.importing.arrays.mat_arrays import OF_CELL, conversion_advice
+from study.importing.arrays.mat_arrays import CELL_ENTRY_PREFIX, suggest_conversion
 from study.importing.imposed_roles import IMPOSED_REMARK, NOT_IMPOSED_REMARK, swap_imposed_roles
 from study.importing.map_format.signal_words import (
     may_be_imposed_motion,
@@ -24,17 +24,17 @@ from study.importing.map_format.signal_words import (
 )
 from study.importing.surplus_arrays import (
     LEAST_SAMPLES,
-    equal_clocks,
+    find_equal_clocks,
+    find_rates,
+    find_surplus_arrays,
+    has_time_line,
     is_growing_time,
-    quote,
-    rates_in,
-    surplus_arrays,
-    time_in_table,
+    quote_name,
 )
 
-_FORCES = ("force", "torque")
+_FORCE_QUANTITIES = ("force", "torque")
 """Quantities of forces: in rotation, torques."""
-_MAX_NAMED = 4
+_MAX_LISTED_RUNS = 4
 """Most further runs that a comment of the skeleton names; dots stand for the rest."""
 _ROLE_SUFFIX = re.compile(r"(?i)_(test|tst|train|trn|est|estimation|fit|val|vad|valid|validation)(?=_|$)")
 """Parts of a name that state the role of the data, as in `u_test`."""
@@ -42,7 +42,7 @@ _TIME_UNITS = ("s", "ms", "us", "min")
 """Units of time stamps, by the last part of a name."""
 
 
-def map_skeleton(arrays: Arrays) -> str:
+def make_map_skeleton(arrays: Arrays) -> str:
     """The map as TOML text. Unknown values are empty texts, which an import refuses with the name of the key."""
     return "\n".join(_write_lines(arrays)) + "\n"
 
@@ -50,34 +50,39 @@ def map_skeleton(arrays: Arrays) -> str:
 def _write_lines(all_arrays: Arrays) -> Iterator[str]:
     """Lines of the map: head, clocks, channels, parts, segment."""
     groups = groups_in(all_arrays.by_name, LEAST_SAMPLES)
-    ungrouped = _find_ungrouped_runs(all_arrays, groups)
-    arrays = _first_run(all_arrays, groups, ungrouped)
-    surplus = surplus_arrays(arrays)
+    ungrouped_names = _find_ungrouped_runs(all_arrays, groups)
+    arrays = _select_first_run(all_arrays, groups, ungrouped_names)
+    surplus = find_surplus_arrays(arrays)
     all_clocks = [
         name for name, array in arrays.by_name.items() if name in arrays.clocks or is_growing_time(name, array)
     ]
     clocks = [name for name in all_clocks if name not in surplus]
-    roles = _roles(arrays, [*all_clocks, *surplus])
+    roles = _propose_array_roles(arrays, [*all_clocks, *surplus])
     yield f"# A map for {arrays.name}. Keys and examples: docs/importing.md."
     yield 'device = ""               # what was recorded'
     yield 'hold = "zero-order"       # how the command moves between samples: zero-order, band-limited, linear'
-    yield from _clocks(arrays, clocks)
-    yield from _direction(roles)
+    yield from _write_clocks(arrays, clocks)
+    yield from _write_direction(roles)
     for name, array in arrays.by_name.items():
-        clock = _clock_of(name, arrays, all_clocks) if len(clocks) > 1 else ""
+        clock = _match_clock(name, arrays, all_clocks) if len(clocks) > 1 else ""
         is_numeric = array.dtype.kind in "fiub" and array.size >= LEAST_SAMPLES
         if name in surplus:
             yield f"\n# {name} {surplus[name]}"
         elif name in clocks:
             continue
         elif array.ndim == 1 and is_numeric:
-            yield from _channel((_stem(name), name, _stem(name)), _shape(array.shape), clock, roles.get(name, ""))
+            yield from _write_channel(
+                (_strip_value_suffix(name), name, _strip_value_suffix(name)),
+                _describe_shape(array.shape),
+                clock,
+                roles.get(name, ""),
+            )
         elif array.ndim == 2 and is_numeric:
-            yield from _table(name, array, clock, roles.get(name, ""))
+            yield from _write_table(name, array, clock, roles.get(name, ""))
         else:
-            yield from _no_channel(name, array)
-    yield from _parts(groups.prefixes)
-    yield from _ungrouped_comments(ungrouped, groups)
+            yield from _describe_excluded_array(name, array)
+    yield from _write_parts(groups.prefixes)
+    yield from _write_ungrouped_runs(ungrouped_names, groups)
     yield ""
     yield "[[segment]]"
     yield 'kind = "noise"            # multisine, sweep, sine, slow, noise, binary, step, impact, free, rest'
@@ -87,42 +92,54 @@ def _write_lines(all_arrays: Arrays) -> Iterator[str]:
 def _find_ungrouped_runs(all_arrays: Arrays, groups: Groups) -> list[str]:
     """Arrays of runs in cells that belong to no group. Cells of single numbers hold constants and do not count."""
     long_names = [
-        name for name, array in all_arrays.by_name.items() if OF_CELL.match(name) and array.size >= LEAST_SAMPLES
+        name
+        for name, array in all_arrays.by_name.items()
+        if CELL_ENTRY_PREFIX.match(name) and array.size >= LEAST_SAMPLES
     ]
     return [name for name in long_names if not name.startswith(groups.prefixes)] if groups.prefixes else []
 
 
-def _first_run(all_arrays: Arrays, groups: Groups, ungrouped: Sequence[str]) -> Arrays:
+def _select_first_run(all_arrays: Arrays, groups: Groups, ungrouped_names: Sequence[str]) -> Arrays:
     """Arrays of the first of several runs and those that belong to no run, except `ungrouped`; the times of tables
     [time, value ...] as separate arrays."""
     run_names = [name for name in all_arrays.by_name if name.startswith(groups.prefixes)] if groups.prefixes else []
-    common = {name: array for name, array in all_arrays.by_name.items() if name not in (*run_names, *ungrouped)}
-    first_arrays = {**{name: all_arrays.by_name[full] for name, full in groups.names.items()}, **common}
+    common_arrays = {
+        name: array for name, array in all_arrays.by_name.items() if name not in (*run_names, *ungrouped_names)
+    }
+    first_arrays = {
+        **{name: all_arrays.by_name[full_name] for name, full_name in groups.names.items()},
+        **common_arrays,
+    }
     times = {
-        _line_expression(name, array, 0): _first_line(array)
+        _format_line_expression(name, array, 0): _select_first_line(array)
         for name, array in first_arrays.items()
-        if time_in_table(array)
+        if has_time_line(array)
     }
     return Arrays(all_arrays.path, {**first_arrays, **times}, (*all_arrays.clocks, *times))
 
 
-def _clock_of(name: str, arrays: Arrays, clocks: Sequence[str]) -> str:
+def _match_clock(name: str, arrays: Arrays, clocks: Sequence[str]) -> str:
     """The clock with the same number of samples whose name has the longest common prefix; of equal clocks, the one that
     is kept. Empty without a clock of this length."""
-    fitting = [clock for clock in clocks if len(arrays.by_name[clock]) == max(arrays.by_name[name].shape, default=0)]
+    matching_clocks = [
+        clock for clock in clocks if len(arrays.by_name[clock]) == max(arrays.by_name[name].shape, default=0)
+    ]
 
-    def common_length(clock: str) -> int:
+    def count_common_letters(clock: str) -> int:
+        """Length of the common prefix of the clock's name and the array's."""
         return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(name, clock, strict=False)))
 
-    best_clock = max(fitting, key=common_length, default="")
-    return equal_clocks(arrays).get(best_clock, best_clock)
+    best_clock = max(matching_clocks, key=count_common_letters, default="")
+    return find_equal_clocks(arrays).get(best_clock, best_clock)
 
 
-def _direction(roles: Mapping[str, str]) -> Iterator[str]:
-    """A comment on which of force and motion is taken for the command, where names leave it open."""
-    columns = [parse_signal_name(_stem(name)) for name in roles]
+def _write_direction(roles: Mapping[str, str]) -> Iterator[str]:
+    """A comment that says whether the force or the motion is taken for the command, where names leave it open."""
+    columns = [parse_signal_name(_strip_value_suffix(name)) for name in roles]
     if may_be_imposed_motion(columns):
-        forces = [roles[name] for name, column in zip(roles, columns, strict=True) if column.quantity in _FORCES]
+        forces = [
+            roles[name] for name, column in zip(roles, columns, strict=True) if column.quantity in _FORCE_QUANTITIES
+        ]
         yield from (
             "",
             *wrap(
@@ -134,7 +151,7 @@ def _direction(roles: Mapping[str, str]) -> Iterator[str]:
         )
 
 
-def _no_channel(name: str, array: Array) -> Iterator[str]:
+def _describe_excluded_array(name: str, array: Array) -> Iterator[str]:
     """A comment on an array that is not a channel: invalid, without numbers, constant, or of more than two
     dimensions."""
     reason = unread_reason(array)
@@ -142,39 +159,39 @@ def _no_channel(name: str, array: Array) -> Iterator[str]:
         yield f"\n# Left out: {reason}"
     elif array.dtype.kind not in "fiub":
         yield f"\n# {name} holds no numbers" + (f": it is {reason}" if reason else "")
-        yield from (f"# {advice}" for advice in (conversion_advice(name, reason),) if advice)
+        yield from (f"# {advice}" for advice in (suggest_conversion(name, reason),) if advice)
     elif array.size < LEAST_SAMPLES:
-        yield f"\n# {name}: {_shape(array.shape)}, a constant for expressions"
+        yield f"\n# {name}: {_describe_shape(array.shape)}, a constant for expressions"
     else:
-        yield f"\n# {name}: {_shape(array.shape)}; a channel is one row of it, as in {quote(name)}[0, 0]"
+        yield f"\n# {name}: {_describe_shape(array.shape)}; a channel is one row of it, as in {quote_name(name)}[0, 0]"
 
 
-def _stem(name: str) -> str:
+def _strip_value_suffix(name: str) -> str:
     """Name without the ending under which Simulink stores the values of a signal: `force` for
     `force.signals.values`."""
-    for end in (".signals.values", ".values", ".Data", ".data"):
-        name = name.removesuffix(end)
+    for suffix in (".signals.values", ".values", ".Data", ".data"):
+        name = name.removesuffix(suffix)
     return name
 
 
-def _line_expression(name: str, array: Array, number: int) -> str:
-    """Expression for one line of a table, along its longer side."""
-    return f"{quote(name)}[{number}]" if array.shape[0] < array.shape[1] else f"{quote(name)}[:, {number}]"
+def _format_line_expression(name: str, array: Array, number: int) -> str:
+    """Expression for a row or column of a table: the line of this number along its longer side."""
+    return f"{quote_name(name)}[{number}]" if array.shape[0] < array.shape[1] else f"{quote_name(name)}[:, {number}]"
 
 
-def _first_line(array: Array) -> Array:
-    """First line of a table, along its longer side."""
+def _select_first_line(array: Array) -> Array:
+    """First row or column of a table, whichever is longer."""
     return array[0] if array.shape[0] < array.shape[1] else array[:, 0]
 
 
-def _roles(arrays: Arrays, excluded: list[str]) -> dict[str, str]:
+def _propose_array_roles(arrays: Arrays, excluded: list[str]) -> dict[str, str]:
     """Roles by name, where names, units and data determine them. excluded: arrays that are not channels."""
     channels = [name for name, array in arrays.by_name.items() if array.size >= LEAST_SAMPLES and name not in excluded]
-    columns = [replace(parse_signal_name(_stem(name)), header=name) for name in channels]
+    columns = [replace(parse_signal_name(_strip_value_suffix(name)), header=name) for name in channels]
     return dict(zip(channels, swap_imposed_roles(columns, arrays.by_name, propose_roles(columns)), strict=True))
 
 
-def _parts(prefixes: tuple[str, ...]) -> Iterator[str]:
+def _write_parts(prefixes: tuple[str, ...]) -> Iterator[str]:
     """A [[part]] for each run."""
     if prefixes:
         yield "\n# Several runs are in the file: their arrays are named without the prefix above."
@@ -183,21 +200,25 @@ def _parts(prefixes: tuple[str, ...]) -> Iterator[str]:
         yield f"prefix = {json.dumps(prefix)}"
 
 
-def _ungrouped_comments(ungrouped: Sequence[str], groups: Groups) -> Iterator[str]:
+def _write_ungrouped_runs(ungrouped_names: Sequence[str], groups: Groups) -> Iterator[str]:
     """Comments on runs in cells of another length, and on how to add them where their names identify the arrays."""
-    if ungrouped:
-        names_text = ", ".join(ungrouped[:_MAX_NAMED]) + (" ..." if ungrouped[_MAX_NAMED:] else "")
+    if ungrouped_names:
+        names_text = ", ".join(ungrouped_names[:_MAX_LISTED_RUNS]) + (
+            " ..." if ungrouped_names[_MAX_LISTED_RUNS:] else ""
+        )
         yield f"\n# Also in the file, in cells of another length: {names_text}"
     name_by_stem = {_ROLE_SUFFIX.sub("", name): name for name in groups.names if name.isidentifier()}
-    lets: dict[str, list[str]] = {}
-    for prefix, slash, name in (full.partition("/") for full in ungrouped):
+    definitions_by_run: dict[str, list[str]] = {}
+    for prefix, slash, name in (full_name.partition("/") for full_name in ungrouped_names):
         if (stem := _ROLE_SUFFIX.sub("", name)) in name_by_stem:
-            lets.setdefault(prefix + slash, []).append(f"{name_by_stem[stem]} = {json.dumps(quote(name))}")
-    for prefix, pairs in list(lets.items())[-1:]:
-        yield f'# Such a run is added by [[part]] with prefix = "{prefix}" and let = {{ {", ".join(pairs)} }}'
+            definitions_by_run.setdefault(prefix + slash, []).append(
+                f"{name_by_stem[stem]} = {json.dumps(quote_name(name))}"
+            )
+    for prefix, definitions in list(definitions_by_run.items())[-1:]:
+        yield f'# Such a run is added by [[part]] with prefix = "{prefix}" and let = {{ {", ".join(definitions)} }}'
 
 
-def _clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
+def _write_clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
     """A [[clock]] for each time column; without one, a clock with the rate of the file, or with a comment."""
     for name in clocks:
         stem, unit = (
@@ -205,37 +226,37 @@ def _clocks(arrays: Arrays, clocks: list[str]) -> Iterator[str]:
             if name in arrays.by_name and parse_signal_name(name).quantity == "time"
             else (name, "")
         )
-        ending = stem.rpartition("_")[2]
+        suffix = stem.rpartition("_")[2]
         yield "\n[[clock]]"
         if len(clocks) > 1:
             yield f"name = {json.dumps(name)}"
         yield f"time = {json.dumps(name)}"
-        yield f'time_unit = {json.dumps(unit or (ending if ending in _TIME_UNITS else ""))}            # "s", "ms"'
+        yield f'time_unit = {json.dumps(unit or (suffix if suffix in _TIME_UNITS else ""))}            # "s", "ms"'
     if clocks:
         return
     yield "\n[[clock]]"
-    rates = rates_in(arrays)
+    rates = find_rates(arrays)
     for rate, name in list(rates.items())[:1]:
         yield f"rate = {json.dumps(rate)}           # in hertz{'' if rate == name else f', {name} in seconds'}"
     if not rates:
         yield "# rate_hz = 1000, or unknown = true"
 
 
-def _table(name: str, array: Array, clock: str, role: str) -> Iterator[str]:
+def _write_table(name: str, array: Array, clock: str, role: str) -> Iterator[str]:
     """A channel per line of a table; a table [time, value] gives one channel, with the name and role of the table."""
-    has_time = time_in_table(array)
+    has_time = has_time_line(array)
     for number in range(int(has_time), min(array.shape)):
         is_single = has_time and min(array.shape) == 2
         channel_name = name if is_single else f"{name}{number + (not has_time)}"
-        yield from _channel(
-            (channel_name, _line_expression(name, array, number), name),
-            _shape(array.shape),
+        yield from _write_channel(
+            (channel_name, _format_line_expression(name, array, number), name),
+            _describe_shape(array.shape),
             clock if has_time else "",
             role if is_single else "",
         )
 
 
-def _channel(names: tuple[str, str, str], shape: str, clock: str, role: str) -> Iterator[str]:
+def _write_channel(names: tuple[str, str, str], shape: str, clock: str, role: str) -> Iterator[str]:
     """A [[channel]]. names: of the channel, of its value (an expression), and of the array."""
     name, value, header = names
     parsed = parse_signal_name(header)
@@ -250,6 +271,6 @@ def _channel(names: tuple[str, str, str], shape: str, clock: str, role: str) -> 
         yield f"clock = {json.dumps(clock)}"
 
 
-def _shape(shape: tuple[int, ...]) -> str:
+def _describe_shape(shape: tuple[int, ...]) -> str:
     """Shape of an array in words."""
     return f"{' x '.join(str(count) for count in shape)} samples" if shape else "one number"

@@ -65,7 +65,7 @@ def part_signals(
     for channel in import_map.channel:
         logger = by_clock[channel.clock or first]
         values = _read_values(channel, logger, import_map)
-        sources.append((channel, logger.base.samples(values)))
+        sources.append((channel, logger.base.make_samples(values)))
     grid = _make_grid(import_map, part, loggers, [samples for _, samples in sources])
     columns: dict[Key, FloatArray] = {}
     for channel, samples in sources:
@@ -89,7 +89,7 @@ def _read_values(channel: ChannelMap, logger: Logger, import_map: ImportMap) -> 
     or length, or infinite values."""
     subject = f"channel '{channel.name}'"
     try:
-        values = logger.names.value_of(channel.value, logger.base)
+        values = logger.names.compute_value(channel.value, logger.base)
     except ImportProblemError as error:
         raise ImportProblemError(f"{subject}: {error}") from error
     if values.ndim > 1:
@@ -115,7 +115,7 @@ def _count_samples(logger: Logger, import_map: ImportMap) -> int:
     first = import_map.clock[0].name
     for channel in import_map.channel:
         if (channel.clock or first) == logger.clock.name:
-            values = logger.names.value_of(channel.value, logger.base)
+            values = logger.names.compute_value(channel.value, logger.base)
             if values.ndim == 1:
                 return len(values)
     return 0
@@ -202,7 +202,7 @@ def _compute_channel(
     values."""
     arrays = {**file.arrays, "clock_s": grid.times_s(), "rate_hz": np.array(grid.rate_hz), **columns}
     try:
-        value = Namespace(arrays, file.definitions, file.file_name, file.budget).value_of(text, _GridClock(grid))
+        value = Namespace(arrays, file.definitions, file.file_name, file.budget).compute_value(text, _GridClock(grid))
     except ImportProblemError as error:
         raise ImportProblemError(f"computed channel '{name}': {error}") from error
     if value.ndim == 0:

@@ -1,6 +1,7 @@
 """Arrays that a proposed map leaves out: arrays without any number, row numbers, and repeated time columns.
 
-The module also recognises time columns, tables whose first column is the time, and sample rates.
+The module also recognises time columns, tables whose first column is the time, and sample rates. Called by `header_map`
+and `map_skeleton`.
 """
 
 import re
@@ -20,12 +21,12 @@ CLOCK_WORDS = {
     "tout", "date",
 }  # fmt: skip
 """Words in the name of a time column, in lower case."""
-_INDEX = re.compile(
+_INDEX_NAME = re.compile(
     r"column1|#|unnamed: 0|(index|idx|i|n|nr|no|number|row|record|sample|scan|point)[ _.]?(nr|no|number|#)?\.?",
     re.IGNORECASE,
 )
 """Name of a column of row numbers, or of a column without a name."""
-_RATE = re.compile(
+_RATE_NAME = re.compile(
     r"((.* )?(fs|(sampl(e|es|ing)|scan|acquisition|logging) ?(rate|freq|frequency)|sampling)|rate)(( in)? ?k?hz)?"
 )
 """Words in the name of a sample rate; the rate of an excitation does not match."""
@@ -35,14 +36,14 @@ _USUAL_RATIOS = (1.0, 1e-6, 1e-3, 1e3, 1e6)
 """Ratios of the units of two clocks that are tried where a name states no unit."""
 _MAX_STEP_SPREAD = 0.02
 """Largest range of a clock's steps, relative to their median, for them to count as even."""
-SAME_CLOCK = 0.5
+SAME_CLOCK_TOLERANCE = 0.5
 """Stamps that both begin at 0 are one clock if they differ by at most this fraction of a step."""
 
 
-def surplus_arrays(arrays: Arrays) -> Mapping[str, str]:
+def find_surplus_arrays(arrays: Arrays) -> Mapping[str, str]:
     """Reason for leaving an array out, as a clause, by name of the array."""
-    empty = {name: "holds no numbers at all" for name, array in arrays.by_name.items() if _is_empty(array)}
-    empty |= {
+    without_numbers = {name: "holds no numbers at all" for name, array in arrays.by_name.items() if _is_empty(array)}
+    without_numbers |= {
         name: "holds no numbers" for name, array in arrays.by_name.items() if array.dtype.kind in "SU" and array.ndim
     }
     has_clock = any(name in arrays.clocks or is_growing_time(name, array) for name, array in arrays.by_name.items())
@@ -50,25 +51,25 @@ def surplus_arrays(arrays: Arrays) -> Mapping[str, str]:
         name: "numbers the rows" for name, array in arrays.by_name.items() if has_clock and _is_index(name, array)
     }
     return (
-        empty
+        without_numbers
         | row_numbers
-        | {name: f"is the same time as '{kept_clock}'" for name, kept_clock in equal_clocks(arrays).items()}
+        | {name: f"is the same time as '{kept_clock}'" for name, kept_clock in find_equal_clocks(arrays).items()}
     )
 
 
 @np.errstate(all="ignore")
 def is_growing_time(name: str, array: Array) -> bool:
     """Whether an array is named as a time, never decreases, and grows overall; coarse stamps may repeat."""
-    grows = array.ndim == 1 and array.dtype.kind in "fiu" and array.size >= LEAST_SAMPLES
+    is_series = array.ndim == 1 and array.dtype.kind in "fiu" and array.size >= LEAST_SAMPLES
     return (
-        grows
-        and bool(name_words(name) & CLOCK_WORDS)
+        is_series
+        and bool(split_name_words(name) & CLOCK_WORDS)
         and bool((array[1:] >= array[:-1]).all() and array[-1] > array[0])
     )
 
 
-def name_words(name: str) -> set[str]:
-    """Words of a name without its unit, in lower case."""
+def split_name_words(name: str) -> set[str]:
+    """Set of the words of a name without its unit, in lower case."""
     return set(_split_words(split_bracketed_unit(name)[0]))
 
 
@@ -77,21 +78,23 @@ def _split_words(text: str) -> list[str]:
     return "".join(letter if letter.isalnum() else " " for letter in text.lower()).split()
 
 
-def _last_part(name: str) -> str:
+def _extract_last_part(name: str) -> str:
     """Last part of a name of several levels (`data.fs`, `1-of-2/fs`), without its unit."""
     return re.split(r"[./](?=\w)(?!k?Hz\b)", split_bracketed_unit(name)[0])[-1]
 
 
-def rates_in(arrays: Arrays) -> Mapping[str, str]:
+def find_rates(arrays: Arrays) -> Mapping[str, str]:
     """Single numbers named as a sample rate or sampling interval: name by the expression for the rate; rates come
     first."""
-    single = [name for name, array in arrays.by_name.items() if array.size == 1 and array.dtype.kind in "fiu"]
-    rates = {name: name for name in single if _RATE.fullmatch(" ".join(_split_words(_last_part(name))))}
-    steps = {f"1 / {quote(name)}": name for name in single if name_words(name) & _STEP_WORDS}
+    single_values = [name for name, array in arrays.by_name.items() if array.size == 1 and array.dtype.kind in "fiu"]
+    rates = {
+        name: name for name in single_values if _RATE_NAME.fullmatch(" ".join(_split_words(_extract_last_part(name))))
+    }
+    steps = {f"1 / {quote_name(name)}": name for name in single_values if split_name_words(name) & _STEP_WORDS}
     return {**rates, **steps}
 
 
-def quote(name: str) -> str:
+def quote_name(name: str) -> str:
     """Expression for an array by its name."""
     return name if name.isidentifier() else f"array('{name}')"
 
@@ -105,27 +108,28 @@ def _is_empty(array: Array) -> bool:
 def _is_index(name: str, array: Array) -> bool:
     """Whether an array has no name or one of a row number, and counts the rows."""
     is_column = array.ndim == 1 and array.dtype.kind in "fiu" and array.size >= LEAST_SAMPLES
-    return is_column and bool(_INDEX.fullmatch(name)) and bool((np.diff(array.astype(float)) == 1).all())
+    return is_column and bool(_INDEX_NAME.fullmatch(name)) and bool((np.diff(array.astype(float)) == 1).all())
 
 
-def equal_clocks(arrays: Arrays) -> Mapping[str, str]:
-    """Time columns that repeat another time column, each with the name of the other."""
+def find_equal_clocks(arrays: Arrays) -> Mapping[str, str]:
+    """Time columns that repeat another: name of the column that is kept, by name of the repetition. Of equal columns,
+    one with a unit of time is kept, then one that the file itself calls a clock."""
     kept_clocks: list[str] = []
-    repeated = {}
+    repeated_clocks = {}
     clocks = [name for name, array in arrays.by_name.items() if name in arrays.clocks or is_growing_time(name, array)]
-    for name in sorted(clocks, key=lambda name: (_seconds(name) is None, name not in arrays.clocks)):
+    for name in sorted(clocks, key=lambda name: (_read_unit_s(name) is None, name not in arrays.clocks)):
         equal_clock = next(
             (kept_clock for kept_clock in kept_clocks if _is_same_clock(arrays.by_name, kept_clock, name)), None
         )
         if equal_clock is None:
             kept_clocks.append(name)
         else:
-            repeated[name] = equal_clock
-    return repeated
+            repeated_clocks[name] = equal_clock
+    return repeated_clocks
 
 
 @np.errstate(all="ignore")
-def time_in_table(array: Array) -> bool:
+def has_time_line(array: Array) -> bool:
     """Whether a table has the form [time, value ...]: its first line along the longer side increases, and either has
     even steps or is the only line that increases."""
     if array.ndim != 2 or array.dtype.kind not in "fiu" or max(array.shape) < LEAST_SAMPLES:
@@ -133,8 +137,10 @@ def time_in_table(array: Array) -> bool:
     lines = array if array.shape[0] < array.shape[1] else array.T
     is_growing = [bool((line[1:] > line[:-1]).all()) for line in lines]
     steps = np.diff(lines[0].astype(float))
-    is_even = bool(np.ptp(steps) <= _MAX_STEP_SPREAD * abs(np.median(steps)))  # even where the values increase, too
-    return len(lines) > 1 and is_growing[0] and (is_even or not all(is_growing))
+    has_even_steps = bool(
+        np.ptp(steps) <= _MAX_STEP_SPREAD * abs(np.median(steps))
+    )  # even where the values increase, too
+    return len(lines) > 1 and is_growing[0] and (has_even_steps or not all(is_growing))
 
 
 @np.errstate(all="ignore")
@@ -149,14 +155,14 @@ def _is_same_clock(by_name: Mapping[str, Array], first: str, second: str) -> boo
     ):
         return False
     first_times, second_times = first_times - first_times[0], second_times - second_times[0]
-    units = _seconds(first), _seconds(second)
+    units = _read_unit_s(first), _read_unit_s(second)
     ratios = _USUAL_RATIOS if None in units else ((units[1] or 1) / (units[0] or 1),)
     ratio = min(ratios, key=lambda ratio: abs(second_times[-1] * ratio - first_times[-1]))
     step = float(np.nanmedian(np.diff(first_times)))
-    return bool(np.nanmax(np.abs(second_times * ratio - first_times)) <= SAME_CLOCK * step)
+    return bool(np.nanmax(np.abs(second_times * ratio - first_times)) <= SAME_CLOCK_TOLERANCE * step)
 
 
-def _seconds(name: str) -> float | None:
+def _read_unit_s(name: str) -> float | None:
     """Factor from the unit in brackets to seconds; None without a unit of time."""
     try:
         unit = parse_unit(split_bracketed_unit(name)[1])

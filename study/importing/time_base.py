@@ -3,7 +3,7 @@
 Stamps are refused where they are missing, run backwards (a counter that wraps around, a clock that is set back),
 repeat, or jump; the message names the key of the map that corrects them. Stamps that are uniform apart from rounding
 and skipped rows give a rate and the index of each sample (`uniform_stamps`). Rows that a logger wrote twice are removed
-(`drop_doubled_rows`).
+(`drop_doubled_rows`). Called by `build_recording`.
 """
 
 from dataclasses import dataclass, replace
@@ -24,7 +24,7 @@ _USUAL_GAP = 3
 """A step longer than this many median steps is a gap, unless the map states `gap_s`."""
 _HOUR_S = 3600.0
 """Step (s) of a clock that is set to summer time or back."""
-_COUNTERS = (2**16, 2**24, 2**31, 2**32, 10**6, 10**9)
+_COUNTER_LIMITS = (2**16, 2**24, 2**31, 2**32, 10**6, 10**9)
 """Values at which counters of loggers wrap around to 0, in the unit of the file."""
 NUMBERED_HZ = 1.0
 """Placeholder rate (Hz) of samples whose time is unknown."""
@@ -69,13 +69,13 @@ class TimeBase:
         """Sentence with the number of gaps in the stamps, and with the key that declares that nothing is missing; empty
         without gaps."""
         steps_s = np.diff(self.times_s(0)) if self.stamps_s is not None else np.zeros(0)
-        wide_s = steps_s[steps_s > self.gap_s]
-        if not len(wide_s):
+        gaps_s = steps_s[steps_s > self.gap_s]
+        if not len(gaps_s):
             return ""
-        count = f"{len(wide_s)} gap{'s' if len(wide_s) > 1 else ''}"
+        gaps_text = f"{len(gaps_s)} gap{'s' if len(gaps_s) > 1 else ''}"
         return (
-            f"Clock '{self.name}' has {count} (the widest {wide_s.max():.4g} s): their samples are missing. Where "
-            f"nothing is missing, as in a log of changes, write gap_s = {1.01 * wide_s.max():.3g} and its `time` under "
+            f"Clock '{self.name}' has {gaps_text} (the widest {gaps_s.max():.4g} s): their samples are missing. Where "
+            f"nothing is missing, as in a log of changes, write gap_s = {1.01 * gaps_s.max():.3g} and its `time` under "
             "[[clock]] in the map, and resample under each [[channel]]."
         )
 
@@ -92,7 +92,7 @@ class TimeBase:
             f"{self.rate_hz:.6g} Hz is taken; they lie up to {deviation_s:.2g} s from a uniform grid."
         )
 
-    def samples(self, values: Value) -> Samples:
+    def make_samples(self, values: Value) -> Samples:
         """The values (n,) with their times by the reference clock. Rows that a uniform logger skipped become NaN,
         unless the map says that there are no gaps."""
         times_s = self.times_s(len(values)) + self.offset_s
@@ -110,18 +110,18 @@ class TimeBase:
         return Samples(times_s[0] + np.arange(len(padded)) / self.rate_hz, padded, self.rate_hz, self.gap_s)
 
 
-def time_base(clock: ClockMap, names: Namespace) -> TimeBase:
+def make_time_base(clock: ClockMap, names: Namespace) -> TimeBase:
     """Time base of a clock of the map, without its offset to other clocks. names: the arrays of the file. Raises
     ImportProblemError where the rate is not positive or the stamps are unusable."""
     if clock.time:
-        return _base_from_stamps(clock, names)
-    rate_hz = NUMBERED_HZ if clock.unknown else clock.rate_hz or names.number(clock.rate)
+        return _make_base_from_stamps(clock, names)
+    rate_hz = NUMBERED_HZ if clock.unknown else clock.rate_hz or names.compute_number(clock.rate)
     if not rate_hz > 0:
         raise ImportProblemError(f"clock '{clock.name}': its rate, {clock.rate}, is {rate_hz:g}; it must be above 0")
     return TimeBase(clock.name, rate_hz, None, None, clock.gap_s or 1.5 / rate_hz)
 
 
-def _base_from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
+def _make_base_from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
     """Time base from time stamps. Raises ImportProblemError."""
     try:
         unit = parse_unit(clock.time_unit)
@@ -129,7 +129,7 @@ def _base_from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
         raise ImportProblemError(f"clock '{clock.name}': time_unit: {error}") from error
     if unit.si != "s":
         raise ImportProblemError(f"clock '{clock.name}': time_unit is '{clock.time_unit}', which is no unit of time")
-    stamps_s: Value = names.value_of(clock.time, NoTime()) * unit.factor
+    stamps_s: Value = names.compute_value(clock.time, NoTime()) * unit.factor
     if stamps_s.ndim != 1 or len(stamps_s) < 2:
         raise ImportProblemError(
             f"clock '{clock.name}': {clock.time} has the shape {stamps_s.shape}; stamps are one row of two or more"
@@ -138,10 +138,10 @@ def _base_from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
         raise ImportProblemError(f"clock '{clock.name}': {clock.time} {problem}")
     rate_hz, sample_index = fit_uniform_rate(stamps_s, last_decimal(stamps_s / unit.factor) * unit.factor)
     if sample_index is not None and sample_index[-1] >= MOST_SAMPLES:
-        widest = int(np.argmax(np.diff(stamps_s)))
+        jump_row = int(np.argmax(np.diff(stamps_s)))
         raise ImportProblemError(
-            f"clock '{clock.name}': {clock.time} jumps from {stamps_s[widest]:.9g} to {stamps_s[widest + 1]:.9g} s "
-            f"at sample {widest + 1}; at {rate_hz:g} Hz the recording would be {sample_index[-1] + 1:.3g} "
+            f"clock '{clock.name}': {clock.time} jumps from {stamps_s[jump_row]:.9g} to {stamps_s[jump_row + 1]:.9g} s "
+            f"at sample {jump_row + 1}; at {rate_hz:g} Hz the recording would be {sample_index[-1] + 1:.3g} "
             "samples long, most of them missing. Correct the stamps, or cut the file there into several, which are "
             "imported together"
         )
@@ -162,19 +162,21 @@ def _find_stamp_problem(stamps_s: Value, time: str, unit_s: float) -> str:
     empty if they are finite and increase without a jump of an hour. time: expression of the stamps. unit_s: their
     unit."""
     if not np.isfinite(stamps_s).all():
-        first = int(np.argmax(~np.isfinite(stamps_s)))
-        return f"is no number at sample {first}; time is never missing"
+        row = int(np.argmax(~np.isfinite(stamps_s)))
+        return f"is no number at sample {row}; time is never missing"
     steps_s = np.diff(stamps_s)
     if (steps_s < 0).any():
-        first = int(np.argmax(steps_s < 0)) + 1
-        backward_s = float(-steps_s[first - 1])
-        problem = f"runs backwards at sample {first}, from {stamps_s[first - 1]:.9g} to {stamps_s[first]:.9g} s"
-        usual_s = float(np.median(steps_s))
-        wrap = next((wrap for wrap in _COUNTERS if abs(backward_s + usual_s - wrap * unit_s) < 2 * usual_s), 0)
-        if wrap and stamps_s.max() < wrap * unit_s and stamps_s.min() >= 0:
+        row = int(np.argmax(steps_s < 0)) + 1
+        backward_s = float(-steps_s[row - 1])
+        problem = f"runs backwards at sample {row}, from {stamps_s[row - 1]:.9g} to {stamps_s[row]:.9g} s"
+        median_s = float(np.median(steps_s))
+        limit = next(
+            (limit for limit in _COUNTER_LIMITS if abs(backward_s + median_s - limit * unit_s) < 2 * median_s), 0
+        )
+        if limit and stamps_s.max() < limit * unit_s and stamps_s.min() >= 0:
             return (
-                f"{problem}, as a counter that restarts at {wrap}; the map's [[clock]] mends it: "
-                f'time = "{time} + {wrap} * cumsum(diff({time}) < 0)"'
+                f"{problem}, as a counter that restarts at {limit}; the map's [[clock]] mends it: "
+                f'time = "{time} + {limit} * cumsum(diff({time}) < 0)"'
             )
         if abs(backward_s - _HOUR_S) > _HOUR_S / 60:
             return f"{problem}; put the rows in order, or cut the file there into several, which are imported together"
@@ -183,10 +185,10 @@ def _find_stamp_problem(stamps_s: Value, time: str, unit_s: float) -> str:
             f'{problem}, as a clock that is set back by an hour; the map\'s [[clock]] mends it: time = "{expression}"'
         )
     if (steps_s == 0).any():
-        first = int(np.argmax(steps_s == 0)) + 1
+        row = int(np.argmax(steps_s == 0)) + 1
         rate_hz = (len(stamps_s) - 1) / float(np.ptp(stamps_s)) if np.ptp(stamps_s) else 1000.0
         return (
-            f"stands still at sample {first}, at {stamps_s[first]:.9g} s; where the sampling was even and only the "
+            f"stands still at sample {row}, at {stamps_s[row]:.9g} s; where the sampling was even and only the "
             f"stamps are coarse, state the rate in place of `time` in the map's [[clock]], as in "
             f"rate_hz = {rate_hz:.4g}; where a sample was logged twice with other values, remove either of the two"
         )
@@ -205,7 +207,7 @@ def drop_doubled_rows(clock: ClockMap, names: Namespace) -> tuple[Namespace, str
     row with a repeated stamp has other values than the row above. Raises ImportProblemError."""
     if not clock.time:
         return names, ""
-    stamps: Value = names.value_of(clock.time, NoTime())
+    stamps: Value = names.compute_value(clock.time, NoTime())
     if stamps.ndim != 1 or len(stamps) < 2:
         return names, ""
     repeated = np.flatnonzero(stamps[1:] == stamps[:-1]) + 1
@@ -218,9 +220,9 @@ def drop_doubled_rows(clock: ClockMap, names: Namespace) -> tuple[Namespace, str
     arrays = {
         name: array[kept_rows] if _has_row_count(array, len(stamps)) else array for name, array in names.arrays.items()
     }
-    count = f"{len(repeated)} row{'s' if len(repeated) > 1 else ''}"
-    text = f"Clock '{clock.name}': {count} logged twice (the same stamp, the same values) left out."
-    return replace(names, arrays=arrays), text
+    rows_text = f"{len(repeated)} row{'s' if len(repeated) > 1 else ''}"
+    remark = f"Clock '{clock.name}': {rows_text} logged twice (the same stamp, the same values) left out."
+    return replace(names, arrays=arrays), remark
 
 
 def _is_repeated(array: Array, rows: npt.NDArray[np.intp]) -> bool:

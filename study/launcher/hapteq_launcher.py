@@ -2,7 +2,7 @@
 
 The names of the packages are generic. A foreign `analysis.py` or `study.py` on the import path would be imported
 instead, and the program would fail with a confusing error. This module has a unique name, so that it can report the
-problem.
+problem. The console script `hapteq` and `python -m study` call `main`.
 """
 
 import importlib.util
@@ -13,7 +13,7 @@ PACKAGES = ("study", "analysis", "equalizer", "protocols")
 """The four packages of hapteq."""
 
 
-def home() -> Path | None:
+def find_home_folder() -> Path | None:
     """The first folder on the import path that contains all four packages; None without such a folder."""
     for entry in sys.path:
         folder = Path(entry or ".").resolve()
@@ -22,28 +22,28 @@ def home() -> Path | None:
     return None
 
 
-def foreign_packages() -> list[Path]:
+def find_foreign_packages() -> list[Path]:
     """Files that would be imported under the name of one of the packages without belonging to hapteq."""
-    ours = home()
+    home_folder = find_home_folder()
     foreign_paths = []
     for name in PACKAGES:
         spec = importlib.util.find_spec(name)
         origin = Path(spec.origin).resolve() if spec is not None and spec.origin else None
-        if origin is not None and (ours is None or origin != ours / name / "__init__.py"):
+        if origin is not None and (home_folder is None or origin != home_folder / name / "__init__.py"):
             foreign_paths.append(origin)
     return foreign_paths
 
 
 def main() -> int:
     """Run the command line of hapteq. Returns its exit code; 1 where foreign packages hide its own."""
-    foreign = foreign_packages()
-    if foreign:
-        names = ", ".join(str(path) for path in foreign)
+    foreign_paths = find_foreign_packages()
+    if foreign_paths:
+        paths_text = ", ".join(str(path) for path in foreign_paths)
         sys.stderr.write(
-            f"Another program's files hide those of hapteq: {names}.\n"
+            f"Another program's files hide those of hapteq: {paths_text}.\n"
             "Nothing was started. Rename them, or start hapteq without their folder on PYTHONPATH.\n"
         )
         return 1
-    from study.cli.main import main as command_line
+    from study.cli.main import main as run_command_line
 
-    return command_line()
+    return run_command_line()

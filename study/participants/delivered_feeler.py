@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 from protocols.trial import Phase
 from study.participants.direction_feeler import DirectionFeeler
 from study.participants.observer import PerceivedStimulus, Reply
-from study.participants.psychometric_curve import threshold_at
+from study.participants.psychometric_curve import interpolate_threshold_n
 
 MPS2_PER_N = ((5.0, 1.5), (15.0, 2.7), (25.0, 2.85), (35.0, 3.1), (45.0, 3.6))
 """(Hz, m/s² per N): acceleration along a direction that the simulated omega.3 delivers per newton; medians of four
@@ -47,17 +47,17 @@ class DeliveredFeeler:
         """Answer (1 or 2) and response time (s) for one presentation."""
         return self.feeler.reply(replace(felt, level_n=self.felt_n(felt)), seed)
 
-    def share_right(self, felt: PerceivedStimulus) -> float:
+    def compute_right_share(self, felt: PerceivedStimulus) -> float:
         """Probability of the right answer."""
-        return self.feeler.share_right(replace(felt, level_n=self.felt_n(felt)))
+        return self.feeler.compute_right_share(replace(felt, level_n=self.felt_n(felt)))
 
     def felt_n(self, felt: PerceivedStimulus) -> float:
         """Force (N) which, delivered without disturbance and before adaptation, would be felt as well as this trial."""
         delivered = felt.delivered
         if felt.phase is Phase.DETECTION or delivered is None:
             return felt.level_n
-        per_newton = threshold_at(MPS2_PER_N, felt.frequency_hz)
-        threshold_mps2 = per_newton * threshold_at(self.feeler.thresholds_n, felt.frequency_hz)
+        per_newton = interpolate_threshold_n(MPS2_PER_N, felt.frequency_hz)
+        threshold_mps2 = per_newton * interpolate_threshold_n(self.feeler.thresholds_n, felt.frequency_hz)
         directed = math.sqrt(max(0.0, delivered.along_mps2**2 - delivered.off_axis_mps2**2))
         masked = math.hypot(1.0, self.masking * (delivered.harmonics_mps2 or 0.0) / threshold_mps2)
         adapted_db = self.adaptation_db * -math.expm1(-felt.trial / self.adaptation_trials)

@@ -19,7 +19,7 @@ from protocols.trial import Phase
 from study.participants.chance import draw_response_time_s, draw_uniform
 from study.participants.detection import DETECTION_SLOPE, TYPICAL_DETECTION_N
 from study.participants.observer import PerceivedStimulus, Reply
-from study.participants.psychometric_curve import WeibullCurve, threshold_at
+from study.participants.psychometric_curve import WeibullCurve, interpolate_threshold_n
 
 _NORMAL = NormalDist()
 """Standard normal distribution."""
@@ -53,31 +53,32 @@ class DirectionFeeler:
     def reply(self, felt: PerceivedStimulus, seed: int) -> Reply:
         """Answer (1 or 2) and response time (s) for one presentation, random but the same for equal arguments."""
         choice_draw, time_draw = draw_uniform(felt, seed, 2)
-        answer = 1 if choice_draw < self.share_of_1(felt) else 2
+        answer = 1 if choice_draw < self.compute_share_of_answer_1(felt) else 2
         return Reply(answer, draw_response_time_s(time_draw))
 
-    def share_of_1(self, felt: PerceivedStimulus) -> float:
-        """Probability of answer 1."""
+    def compute_share_of_answer_1(self, felt: PerceivedStimulus) -> float:
+        """Probability of answer 1, lapses included."""
         sign = 1.0 if felt.direction_shown == 1 else -1.0
-        certain = _NORMAL.cdf(sign * self.d_prime(felt) / 2 - self.criterion_at(felt))
-        return self.lapse + (1.0 - 2.0 * self.lapse) * certain
+        share_without_lapses = _NORMAL.cdf(sign * self.compute_d_prime(felt) / 2 - self.compute_criterion(felt))
+        return self.lapse + (1.0 - 2.0 * self.lapse) * share_without_lapses
 
-    def share_right(self, felt: PerceivedStimulus) -> float:
-        """Probability of the right answer."""
-        share_of_1 = self.share_of_1(felt)
+    def compute_right_share(self, felt: PerceivedStimulus) -> float:
+        """Probability of the right answer, lapses included."""
+        share_of_1 = self.compute_share_of_answer_1(felt)
         return share_of_1 if felt.direction_shown == 1 else 1.0 - share_of_1
 
-    def criterion_at(self, felt: PerceivedStimulus) -> float:
+    def compute_criterion(self, felt: PerceivedStimulus) -> float:
         """Criterion c at this trial, with its drift."""
         return self.criterion + self.criterion_per_100_trials * felt.trials_before / 100.0
 
-    def d_prime(self, felt: PerceivedStimulus) -> float:
-        """Sensitivity d' to this stimulus: 0 for the direction above `numb_above_hz`."""
-        detection = felt.phase is Phase.DETECTION
-        if felt.frequency_hz > self.numb_above_hz and not detection:
+    def compute_d_prime(self, felt: PerceivedStimulus) -> float:
+        """Sensitivity d' to this stimulus; 0 above `numb_above_hz`, where the direction is not felt, except in a
+        detection trial."""
+        is_detection = felt.phase is Phase.DETECTION
+        if felt.frequency_hz > self.numb_above_hz and not is_detection:
             return 0.0
         drift_db = self.drift_db_per_100_trials * felt.trials_before / 100.0
-        thresholds_n = self.detection_n if detection else self.thresholds_n
-        threshold_n = threshold_at(thresholds_n, felt.frequency_hz) * 10.0 ** (drift_db / 20.0)
-        slope = DETECTION_SLOPE if detection else self.slope
-        return WeibullCurve(threshold_n, slope).distance(felt.level_n)
+        thresholds_n = self.detection_n if is_detection else self.thresholds_n
+        threshold_n = interpolate_threshold_n(thresholds_n, felt.frequency_hz) * 10.0 ** (drift_db / 20.0)
+        slope = DETECTION_SLOPE if is_detection else self.slope
+        return WeibullCurve(threshold_n, slope).compute_d_prime(felt.level_n)

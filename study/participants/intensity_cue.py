@@ -41,7 +41,7 @@ class IntensityCue:
         choice_draw, time_draw = draw_uniform(felt, seed, 2)
         sign = 1.0 if felt.direction_shown == 1 else -1.0
         detection = WeibullCurve(self.detection_n, DETECTION_SLOPE)
-        distance = detection.distance if felt.phase is Phase.DETECTION else self.d_prime
+        distance = detection.compute_d_prime if felt.phase is Phase.DETECTION else self.d_prime
         share_of_1 = NormalDist().cdf(sign * distance(felt.level_n) / 2 + self._rove_deviation(felt))
         return Reply(1 if choice_draw < share_of_1 else 2, draw_response_time_s(time_draw))
 

@@ -45,6 +45,6 @@ class UnsureRepeater:
     def _evidence(self, felt: PerceivedStimulus, seed: int) -> float:
         """Average evidence of all looks minus the criterion, in standard errors of the average."""
         sign = 1.0 if felt.direction_shown == 1 else -1.0
-        mean_evidence = sign * self.feeler.d_prime(felt) / 2.0 - self.feeler.criterion_at(felt)
+        mean_evidence = sign * self.feeler.compute_d_prime(felt) / 2.0 - self.feeler.compute_criterion(felt)
         uniform_draws = [draw_uniform(replace(felt, attempt=look), seed, 1)[0] for look in range(felt.attempt + 1)]
         return sum(mean_evidence + _NORMAL.inv_cdf(draw) for draw in uniform_draws) / math.sqrt(len(uniform_draws))

@@ -1,6 +1,7 @@
 """Status of a session in the list of past sessions: a symbol with a word, and a sentence.
 
-Symbol and word differ between states, so that the status can be read without seeing colour.
+Symbol and word differ between states, so that the status can be read without seeing colour. Used by the
+screens of sessions and by `hapteq sessions`.
 """
 
 from study.session.views.archive_views import INELIGIBILITY_REASONS, SessionLine, SessionStatus
@@ -28,21 +29,24 @@ STYLES: dict[SessionStatus, str] = {
 """Style of symbol and word for each status, in Textual's notation."""
 
 
-def status_text(standing: SessionStatus) -> str:
-    """Symbol and word of a status."""
-    return f"{SYMBOLS[standing]} {standing}"
+def format_status(status: SessionStatus) -> str:
+    """Format a status as symbol and word."""
+    return f"{SYMBOLS[status]} {status}"
 
 
-def describe(line: SessionLine) -> str:
-    """One or two sentences about a session in a list, and what can be done with it."""
+def describe_session(line: SessionLine) -> str:
+    """Describe a session of the list in one or two sentences, and what can be done with it."""
     match line.standing:
         case "finished":
-            return f"{_observer_text(line)} finished all {_runs(line.runs)} with {_answers(line)}."
+            return (
+                f"{_format_session_name(line)} finished all {_format_run_count(line.runs)} "
+                f"with {_format_answer_count(line)}."
+            )
         case "unfinished":
-            done = f"{line.runs_done} of {_runs(line.runs)} done, {_answers(line)}"
-            return f"{_observer_text(line)} is not finished: {done}. It can be resumed."
+            progress_text = f"{line.runs_done} of {_format_run_count(line.runs)} done, {_format_answer_count(line)}"
+            return f"{_format_session_name(line)} is not finished: {progress_text}. It can be resumed."
         case "running":
-            return f"{_observer_text(line)} is running now in another program. You can watch it."
+            return f"{_format_session_name(line)} is running now in another program. You can watch it."
         case "refused" | "excluded":
             return f"{line.name} is over: {INELIGIBILITY_REASONS[line.standing]}. The person does not take part."
         case "withdrawn":
@@ -51,13 +55,16 @@ def describe(line: SessionLine) -> str:
             return f"{line.name} cannot be read. {line.remark}".rstrip()
 
 
-def _observer_text(line: SessionLine) -> str:
+def _format_session_name(line: SessionLine) -> str:
+    """Format the name of a session, with its simulated participant if it has one."""
     return f"{line.name}{f' (simulated: {line.observer})' if line.observer else ''}"
 
 
-def _answers(line: SessionLine) -> str:
+def _format_answer_count(line: SessionLine) -> str:
+    """Format the number of answers with its noun."""
     return f"{line.answers} answer{'' if line.answers == 1 else 's'}"
 
 
-def _runs(runs: int) -> str:
-    return f"{runs} run{'' if runs == 1 else 's'}"
+def _format_run_count(run_count: int) -> str:
+    """Format a number of runs with its noun."""
+    return f"{run_count} run{'' if run_count == 1 else 's'}"

@@ -1,8 +1,7 @@
-"""Colour themes of the applications: dark, light and high contrast.
+"""Colour themes of the terminal applications: dark, light and high contrast.
 
-The hues are those of the palette of Okabe and Ito, which can be distinguished with colour vision deficiencies; where
-needed they are made darker or lighter to be legible on the background. Source: M. Okabe, K. Ito, Color Universal Design
-(2008).
+The hues are those of the palette of Okabe and Ito, which can be distinguished with colour vision deficiencies; some are
+made darker or lighter to be legible on the background. Source: M. Okabe, K. Ito, Color Universal Design (2008).
 """
 
 from typing import Any
@@ -42,7 +41,7 @@ LIGHT = Theme(
 )
 """Dark text on a light background."""
 
-CONTRAST = Theme(
+HIGH_CONTRAST = Theme(
     name="hapteq-contrast",
     primary="#56B4E9",
     secondary="#56B4E9",
@@ -58,14 +57,14 @@ CONTRAST = Theme(
 )
 """High contrast: white text and bright colours on black."""
 
-THEMES = (DARK, LIGHT, CONTRAST)
-"""All themes."""
+THEMES = (DARK, LIGHT, HIGH_CONTRAST)
+"""All themes, in the order in which a key cycles through them."""
 NEXT_THEME = {"hapteq-dark": "hapteq-light", "hapteq-light": "hapteq-contrast", "hapteq-contrast": "hapteq-dark"}
 """Name of the theme that follows each theme, for a key that cycles through them."""
 
 
-def register_themes(app: App[Any], chosen: str = DARK.name) -> None:
-    """Register all themes with the application and select the theme named `chosen`."""
+def register_themes(app: App[Any], theme_name: str = DARK.name) -> None:
+    """Register all themes with the application and select one. theme_name: name of a theme, such as `DARK.name`."""
     for theme in THEMES:
         app.register_theme(theme)
-    app.theme = chosen
+    app.theme = theme_name

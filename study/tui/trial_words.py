@@ -13,19 +13,20 @@ from study.session.views.form_views import Form, Limits
 from study.session.views.views import DemoMenu, Progress, Question, Task, Welcome
 
 
-def heading(question: Question, words: Words = ENGLISH_WORDS) -> str:
-    """Heading of a trial: kind and number of its run, number of the trial, and whether it is presented again."""
-    place = {
-        "run": words[run_key(question)],
+def format_heading(question: Question, words: Words = ENGLISH_WORDS) -> str:
+    """Format the heading of a trial: kind and number of its run, number of the trial, and whether it is presented
+    again."""
+    heading_values = {
+        "run": words[choose_run_text(question)],
         "number": question.run_number,
         "runs": question.runs_in_phase,
         "trial": question.trial_number,
     }
-    return words.fill("heading_again" if question.repeated else "heading", place)
+    return words.fill("heading_again" if question.repeated else "heading", heading_values)
 
 
-def run_key(question: Question) -> str:
-    """Key of the text that names the kind of run."""
+def choose_run_text(question: Question) -> str:
+    """Choose the key (in `Words`) of the text that names the kind of run: practice, interval, training or test."""
     if question.practice:
         return "run_practice"
     if question.task is Task.INTERVAL:
@@ -33,32 +34,35 @@ def run_key(question: Question) -> str:
     return "run_training" if question.phase is Phase.TRAINING else "run_test"
 
 
-def progress_sentence(progress: Progress, words: Words = ENGLISH_WORDS) -> str:
-    """Share of the session that is done (%), and the minutes left where they are known."""
-    share, minutes = round(100 * progress.share_done), progress.minutes_left
-    if minutes is None:
-        return words.fill("done", {"share": share})
-    return words.fill("done_left_1" if minutes == 1 else "done_left_n", {"share": share, "count": minutes})
+def describe_progress(progress: Progress, words: Words = ENGLISH_WORDS) -> str:
+    """Describe the share of the session that is done (%), and the minutes left where they are known."""
+    share_percent, minutes_left = round(100 * progress.share_done), progress.minutes_left
+    if minutes_left is None:
+        return words.fill("done", {"share": share_percent})
+    return words.fill(
+        "done_left_1" if minutes_left == 1 else "done_left_n", {"share": share_percent, "count": minutes_left}
+    )
 
 
-def plan(notice: Welcome, words: Words = ENGLISH_WORDS) -> str:
-    """Number of runs of the sitting, and whether training is among them."""
+def describe_plan(notice: Welcome, words: Words = ENGLISH_WORDS) -> str:
+    """Describe the sitting: its number of runs, and whether training is among them; without runs, training only."""
     if not notice.runs:
         return words["plan_training"]
     return words.fill_count("plan_training_runs" if notice.training_runs else "plan_runs", notice.runs)
 
 
-def describe_felt(menu: DemoMenu, vibration: int, words: Words = ENGLISH_WORDS) -> str:
-    """Which of the two directions were felt at a vibration in the demonstration. vibration: its number, from 1."""
-    numbers = [str(number) for number in (1, 2) if (vibration, number) in menu.played_pairs]
-    if not numbers:
+def describe_felt_directions(menu: DemoMenu, vibration: int, words: Words = ENGLISH_WORDS) -> str:
+    """Describe which of the two directions were felt at a vibration in the demonstration. vibration: its number, from
+    1."""
+    felt_numbers = [str(number) for number in (1, 2) if (vibration, number) in menu.played_pairs]
+    if not felt_numbers:
         return words["demo_none"]
-    both_numbers = words.fill("demo_and", {"first": numbers[0], "second": numbers[-1]})
-    return words.fill("demo_felt", {"numbers": both_numbers if len(numbers) == 2 else numbers[0]})
+    both_numbers = words.fill("demo_and", {"first": felt_numbers[0], "second": felt_numbers[-1]})
+    return words.fill("demo_felt", {"numbers": both_numbers if len(felt_numbers) == 2 else felt_numbers[0]})
 
 
-def void_words(reason: str, words: Words = ENGLISH_WORDS) -> str:
-    """Text for the participant after a void trial. reason: as in the session log."""
+def describe_void_trial(reason: str, words: Words = ENGLISH_WORDS) -> str:
+    """Describe to the participant why a trial was void. reason: as in the session log."""
     if is_computer_busy(reason):
         return words["void_busy"]
     if reason == SCREEN_SILENT:
@@ -68,18 +72,18 @@ def void_words(reason: str, words: Words = ENGLISH_WORDS) -> str:
     return words.fill("void_because", {"reason": words.fact(reason)})
 
 
-def refusal_words(outcome: Literal["refused", "excluded"], words: Words = ENGLISH_WORDS) -> tuple[str, ...]:
-    """Last text for a person who does not take part, and a sentence on which data are kept."""
+def describe_refusal(outcome: Literal["refused", "excluded"], words: Words = ENGLISH_WORDS) -> tuple[str, ...]:
+    """Choose the last text for a person who does not take part, and a sentence on which data are kept."""
     return words[outcome], words[f"{outcome}_kept"]
 
 
-def origin(form: Form, words: Words = ENGLISH_WORDS) -> str:
-    """Version of a form and number of its ethics approval; empty where the form states neither."""
-    version = words.fill("form_version", {"version": form.version}) if form.version else ""
-    ethics = words.fill("form_ethics", {"number": form.ethics_id}) if form.ethics_id else ""
-    return " ".join(filter(None, (version, ethics)))
+def describe_form_origin(form: Form, words: Words = ENGLISH_WORDS) -> str:
+    """Describe the version of a form and the number of its ethics approval; empty where the form states neither."""
+    version_text = words.fill("form_version", {"version": form.version}) if form.version else ""
+    ethics_text = words.fill("form_ethics", {"number": form.ethics_id}) if form.ethics_id else ""
+    return " ".join(filter(None, (version_text, ethics_text)))
 
 
-def limits_words(limits: Limits, words: Words = ENGLISH_WORDS) -> str:
-    """Range of the numbers that a field of a form accepts."""
+def describe_number_limits(limits: Limits, words: Words = ENGLISH_WORDS) -> str:
+    """Describe the range of the numbers that a field of a form accepts."""
     return words.fill("form_number", {"lowest": f"{limits.lowest:g}", "highest": f"{limits.highest:g}"})

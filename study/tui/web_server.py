@@ -20,10 +20,10 @@ from aiohttp import web
 from rich.console import Console
 from textual_serve.server import Server
 
-RELOAD_S = 10.0
+RELOAD_TIMEOUT_S = 10.0
 """Longest time (s) for which a reloaded page waits until the application of the previous page has ended."""
 
-THIS_MACHINE = ("localhost", "127.0.0.1", "[::1]")
+LOCAL_HOST_NAMES = ("localhost", "127.0.0.1", "[::1]")
 """Names by which a browser may address this machine."""
 TOKEN_BYTES = 32
 """Number of random bytes of the token, too many to guess."""
@@ -31,23 +31,23 @@ TOKEN_BYTES = 32
 
 class ScreenServer(Server):
     """Starts `command` for the page, at most once at a time. Closing the page ends it, as closing a terminal would.
-    host, port: where to listen; say: prints a line for the user."""
+    host, port: where to listen; print_line: prints a line for the user."""
 
-    def __init__(self, command: Sequence[str], host: str, port: int, say: Callable[[str], None]) -> None:
+    def __init__(self, command: Sequence[str], host: str, port: int, print_line: Callable[[str], None]) -> None:
         super().__init__(
             shlex.join(command),
             host=host,
             port=port,
             title="hapteq study",
-            public_url=_address(_url_host(host), port),
+            public_url=_format_origin(_format_url_host(host), port),
         )
         self.console = Console(stderr=True)
-        self._say = say
-        self._origins = origins(host, port)
+        self._print_line = print_line
+        self._allowed_origins = list_origins(host, port)
         self._token = secrets.token_urlsafe(TOKEN_BYTES)
-        self._headers = self._safe_headers()
-        self._seat = asyncio.Lock()
-        self._being_taken: set[str] = set()
+        self._headers = self._make_security_headers()
+        self._window_lock = asyncio.Lock()
+        self._downloads_in_progress: set[str] = set()
 
     def initialize_logging(self) -> None:
         """Log warnings only: a log of requests would hide important lines and show the token."""
@@ -55,34 +55,36 @@ class ScreenServer(Server):
         logging.getLogger("aiohttp.access").disabled = True
 
     async def on_startup(self, app: web.Application) -> None:
-        self._say(f"The study is at {self.public_url}/{self._token}/ for one window at a time. Ctrl-C ends it.")
-        self._say("Keep this address to yourself: any browser that has it can take the study. It changes each time.")
+        self._print_line(f"The study is at {self.public_url}/{self._token}/ for one window at a time. Ctrl-C ends it.")
+        self._print_line(
+            "Keep this address to yourself: any browser that has it can take the study. It changes each time."
+        )
 
     async def handle_websocket(self, request: web.Request) -> web.WebSocketResponse:
         # A browser states the page that opens a WebSocket; other pages must not drive the device.
-        if request.headers.get("Origin") not in self._origins:
+        if request.headers.get("Origin") not in self._allowed_origins:
             raise web.HTTPForbidden(text="Only the page of this server may drive the device.")
         try:
-            async with asyncio.timeout(RELOAD_S):
-                await self._seat.acquire()
+            async with asyncio.timeout(RELOAD_TIMEOUT_S):
+                await self._window_lock.acquire()
         except TimeoutError:
             raise web.HTTPConflict(text="The study is open in another window.") from None
         try:
             return await super().handle_websocket(request)
         finally:
-            self._seat.release()
+            self._window_lock.release()
 
     async def handle_download(self, request: web.Request) -> web.StreamResponse:
         """Send a file to the first request only: two requests would each receive a part of its pieces. Raises
         HTTPConflict for another method than GET, and while the file is being sent."""
         key = request.match_info["key"]
-        if request.method != "GET" or key in self._being_taken:
+        if request.method != "GET" or key in self._downloads_in_progress:
             raise web.HTTPConflict(text="This report is sent once, and to one window.")
-        self._being_taken.add(key)
+        self._downloads_in_progress.add(key)
         try:
             return await super().handle_download(request)
         finally:
-            self._being_taken.discard(key)
+            self._downloads_in_progress.discard(key)
 
     async def _make_app(self) -> web.Application:
         """The web application: page, WebSocket and resources below the path /TOKEN, downloads below /download."""
@@ -118,29 +120,31 @@ class ScreenServer(Server):
         return True
 
     async def _add_headers(self, request: web.Request, response: web.StreamResponse) -> None:
+        """Add the security headers to a response before it is sent."""
         response.headers.update(self._headers)
 
-    def _safe_headers(self) -> dict[str, str]:
-        """Security headers of each answer. The page's inline scripts are allowed by their hashes; nothing is loaded
-        from other servers, fonts included."""
-        page = (self.templates_path / "app_index.html").read_text("utf-8")
-        scripts = " ".join(f"'sha256-{_sha256(script)}'" for script in _inline_scripts(page))
-        own_origins = " ".join(
-            sorted(origin for origin in self._origins if "[" not in origin)
+    def _make_security_headers(self) -> dict[str, str]:
+        """Make the security headers of each answer. The page's inline scripts are allowed by their hashes; nothing is
+        loaded from other servers, fonts included."""
+        page_html = (self.templates_path / "app_index.html").read_text("utf-8")
+        script_hashes = " ".join(f"'sha256-{_hash_script(script)}'" for script in _find_inline_scripts(page_html))
+        allowed_origins = " ".join(
+            sorted(origin for origin in self._allowed_origins if "[" not in origin)
         )  # a policy holds no IPv6
-        policy = (
+        policy_directives = (
             "default-src 'none'",
-            f"script-src 'self' {own_origins} 'unsafe-hashes' {scripts}",
-            f"style-src 'self' {own_origins} 'unsafe-inline'",  # the terminal in the page sets styles while it draws
-            f"img-src 'self' {own_origins} data:",
-            f"font-src 'self' {own_origins} data:",
-            f"connect-src 'self' {own_origins} {own_origins.replace('http:', 'ws:')}",
+            f"script-src 'self' {allowed_origins} 'unsafe-hashes' {script_hashes}",
+            # The terminal in the page sets styles while it draws.
+            f"style-src 'self' {allowed_origins} 'unsafe-inline'",
+            f"img-src 'self' {allowed_origins} data:",
+            f"font-src 'self' {allowed_origins} data:",
+            f"connect-src 'self' {allowed_origins} {allowed_origins.replace('http:', 'ws:')}",
             "base-uri 'none'",
             "form-action 'none'",
             "frame-ancestors 'none'",
         )
         return {
-            "Content-Security-Policy": "; ".join(policy),
+            "Content-Security-Policy": "; ".join(policy_directives),
             "X-Frame-Options": "DENY",
             "X-Content-Type-Options": "nosniff",
             "Referrer-Policy": "no-referrer",
@@ -148,26 +152,29 @@ class ScreenServer(Server):
         }
 
 
-def origins(host: str, port: int) -> frozenset[str]:
-    """Origins (scheme, host, port) of the server's page, as a browser states them in the Origin header."""
-    names = THIS_MACHINE if _url_host(host) in THIS_MACHINE else (_url_host(host),)
-    return frozenset(_address(name, port) for name in names)
+def list_origins(host: str, port: int) -> frozenset[str]:
+    """List the origins (scheme, host, port) of the server's page, as a browser states them in the Origin header."""
+    host_names = LOCAL_HOST_NAMES if _format_url_host(host) in LOCAL_HOST_NAMES else (_format_url_host(host),)
+    return frozenset(_format_origin(name, port) for name in host_names)
 
 
-def _url_host(host: str) -> str:
-    """The host as a URL contains it: an IPv6 address in brackets."""
+def _format_url_host(host: str) -> str:
+    """Format the host as a URL contains it: an IPv6 address in brackets."""
     return f"[{host}]" if ":" in host else host
 
 
-def _address(name: str, port: int) -> str:
-    return f"http://{name}" if port == 80 else f"http://{name}:{port}"
+def _format_origin(host_name: str, port: int) -> str:
+    """Format the origin, without the port where it is the default of http (80), as browsers do."""
+    return f"http://{host_name}" if port == 80 else f"http://{host_name}:{port}"
 
 
-def _inline_scripts(page: str) -> Iterator[str]:
-    """Inline scripts and event handlers (on... attributes) of an HTML page, each of which needs its own hash."""
-    yield from re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
-    yield from dict.fromkeys(re.findall(r'\bon[a-z]+="([^"]*)"', page, re.IGNORECASE))
+def _find_inline_scripts(page_html: str) -> Iterator[str]:
+    """Find the inline scripts and event handlers (on... attributes) of an HTML page, each of which needs its own
+    hash."""
+    yield from re.findall(r"<script>(.*?)</script>", page_html, re.DOTALL)
+    yield from dict.fromkeys(re.findall(r'\bon[a-z]+="([^"]*)"', page_html, re.IGNORECASE))
 
 
-def _sha256(script: str) -> str:
+def _hash_script(script: str) -> str:
+    """Compute the SHA-256 of a script, base64, as a content security policy states it."""
     return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()

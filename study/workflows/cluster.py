@@ -1,7 +1,7 @@
 """Execution of work on the workers of a dask cluster, by the `Executor` interface that local processes also have.
 
 Each worker imports its own installation of hapteq. All must have the same version, because other code could give other
-numbers.
+numbers. `study.cli` opens the executor where the option --scheduler is given.
 """
 
 import threading
@@ -24,18 +24,19 @@ SCHEDULER_TIMEOUT_S = 10.0
 WORKER_TIMEOUT_S = 60.0
 """Longest time in seconds that work waits while the scheduler has no worker or does not answer; either may be
 restarting."""
-POLL_S = 1.0
+POLL_INTERVAL_S = 1.0
 """Interval in seconds at which the workers are counted."""
 RESULTS_KEPT = "What was finished is kept."
 """Sentence on what was saved, for errors after the work began."""
-INSTALL = "pip install 'hapteq[cluster]'"
+INSTALL_COMMAND = "pip install 'hapteq[cluster]'"
 """Command that installs dask with its scheduler."""
 
 
 @contextmanager
-def cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Executor]:
-    """Executor on the workers of the scheduler at `address`, such as tcp://10.0.0.5:8786. A task whose worker dies is
-    repeated by another. one_thread: refuse workers with several threads, for tasks that draw or measure processor time.
+def open_cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Executor]:
+    """Open an executor on the workers of the scheduler at `address`, such as tcp://10.0.0.5:8786. A task whose worker
+    dies is repeated by another. one_thread: refuse workers with several threads, for tasks that draw or measure
+    processor time.
 
     Raises StudyError where no scheduler answers, it has no workers, or a worker has another version; later, where the
     scheduler is lost, a task repeatedly kills its workers, or for `WORKER_TIMEOUT_S` there is no worker or the
@@ -50,7 +51,7 @@ def cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Execu
         raise StudyError(
             "There is no access to a cluster",
             "The package distributed is not installed.",
-            f"Install it: {INSTALL}. On this computer alone, use --workers.",
+            f"Install it: {INSTALL_COMMAND}. On this computer alone, use --workers.",
             saved="Nothing was begun.",
         ) from missing
     try:
@@ -67,30 +68,30 @@ def cluster_workers(address: str, *, one_thread: bool = False) -> Iterator[Execu
         _require_workers(client, address, one_thread)
         causes: list[StudyError] = []
         try:
-            with _executor(client) as executor, _watch(client, executor, address, causes):
+            with _open_executor(client) as executor, _watch_workers(client, executor, address, causes):
                 yield executor
         except (KilledWorker, ClosedClientError, CommClosedError, CancelledError) as problem:
-            raise causes[0] if causes else _undone_error(problem) from problem
+            raise causes[0] if causes else _make_lost_work_error(problem) from problem
         except (RuntimeError, TypeError, ValueError) as problem:
             # A future that was lost with its scheduler has no result, on which distributed's executor fails; an
-            # executor that `_watch` cancelled refuses further tasks. Both are errors of the cluster, not of a task.
+            # executor that `_watch_workers` cancelled refuses further tasks. Both are errors of the cluster.
             if client.status == "running" and not causes:
                 raise
-            raise causes[0] if causes else _undone_error(problem) from problem
+            raise causes[0] if causes else _make_lost_work_error(problem) from problem
 
 
 @contextmanager
-def _executor(client: "Client") -> Iterator[Executor]:
-    """Executor of the client. Unfinished tasks are cancelled on exit: the executor's own exit would wait for them, and
-    for finished ones that are computed again because their worker died."""
+def _open_executor(client: "Client") -> Iterator[Executor]:
+    """Open the executor of the client. Unfinished tasks are cancelled on exit: the executor's own exit would wait for
+    them, and for finished ones that are computed again because their worker died."""
     executor = client.get_executor(pure=False)
     try:
         yield executor
     finally:
-        _cancel(executor)
+        _cancel_tasks(executor)
 
 
-def _cancel(executor: Executor) -> None:
+def _cancel_tasks(executor: Executor) -> None:
     """Cancel all tasks of the executor, without waiting for an answer of the scheduler."""
     from distributed.client import ClosedClientError
 
@@ -99,7 +100,7 @@ def _cancel(executor: Executor) -> None:
 
 
 @contextmanager
-def _watch(client: "Client", executor: Executor, address: str, causes: list[StudyError]) -> Iterator[None]:
+def _watch_workers(client: "Client", executor: Executor, address: str, causes: list[StudyError]) -> Iterator[None]:
     """While the context lasts: cancel all tasks, and append the cause to `causes`, if for `WORKER_TIMEOUT_S` the
     scheduler has no worker or does not answer."""
     stop_event = threading.Event()
@@ -109,33 +110,38 @@ def _watch(client: "Client", executor: Executor, address: str, causes: list[Stud
         yield
     finally:
         stop_event.set()
-        watcher.join(POLL_S)  # if the scheduler does not answer, the thread still waits for it, and does nothing more
+        # If the scheduler does not answer, the thread still waits for it, and does nothing more.
+        watcher.join(POLL_INTERVAL_S)
 
 
 def _await_loss(
     client: "Client", executor: Executor, address: str, causes: list[StudyError], stop_event: threading.Event
 ) -> None:
-    """Count the workers every `POLL_S` until `stop_event` is set or they are lost; runs in the thread of `_watch`."""
+    """Count the workers every `POLL_INTERVAL_S` until `stop_event` is set or they are lost; runs in the thread of
+    `_watch_workers`."""
     last_seen_s = time.monotonic()
-    while not stop_event.wait(POLL_S):
-        workers, problem = _workers(client)
+    while not stop_event.wait(POLL_INTERVAL_S):
+        workers, problem = _count_workers(client)
         if workers:
             last_seen_s = time.monotonic()
         elif time.monotonic() - last_seen_s > WORKER_TIMEOUT_S and not stop_event.is_set():
-            causes.append(_no_workers_error(address) if problem is None else _silent_error(address, problem))
-            _cancel(executor)
+            causes.append(
+                _make_no_workers_error(address) if problem is None else _make_silent_scheduler_error(address, problem)
+            )
+            _cancel_tasks(executor)
             return
 
 
-def _workers(client: "Client") -> tuple[int, Exception | None]:
-    """Number of the scheduler's workers; 0 and the error where it does not answer within `SCHEDULER_TIMEOUT_S`."""
+def _count_workers(client: "Client") -> tuple[int, Exception | None]:
+    """Count the scheduler's workers; 0 and the error where it does not answer within `SCHEDULER_TIMEOUT_S`."""
     try:
         return len(client.nthreads(callback_timeout=SCHEDULER_TIMEOUT_S)), None
     except Exception as problem:  # noqa: BLE001 — distributed has many for a lost scheduler, and none may end the watch
         return 0, problem
 
 
-def _no_workers_error(address: str) -> StudyError:
+def _make_no_workers_error(address: str) -> StudyError:
+    """Make the error for a scheduler that had no worker for `WORKER_TIMEOUT_S`."""
     return StudyError(
         "The cluster has no workers any more",
         f"For {WORKER_TIMEOUT_S:g} s the scheduler at {address} had none: they ended, or cannot reach it.",
@@ -144,7 +150,8 @@ def _no_workers_error(address: str) -> StudyError:
     )
 
 
-def _silent_error(address: str, problem: Exception) -> StudyError:
+def _make_silent_scheduler_error(address: str, problem: Exception) -> StudyError:
+    """Make the error for a scheduler that did not answer for `WORKER_TIMEOUT_S`."""
     return StudyError(
         "The scheduler does not answer any more",
         f"For {WORKER_TIMEOUT_S:g} s the scheduler at {address} named no worker. When last asked: "
@@ -155,7 +162,8 @@ def _silent_error(address: str, problem: Exception) -> StudyError:
     )
 
 
-def _undone_error(problem: BaseException) -> StudyError:
+def _make_lost_work_error(problem: BaseException) -> StudyError:
+    """Make the error for tasks that were lost with a worker or the scheduler."""
     return StudyError(
         "The cluster did not do this",
         f"{type(problem).__name__}: {problem}.",
@@ -164,8 +172,9 @@ def _undone_error(problem: BaseException) -> StudyError:
     )
 
 
-def hapteq_version() -> str:
-    """Version of hapteq in the process that calls it, this one or a worker; empty where hapteq is not installed."""
+def read_hapteq_version() -> str:
+    """Read the version of hapteq in the process that calls it, this one or a worker; empty where hapteq is not
+    installed."""
     try:
         return version("hapteq")
     except PackageNotFoundError:
@@ -182,33 +191,34 @@ class _WorkerSetup:
     """Number of threads of each worker."""
 
 
-def _ask(client: "Client") -> _WorkerSetup:
+def _request_worker_setup(client: "Client") -> _WorkerSetup:
     """Ask the workers for their version of hapteq, and the scheduler for their threads."""
     try:
-        versions: dict[str, str] = client.run(hapteq_version)
-    except ImportError:  # raised by a worker without hapteq, which cannot import `hapteq_version`
+        versions: dict[str, str] = client.run(read_hapteq_version)
+    except ImportError:  # raised by a worker without hapteq, which cannot import `read_hapteq_version`
         versions = dict.fromkeys(client.scheduler_info()["workers"], "")
     workers = client.scheduler_info(n_workers=-1)["workers"].values()
     return _WorkerSetup(versions, tuple(worker["nthreads"] for worker in workers))
 
 
-def _ask_in_time(client: "Client", address: str) -> _WorkerSetup:
-    """`_ask` with a time limit, `WORKER_TIMEOUT_S`: distributed waits without a limit for a scheduler or a worker that
-    does not answer. Raises StudyError."""
-    answer = Future[_WorkerSetup]()
+def _request_setup_in_time(client: "Client", address: str) -> _WorkerSetup:
+    """Call `_request_worker_setup` with the time limit `WORKER_TIMEOUT_S`: distributed waits without a limit for a
+    scheduler or a worker that does not answer. Raises StudyError."""
+    setup_future = Future[_WorkerSetup]()
 
-    def ask() -> None:
+    def store_answer() -> None:
+        """Store the setup of the workers, or the exception, in the future."""
         try:
-            answer.set_result(_ask(client))
+            setup_future.set_result(_request_worker_setup(client))
         except BaseException as problem:  # noqa: BLE001 — raised where the result is waited for
-            answer.set_exception(problem)
+            setup_future.set_exception(problem)
 
-    threading.Thread(target=ask, daemon=True).start()
+    threading.Thread(target=store_answer, daemon=True).start()
     try:
-        return answer.result(timeout=WORKER_TIMEOUT_S)
+        return setup_future.result(timeout=WORKER_TIMEOUT_S)
     except TimeoutError as problem:
-        if answer.done():  # the TimeoutError was raised by `_ask` itself, before the time limit
-            raise _cluster_error(
+        if setup_future.done():  # the TimeoutError was raised by `_request_worker_setup` itself, before the time limit
+            raise _make_unusable_cluster_error(
                 f"The scheduler at {address} was reached, and asking its workers failed: "
                 f"{str(problem) or type(problem).__name__}.",
                 "Look at the scheduler, its workers and the network, then run the same command again.",
@@ -223,25 +233,28 @@ def _ask_in_time(client: "Client", address: str) -> _WorkerSetup:
 
 def _require_workers(client: "Client", address: str, one_thread: bool) -> None:
     """Raise StudyError unless there are workers, with this version of hapteq, and with one thread each if needed."""
-    setup = _ask_in_time(client, address)
-    versions = setup.versions
-    if not versions or not setup.threads:  # workers may have left between the two requests
-        raise _cluster_error(f"The scheduler at {address} has no workers.", f"Start some: dask worker {address}.")
-    local_version = hapteq_version()
-    if wrong := sorted(
+    worker_setup = _request_setup_in_time(client, address)
+    versions = worker_setup.versions
+    if not versions or not worker_setup.threads:  # workers may have left between the two requests
+        raise _make_unusable_cluster_error(
+            f"The scheduler at {address} has no workers.", f"Start some: dask worker {address}."
+        )
+    local_version = read_hapteq_version()
+    if other_versions := sorted(
         {worker_version or "none" for worker_version in versions.values() if worker_version != local_version}
     ):
-        raise _cluster_error(
-            f"Workers at {address} have hapteq {', '.join(wrong)}; here it is {local_version}.",
+        raise _make_unusable_cluster_error(
+            f"Workers at {address} have hapteq {', '.join(other_versions)}; here it is {local_version}.",
             "Install the same version for all of them.",
         )
-    threads = max(setup.threads)
-    if one_thread and threads > 1:
-        raise _cluster_error(
-            f"Workers at {address} have up to {threads} threads, and this work needs a process for each piece.",
+    max_threads = max(worker_setup.threads)
+    if one_thread and max_threads > 1:
+        raise _make_unusable_cluster_error(
+            f"Workers at {address} have up to {max_threads} threads, and this work needs a process for each piece.",
             f"Start them with: dask worker {address} --nthreads 1 --nworkers auto.",
         )
 
 
-def _cluster_error(explanation: str, advice: str) -> StudyError:
+def _make_unusable_cluster_error(explanation: str, advice: str) -> StudyError:
+    """Make the error for a cluster that is refused before work begins."""
     return StudyError("The cluster cannot do this", explanation, advice, saved="Nothing was begun.")

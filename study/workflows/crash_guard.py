@@ -13,4 +13,4 @@ STRICT = "HAPTEQ_STRICT"
 
 def crash_guard() -> Guard:
     """A new guard, for a single run; see `analysis.diagnosis.search.guard.Guard`."""
-    return Guard(on=not os.environ.get(STRICT))
+    return Guard(enabled=not os.environ.get(STRICT))

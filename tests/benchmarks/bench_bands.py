@@ -50,9 +50,9 @@ def models(seed: int):
     middle = identify(narrow, IdentificationSettings(draws=0)).model
     broad = estimate_transfer((synthetic.sweeps(plants, 1.0, 500.0, 30.0, seed),))
     wide = identify(broad, IdentificationSettings(band_hz=(5.0, 450.0), order=40, draws=0)).model
-    lines = broad.within(1.5, 4.0)
+    lines = broad.select_band(1.5, 4.0)
     rigid = fit_rigid_model(lines.frequency_hz, lines.response, plants.RATE_HZ)
-    above = broad.within(20.0, 450.0)
+    above = broad.select_band(20.0, 450.0)
     return middle, wide, MeasuredResponse(above.frequency_hz, above.response), rigid
 
 
@@ -72,9 +72,9 @@ def ways(seed: int) -> dict[str, BandedEqualizer]:
 
 def figures(equalizer: BandedEqualizer, wanted: np.ndarray) -> tuple[float, float, float, float]:
     """Error in 5 to 35 Hz, level above in dB, error of all, ms of work."""
-    equalizer.play(wanted)
+    equalizer.compute_forces(wanted)
     start = time.perf_counter()
-    found = equalizer.play(wanted)
+    found = equalizer.compute_forces(wanted)
     took_ms = 1e3 * (time.perf_counter() - start)
     late = np.zeros_like(found.entering)
     late[found.rows_of_wanted(len(wanted))] = wanted

@@ -16,7 +16,7 @@ from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from equalizer.effects.catalogue import CATALOGUE
 from study.evaluation.challenge.draw_case import Case, draw_case
-from study.workflows.forked_map import map_forked, processor_s
+from study.workflows.forked_map import map_forked, measure_processor_s
 
 SEED = 61
 EFFECTS = ((), ("sensor_lag",), ("force_saturation",), ("coulomb_friction",))
@@ -54,10 +54,10 @@ class Taken:
 def diagnosed(case: Case, without: tuple[str, ...] = (), times: int = 1) -> Taken:
     """times: of the recording, one after another."""
     counted = Counted(map_forked)
-    wall, cpu = time.perf_counter(), processor_s()
+    wall, cpu = time.perf_counter(), measure_processor_s()
     settings = DiagnosisSettings(without=without)
     found = diagnose([case.recording] * times, case.model, settings, counted, lambda what, share: None)
-    taken = time.perf_counter() - wall, processor_s() - cpu
+    taken = time.perf_counter() - wall, measure_processor_s() - cpu
     said = found.diagnosis
     return Taken(*taken, counted.items, f"{said.verdict} {' '.join(effect.effect for effect in said.effects)}")
 

@@ -24,7 +24,7 @@ from study.devices.force_dimension.loop_cells import LIBRARY
 from study.devices.governor import cells
 from study.devices.governor.governor import Governor
 from study.devices.safe import SafeDevice
-from study.workflows.checks.bare_loop import compare_with_bare_loop, run_bare_loop_beside
+from study.workflows.checks.bare_loop import compare_with_bare_loop, run_bare_loop_in_parallel
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 import rigs
@@ -139,7 +139,7 @@ def main() -> int:
         for way in ("compiled", "from Python"):
             with (
                 vendor_stub.copied(compiled, folder / way) as stub,
-                run_bare_loop_beside(TIMED_S, rigs.RATE_HZ, True) as bare,
+                run_bare_loop_in_parallel(TIMED_S, rigs.RATE_HZ, True) as bare,
             ):
                 stub.set("watchdog_stretch", 10)
                 rig = stub.rig(sensed=False)

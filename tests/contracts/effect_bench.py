@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.forces.missing_force import missing_force
+from analysis.diagnosis.forces.missing_force import estimate_missing_force
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.simulation.simulator import SimulationResult, simulate_mechanism
@@ -99,7 +99,7 @@ def evidence(model: MechanicalModel, seen: Measured) -> Evidence:
     unit = np.repeat([NOISE_MPS2, NOISE_M], p)
     left = np.hstack([seen.response - predicted.response, seen.position - predicted.position]) / unit
     expected = 0.1 * np.sqrt(np.mean(seen.command**2, axis=0))
-    missing = missing_force(model, left, unit, RATE_HZ, expected)
+    missing = estimate_missing_force(model, left, unit, RATE_HZ, expected)
     return Evidence(
         model=model,
         sample_rate_hz=RATE_HZ,

@@ -10,7 +10,7 @@ from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import JointForce, OnResponse, Structure
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME
-from equalizer.plant.mechanical_model import ModelEffect, effect_problems
+from equalizer.plant.mechanical_model import ModelEffect, find_effect_problems
 
 ALL = sorted(EFFECTS)
 BY_WHOLE_RECORD = ("sensor_drift", "logger_offset", "lost_samples")
@@ -57,7 +57,7 @@ def test_an_effect_says_what_it_is(name):
 @pytest.mark.parametrize("name", ALL)
 def test_what_is_reported_is_a_valid_entry_of_the_vocabulary(name, bench):
     reported = EFFECTS[name].report(bench.EXAMPLES[name])
-    assert not list(effect_problems(ModelEffect(name, None, reported)))
+    assert not list(find_effect_problems(ModelEffect(name, None, reported)))
     assert EFFECTS_BY_NAME[name].main.name in reported
 
 

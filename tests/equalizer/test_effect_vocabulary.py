@@ -35,7 +35,7 @@ def test_every_unit_is_one_that_files_may_use():
 def test_units_follow_the_model_and_its_response():
     level, cubic = EFFECTS_BY_NAME["coulomb_friction"].main, EFFECTS_BY_NAME["sensor_nonlinearity"].main
     clipping = EFFECTS_BY_NAME["sensor_clipping"].main
-    assert level.unit_in(system=LINEAR, response_unit="m/s^2") == "N"
-    assert level.unit_in(system=ROTATIONAL, response_unit="rad") == "N m"
-    assert clipping.unit_in(system=LINEAR, response_unit="m/s^2") == "m/s^2"
-    assert cubic.unit_in(system=LINEAR, response_unit="m/s^2") == "1/(m/s^2)^2"
+    assert level.find_unit(system=LINEAR, response_unit="m/s^2") == "N"
+    assert level.find_unit(system=ROTATIONAL, response_unit="rad") == "N m"
+    assert clipping.find_unit(system=LINEAR, response_unit="m/s^2") == "m/s^2"
+    assert cubic.find_unit(system=LINEAR, response_unit="m/s^2") == "1/(m/s^2)^2"

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from equalizer.laws.law import law_of
+from equalizer.laws.law import parse_law
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES
 from equalizer.plant.mechanical_model import (
     ActuatorLimits,
@@ -13,7 +13,7 @@ from equalizer.plant.mechanical_model import (
     SensorLimits,
     Tolerance,
 )
-from equalizer.plant.mechanical_model_toml import MATRICES, mechanical_model_toml, parse_mechanical_model
+from equalizer.plant.mechanical_model_toml import MATRICES, format_mechanical_model, parse_mechanical_model
 from equalizer.signals.signal import FloatArray
 
 ONE_AXIS = """
@@ -67,7 +67,7 @@ def models(draw):
 @given(models())
 @settings(max_examples=60, deadline=None)
 def test_a_written_model_is_read_back_to_the_last_digit(model):
-    again = parse_mechanical_model(mechanical_model_toml(model))
+    again = parse_mechanical_model(format_mechanical_model(model))
     for name in MATRICES:
         assert np.array_equal(getattr(again, name), getattr(model, name))
     for name in ("name", "quantity", "sensor", "actuator", "effects", "tolerance", "rotational", "provenance"):
@@ -80,7 +80,7 @@ def test_the_shared_cases_are_read_and_written_without_loss(shared, number):
     assert (model.coordinates, model.inputs, model.outputs) == (6, 3, 3)
     assert model.sensor == SensorLimits(500.0, 29.43)
     assert model.tolerance is not None
-    again = parse_mechanical_model(mechanical_model_toml(model))
+    again = parse_mechanical_model(format_mechanical_model(model))
     assert np.array_equal(again.mass, model.mass)
 
 
@@ -156,7 +156,7 @@ def test_a_value_that_toml_does_not_have_is_refused_when_writing():
         **{name: getattr(model, name) for name in ("name", "quantity", *MATRICES)}, provenance={"a": 1j}
     )
     with pytest.raises(TypeError, match="a value of type complex cannot be written as TOML: 1j"):
-        mechanical_model_toml(odd)
+        format_mechanical_model(odd)
 
 
 LAW = '[[effect]]\nkind = "discovered_law"\naxis = "x"\nacts_on = "force"\nexpression = "-2.0*vx**3"\n'
@@ -174,7 +174,7 @@ LAW = '[[effect]]\nkind = "discovered_law"\naxis = "x"\nacts_on = "force"\nexpre
     ],
 )
 def test_a_discovered_law_that_cannot_be_read_is_said_so(old, new, problem):
-    assert parse_mechanical_model(ONE_AXIS + LAW).effects[0].law == law_of("-2.0*vx**3", "force", "x")
+    assert parse_mechanical_model(ONE_AXIS + LAW).effects[0].law == parse_law("-2.0*vx**3", "force", "x")
     with pytest.raises(MechanicalModelError) as error:
         parse_mechanical_model(ONE_AXIS + LAW.replace(old, new))
     assert problem in str(error.value)

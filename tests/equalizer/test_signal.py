@@ -20,7 +20,7 @@ def test_equal_words_per_channel_are_folded_into_one():
 def test_channels_may_differ_in_quantity_and_unit():
     mixed = signal(quantity=("position", "angle"), unit=("m", "rad"))
     assert mixed.units == ("m", "rad")
-    assert mixed.part(0, 1).quantity == ("position", "angle")
+    assert mixed.select_samples(0, 1).quantity == ("position", "angle")
 
 
 def test_a_list_of_the_wrong_length_is_refused():

@@ -2,7 +2,14 @@
 
 import pytest
 
-from equalizer.signals.units import KNOWN_UNITS, UnknownUnitError, check_quantity, parse_unit, plain_unit, suggest_unit
+from equalizer.signals.units import (
+    KNOWN_UNITS,
+    UnknownUnitError,
+    check_quantity,
+    normalise_unit,
+    parse_unit,
+    suggest_unit,
+)
 
 
 @pytest.mark.parametrize(
@@ -24,13 +31,13 @@ from equalizer.signals.units import KNOWN_UNITS, UnknownUnitError, check_quantit
 )  # fmt: skip
 def test_a_spelling_of_others_is_understood(spelled, unit):
     expected = {"deg C": "degC"}.get(unit, unit)
-    assert plain_unit(spelled) == expected
-    assert parse_unit(plain_unit(spelled)) == parse_unit(expected)
+    assert normalise_unit(spelled) == expected
+    assert parse_unit(normalise_unit(spelled)) == parse_unit(expected)
 
 
 @pytest.mark.parametrize("unit", [*KNOWN_UNITS, "N m", "m/s^2", "mN", "MN", "mS", "kg m^2", "oz in^2"])
 def test_what_is_written_here_stays(unit):
-    assert plain_unit(unit) == unit
+    assert normalise_unit(unit) == unit
 
 
 @pytest.mark.parametrize(
@@ -43,7 +50,7 @@ def test_what_is_written_here_stays(unit):
     ],
 )  # fmt: skip
 def test_an_unknown_unit_is_refused_with_the_nearest_known(unknown, near):
-    assert plain_unit(unknown) == unknown
+    assert normalise_unit(unknown) == unknown
     assert suggest_unit(unknown) == near
     with pytest.raises(UnknownUnitError) as refused:
         parse_unit(unknown)
@@ -53,8 +60,8 @@ def test_an_unknown_unit_is_refused_with_the_nearest_known(unknown, near):
 
 def test_a_gram_force_is_a_thousandth_of_a_kilopond():
     assert parse_unit("gf").factor == pytest.approx(parse_unit("kgf").factor / 1000)
-    assert parse_unit(plain_unit("kgf·cm")).factor == pytest.approx(9.80665 / 100)
-    assert parse_unit(plain_unit("oz-in")).factor == pytest.approx(0.0070615518142260)
+    assert parse_unit(normalise_unit("kgf·cm")).factor == pytest.approx(9.80665 / 100)
+    assert parse_unit(normalise_unit("oz-in")).factor == pytest.approx(0.0070615518142260)
 
 
 @pytest.mark.parametrize("unit", ["ms^-1", "ms^-2", "m/s^-2", "N m/rad^-1"])

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME, matrix_unit
-from equalizer.plant.mechanical_model import MechanicalModel, with_units_of
-from equalizer.plant.mechanical_model_toml import mechanical_model_toml, parse_mechanical_model
+from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME, find_matrix_unit
+from equalizer.plant.mechanical_model import MechanicalModel, adopt_recording_units
+from equalizer.plant.mechanical_model_toml import format_mechanical_model, parse_mechanical_model
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL, UnitSystem, system_of
 
 MOTOR = UnitSystem("A", "rad")
@@ -23,13 +23,13 @@ def body(gain: float = 1.0) -> MechanicalModel:
      (UnitSystem("V", "m"), ("V s^2/m", "V s/m", "V/m"))],
 )  # fmt: skip
 def test_mass_damping_and_stiffness(system, units):
-    assert tuple(matrix_unit(part, system) for part in ("mass", "damping", "stiffness")) == units
+    assert tuple(find_matrix_unit(part, system) for part in ("mass", "damping", "stiffness")) == units
 
 
 def test_no_number_of_an_effect_is_a_force_where_the_command_is_none():
-    units = [part.unit_in(MOTOR, "rad") for effect in EFFECT_NAMES for part in effect.parameters]
+    units = [part.find_unit(MOTOR, "rad") for effect in EFFECT_NAMES for part in effect.parameters]
     assert not any("N" in unit.split() or "kg" in unit for unit in units)
-    assert EFFECTS_BY_NAME["gravity_torque"].main.unit_in(MOTOR, "rad") == "A"
+    assert EFFECTS_BY_NAME["gravity_torque"].main.find_unit(MOTOR, "rad") == "A"
 
 
 def test_the_motion_is_what_a_speed_or_acceleration_is_the_rate_of():
@@ -39,11 +39,13 @@ def test_the_motion_is_what_a_speed_or_acceleration_is_the_rate_of():
 
 
 def test_a_model_takes_its_recordings_units_and_keeps_them_in_a_file():
-    found = with_units_of(body(), ("A",), ("rad",))
+    found = adopt_recording_units(body(), ("A",), ("rad",))
     assert found.system == MOTOR
-    assert parse_mechanical_model(mechanical_model_toml(found)).system == MOTOR
+    assert parse_mechanical_model(format_mechanical_model(found)).system == MOTOR
 
 
 def test_a_model_in_si_stays_so():
-    assert with_units_of(body(), ("N m",), ("rad",)).units is None
-    assert with_units_of(body(0.05), ("A",), ("rad",)).system == ROTATIONAL  # its input turns amperes into torques
+    assert adopt_recording_units(body(), ("N m",), ("rad",)).units is None
+    assert (
+        adopt_recording_units(body(0.05), ("A",), ("rad",)).system == ROTATIONAL
+    )  # its input turns amperes into torques

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from equalizer.signals.units import ALLOWED, KNOWN_UNITS, UnknownUnitError, check_quantity, parse_unit, quantity_of
+from equalizer.signals.units import ALLOWED, KNOWN_UNITS, UnknownUnitError, check_quantity, find_quantity, parse_unit
 
 
 @pytest.mark.parametrize(
@@ -131,4 +131,4 @@ def test_a_temperature_in_a_product_is_a_difference():
 
 
 def test_the_usual_word_for_a_unit():
-    assert [quantity_of(si) for si in ("N", "m/s^2", "rad", "N/V")] == ["force", "acceleration", "angle", "N/V"]
+    assert [find_quantity(si) for si in ("N", "m/s^2", "rad", "N/V")] == ["force", "acceleration", "angle", "N/V"]

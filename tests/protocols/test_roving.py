@@ -8,7 +8,7 @@ import pytest
 from protocols.definition.preparation import DemoSettings, PracticeSettings
 from protocols.document.hashing import protocol_hash
 from protocols.document.loading import ProtocolError, load_protocol
-from protocols.procedure.schedule import demo_level_n, draw_trial, practice_level_n, rove_level_n
+from protocols.procedure.schedule import draw_demo_level_n, draw_practice_level_n, draw_trial, rove_level_n
 from protocols.procedure.staircase import to_db
 
 ROVED = PracticeSettings(frequencies_hz=(25.0,), level_n=2.0, rove_db=6.0)
@@ -18,7 +18,7 @@ TRIALS = [(seed, trial) for seed in range(40) for trial in range(50)]
 @pytest.fixture
 def drawn(small_protocol):
     """(levels in dB re 2 N, directions) of many practice trials."""
-    levels = [to_db(practice_level_n(ROVED, seed, 1, trial, 0) / 2.0) for seed, trial in TRIALS]
+    levels = [to_db(draw_practice_level_n(ROVED, seed, 1, trial, 0) / 2.0) for seed, trial in TRIALS]
     schedule = small_protocol.schedule
     sides = [draw_trial(schedule, "random", seed, 1, trial, 0).direction for seed, trial in TRIALS]
     return np.array(levels), np.array(sides)
@@ -51,11 +51,11 @@ def test_who_goes_by_strength_alone_is_right_as_seldom_as_the_protocol_says(draw
 
 def test_demonstrations_vary_too_and_a_width_of_0_is_one_level():
     demo = DemoSettings(level_n=2.0, rove_db=6.0)
-    levels = {demo_level_n(demo, 7, played) for played in range(20)}
+    levels = {draw_demo_level_n(demo, 7, played) for played in range(20)}
     assert len(levels) == 20
     assert 1.41 < min(levels) < max(levels) < 2.83
-    assert {demo_level_n(replace(demo, rove_db=0.0), 7, played) for played in range(20)} == {2.0}
-    assert practice_level_n(replace(ROVED, rove_db=0.0), 7, 1, 3, 0) == 2.0
+    assert {draw_demo_level_n(replace(demo, rove_db=0.0), 7, played) for played in range(20)} == {2.0}
+    assert draw_practice_level_n(replace(ROVED, rove_db=0.0), 7, 1, 3, 0) == 2.0
 
 
 @pytest.mark.parametrize("table", ["demo", "practice"])

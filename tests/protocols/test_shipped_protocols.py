@@ -7,7 +7,7 @@ import pytest
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.recording_segments import MultisineSegment, SineSegment, SweepSegment
 from protocols.definition.staircase_rule import StepChange, StepPhase
-from protocols.document.explain import explain
+from protocols.document.explain import explain_protocol
 from protocols.document.loading import load_protocol
 
 NAMES = tuple(sorted(path.name.removesuffix(".toml") for path in files("protocols").iterdir() if ".toml" in path.name))
@@ -52,7 +52,7 @@ def test_the_open_choices_are_the_ones_that_are_documented(threshold):
 
 def test_the_published_study_writes_out_every_value_it_has(threshold, threshold_text):
     written = {line.split("=")[0].strip() for line in threshold_text.splitlines() if "=" in line}
-    keys = {field.key.rpartition(".")[2] for field in explain(threshold)}
+    keys = {field.key.rpartition(".")[2] for field in explain_protocol(threshold)}
     assert keys <= written
 
 

@@ -20,12 +20,12 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from analysis.psychophysics.catch_trials import wilson_interval
-from analysis.psychophysics.group_contrasts import contrasts
+from analysis.psychophysics.group_contrasts import compute_contrasts
 from analysis.psychophysics.hierarchy.curve import Family
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
 from analysis.psychophysics.hierarchy.inference import compute_pseudo_thresholds, estimate_medians
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
-from analysis.psychophysics.repeated_measures import repeated_measures
+from analysis.psychophysics.repeated_measures import analyse_repeated_measures
 from analysis.psychophysics.two_analyses import SIMULATED_RULE
 from protocols.procedure.staircase import to_db
 
@@ -44,7 +44,7 @@ def judge(crowd: Crowd, seed: tuple[int, ...]) -> dict[str, list[float] | list[b
     fit = fit_hierarchy(study.answers)
     pseudo, true_db = compute_pseudo_thresholds(fit), 20.0 * np.log10(crowd.medians_n)
     medians = estimate_medians(fit, to_db(SIMULATED_RULE.cap_n), 0.95)
-    found, true_differences = contrasts(HZ, pseudo, 0.95), true_db[1:] - true_db[0]
+    found, true_differences = compute_contrasts(HZ, pseudo, 0.95), true_db[1:] - true_db[0]
     pairs = list(zip(found, true_differences, strict=True))
     return {
         "error": [float(m.db - true) for m, true in zip(medians, true_db, strict=True)],
@@ -59,8 +59,8 @@ def judge(crowd: Crowd, seed: tuple[int, ...]) -> dict[str, list[float] | list[b
 def judge_null(seed: tuple[int, ...]) -> dict[str, list[float]]:
     study = simulate_study(Crowd(HZ, (3.5,) * 5, frequency_sd_db=UNEQUAL), SIMULATED_RULE, PEOPLE, seed)
     pseudo = compute_pseudo_thresholds(fit_hierarchy(study.answers))
-    overall = repeated_measures(study.answers.subjects, pseudo.tolist()).p_huynh_feldt
-    return {"p": [1.0 if overall is None else overall, *(c.p for c in contrasts(HZ, pseudo, 0.95))]}
+    overall = analyse_repeated_measures(study.answers.subjects, pseudo.tolist()).p_huynh_feldt
+    return {"p": [1.0 if overall is None else overall, *(c.p for c in compute_contrasts(HZ, pseudo, 0.95))]}
 
 
 def simulate(folder: Path, seconds: float, seed: int) -> None:

@@ -18,16 +18,16 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from analysis.psychophysics.anova import one_way_anova
+from analysis.psychophysics.anova import compute_one_way_anova
 from analysis.psychophysics.comparisons import compare_all
 from analysis.psychophysics.coverage.coverage_words import CASES_HZ, MeasuredCoverage, coverage_lines
 from analysis.psychophysics.coverage.measured_coverage import MEASURED
-from analysis.psychophysics.group_contrasts import contrasts
-from analysis.psychophysics.hierarchy.primary import primary_analysis
+from analysis.psychophysics.group_contrasts import compute_contrasts
+from analysis.psychophysics.hierarchy.primary import compute_primary_analysis
 from analysis.psychophysics.hierarchy.run_likelihood import RunLikelihood
 from analysis.psychophysics.hierarchy.single_persons import fit_single_persons
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
-from analysis.psychophysics.tobit import tobit_contrasts
+from analysis.psychophysics.tobit import compute_tobit_contrasts
 from analysis.psychophysics.two_analyses import SIMULATED_RULE
 
 ROOT = Path(__file__).parents[2]
@@ -44,11 +44,11 @@ Found = tuple[str, float, float | None, bool]
 def judge(number: int) -> Iterator[Found]:
     study = simulate_study(CROWD, SIMULATED_RULE, PEOPLE, (71, number))
     true_db = 20.0 * np.log10(MEDIANS_N)
-    primary = primary_analysis(study.answers, CAP_N)
+    primary = compute_primary_analysis(study.answers, CAP_N)
     families = {
         "model": primary.contrasts,
-        "means": contrasts(HZ, study.threshold_db, 0.95),
-        "tobit": tobit_contrasts(HZ, study.threshold_db, study.cap_reversals > 0, 0.95),
+        "means": compute_contrasts(HZ, study.threshold_db, 0.95),
+        "tobit": compute_tobit_contrasts(HZ, study.threshold_db, study.cap_reversals > 0, 0.95),
     }
     for name, family in families.items():
         for contrast in family:
@@ -60,7 +60,7 @@ def judge(number: int) -> Iterator[Found]:
     alone = simulate_study(CROWD, SIMULATED_RULE, 1, (72, number))
     yield from _runs("single", fit_single_persons(alone.answers, CAP_N).runs, alone.true_db)
     null = simulate_study(NULL, SIMULATED_RULE, PEOPLE, (73, number))
-    yield "one-way", 0.0, None, one_way_anova(_named(null.threshold_n)).p < 0.05
+    yield "one-way", 0.0, None, compute_one_way_anova(_named(null.threshold_n)).p < 0.05
 
 
 def _named(threshold_n):
@@ -70,7 +70,7 @@ def _named(threshold_n):
 def _published(threshold_n) -> Iterator[Found]:
     """Tukey's intervals hold a difference of mean thresholds in newtons: of people who are normal in dB."""
     mean_n = np.array(MEDIANS_N) * math.exp((SPREAD_DB * math.log(10.0) / 20.0) ** 2 / 2.0)
-    for pair in compare_all(one_way_anova(_named(threshold_n))).pairs:
+    for pair in compare_all(compute_one_way_anova(_named(threshold_n))).pairs:
         if pair.first == "5 Hz":
             place = HZ.index(float(pair.second.split()[0]))
             yield "tukey", HZ[place], None, pair.lower <= mean_n[place] - mean_n[0] <= pair.upper

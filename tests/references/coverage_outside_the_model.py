@@ -16,7 +16,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from analysis.psychophysics.hierarchy.answers import Answers
-from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis, primary_analysis
+from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis, compute_primary_analysis
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from analysis.psychophysics.two_analyses import SIMULATED_RULE
 
@@ -75,7 +75,9 @@ def main() -> None:
         found = []
         for number in range(studies):
             answers = simulate_study(CROWDS.get(name, USUAL), SIMULATED_RULE, PEOPLE, (SEED, number)).answers
-            analysis = primary_analysis(with_few(answers, *FEW[name]) if name in FEW else answers, SIMULATED_RULE.cap_n)
+            analysis = compute_primary_analysis(
+                with_few(answers, *FEW[name]) if name in FEW else answers, SIMULATED_RULE.cap_n
+            )
             assert analysis is not None
             found.append(analysis)
         sys.stdout.write("\n".join([*result_lines(name, found), ""]))

@@ -15,9 +15,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from analysis.psychophysics.bias import response_bias
+from analysis.psychophysics.bias import estimate_response_bias
 from analysis.psychophysics.catch_trials import wilson_interval
-from analysis.psychophysics.criterion_drift import criterion_drifts
+from analysis.psychophysics.criterion_drift import estimate_criterion_drifts
 from analysis.psychophysics.study_warnings import DRIFT_LEVEL, LEFT_OUT_LEVEL, STRONG_BIAS
 from protocols.trial import Trial
 from study.participants.observers import find_observer
@@ -54,7 +54,7 @@ def answers_by_run(trials: list[Trial]) -> list[Run]:
     """Of the trials that count."""
     runs: dict[int, Run] = {}
     for trial in trials:
-        if trial.counts:
+        if trial.is_valid:
             shown, correct = runs.setdefault(trial.run, ([], []))
             shown.append(trial.direction_shown)
             correct.append(bool(trial.correct))
@@ -65,13 +65,13 @@ def named(sessions: list[list[Run]]) -> list[bool]:
     """Whether the report on a study of these sessions names each."""
     return [
         drift is not None and drift.p < DRIFT_LEVEL and drift.p_without_a_run < LEFT_OUT_LEVEL
-        for drift in criterion_drifts(sessions)
+        for drift in estimate_criterion_drifts(sessions)
     ]
 
 
 def leans(runs: list[Run]) -> bool:
     """Whether the report names the bias of a run."""
-    return any((bias := response_bias(*run)) is not None and abs(bias.criterion) > STRONG_BIAS for run in runs)
+    return any((bias := estimate_response_bias(*run)) is not None and abs(bias.criterion) > STRONG_BIAS for run in runs)
 
 
 def flags(sessions: list[list[Run]], quiet: list[list[Run]]) -> dict[str, list[bool]]:

@@ -27,11 +27,11 @@ from scipy.stats import chi2
 from scipy.stats import t as student
 
 from analysis.psychophysics.catch_trials import wilson_interval
-from analysis.psychophysics.group_contrasts import contrasts
+from analysis.psychophysics.group_contrasts import compute_contrasts
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
 from analysis.psychophysics.hierarchy.inference import compute_pseudo_thresholds
 from analysis.psychophysics.power.simulated_study import FAMILIES, Crowd, simulate_study
-from analysis.psychophysics.repeated_measures import repeated_measures
+from analysis.psychophysics.repeated_measures import analyse_repeated_measures
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
 
 PEOPLE, SEED, BINS = 10, 20, 20
@@ -66,8 +66,8 @@ def judge(crowd: Crowd, seed: tuple[int, ...]) -> dict[str, list[float]]:
     study = simulate_study(crowd, RULE, PEOPLE, seed)
     pseudo = compute_pseudo_thresholds(fit_hierarchy(study.answers))
     true_db = 20.0 * np.log10(crowd.medians_n)
-    within = repeated_measures(study.answers.subjects, pseudo.tolist())
-    found = contrasts(HZ, pseudo, 0.95)
+    within = analyse_repeated_measures(study.answers.subjects, pseudo.tolist())
+    found = compute_contrasts(HZ, pseudo, 0.95)
     against = pseudo[:, 1:] - pseudo[:, :1]
     return {
         "overall": [within.p_huynh_feldt if within.p_huynh_feldt is not None else 1.0],

@@ -13,14 +13,14 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from scipy.stats import t as student
 
-from analysis.psychophysics.anova import one_way_anova
-from analysis.psychophysics.group_contrasts import contrasts
+from analysis.psychophysics.anova import compute_one_way_anova
+from analysis.psychophysics.group_contrasts import compute_contrasts
 from analysis.psychophysics.hierarchy.curve import Family
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
 from analysis.psychophysics.hierarchy.inference import compute_pseudo_thresholds, find_lower_bound
 from analysis.psychophysics.hierarchy.objective import Prior
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
-from analysis.psychophysics.repeated_measures import repeated_measures
+from analysis.psychophysics.repeated_measures import analyse_repeated_measures
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
 
 PEOPLE = 10
@@ -54,9 +54,9 @@ def measure(crowd: Crowd, studies: int, bounds: bool) -> dict[str, list[float]]:
         pseudo = compute_pseudo_thresholds(fit)
         error = fit.means_db - true
         covered = np.abs(error) <= half * pseudo.std(axis=0, ddof=1) / PEOPLE**0.5
-        found = contrasts(HZ, pseudo, 0.95)
-        within = repeated_measures(study.answers.subjects, pseudo.tolist())
-        paper = one_way_anova({f"{f}": list(column) for f, column in zip(HZ, study.threshold_n.T, strict=True)})
+        found = compute_contrasts(HZ, pseudo, 0.95)
+        within = analyse_repeated_measures(study.answers.subjects, pseudo.tolist())
+        paper = compute_one_way_anova({f"{f}": list(column) for f, column in zip(HZ, study.threshold_n.T, strict=True)})
         rows.append({
             "bias": error,
             "cover": covered,

@@ -67,7 +67,7 @@ def killed_after(seconds: float, asked: list[str]) -> bool:
 
 def decisions(folder: SessionFolder) -> list[list[object]]:
     state = fold_session(folder).state
-    return [[t.run, t.trial, t.frequency_hz, t.level_n, t.correct] for t in state.trials if t.counts]
+    return [[t.run, t.trial, t.frequency_hz, t.level_n, t.correct] for t in state.trials if t.is_valid]
 
 
 def thresholds(folder: SessionFolder) -> list[str]:

@@ -51,7 +51,7 @@ def test_a_simulated_participant_takes_a_study_on_the_driver(stub, short_file, t
     assert 0.3 < stub.get("peak_n") <= 4.5
     trials = read_trials(tmp_path / "data" / "ideal1_001" / "trials.csv")
     assert len(trials) > 7
-    assert all(trial.late_ticks is not None and trial.latest_s > 0 for trial in trials if trial.counts)
+    assert all(trial.late_ticks is not None and trial.latest_s > 0 for trial in trials if trial.is_valid)
 
 
 class Taking:
@@ -240,4 +240,4 @@ def test_faults_that_come_and_go_void_trials_and_lose_no_answer(stub, short_file
     assert trouble.made == 2
     assert stub.get("peak_n") <= 4.5
     assert any(isinstance(event, TrialSpoiled) for event in read_log(log).events)
-    assert len([trial for trial in read_trials(log.parent / "trials.csv") if trial.counts]) > 7
+    assert len([trial for trial in read_trials(log.parent / "trials.csv") if trial.is_valid]) > 7

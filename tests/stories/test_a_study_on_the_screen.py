@@ -136,7 +136,7 @@ def test_from_the_start_to_the_report_with_a_kill_in_the_middle(at_the_screen, s
     assert answers(again.events()) >= before
     assert "Nothing was felt" in (session.path / "analysis" / "report.html").read_text()
 
-    counted = [trial for trial in state.trials if trial.counts]
+    counted = [trial for trial in state.trials if trial.is_valid]
     other = headless([bool(trial.correct) for trial in counted], text, tmp_path / "headless")
 
     def levels(trials):

@@ -30,7 +30,7 @@ BAND = (LINES_HZ > 4.99) & (LINES_HZ < 35.01)
 
 def linear_omega3(hand: bool, seed: int) -> CompiledRig:
     from study.devices.simulated.compiled import advance, sense
-    from study.devices.simulated.packing import effective_mass_kg, make_rest_state, pack_parameters
+    from study.devices.simulated.packing import compute_effective_mass_kg, make_rest_state, pack_parameters
     from study.devices.simulated.parameters import Omega3Parameters
 
     parameters = Omega3Parameters()
@@ -38,7 +38,7 @@ def linear_omega3(hand: bool, seed: int) -> CompiledRig:
     drives = replace(parameters.drives, friction_n_m=0.0)
     parameters = replace(parameters, drives=drives, accelerometer=straight)
     packed = pack_parameters(parameters, hand, (0.0, 0.0, 0.0))
-    info = DeviceInfo("linear omega.3", True, RATE_HZ, 12.0, effective_mass_kg(parameters, packed))
+    info = DeviceInfo("linear omega.3", True, RATE_HZ, 12.0, compute_effective_mass_kg(parameters, packed))
     noise = np.array(np.random.SeedSequence(seed).generate_state(1, np.uint64), dtype=np.uint64)
     return CompiledRig(info, make_rest_state(packed, (0.0, 0.0, 0.0)), packed, noise, sense, advance)
 

@@ -33,7 +33,7 @@ from study.store.sessions.live_file import read_live
 from study.store.sessions.log_writer import is_log_locked
 from study.workflows.files.validate import validate_file
 from study.workflows.results.fold_session import fold_session
-from study.workflows.views.view_home import home_view
+from study.workflows.views.view_home import make_home_view
 from study.workflows.views.watch_session import follow
 
 pytestmark = pytest.mark.timeout(60)
@@ -113,7 +113,7 @@ def test_a_folder_of_sessions_is_listed_although_a_log_a_model_and_a_protocol_ar
     (data / "P01_001").mkdir(parents=True)
     for place in (data / "P01_001" / "events.jsonl", data / "P01_001" / "live.json", data / "m.h5", data / "p.toml"):
         no_file(place, kind)
-    view = home_view(data)
+    view = make_home_view(data)
     (line,) = view.sessions
     assert (line.standing, view.models) == ("unreadable", ())
     assert not any(entry.name.startswith(str(tmp_path)) for entry in view.protocols)

@@ -21,12 +21,12 @@ from analysis.diagnosis.balance.command_laws import (
     AS_COMMANDED,
     CommandLaw,
     PiecewiseCommandLaw,
-    coil_laws,
-    command_laws,
-    neighbours_of,
-    piecewise_curve,
-    piecewise_pull,
-    slew_laws,
+    make_command_laws,
+    make_electromagnet_laws,
+    make_piecewise_attraction,
+    make_piecewise_curve,
+    make_slew_laws,
+    vary_parameters,
 )
 from analysis.diagnosis.balance.inverse_balance import InverseBalance
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
@@ -36,7 +36,7 @@ from analysis.diagnosis.balance.linear_part import search_with_linear_part
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import SLIDING, StructureSearch
-from analysis.diagnosis.data.correlated_residuals import bootstrap_draws, gain_with_bound
+from analysis.diagnosis.data.correlated_residuals import bootstrap_gain, draw_bootstrap_blocks
 from analysis.diagnosis.settings import (
     COMMAND_LAW_LEAVES,
     COMMAND_RIVAL_LEAVES_MORE,
@@ -118,7 +118,7 @@ def _withdraw_if_curved(law: JudgedLaw, actuator: Actuator) -> JudgedLaw:
 
 def _pass_through_law(motion: Motion, axis: int, driven_channel: int, law: CommandLaw) -> Motion:
     force = motion.force.copy()
-    force[:, [axis]] = law.of(force[:, axis], motion.position[:, driven_channel])
+    force[:, [axis]] = law.compute_columns(force[:, axis], motion.position[:, driven_channel])
     return replace(motion, force=force)
 
 
@@ -141,13 +141,13 @@ def find_actuator(
         return replacement
     # Laws of the position are left out where the balance is solved for it: they would reproduce it.
     sums = _list_sums(search) if target is None else [()]
-    unchanged_error, motion_laws = min((inverse.total_error(AS_COMMANDED, entry), entry) for entry in sums)
+    unchanged_error, motion_laws = min((inverse.sum_errors(AS_COMMANDED, entry), entry) for entry in sums)
     laws = _select_promising(inverse, kinds, (1 - FURTHER_LAW_OF_ALL / 2) * unchanged_error, motion_laws)
     if not laws:
         return None
     best = _refine_best_per_effect(inverse, laws, motion_laws)
     law = min(best, key=lambda entry: entry[0])[1]
-    error_alone, error_with_laws = (inverse.total_error(law, entry) for entry in ((), motion_laws))
+    error_alone, error_with_laws = (inverse.sum_errors(law, entry) for entry in ((), motion_laws))
     rivals = [rival_law for _, rival_law in best if rival_law is not law]
     law = _scale_to_command(law, search.regression)
     judged_law = _judge_law(inverse, law, rivals, (motion_laws, motion_laws))
@@ -170,12 +170,12 @@ def _list_law_kinds(regression: Regression, rotational: bool, excluded: frozense
         return ()
     commands = [motion.force[:, regression.axis] for motion in motions]
     kinds: list[tuple[PiecewiseCommandLaw | None, list[CommandLaw]]] = [
-        (piecewise_curve(command), list(command_laws(command))),
-        (None, list(slew_laws(commands, motions[0].rate_hz))),
+        (make_piecewise_curve(command), list(make_command_laws(command))),
+        (None, list(make_slew_laws(commands, motions[0].rate_hz))),
     ]
     if motions[0].order == 0 and not rotational:
         position = np.concatenate([motion.position[motion.fit, driven_channel] for motion in motions])
-        kinds.append((piecewise_pull(position), list(coil_laws(position))))
+        kinds.append((make_piecewise_attraction(position), list(make_electromagnet_laws(position))))
     allowed = [(approx, [law for law in laws if law.effect not in excluded]) for approx, laws in kinds]
     return [kind for kind in allowed if kind[1]]
 
@@ -188,7 +188,7 @@ def _select_promising(
     return [
         law
         for approx, laws in kinds
-        if approx is None or inverse.least_error(approx, motion_laws) <= limit
+        if approx is None or inverse.fit_lower_bound(approx, motion_laws) <= limit
         for law in laws
     ]
 
@@ -200,7 +200,7 @@ def _replace_motion_laws(inverse: InverseBalance, kinds: LawKinds, named_laws: t
         return None
     # Half of the gain required below, because the sums only approximate the laws.
     error_share = 1 - COMMAND_LAW_LEAVES / 2 if len(named_laws) == 1 else 1 / (1 - COMMAND_RIVAL_LEAVES_MORE)
-    largest_error = error_share * inverse.total_error(AS_COMMANDED, named_laws)
+    largest_error = error_share * inverse.sum_errors(AS_COMMANDED, named_laws)
     laws = _select_promising(inverse, kinds, largest_error, ())
     if not laws:
         return None
@@ -231,7 +231,7 @@ def _refine_best_per_effect(
     inverse: InverseBalance, laws: Sequence[CommandLaw], motion_laws: tuple[int, ...]
 ) -> list[tuple[float, CommandLaw]]:
     best: dict[str, tuple[float, CommandLaw]] = {}
-    for law, error in zip(laws, inverse.total_errors(laws, motion_laws), strict=True):
+    for law, error in zip(laws, inverse.sum_errors_per_law(laws, motion_laws), strict=True):
         if law.effect not in best or error < best[law.effect][0]:
             best[law.effect] = error, law
     results = cast(
@@ -253,7 +253,7 @@ def _refine_values(
     """Error and parameters of a law after a coordinate search over its parameters."""
     error, law = start
     for _ in range(MOST_PASSES):
-        neighbours = [(inverse.total_error(neighbour, motion_laws), neighbour) for neighbour in neighbours_of(law)]
+        neighbours = [(inverse.sum_errors(neighbour, motion_laws), neighbour) for neighbour in vary_parameters(law)]
         if not neighbours or min(neighbours, key=lambda candidate: candidate[0])[0] >= error * (1 - 1e-3):
             break
         error, law = min(neighbours, key=lambda candidate: candidate[0])
@@ -268,18 +268,18 @@ def _judge_law(
 ) -> JudgedLaw:
     """The law with its gain and rivals. sums: laws of the motion fitted without and with the law of the command."""
     laws_without, laws_with = sums
-    errors_without, errors_with = inverse.errors(AS_COMMANDED, laws_without, True), inverse.errors(law, laws_with, True)
-    linear = float(inverse.errors(AS_COMMANDED, (), True).sum())
-    draws = bootstrap_draws(len(errors_with))
-    rival_errors = [(inverse.errors(rival, laws_with, True), rival.effect) for rival in rivals]
-    largest_error = float(errors_with.sum()) / (1 - COMMAND_RIVAL_LEAVES_MORE)
+    reduced, full = inverse.evaluate_law(AS_COMMANDED, laws_without, True), inverse.evaluate_law(law, laws_with, True)
+    linear = float(inverse.evaluate_law(AS_COMMANDED, (), True).sum())
+    draws = draw_bootstrap_blocks(len(full))
+    rival_errors = [(inverse.evaluate_law(rival, laws_with, True), rival.effect) for rival in rivals]
+    largest_error = float(full.sum()) / (1 - COMMAND_RIVAL_LEAVES_MORE)
     equivalents = tuple(effect for errors, effect in rival_errors if float(errors.sum()) <= largest_error)
-    is_first = [errors[draws].sum(axis=1) >= errors_with[draws].sum(axis=1) for errors, _ in rival_errors]
-    gain, low = gain_with_bound(errors_without, errors_with)
+    is_first = [errors[draws].sum(axis=1) >= full[draws].sum(axis=1) for errors, _ in rival_errors]
+    gain, low = bootstrap_gain(reduced, full)
     placeholder_law = Law(law.effect, inverse.search.regression.axis, (), lambda m, _: m.force, lambda w, n, mass: None)
     return JudgedLaw(
         NO_COLUMN, placeholder_law, dict(law.values), gain, low,
-        float((errors_without - errors_with).sum()) / max(linear, 1e-300), equivalents,
+        float((reduced - full).sum()) / max(linear, 1e-300), equivalents,
         float(np.mean(np.all(is_first, axis=0))) if is_first else 1.0, _find_objection(law, gain, low, equivalents),
         formula=law.as_formula(),
     )  # fmt: skip

@@ -89,14 +89,14 @@ def _reverses(regression: Regression, channel: int) -> bool:
 def _has_inertia(regression: Regression, laws: tuple[int, ...]) -> bool:
     """Whether a mass reduces the cross-validated error (`improves_significantly`) and its time constant m / d exceeds a
     sample. True without a test where the mass is given, or where the data have no time axis to determine it from."""
-    columns, driven_channel = regression.columns_of(laws), regression.base_terms.driven_channel
+    columns, driven_channel = regression.select_columns(laws), regression.base_terms.driven_channel
     if regression.mass is not None or not np.isfinite(regression.motions[0].band_hz):
         return True
     massless = [column for column in columns if column != driven_channel]
     without_mass, with_mass = (
-        Structure(laws, regression.cross_validated_errors(column_set)) for column_set in (massless, columns)
+        Structure(laws, regression.cross_validate(column_set)) for column_set in (massless, columns)
     )
-    weights = regression.weights(columns)
+    weights = regression.fit_weights(columns)
     mass, damping = (
         float(weights[columns.index(k)]) for k in (driven_channel, len(regression.motions[0].channels) + driven_channel)
     )

@@ -12,7 +12,7 @@ import numpy as np
 from analysis.diagnosis.balance.actuator import DrivenAxis, find_balance
 from analysis.diagnosis.balance.actuator_equivalents import doubt_laws_of_actuator
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
-from analysis.diagnosis.balance.linear_part import driven_motion, search_with_linear_part
+from analysis.diagnosis.balance.linear_part import find_driven_channels, search_with_linear_part
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motion_band_hz, compute_motions
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observe_parts
@@ -66,7 +66,7 @@ def balance_selected_motions(
 def restrict_to_motion_band(records: Sequence[Observed], motions: Sequence[Motion]) -> Sequence[Motion]:
     """The motions filtered to the band of the driven motions; empty where that band is hardly narrower. A further
     measured motion, such as the deflection of a beam, may be mere noise at high frequencies. Raises NoMotionError."""
-    narrow_hz = compute_motion_band_hz(motions, driven_motion(motions))
+    narrow_hz = compute_motion_band_hz(motions, find_driven_channels(motions))
     return compute_motions(records, narrow_hz) if narrow_hz < SECOND_BAND_NARROWER * motions[0].band_hz else ()
 
 

@@ -3,7 +3,7 @@
 X (samples, k) holds the columns of a force balance, such as acceleration, velocity and position; y is the force. A
 block keeps the Gram matrix X'X and the cross products X'y only. Sums of these over blocks give the fit to any subset of
 blocks and columns without the samples, which makes cross-validation fast. The residual sum of squares of weights w is
-y'y - 2 w'X'y + w'X'X w.
+y'y - 2 w'X'y + w'X'X w. `regression` and `inverse_balance` use it.
 """
 
 from collections.abc import Sequence
@@ -43,40 +43,51 @@ class Block:
     """Indices of the block's samples among the kept samples of its motion."""
 
 
-def column_scale(rows: Sequence[FloatArray], fit: Sequence[Mask]) -> FloatArray:
-    """(k,): root mean square of each column over the masked samples of all motions; 1 where that is 0."""
-    size = np.sqrt(np.mean(np.vstack([r[mask] for r, mask in zip(rows, fit, strict=True)]) ** 2, axis=0))
-    return np.where(size > 0, size, 1.0)
+def compute_scale(columns: Sequence[FloatArray], masks: Sequence[Mask]) -> FloatArray:
+    """Compute (k,): root mean square of each column over the masked samples of all motions; 1 where that is 0."""
+    rms = np.sqrt(
+        np.mean(
+            np.vstack([motion_columns[mask] for motion_columns, mask in zip(columns, masks, strict=True)]) ** 2, axis=0
+        )
+    )
+    return np.where(rms > 0, rms, 1.0)
 
 
-def blocks_of(
-    rows: Sequence[FloatArray], forces: Sequence[FloatArray], masks: Sequence[Mask], units: tuple[FloatArray, float]
+def build_blocks(
+    columns: Sequence[FloatArray],
+    forces: Sequence[FloatArray],
+    masks: Sequence[Mask],
+    scale_and_mean: tuple[FloatArray, float],
 ) -> tuple[Block, ...]:
-    """Blocks of the masked samples, about twice `BALANCE_FOLDS` in all, from columns divided by their scales. units:
+    """Build about 2 `BALANCE_FOLDS` blocks of the masked samples, from columns divided by their scales. scale_and_mean:
     scales (k,), and the mean about which `Block.signal` is taken. Of more than `BALANCE_MOST_SAMPLES` samples, only the
     first part of each block is used."""
-    scale, mean = units
-    total = sum(int(mask.sum()) for mask in masks)
+    scale, mean = scale_and_mean
+    total_samples = sum(int(mask.sum()) for mask in masks)
     blocks = []
-    share = min(1.0, BALANCE_MOST_SAMPLES / max(total, 1))
-    for number, (columns, force, mask) in enumerate(zip(rows, forces, masks, strict=True)):
+    used_share = min(1.0, BALANCE_MOST_SAMPLES / max(total_samples, 1))
+    for motion_index, (motion_columns, force, mask) in enumerate(zip(columns, forces, masks, strict=True)):
         indices = np.flatnonzero(mask)
-        count = int(np.clip(round(2 * BALANCE_FOLDS * len(indices) / max(total, 1)), 1, len(indices) or 1))
-        for block_indices in np.array_split(indices, count) if len(indices) else []:
-            part = block_indices[: max(int(share * len(block_indices)), 1)]
-            x, y = columns[part] / scale, force[part]
-            blocks.append(Block(x.T @ x, x.T @ y, float(y @ y), float(np.sum((y - mean) ** 2)), number, part))
+        block_count = int(
+            np.clip(round(2 * BALANCE_FOLDS * len(indices) / max(total_samples, 1)), 1, len(indices) or 1)
+        )
+        for block_indices in np.array_split(indices, block_count) if len(indices) else []:
+            used_indices = block_indices[: max(int(used_share * len(block_indices)), 1)]
+            x, y = motion_columns[used_indices] / scale, force[used_indices]
+            blocks.append(
+                Block(x.T @ x, x.T @ y, float(y @ y), float(np.sum((y - mean) ** 2)), motion_index, used_indices)
+            )
     return tuple(blocks)
 
 
-def block_products(block: Block, columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-    """Gram matrix (k, k) and cross products (k,) of k chosen columns of a block."""
+def select_products(block: Block, columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+    """Select the Gram matrix (k, k) and cross products (k,) of k columns of a block."""
     indices = list(columns)
     return block.gram[np.ix_(indices, indices)], block.cross[indices]
 
 
-def products_per_block(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-    """(blocks, c, c) and (blocks, c): each block's Gram matrix and cross products of c columns."""
+def stack_products(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+    """Stack each block's Gram matrix and cross products of c columns: (blocks, c, c) and (blocks, c)."""
     indices = np.asarray(columns, dtype=np.intp)
     grid = indices[:, None], indices[None, :]
     grams = np.array([block.gram[grid] for block in blocks]).reshape(-1, len(indices), len(indices))
@@ -84,34 +95,40 @@ def products_per_block(blocks: Sequence[Block], columns: Sequence[int]) -> tuple
 
 
 def sum_products(blocks: Sequence[Block], columns: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-    """Gram matrix (k, k) and cross products (k,) of k chosen columns, summed over the blocks."""
-    grams, crosses = products_per_block(blocks, columns)
+    """Sum the Gram matrices (k, k) and cross products (k,) of k columns over the blocks."""
+    grams, crosses = stack_products(blocks, columns)
     return np.asarray(grams.sum(axis=0)), np.asarray(crosses.sum(axis=0))
 
 
 def solve_normal_equations(products: tuple[FloatArray, FloatArray], ridge: float) -> FloatArray:
-    """Weights (..., c) of stacked systems with Gram matrices (..., c, c) and cross products (..., c). ridge: added to
-    the diagonal, relative to its mean. Raises LinAlgError where a system is singular nevertheless."""
+    """Solve for weights (..., c) of stacked systems with Gram matrices (..., c, c) and cross products (..., c). ridge:
+    added to the diagonal, relative to its mean. Raises LinAlgError where a system is singular nevertheless."""
     gram, cross = products
-    count = gram.shape[-1]
-    size = np.trace(gram, axis1=-2, axis2=-1)[..., None, None] / count
-    return np.asarray(np.linalg.solve(gram + (ridge * size + 1e-300) * np.eye(count), cross[..., None])[..., 0])
+    column_count = gram.shape[-1]
+    mean_diagonal = np.trace(gram, axis1=-2, axis2=-1)[..., None, None] / column_count
+    return np.asarray(
+        np.linalg.solve(gram + (ridge * mean_diagonal + 1e-300) * np.eye(column_count), cross[..., None])[..., 0]
+    )
 
 
 def solve_without_columns(gram: FloatArray, cross: FloatArray, fixed: Mask) -> FloatArray:
-    """Weights (..., c), with those of the `fixed` (c,) columns held at zero; see `solve_normal_equations`."""
+    """Solve for weights (..., c) with those of the `fixed` (c,) columns at zero; see `solve_normal_equations`."""
     free = np.flatnonzero(~fixed)
     weights = np.zeros_like(cross)
     weights[..., free] = solve_normal_equations((gram[..., free[:, None], free], cross[..., free]), RIDGE)
     return weights
 
 
-def solve_ridge(products: tuple[FloatArray, FloatArray], ridge: float, free: Mask) -> FloatArray:
-    """Weights (..., c) by ridge regression. ridge: relative to the mean diagonal element, on the columns that are not
-    `free` (c,); these have `RIDGE`."""
+def solve_ridge(products: tuple[FloatArray, FloatArray], ridge: float, is_unpenalised: Mask) -> FloatArray:
+    """Solve for weights (..., c) by ridge regression (Hoerl and Kennard, Technometrics 12:55, 1970). ridge: relative to
+    the mean diagonal element; columns that are unpenalised (c,) have `RIDGE` instead."""
     gram, cross = products
-    size = np.trace(gram, axis1=-2, axis2=-1)[..., None, None] / gram.shape[-1]
-    return np.asarray(np.linalg.solve(gram + np.diag(np.where(free, RIDGE, ridge)) * size, cross[..., None])[..., 0])
+    mean_diagonal = np.trace(gram, axis1=-2, axis2=-1)[..., None, None] / gram.shape[-1]
+    return np.asarray(
+        np.linalg.solve(gram + np.diag(np.where(is_unpenalised, RIDGE, ridge)) * mean_diagonal, cross[..., None])[
+            ..., 0
+        ]
+    )
 
 
 def with_prior(products: tuple[FloatArray, FloatArray], prior: Prior) -> tuple[FloatArray, FloatArray]:
@@ -120,15 +137,15 @@ def with_prior(products: tuple[FloatArray, FloatArray], prior: Prior) -> tuple[F
     if prior is None:
         return products
     gram, cross = products[0].copy(), products[1].copy()
-    first = np.arange(len(prior[0]))
-    gram[..., first, first] += prior[0]
-    cross[..., first] += prior[1]
+    prior_columns = np.arange(len(prior[0]))
+    gram[..., prior_columns, prior_columns] += prior[0]
+    cross[..., prior_columns] += prior[1]
     return gram, cross
 
 
 def compute_squared_error(products: tuple[FloatArray, FloatArray], weights: FloatArray, power: float) -> float:
-    """Residual sum of squares of given weights (c,), at least 0. products: Gram matrix (c, c) and cross products (c,).
-    power: sum of squares of the fitted force."""
+    """Compute the residual sum of squares of given weights (c,), at least 0. products: Gram matrix (c, c) and cross
+    products (c,). power: sum of squares of the fitted force."""
     gram, cross = products
     return max(power - 2 * float(weights @ cross) + float(weights @ gram @ weights), 0.0)
 
@@ -136,7 +153,7 @@ def compute_squared_error(products: tuple[FloatArray, FloatArray], weights: Floa
 def compute_squared_errors(
     blocks: Sequence[Block], products: tuple[FloatArray, FloatArray], weights: FloatArray
 ) -> FloatArray:
-    """(blocks,): residual sums of squares. products: `products_per_block` of these blocks. weights: (c,) or
+    """Compute (blocks,): residual sums of squares. products: `stack_products` of these blocks. weights: (c,) or
     (blocks, c)."""
     weights = np.broadcast_to(weights, products[1].shape)
     power = np.array([block.power for block in blocks])

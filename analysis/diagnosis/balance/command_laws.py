@@ -3,7 +3,7 @@
 Laws of the motion are further columns of the regression of the commanded force. The laws in this file change that
 force itself, f = g(u), so that they are tested in the balance solved for the acceleration (`inverse_balance`). All
 constants below are set by hand: a grid need only be so fine that the best of its laws is refined to the true law
-(`neighbours_of`).
+(`vary_parameters`). Called by `actuator`.
 
 Reference: Slotine and Li, Applied Nonlinear Control (1991), chapter 5 (dead zone, saturation, relay).
 """
@@ -23,14 +23,14 @@ from equalizer.signals.signal import FloatArray
 DEADBAND_QUANTILES, SATURATION_QUANTILES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9), (
     0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98,
 )  # fmt: skip
-"""Quantiles of the command's size at which a dead band ends, and at which an actuator saturates."""
+"""Quantiles of the command's magnitude at which a dead band ends, and at which an actuator saturates."""
 CURVE_QUANTILES = (0.05, 0.1, 0.2, 0.3)
-"""Quantiles of the command's size at which a curve begins."""
-POWERS = (0.3, 0.5, 0.7, 1.4, 2.0)
-"""Exponents of the command beyond that point: valves and magnets that saturate, propellers."""
-SQUARES = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)
+"""Quantiles of the command's magnitude at which a power curve begins."""
+CURVE_EXPONENTS = (0.3, 0.5, 0.7, 1.4, 2.0)
+"""Exponents of the command beyond that point: below 1 for valves and magnets that saturate, 2 for propellers."""
+SQUARE_SHARES = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)
 """Shares of the force at the largest command that grow with the square of the command."""
-GAPS = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
+GAP_SHARES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
 """Smallest distances of a magnet from its armature, relative to the travel. Beyond the largest, the force falls by less
 than half over the travel. Against a linear spring, a magnet is stable over a third of its gap only (pull-in), where
 the smallest distance is twice the travel."""
@@ -38,10 +38,11 @@ REFINING_FACTORS = (0.95, 0.98, 1.02, 1.05)
 """Factors on a parameter in a coordinate search."""
 REFINED_PARAMETERS = ("width", "limit", "square", "gap", "power", "rate")
 """Parameters on a grid; others are switches or scales."""
-RATES = 20
+SLEW_LIMIT_COUNT = 20
 """Number of slew limits that are tried, in a geometric series."""
 NODE_QUANTILES = (0.05, 0.15, 0.3, 0.5, 0.7, 0.85, 0.95)
-"""Quantiles at which a piecewise linear function has its nodes; at those of the command's size it may jump, too."""
+"""Quantiles at which a piecewise linear function has its nodes; at those of the command's magnitude it may also
+jump."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +59,7 @@ class CommandLaw:
     factor_at: Callable[[FloatArray, dict[str, float]], FloatArray] | None = None
     """Maps positions (n,) and the values to the factor of the force (n,); None = it does not depend on the position."""
     flexible: bool = False
-    """Whether it has more freedom than the other laws, and counts only with a clearly smaller error."""
+    """Whether it has more free parameters than the other laws, and is chosen only with a clearly smaller error."""
     scale: float = 1.0
     """Scale that converts a single column to a force."""
     formula: Callable[[dict[str, float], float], Formula] | None = None
@@ -69,56 +70,59 @@ class CommandLaw:
         """See `inverse_balance.ForceOfCommand`."""
         return 1
 
-    def of(self, command: FloatArray, position: FloatArray) -> FloatArray:
-        """(n, weights): the columns at command and position (n,) each, in the units of a force where it has a scale."""
+    def compute_columns(self, command: FloatArray, position: FloatArray) -> FloatArray:
+        """Compute the columns (n, weights) at command and position (n,) each; in N (N m) after `scale_to`."""
         columns = self.scale * self.columns(command, self.values)
         return columns if self.factor_at is None else columns * self.factor_at(position, self.values)[:, None]
 
     def scale_to(self, command: FloatArray, position: FloatArray) -> "CommandLaw":
-        """The law scaled so that its force fits the command (least squares), where it has a formula: a mass fitted with
-        it then keeps its size. command, position: (n,) each."""
+        """Scale a law that has a formula so that its force fits the command (least squares): the mass fitted with it is
+        then not scaled. command, position: (n,) each."""
         if self.formula is None:
             return self
-        force = self.of(command, position)[:, 0]
+        force = self.compute_columns(command, position)[:, 0]
         return replace(self, scale=self.scale * float(force @ command) / max(float(force @ force), 1e-300))
 
     def as_formula(self) -> Formula | None:
-        """Formula of the force with these values and scale; None where the catalogue has the effect."""
+        """Convert the law to a formula with its values and scale; None where the catalogue has the effect."""
         return None if self.formula is None else self.formula(self.values, self.scale)
 
 
 AS_COMMANDED = CommandLaw("as_commanded", {}, lambda u, _: u[:, None])
+"""The ideal actuator, whose force is the command: the law to which the others are compared."""
 
 
-def command_laws(command: FloatArray) -> Iterator[CommandLaw]:
-    """All static nonlinearities of the actuator, over their grids of parameters. command: (n,), known throughout."""
-    size = np.abs(command)
-    for width in _sizes(size, DEADBAND_QUANTILES):
+def make_command_laws(command: FloatArray) -> Iterator[CommandLaw]:
+    """Make all static nonlinearities of the actuator, over their grids of parameters. command: (n,), finite."""
+    magnitude = np.abs(command)
+    for width in _compute_distinct_quantiles(magnitude, DEADBAND_QUANTILES):
         for jump in (0.0, 1.0):
-            yield CommandLaw("force_deadband", {"width": width, "jump": jump}, _deadband_force)
-    for limit in _sizes(size, SATURATION_QUANTILES):
+            yield CommandLaw("force_deadband", {"width": width, "jump": jump}, _compute_deadband_force)
+    for limit in _compute_distinct_quantiles(magnitude, SATURATION_QUANTILES):
         yield CommandLaw(
             "force_saturation",
             {"limit": limit},
             lambda u, parameters: np.clip(u, -parameters["limit"], parameters["limit"])[:, None],
         )
-    unit = float(size.max(initial=0.0)) or 1.0
-    for square in SQUARES:
-        yield CommandLaw("force_nonlinearity", {"square": square, "reference": unit}, _nonlinear_force)
-    for width in (0.0, *_sizes(size, CURVE_QUANTILES)):
-        for power in POWERS:
+    largest = float(magnitude.max(initial=0.0)) or 1.0
+    for square in SQUARE_SHARES:
+        yield CommandLaw("force_nonlinearity", {"square": square, "reference": largest}, _compute_square_law_force)
+    for width in (0.0, *_compute_distinct_quantiles(magnitude, CURVE_QUANTILES)):
+        for power in CURVE_EXPONENTS:
             values = {"width": width, "power": power}
-            yield CommandLaw("actuator_curve", values, _power_force, flexible=True, formula=_power_formula)
+            yield CommandLaw(
+                "actuator_curve", values, _compute_power_law_force, flexible=True, formula=_make_power_formula
+            )
     yield CommandLaw("actuator_asymmetry", {}, lambda u, _: np.stack([u, np.abs(u)], axis=1))
 
 
-def slew_laws(commands: Sequence[FloatArray], rate_hz: float) -> Iterator[CommandLaw]:
-    """Slew-rate limits: the command is followed at a limited rate, as by a positioning servo. commands: (n,) each. The
+def make_slew_laws(commands: Sequence[FloatArray], rate_hz: float) -> Iterator[CommandLaw]:
+    """Make slew-rate limits: the output follows the command at a limited rate, as of a servo. commands: (n,) each. The
     rates range from the full stroke within the longest command to its fastest change. A rate is left out where the
     limited output hardly ever reaches the command, so that only the sign of the command would matter."""
     fastest = max(float(np.abs(np.diff(command)).max(initial=0.0)) for command in commands) * rate_hz
     slowest = float(np.ptp(np.concatenate(commands))) * rate_hz / max(len(command) for command in commands)
-    for rate in np.geomspace(slowest, fastest, RATES)[:-1] if 0 < slowest < fastest else ():
+    for rate in np.geomspace(slowest, fastest, SLEW_LIMIT_COUNT)[:-1] if 0 < slowest < fastest else ():
         law = CommandLaw("slew_limit", {"rate": float(rate)}, partial(_compute_slewed_force, 1 / rate_hz))
         reaches_command = [
             np.abs(law.columns(command, law.values)[:, 0] - command) < rate / rate_hz for command in commands
@@ -128,39 +132,45 @@ def slew_laws(commands: Sequence[FloatArray], rate_hz: float) -> Iterator[Comman
 
 
 def _compute_slewed_force(step_s: float, command: FloatArray, parameters: dict[str, float]) -> FloatArray:
+    """Compute (n, 1): the command (n,) after a slew-rate limit. step_s: sampling interval."""
     # The output equals the first command when the recording begins.
     return limit_slew(command, step_s, parameters["rate"], float(command[0]))[:, None]
 
 
-def coil_laws(position: FloatArray) -> Iterator[CommandLaw]:
-    """An electromagnet: force proportional to the square of the current over that of the distance; with a permanent
-    magnet, to the current. position: (n,); the magnet may be beyond either end."""
+def make_electromagnet_laws(position: FloatArray) -> Iterator[CommandLaw]:
+    """Make the laws of an electromagnet: force proportional to the square of the current over that of the distance;
+    with a permanent magnet, to the current. position: (n,); the magnet may be beyond either end."""
     low, high = float(position.min()), float(position.max())
-    for side, end in ((1.0, low), (-1.0, high)):
-        for gap in GAPS:
-            for columns in (_force_of_square, AS_COMMANDED.columns):
-                factor_at = partial(_attraction_at, side, end)
+    for direction, nearest_position in ((1.0, low), (-1.0, high)):
+        for gap in GAP_SHARES:
+            for columns in (_square_command, AS_COMMANDED.columns):
+                factor_at = partial(_compute_attraction_factor, direction, nearest_position)
                 yield CommandLaw("electromagnet", {"gap": gap * (high - low)}, columns, factor_at, True)
 
 
-def _attraction_at(side: float, end: float, position: FloatArray, parameters: dict[str, float]) -> FloatArray:
-    """side: 1 where the position is a distance that grows, from `end` on; -1 where it falls."""
-    return np.asarray((parameters["gap"] + np.maximum(side * (position - end), 0.0)) ** -2)
+def _compute_attraction_factor(
+    direction: float, nearest_position: float, position: FloatArray, parameters: dict[str, float]
+) -> FloatArray:
+    """Compute (n,): 1 / distance² from the magnet, which is `gap` beyond `nearest_position`. direction: 1 where the
+    distance grows with the position (n,), -1 where it falls."""
+    return np.asarray((parameters["gap"] + np.maximum(direction * (position - nearest_position), 0.0)) ** -2)
 
 
-def _power_formula(parameters: dict[str, float], scale: float) -> Formula:
-    """Formula of `_power_force`: scale sgn(f) max(|f| - width, 0)^power of a command f."""
+def _make_power_formula(parameters: dict[str, float], scale: float) -> Formula:
+    """Make the formula of `_compute_power_law_force`: scale sgn(f) max(|f| - width, 0)^power of a command f."""
     if not parameters["width"]:
         return Formula(f"{scale:.6g}*sign(f)*abs(f)**p0", (parameters["power"],))
     return Formula(f"{scale:.6g}*sign(f)*maximum(abs(f) - p0, 0)**p1", (parameters["width"], parameters["power"]))
 
 
-def _force_of_square(command: FloatArray, parameters: dict[str, float]) -> FloatArray:
+def _square_command(command: FloatArray, parameters: dict[str, float]) -> FloatArray:
+    """Compute (n, 1): the square of the command (n,). parameters: not used."""
     return command[:, None] ** 2
 
 
-def neighbours_of(law: CommandLaw) -> Iterator[CommandLaw]:
-    """The law with each of its `REFINED_PARAMETERS` that is not zero multiplied by each of the `REFINING_FACTORS`."""
+def vary_parameters(law: CommandLaw) -> Iterator[CommandLaw]:
+    """Make copies of the law, each with one of its `REFINED_PARAMETERS` multiplied by one of the `REFINING_FACTORS`;
+    without parameters that are zero and values of `square` beyond +-1."""
     for name in REFINED_PARAMETERS:
         value = law.values.get(name, 0.0)
         for factor in REFINING_FACTORS if value else ():
@@ -168,25 +178,28 @@ def neighbours_of(law: CommandLaw) -> Iterator[CommandLaw]:
                 yield replace(law, values={**law.values, name: factor * value})
 
 
-def _nonlinear_force(command: FloatArray, parameters: dict[str, float]) -> FloatArray:
+def _compute_square_law_force(command: FloatArray, parameters: dict[str, float]) -> FloatArray:
+    """Compute (n, 1): the force of which the share `square` grows with the square of the command (n,)."""
     return square_law_force(command, parameters["square"], parameters["reference"])[:, None]
 
 
-def _power_force(command: FloatArray, parameters: dict[str, float]) -> FloatArray:
+def _compute_power_law_force(command: FloatArray, parameters: dict[str, float]) -> FloatArray:
+    """Compute (n, 1): sgn(u) max(|u| - width, 0)^power of the command u (n,)."""
     excess = np.maximum(np.abs(command) - parameters["width"], 0.0)
     return np.asarray(np.sign(command) * excess ** parameters["power"])[:, None]
 
 
-def _sizes(size: FloatArray, shares: Sequence[float]) -> list[float]:
-    """Quantiles of the command's size (n,) above zero and below its largest, ascending and each once."""
-    quantiles = np.unique(np.quantile(size, shares))
-    return [float(value) for value in quantiles if 0 < value < size.max()]
+def _compute_distinct_quantiles(magnitude: FloatArray, shares: Sequence[float]) -> list[float]:
+    """Compute the different quantiles of the command's magnitude (n,) between zero and its maximum, ascending."""
+    quantiles = np.unique(np.quantile(magnitude, shares))
+    return [float(value) for value in quantiles if 0 < value < magnitude.max()]
 
 
-def _deadband_force(command: FloatArray, parameters: dict[str, float]) -> FloatArray:
+def _compute_deadband_force(command: FloatArray, parameters: dict[str, float]) -> FloatArray:
+    """Compute (n, 1): the force beyond a dead band of +-width, with a jump of `jump` widths at its ends."""
     width = parameters["width"]
-    passed = command - np.clip(command, -width, width)
-    return np.asarray(passed + parameters["jump"] * width * np.sign(passed))[:, None]
+    excess = command - np.clip(command, -width, width)
+    return np.asarray(excess + parameters["jump"] * width * np.sign(excess))[:, None]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -199,32 +212,32 @@ class PiecewiseCommandLaw:
     sloped: int
     """See `inverse_balance.ForceOfCommand`."""
 
-    def of(self, command: FloatArray, position: FloatArray) -> FloatArray:
-        """(n, k): the columns at command and position (n,) each."""
+    def compute_columns(self, command: FloatArray, position: FloatArray) -> FloatArray:
+        """Compute the columns (n, k) at command and position (n,) each."""
         return self.columns(command, position)
 
 
-def piecewise_curve(command: FloatArray) -> PiecewiseCommandLaw:
-    """A piecewise linear function of the command with jumps, separate for each sign. command: (n,), whose range the
-    nodes span."""
-    bends = np.unique(np.quantile(np.abs(command), NODE_QUANTILES))
+def make_piecewise_curve(command: FloatArray) -> PiecewiseCommandLaw:
+    """Make a piecewise linear function of the command with jumps, separate for each sign. command: (n,), whose range
+    the nodes span."""
+    nodes = np.unique(np.quantile(np.abs(command), NODE_QUANTILES))
 
-    def columns(u: FloatArray, position: FloatArray) -> FloatArray:
-        sides = (np.maximum(u, 0.0), np.maximum(-u, 0.0))
-        hinges = [np.maximum(side - bend, 0.0) for side in sides for bend in bends]
-        jumps = [np.where(side > bend, 1.0, 0.0) for side in sides for bend in bends]
-        return np.stack([u, sides[0], *hinges, *jumps], axis=1)
+    def compute_columns(u: FloatArray, position: FloatArray) -> FloatArray:
+        one_sided_commands = (np.maximum(u, 0.0), np.maximum(-u, 0.0))
+        hinges = [np.maximum(one_sided - node, 0.0) for one_sided in one_sided_commands for node in nodes]
+        jumps = [np.where(one_sided > node, 1.0, 0.0) for one_sided in one_sided_commands for node in nodes]
+        return np.stack([u, one_sided_commands[0], *hinges, *jumps], axis=1)
 
-    return PiecewiseCommandLaw(columns, 2 + 2 * len(bends))
+    return PiecewiseCommandLaw(compute_columns, 2 + 2 * len(nodes))
 
 
-def piecewise_pull(position: FloatArray) -> PiecewiseCommandLaw:
-    """The command and its square, each with a gain that is piecewise linear in the position. position: (n,), whose
-    range the nodes span."""
-    bends = np.unique(np.quantile(position, NODE_QUANTILES))
+def make_piecewise_attraction(position: FloatArray) -> PiecewiseCommandLaw:
+    """Make the sum of the command and its square, each with a gain piecewise linear in the position. position: (n,),
+    whose range the nodes span."""
+    nodes = np.unique(np.quantile(position, NODE_QUANTILES))
 
-    def columns(u: FloatArray, x: FloatArray) -> FloatArray:
-        gains = [np.ones_like(x), x - bends[0], *(np.maximum(x - bend, 0.0) for bend in bends)]
+    def compute_columns(u: FloatArray, x: FloatArray) -> FloatArray:
+        gains = [np.ones_like(x), x - nodes[0], *(np.maximum(x - node, 0.0) for node in nodes)]
         return np.stack([force * gain for force in (u, u**2) for gain in gains], axis=1)
 
-    return PiecewiseCommandLaw(columns, 4 + 2 * len(bends))
+    return PiecewiseCommandLaw(compute_columns, 4 + 2 * len(nodes))

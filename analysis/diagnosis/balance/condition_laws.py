@@ -1,7 +1,7 @@
 """Friction, damping, stiffness and force that depend on a recorded condition, such as a temperature or a setting.
 
 With c the deviation of the condition from its mean, in units of its standard deviation, and q, v the motion of one
-axis, the force that resists the motion is
+axis, the force that resists the motion is (`laws` adds these laws to its candidates)
 
     friction  (w1 + w2 c) tanh(v / width)      damping  w c v      stiffness  w c q      force  w c
 
@@ -13,74 +13,78 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from analysis.diagnosis.balance.friction_laws import friction_widths
+from analysis.diagnosis.balance.friction_laws import compute_friction_widths
 from analysis.diagnosis.balance.law import Columns, Formula, Law, Scales, name_weights, smooth_sign
 from analysis.diagnosis.balance.motion import Condition, Motion
 from equalizer.signals.signal import FloatArray
 
 
-def condition_laws(motions: Sequence[Motion], c: int, scales: Scales) -> Iterator[Law]:
-    """Laws of one axis for every recorded condition. c: channel of the motion, scales: the sizes of that motion."""
-    for k, condition in enumerate(motions[0].conditions):
-        yield from _laws_of_condition(condition, k, c, scales)
+def make_condition_laws(motions: Sequence[Motion], channel: int, scales: Scales) -> Iterator[Law]:
+    """Make the laws of one axis for every recorded condition. channel: of the motion; scales: of that motion."""
+    for condition_index, condition in enumerate(motions[0].conditions):
+        yield from _make_laws_of_condition(condition, condition_index, channel, scales)
 
 
-def _laws_of_condition(condition: Condition, k: int, c: int, scales: Scales) -> Iterator[Law]:
-    """Laws of one condition. k: its column in `Motion.condition`; c and scales: as in `condition_laws`."""
-    sharp, spans = friction_widths(scales)
-    for width in sharp:
+def _make_laws_of_condition(condition: Condition, index: int, channel: int, scales: Scales) -> Iterator[Law]:
+    """Make the laws of one condition. index: its column in `Motion.condition`; else as `make_condition_laws`."""
+    widths, width_bounds = compute_friction_widths(scales)
+    for width in widths:
         yield Law(
-            "condition_dependent_friction", c, (float(width),), _friction_columns(c, k), _friction_values,
-            bounded=spans, formula=_friction_formula(condition),
+            "condition_dependent_friction", channel, (float(width),), _make_friction_columns(channel, index),
+            _read_friction_values, bounded=width_bounds, formula=_make_friction_formula(condition),
         )  # fmt: skip
     if np.isfinite(scales.band_hz):
         yield Law(
-            "condition_dependent_damping", c, (), lambda m, _: m.condition[:, [k]] * m.velocity[:, [c]],
-            name_weights("change"), formula=_formula(condition, "v"),
+            "condition_dependent_damping", channel, (), lambda m, _: m.condition[:, [index]] * m.velocity[:, [channel]],
+            name_weights("change"), formula=_make_formula(condition, "v"),
         )  # fmt: skip
     yield Law(
-        "condition_dependent_stiffness", c, (), lambda m, _: m.condition[:, [k]] * m.position[:, [c]],
-        name_weights("change"), formula=_formula(condition, "q"),
+        "condition_dependent_stiffness", channel, (), lambda m, _: m.condition[:, [index]] * m.position[:, [channel]],
+        name_weights("change"), formula=_make_formula(condition, "q"),
     )  # fmt: skip
     yield Law(
-        "condition_dependent_force", c, (), lambda m, _: m.condition[:, [k]], name_weights("change"),
-        formula=_formula(condition),
+        "condition_dependent_force", channel, (), lambda m, _: m.condition[:, [index]], name_weights("change"),
+        formula=_make_formula(condition),
     )  # fmt: skip
 
 
-def _friction_columns(c: int, k: int) -> Columns:
-    def columns(m: Motion, n: tuple[float, ...]) -> FloatArray:
-        friction_sign = smooth_sign(m.velocity[:, [c]], n[0])
-        return np.hstack([friction_sign, friction_sign * m.condition[:, [k]]])
+def _make_friction_columns(channel: int, index: int) -> Columns:
+    """Columns (n, 2): the smoothed sign of the velocity, and the same times the condition."""
 
-    return columns
+    def compute_columns(m: Motion, n: tuple[float, ...]) -> FloatArray:
+        friction_sign = smooth_sign(m.velocity[:, [channel]], n[0])
+        return np.hstack([friction_sign, friction_sign * m.condition[:, [index]]])
+
+    return compute_columns
 
 
-def _friction_values(w: FloatArray, n: tuple[float, ...], mass: float) -> dict[str, float] | None:
+def _read_friction_values(w: FloatArray, n: tuple[float, ...], mass: float) -> dict[str, float] | None:
+    """Convert the weights to level and change (N or N m); None where the mean friction is not positive."""
     return {"level": float(w[0]), "change": float(w[1])} if w[0] > 0 else None
 
 
-def _friction_formula(condition: Condition) -> Callable[[dict[str, float]], Formula]:
-    # Negative friction would drive the motion.
-    text = f"-maximum(p0 + p1*{_deviation(condition)}, 0)*sign(v)"
+def _make_friction_formula(condition: Condition) -> Callable[[dict[str, float]], Formula]:
+    """Make the formula of the friction, limited to at least 0: negative friction would drive the motion."""
+    text = f"-maximum(p0 + p1*{_format_deviation(condition)}, 0)*sign(v)"
     return lambda parameters: Formula(text, (parameters["level"], parameters["change"]), "force")
 
 
-def _formula(condition: Condition, *factors: str) -> Callable[[dict[str, float]], Formula]:
-    text = "*".join(("-p0", _deviation(condition), *factors))
+def _make_formula(condition: Condition, *factors: str) -> Callable[[dict[str, float]], Formula]:
+    """Make the formula of a force -p0 c times the factors (symbols of the motion)."""
+    text = "*".join(("-p0", _format_deviation(condition), *factors))
     return lambda parameters: Formula(text, (parameters["change"],), "force")
 
 
-def _deviation(condition: Condition) -> str:
-    """Formula of a condition's deviation from its mean, in standard deviations. Its numbers are integers, which belong
-    to the form of a formula and are not fitted. The standard deviation is rounded to about four digits, the mean to
-    the same decimal place."""
-    factor = 10 ** max(0, min(3 - math.floor(math.log10(condition.spread)), 15 - _digits(condition.mean)))
+def _format_deviation(condition: Condition) -> str:
+    """Format a condition's deviation from its mean, in standard deviations, as a formula. Its numbers are integers: a
+    formula's integers are constants that are not fitted. The standard deviation is rounded to about four digits, the
+    mean to the same decimal place."""
+    factor = 10 ** max(0, min(3 - math.floor(math.log10(condition.spread)), 15 - _count_integer_digits(condition.mean)))
     mean, spread = round(condition.mean * factor), max(round(condition.spread * factor), 1)
     scaled = condition.name if factor == 1 else f"{factor}*{condition.name}"
     return f"(({scaled} {'-' if mean >= 0 else '+'} {abs(mean)})/{spread})"
 
 
-def _digits(value: float) -> int:
-    """Number of digits before the decimal point."""
+def _count_integer_digits(value: float) -> int:
+    """Count the digits before the decimal point, at least 1."""
     return max(math.floor(math.log10(abs(value))) + 1, 1) if value else 1

@@ -16,15 +16,15 @@ import numpy as np
 from analysis.diagnosis.balance.blocks import (
     RIDGE,
     Block,
-    block_products,
-    blocks_of,
-    column_scale,
+    build_blocks,
+    compute_scale,
     compute_squared_error,
+    select_products,
     solve_normal_equations,
     sum_products,
 )
 from analysis.diagnosis.balance.command_laws import CommandLaw
-from analysis.diagnosis.balance.judge_laws import blocks_to_judge
+from analysis.diagnosis.balance.judge_laws import select_test_blocks
 from analysis.diagnosis.balance.structures import StructureSearch
 from analysis.diagnosis.settings import STILL_SHARE
 from analysis.diagnosis.types import Mapper, Mask
@@ -36,10 +36,10 @@ class ForceOfCommand(Protocol):
 
     @property
     def sloped(self) -> int:
-        """Number of leading columns whose rate of change is a further regressor: to first order, a short lag."""
+        """Number of leading columns whose time derivative is a further regressor: a short lag, to first order."""
 
-    def of(self, command: FloatArray, position: FloatArray) -> FloatArray:
-        """(n, weights): columns at command and position (n,) each, whose weighted sum is the force."""
+    def compute_columns(self, command: FloatArray, position: FloatArray) -> FloatArray:
+        """Compute the columns (n, weights) at command and position (n,) each, whose weighted sum is the force."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,8 +50,8 @@ class InverseBalance:
     """The search for laws of the motion, whose regression and base are used here."""
     map_: Mapper
     has_friction: bool
-    """Whether friction is among the laws of the motion: samples at rest are then no evidence, because friction balances
-    any force up to its level, and a dead band gives none."""
+    """Whether friction is among the laws of the motion: samples at rest are then not used, because static friction
+    balances any force up to its level."""
     target: int | None = None
     """Order of the position's time derivative that the command sets; None = it is a force."""
 
@@ -63,39 +63,40 @@ class InverseBalance:
         column = driven_channel if self.target is None else (2 - self.target) * channel_count + driven_channel
         return column if column < regression.matrices else driven_channel
 
-    def total_errors(self, laws: Sequence[CommandLaw], motion_laws: Sequence[int]) -> list[float]:
-        """Cross-validated sum of squares of each law. motion_laws: indices of laws of the motion fitted with it."""
-        return cast(list[float], list(self.map_(partial(self.total_error, motion_laws=motion_laws), laws)))
+    def sum_errors_per_law(self, laws: Sequence[CommandLaw], motion_laws: Sequence[int]) -> list[float]:
+        """Compute `sum_errors` of each law. motion_laws: indices of laws of the motion that are fitted with it."""
+        return cast(list[float], list(self.map_(partial(self.sum_errors, motion_laws=motion_laws), laws)))
 
-    def total_error(self, law: CommandLaw, motion_laws: Sequence[int]) -> float:
-        """Cross-validated sum of squares of one law of the command. motion_laws: laws of the motion fitted with it."""
-        return float(self.errors(law, motion_laws, False).sum())
+    def sum_errors(self, law: CommandLaw, motion_laws: Sequence[int]) -> float:
+        """Sum the cross-validated squared errors of one law. motion_laws: see `sum_errors_per_law`."""
+        return float(self.evaluate_law(law, motion_laws, False).sum())
 
-    def least_error(self, law: ForceOfCommand, motion_laws: Sequence[int]) -> float:
-        """Sum of squares on the fitted samples: a lower bound for each law that this sum approximates."""
+    def fit_lower_bound(self, law: ForceOfCommand, motion_laws: Sequence[int]) -> float:
+        """Compute the sum of squares on the fitted samples: a lower bound for each law that this sum approximates."""
         fit, _ = self._build_blocks(self._build_rows(law, motion_laws), False)
-        products = [block_products(block, range(len(fit[0].cross))) for block in fit]
+        products = [select_products(block, range(len(fit[0].cross))) for block in fit]
         weights = solve_normal_equations(sum_products(fit, range(len(fit[0].cross))), RIDGE)
         return sum(
             compute_squared_error(block_sums, weights, block.power)
             for block_sums, block in zip(products, fit, strict=True)
         )
 
-    def errors(self, law: CommandLaw, laws: Sequence[int], on_held_out: bool) -> FloatArray:
-        """(blocks,): sums of squares of one law. on_held_out: on the held-out blocks where there are any; else on each
-        block to fit, with weights fitted to the others (cross-validation)."""
-        uses_held_out = on_held_out and blocks_to_judge(self.search.regression) is self.search.regression.test
+    def evaluate_law(self, law: CommandLaw, laws: Sequence[int], on_held_out: bool) -> FloatArray:
+        """Compute (blocks,): sums of squared errors with one law. laws: of the motion, by index. on_held_out: on the
+        held-out blocks if they are a valid test (`select_test_blocks`); else on each block to fit, with weights fitted
+        to the others (cross-validation)."""
+        uses_held_out = on_held_out and select_test_blocks(self.search.regression) is self.search.regression.test
         fit, test = self._build_blocks(self._build_rows(law, laws), uses_held_out)
         columns = list(range(len(fit[0].cross)))
         total = sum_products(fit, columns)
         if uses_held_out:
             weights = solve_normal_equations(total, RIDGE)
             return np.array(
-                [compute_squared_error(block_products(block, columns), weights, block.power) for block in test]
+                [compute_squared_error(select_products(block, columns), weights, block.power) for block in test]
             )
         squares = []
         for block in fit:
-            products = block_products(block, columns)
+            products = select_products(block, columns)
             squares.append(
                 compute_squared_error(
                     products,
@@ -106,41 +107,48 @@ class InverseBalance:
         return np.array(squares)
 
     def _build_blocks(
-        self, rows: Sequence[FloatArray], uses_held_out: bool
+        self, regressors: Sequence[FloatArray], uses_held_out: bool
     ) -> tuple[tuple[Block, ...], tuple[Block, ...]]:
-        """Blocks of samples to fit and, if `uses_held_out`, of held-out samples. rows: regressors per motion."""
+        """Build blocks of samples to fit and, if `uses_held_out`, of held-out samples. regressors: (n, k) per
+        motion."""
         regression = self.search.regression
         motions, solved_column = regression.motions, self.solved_column
         targets = [columns[:, solved_column] for columns in regression.columns]
         fit, test = (
             [
-                motion.valid_samples(mask & is_moving)
+                motion.mask_valid_samples(mask & is_moving)
                 for motion, mask, is_moving in zip(motions, masks, motion_masks, strict=True)
             ]
             for motion_masks in [self._find_moving_samples()]
             for masks in ([m.fit for m in motions], [m.test for m in motions])
         )
         mean = float(np.concatenate([target[mask] for target, mask in zip(targets, fit, strict=True)]).mean())
-        units = column_scale(rows, fit), mean
-        return blocks_of(rows, targets, fit, units), blocks_of(rows, targets, test, units) if uses_held_out else ()
+        units = compute_scale(regressors, fit), mean
+        return build_blocks(regressors, targets, fit, units), build_blocks(
+            regressors, targets, test, units
+        ) if uses_held_out else ()
 
     def _find_moving_samples(self) -> list[Mask]:
-        """(n,) per motion: mask of the samples that are evidence; those at rest are not, where there is friction."""
+        """Find the samples at which the axis moves: masks (n,) per motion; all samples without friction."""
         regression = self.search.regression
         speeds = [motion.velocity[:, regression.base_terms.driven_channel] for motion in regression.motions]
-        used = np.concatenate([speed[motion.fit] for speed, motion in zip(speeds, regression.motions, strict=True)])
-        least_square = STILL_SHARE * float(np.mean(used**2)) if self.has_friction else -1.0
-        return [speed**2 > least_square for speed in speeds]
+        fit_velocity = np.concatenate(
+            [speed[motion.fit] for speed, motion in zip(speeds, regression.motions, strict=True)]
+        )
+        least_squared_speed = STILL_SHARE * float(np.mean(fit_velocity**2)) if self.has_friction else -1.0
+        return [speed**2 > least_squared_speed for speed in speeds]
 
     def _build_rows(self, law: ForceOfCommand, laws: Sequence[int]) -> list[FloatArray]:
-        """Per motion the regression's columns (n, columns): the law's, their rates of change, the other axes' commands,
-        and the laws of the motion."""
+        """Build the columns (n, columns) of each motion: those of the law, their time derivatives, the other axes'
+        commands, and the laws of the motion."""
         regression, rows = self.search.regression, []
         # Columns of the base that are filtered copies of the predicted quantity would reproduce it.
-        filters = {self.solved_column, *range(regression.matrices, regression.base - 1)}
-        law_columns = [column for column in regression.columns_of(laws) if column not in filters]
+        excluded_columns = {self.solved_column, *range(regression.matrices, regression.base - 1)}
+        law_columns = [column for column in regression.select_columns(laws) if column not in excluded_columns]
         for motion, columns in zip(regression.motions, regression.columns, strict=True):
-            force = law.of(motion.force[:, regression.axis], motion.position[:, regression.base_terms.driven_channel])
+            force = law.compute_columns(
+                motion.force[:, regression.axis], motion.position[:, regression.base_terms.driven_channel]
+            )
             other_commands = np.delete(motion.force, regression.axis, axis=1)
             command_columns = np.hstack(
                 [force, np.gradient(force[:, : law.sloped], 1 / motion.rate_hz, axis=0), other_commands]

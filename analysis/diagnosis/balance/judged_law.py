@@ -17,13 +17,13 @@ from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 
 NO_COLUMN = -1
 """Value of `JudgedLaw.place` for a law of the command: it changes the force itself and has no column."""
-DRY_FRICTIONS = {
+FRICTIONS = {
     "coulomb_friction", "asymmetric_friction", "stribeck_friction", "presliding_hysteresis",
     "position_dependent_friction", "drifting_friction", "condition_dependent_friction",
 }  # fmt: skip
 """Laws of dry friction, whose forces are similar where the recorded motion does not vary."""
 FAMILIES = (
-    DRY_FRICTIONS | {"quadratic_damping"},
+    FRICTIONS | {"quadratic_damping"},
     {"hardening_stiffness", "asymmetric_stiffness", "end_stop", "backlash", "gravity_torque"},
 )  # fmt: skip
 """Families of effects with similar forces. A law whose equally good rivals are all of its own family is named, with
@@ -81,24 +81,26 @@ class JudgedLaw:
         return not self.objection
 
 
-def force_ratio(regression: Regression, laws: Sequence[int], number: int) -> float:
-    """Standard deviation of a law's own force over that of the recorded force, on the samples to fit. laws: fitted
-    together. number: the law among them."""
-    columns, place = regression.columns_of(laws), regression.places[number]
+def compute_force_ratio(regression: Regression, laws: Sequence[int], law_index: int) -> float:
+    """Compute the standard deviation of a law's force over that of the recorded force, on the samples to fit. laws:
+    indices, fitted together. law_index: the law among them."""
+    columns, law_columns = regression.select_columns(laws), regression.places[law_index]
     weights = np.zeros(regression.columns[0].shape[1])
-    weights[columns] = regression.weights(columns)
-    masks = [motion.valid_samples(motion.fit) for motion in regression.motions]
-    law_force = [c[mask, place] @ weights[place] for c, mask in zip(regression.columns, masks, strict=True)]
-    force = [f[mask] for f, mask in zip(regression.force, masks, strict=True)]
+    weights[columns] = regression.fit_weights(columns)
+    masks = [motion.mask_valid_samples(motion.fit) for motion in regression.motions]
+    law_force = [
+        rows[mask, law_columns] @ weights[law_columns] for rows, mask in zip(regression.columns, masks, strict=True)
+    ]
+    force = [motion_force[mask] for motion_force, mask in zip(regression.force, masks, strict=True)]
     return float(np.concatenate(law_force).std() / max(float(np.concatenate(force).std()), 1e-300))
 
 
-def special_cases(effect: str) -> tuple[str, ...]:
-    """Effects that a law contains as special cases, and which it therefore fits at least as well as; empty for a law
-    outside the catalogue."""
+def list_simpler(effect: str) -> tuple[str, ...]:
+    """List the effects that are special cases of a law, so that the law fits at least as well; empty for a law outside
+    the catalogue."""
     return EFFECTS[effect].simpler if effect in EFFECTS else ()
 
 
-def family_of(effect: str) -> set[str]:
-    """The family in `FAMILIES` that contains an effect; the effect alone where none does."""
+def find_family(effect: str) -> set[str]:
+    """Find the family in `FAMILIES` that contains an effect; the effect alone where none does."""
     return next((family for family in FAMILIES if effect in family), {effect})

@@ -4,7 +4,7 @@ Both are columns of a linear regression of the measured force. The column of the
 The other columns are the change of that force per standard deviation of each parameter's calibration, so that their
 weights have the prior N(0, 1). The precision of this prior in the normal equations is the variance of the residual: its
 sum of squares per degree of freedom, of which a residual with a narrow spectrum has few (equivalent degrees of freedom
-of a power estimate; Bendat and Piersol 2010, Random Data, ch. 8).
+of a power estimate; Bendat and Piersol 2010, Random Data, ch. 8). Called by `structures` and `confirm`.
 """
 
 from collections.abc import Sequence
@@ -14,10 +14,10 @@ import numpy as np
 
 from analysis.diagnosis.balance.law import Law
 from analysis.diagnosis.balance.motion import Motion
-from analysis.diagnosis.balance.regression import Regression, fit_all_laws, regression_of
+from analysis.diagnosis.balance.regression import Regression, build_regression, fit_all_laws
 from equalizer.signals.signal import FloatArray
 
-FIXED = 1e6
+FIXED_WEIGHT_PRECISION = 1e6
 """Precision of the prior that fixes the first weight at 1, relative to the precision that the data give to it: large
 enough that the data do not move it."""
 
@@ -35,45 +35,46 @@ class GivenBase:
     """Smallest share of the force's rms that all laws together must explain; below it no law is searched for."""
 
 
-def regression_with_model(
+def build_regression_with_model(
     motions: Sequence[Motion], axis: int, laws: Sequence[Law], model_base: GivenBase
 ) -> Regression:
-    """Build the regression of `regression_of` with the model's required force and its sensitivities as the base. Free
-    parameters that change the force by less than 1e-9 of its rms are left out."""
-    varying = _sensitive_columns(model_base)
-    columns = [part[:, varying] for part in model_base.columns]
-    regression = replace(regression_of(motions, axis, laws, False, None, columns), mass=model_base.mass)
+    """Build a regression as `build_regression`, with the model's required force and its sensitivities as the base.
+    Free parameters that change the force by less than 1e-9 of its rms are left out."""
+    sensitive_columns = _find_sensitive_columns(model_base)
+    columns = [motion_columns[:, sensitive_columns] for motion_columns in model_base.columns]
+    regression = replace(build_regression(motions, axis, laws, False, None, columns), mass=model_base.mass)
     scale = regression.scale[: regression.base - 1]
-    precision, cross = np.zeros(len(scale)), np.zeros(len(scale))
-    precision[0] = FIXED * sum(block.gram[0, 0] for block in regression.fit)
-    cross[0] = precision[0] * scale[0]
-    without_tolerances = replace(regression, prior=(precision.copy(), cross))
-    precision[1:] = _power_per_freedom(without_tolerances) / scale[1:] ** 2
-    return replace(regression, prior=(precision, cross))
+    precision, precision_times_mean = np.zeros(len(scale)), np.zeros(len(scale))
+    precision[0] = FIXED_WEIGHT_PRECISION * sum(block.gram[0, 0] for block in regression.fit)
+    precision_times_mean[0] = precision[0] * scale[0]
+    unconstrained = replace(regression, prior=(precision.copy(), precision_times_mean))
+    precision[1:] = _estimate_residual_variance(unconstrained) / scale[1:] ** 2
+    return replace(regression, prior=(precision, precision_times_mean))
 
 
 def explains_enough(regression: Regression, least_share: float) -> bool:
     """Whether all laws together lower the cross-validated sum of squares by more than least² of the force's power, so
     that they explain more than the share `least_share` of its rms."""
-    base_error = float(regression.cross_validated_errors(regression.columns_of(())).sum())
+    base_error = float(regression.cross_validate(regression.select_columns(())).sum())
     all_laws_error = fit_all_laws(regression, range(regression.columns[0].shape[1]))[0]
     return base_error - all_laws_error > least_share**2 * sum(block.signal for block in regression.fit)
 
 
-def _sensitive_columns(model_base: GivenBase) -> list[int]:
-    """Indices of the required force and of the parameters that change it by more than rounding."""
-    size = np.sqrt(np.mean(np.vstack(model_base.columns) ** 2, axis=0))
-    return [0, *(k for k in range(1, len(size)) if size[k] > 1e-9 * size[0])]
+def _find_sensitive_columns(model_base: GivenBase) -> list[int]:
+    """Find the columns of the required force and of the parameters that change it by more than rounding."""
+    rms = np.sqrt(np.mean(np.vstack(model_base.columns) ** 2, axis=0))
+    return [0, *(k for k in range(1, len(rms)) if rms[k] > 1e-9 * rms[0])]
 
 
-def _power_per_freedom(regression: Regression) -> float:
-    """Residual sum of squares per equivalent degree of freedom; the free parameters are fitted without their prior.
-    With the residual's power P on each spectral line, a motion has 2 (sum P)² / sum P² degrees of freedom."""
-    residuals = regression.remainder(regression.columns_of(()))
-    power, freedom = 0.0, 0.0
+def _estimate_residual_variance(regression: Regression) -> float:
+    """Estimate the residual sum of squares per equivalent degree of freedom; the free parameters are fitted without
+    their prior. With the residual's power P on each spectral line, a motion has 2 (sum P)² / sum P² degrees of
+    freedom."""
+    residuals = regression.compute_residuals(regression.select_columns(()))
+    sum_of_squares, degrees_of_freedom = 0.0, 0.0
     for residual, motion in zip(residuals, regression.motions, strict=True):
-        known_residual = np.where(motion.valid_samples(motion.fit), residual, 0.0)
-        lines = np.abs(np.fft.rfft(known_residual)) ** 2
-        power += float(known_residual @ known_residual)
-        freedom += 2 * float(lines.sum()) ** 2 / max(float((lines**2).sum()), 1e-300)
-    return power / max(freedom, 1.0)
+        known_residual = np.where(motion.mask_valid_samples(motion.fit), residual, 0.0)
+        line_power = np.abs(np.fft.rfft(known_residual)) ** 2
+        sum_of_squares += float(known_residual @ known_residual)
+        degrees_of_freedom += 2 * float(line_power.sum()) ** 2 / max(float((line_power**2).sum()), 1e-300)
+    return sum_of_squares / max(degrees_of_freedom, 1.0)

@@ -4,7 +4,8 @@ Derivatives are computed in the frequency domain: each spectral line is multipli
 filtered. The upper end of the band is the highest frequency up to which white noise makes at most a hundredth of the
 acceleration's mean square, because regression on a noisier acceleration would underestimate the mass by more (errors in
 variables; Soderstrom, Automatica 43:939, 2007). Measured accelerations are integrated above a lower end of the band
-only, below which noise would dominate the position (`band.py` computes both ends).
+only, below which noise would dominate the position (`band.py` computes both ends). `balances`, `regression` and the
+first models use the motions.
 """
 
 from collections.abc import Iterable, Sequence
@@ -13,20 +14,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
-from analysis.diagnosis.balance.band import band_begin_hz, band_end_hz
+from analysis.diagnosis.balance.band import compute_band_begin_hz, compute_band_end_hz
 from analysis.diagnosis.data.measured_motion import fill_gaps, is_quasi_static, is_read_as_free
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.settings import MOTION_EDGE_PERIODS, MOTION_OVERSAMPLED, MOVING_BAND_SHARE
 from analysis.diagnosis.types import Mask
 from equalizer.effects.discovered_law import condition_names, law_channels
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
-from equalizer.signals.band_limited import low_pass_gain, odd_extension
+from equalizer.signals.band_limited import compute_low_pass_gain, extend_as_odd
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray, Signal
 
 
 class NoMotionError(ValueError):
-    """The recording has no motion that a force balance could use."""
+    """The recording has no motion that a force balance can use."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,26 +75,27 @@ class Motion:
     """Recorded conditions, for the columns of `condition`."""
 
     def decimate(self, columns: FloatArray) -> FloatArray:
-        """(kept samples, k): columns (n, k) filtered to the band and decimated by `step`."""
+        """Filter columns (n, k) to the band and decimate them by `step`: (kept samples, k)."""
         if not np.isfinite(self.band_hz):
             return columns
-        return self.band_pass(columns)[:: self.step]
+        return self.filter_to_band(columns)[:: self.step]
 
-    def band_pass(self, columns: FloatArray) -> FloatArray:
-        """(n, k): columns filtered to the band, at the recording's rate."""
-        return band_pass(columns, self.rate_hz, self.band_hz, self.lowest_hz)
+    def filter_to_band(self, columns: FloatArray) -> FloatArray:
+        """Filter columns (n, k) to the band, at the recording's rate."""
+        return filter_band_pass(columns, self.rate_hz, self.band_hz, self.lowest_hz)
 
-    def valid_samples(self, mask: Mask) -> Mask:
-        """(kept samples,): the samples of a mask (n,) that are not within a filter length of the part's ends."""
-        edge = int(MOTION_EDGE_PERIODS * self.rate_hz / self.band_hz) + 1
+    def mask_valid_samples(self, mask: Mask) -> Mask:
+        """Mask (kept samples,) of the samples in a mask (n,) that are more than a filter length from the part's
+        ends."""
+        edge_samples = int(MOTION_EDGE_PERIODS * self.rate_hz / self.band_hz) + 1
         interior = np.zeros(len(mask), dtype=np.bool_)
-        interior[edge : len(mask) - edge] = True
+        interior[edge_samples : len(mask) - edge_samples] = True
         return (mask & interior)[:: self.step]
 
 
 def find_motion_signal(recording: Recording) -> Signal | None:
-    """The channels of the lowest time derivative that was measured and varies: positions before velocities before
-    accelerations; None without any."""
+    """Find the channels of the lowest time derivative of the position (0, 1 or 2) that was measured and varies; None
+    without any."""
     signals: list[tuple[int, Signal]] = []
     for signal in (recording.position, recording.response):
         if signal is None:
@@ -102,10 +104,10 @@ def find_motion_signal(recording: Recording) -> Signal | None:
         measured_orders = [order for order in orders if order is not None]
         if not measured_orders:
             continue
-        lowest = min(measured_orders)
-        columns = [k for k, order in enumerate(orders) if order == lowest and _is_varying(signal.samples[:, k])]
+        lowest_order = min(measured_orders)
+        columns = [k for k, order in enumerate(orders) if order == lowest_order and _is_varying(signal.samples[:, k])]
         if columns:
-            signals.append((lowest, signal.select_channels(columns)))
+            signals.append((lowest_order, signal.select_channels(columns)))
     return min(signals, key=lambda item: item[0])[1] if signals else None
 
 
@@ -116,53 +118,53 @@ def _is_varying(samples: FloatArray) -> bool:
 
 
 def compute_motions(records: Sequence[Observed], band_hz: float | None = None) -> tuple[Motion, ...]:
-    """One motion per record, with derivatives and forces. records: with the same channels, units and rate. band_hz:
-    upper end of the band; None = the highest that the noise allows. Raises NoMotionError where there are no records, or
-    a record contains no motion."""
+    """Compute the motion of each record, with derivatives and forces. records: with the same channels, units and rate.
+    band_hz: upper end of the band; None = the highest that the noise allows. Raises NoMotionError where there are no
+    records, or a record contains no motion."""
     signals = [find_motion_signal(record.recording) for record in records]
     if not signals or any(signal is None for signal in signals):
         raise NoMotionError("no response is a position, velocity or acceleration")
     motion_signals = [signal for signal in signals if signal is not None]
     order = DERIVATIVE_OF_QUANTITY[motion_signals[0].quantities[0]]
     rate_hz = records[0].recording.sample_rate_hz
-    filled = [fill_gaps(signal.samples) for signal in motion_signals]
-    untimed = any(is_quasi_static(record.recording) for record in records)
+    filled_samples = [fill_gaps(signal.samples) for signal in motion_signals]
+    is_untimed = any(is_quasi_static(record.recording) for record in records)
     if band_hz is None:
-        band_hz = np.inf if untimed else band_end_hz(filled, rate_hz, order)
-    lowest_hz = band_begin_hz(filled, rate_hz) if order == 2 and not untimed else 0.0
+        band_hz = np.inf if is_untimed else compute_band_end_hz(filled_samples, rate_hz, order)
+    lowest_hz = compute_band_begin_hz(filled_samples, rate_hz) if order == 2 and not is_untimed else 0.0
     conditions, condition_samples = _standardise_conditions(records)
     return tuple(
         replace(
             _compute_motion(record, (samples, order), (band_hz, lowest_hz), condition, motion_signals[0].channels),
             conditions=conditions,
         )
-        for record, samples, condition in zip(records, filled, condition_samples, strict=True)
+        for record, samples, condition in zip(records, filled_samples, condition_samples, strict=True)
     )
 
 
 def compute_motion_band_hz(motions: Sequence[Motion], columns: Iterable[int]) -> float:
-    """Frequency in Hz below which `MOVING_BAND_SHARE` of a channel's mean square velocity lies, the highest over the
-    channels; infinite without a time axis. columns: indices of the channels."""
+    """Compute the frequency in Hz below which `MOVING_BAND_SHARE` of a channel's mean square velocity lies, the highest
+    over the channels; infinite without a time axis. columns: indices of the channels."""
     if not np.isfinite(motions[0].band_hz):
         return np.inf
-    ends = []
+    channel_ends_hz = []
     for column in columns:
-        power, frequency_hz = [], []
+        motion_power, motion_frequencies_hz = [], []
         for motion in motions:
             speed = motion.velocity[:, column]
-            power.append(np.abs(rfft(speed - speed.mean())) ** 2 / len(speed))
-            frequency_hz.append(rfftfreq(len(speed), 1 / motion.rate_hz))
-        all_power, all_frequencies_hz = np.concatenate(power), np.concatenate(frequency_hz)
+            motion_power.append(np.abs(rfft(speed - speed.mean())) ** 2 / len(speed))
+            motion_frequencies_hz.append(rfftfreq(len(speed), 1 / motion.rate_hz))
+        all_power, all_frequencies_hz = np.concatenate(motion_power), np.concatenate(motion_frequencies_hz)
         ascending = np.argsort(all_frequencies_hz)
         cumulative = np.cumsum(all_power[ascending])
-        ends.append(
+        channel_ends_hz.append(
             float(
                 all_frequencies_hz[ascending][
                     min(np.searchsorted(cumulative, MOVING_BAND_SHARE * cumulative[-1]), len(all_frequencies_hz) - 1)
                 ]
             )
         )
-    return max(ends)
+    return max(channel_ends_hz)
 
 
 def _compute_motion(
@@ -172,11 +174,11 @@ def _compute_motion(
     condition: FloatArray,
     channels: tuple[str, ...],
 ) -> Motion:
-    """Motion of one record. measured: samples (n, d) and the order of their time derivative; band: upper and lower end
-    in Hz; condition: (n, q), standardised; channels: of the motion."""
+    """Compute the motion of one record. measured: samples (n, d) and the order of their time derivative; band: upper
+    and lower end in Hz; condition: (n, q), standardised; channels: of the motion."""
     (samples, order), (band_hz, lowest_hz) = measured, band
     rate_hz, hold = record.recording.sample_rate_hz, record.recording.hold
-    # Under a zero-order hold a command acts, in the mean, half a sample after the reading: the motion is shifted to it.
+    # Under a zero-order hold a command acts on average half a sample after the reading: the motion is advanced by that.
     advance_s = 0.5 / rate_hz if hold is Hold.ZERO_ORDER and not record.recording.meta.get("imposed") else 0.0
     if not np.isfinite(band_hz):
         return _make_untimed_motion(record, samples, condition, channels)
@@ -193,22 +195,22 @@ def _compute_motion(
     )  # fmt: skip
 
 
-def band_pass(columns: FloatArray, rate_hz: float, band_hz: float, lowest_hz: float) -> FloatArray:
-    """(n, k): columns band-pass filtered between `lowest_hz` and `band_hz` without a phase shift; low-pass filtered
-    where `lowest_hz` is 0."""
-    return filter_spectrum(columns, rate_hz, lambda f: _band_gain(f, band_hz, lowest_hz))
+def filter_band_pass(columns: FloatArray, rate_hz: float, band_hz: float, lowest_hz: float) -> FloatArray:
+    """Filter columns (n, k) to the band from `lowest_hz` to `band_hz` without a phase shift; a low pass where
+    `lowest_hz` is 0."""
+    return filter_spectrum(columns, rate_hz, lambda f: _compute_band_gain(f, band_hz, lowest_hz))
 
 
-def _band_gain(frequency_hz: FloatArray, band_hz: float, lowest_hz: float) -> FloatArray:
-    """(lines,): real gain of the band-pass filter, of the low-pass filter alone where `lowest_hz` is 0."""
-    low_pass = low_pass_gain(frequency_hz, band_hz)
-    return np.asarray(low_pass * (1 - low_pass_gain(frequency_hz, lowest_hz)) if lowest_hz > 0 else low_pass)
+def _compute_band_gain(frequency_hz: FloatArray, band_hz: float, lowest_hz: float) -> FloatArray:
+    """Compute (lines,): real gain of the band-pass filter; of the low-pass filter alone where `lowest_hz` is 0."""
+    low_pass = compute_low_pass_gain(frequency_hz, band_hz)
+    return np.asarray(low_pass * (1 - compute_low_pass_gain(frequency_hz, lowest_hz)) if lowest_hz > 0 else low_pass)
 
 
 def _make_untimed_motion(
     record: Observed, samples: FloatArray, condition: FloatArray, channels: tuple[str, ...]
 ) -> Motion:
-    """Motion of a recording without a time axis: positions, their change per sample as velocity, and no
+    """Make the motion of a recording without a time axis: positions, their change per sample as velocity, and zero
     acceleration."""
     return Motion(
         record.recording.sample_rate_hz, np.inf, 1, channels, 0, samples, np.gradient(samples, axis=0),
@@ -219,67 +221,67 @@ def _make_untimed_motion(
 def _differentiate_in_band(
     samples: FloatArray, rate_hz: float, band: tuple[float, float], order: int, advance_s: float
 ) -> FloatArray:
-    """(n, k): the time derivative of order `order`; an integral where that is negative. band: upper and lower end in
-    Hz. advance_s: time in s by which the result is advanced. Integrals of an acceleration are high-pass filtered at the
-    lower end of the band; the acceleration itself is not, like the force."""
+    """Compute (n, k): the time derivative of order `order`; an integral where that is negative. band: upper and lower
+    end in Hz. advance_s: time in s by which the result is advanced. Integrals of an acceleration are high-pass filtered
+    at the lower end of the band; the acceleration itself is not, like the force."""
     band_hz, lowest_hz = band
     line, slope = _fit_end_line(samples, rate_hz)
 
-    def gain(frequency_hz: FloatArray) -> FloatArray:
+    def compute_gain(frequency_hz: FloatArray) -> FloatArray:
         i_omega = 2j * np.pi * np.maximum(frequency_hz, 1e-12)
-        band_gain = _band_gain(frequency_hz, band_hz, lowest_hz if order < 0 else 0.0)
+        band_gain = _compute_band_gain(frequency_hz, band_hz, lowest_hz if order < 0 else 0.0)
         return np.asarray(band_gain * np.exp(i_omega * advance_s) * i_omega**order)
 
     if order < 0 and lowest_hz == 0:
         # The integral of a velocity is not periodic: it is summed in time instead of divided by i omega.
-        smooth = _differentiate_in_band(samples, rate_hz, band, 0, advance_s)
-        return np.asarray(np.cumsum(smooth, axis=0) / rate_hz)
+        smoothed = _differentiate_in_band(samples, rate_hz, band, 0, advance_s)
+        return np.asarray(np.cumsum(smoothed, axis=0) / rate_hz)
     if order < 0:
-        return filter_spectrum(samples, rate_hz, gain, subtract_line=False)
-    derivative = filter_spectrum(samples - line, rate_hz, gain, subtract_line=False)
+        return filter_spectrum(samples, rate_hz, compute_gain, subtract_line=False)
+    derivative = filter_spectrum(samples - line, rate_hz, compute_gain, subtract_line=False)
     if order == 0:
         return derivative + line + slope * advance_s
     return derivative + slope if order == 1 else derivative
 
 
-def low_pass_filter(samples: FloatArray, rate_hz: float, band_hz: float) -> FloatArray:
-    """(n, k): samples low-pass filtered to `band_hz` in the frequency domain, with the line between their ends kept."""
-    return filter_spectrum(samples, rate_hz, lambda f: low_pass_gain(f, band_hz))
+def filter_low_pass(samples: FloatArray, rate_hz: float, band_hz: float) -> FloatArray:
+    """Low-pass filter samples (n, k) to `band_hz` in the frequency domain; the line between their ends is kept."""
+    return filter_spectrum(samples, rate_hz, lambda f: compute_low_pass_gain(f, band_hz))
 
 
 def differentiate(samples: FloatArray, rate_hz: float, band_hz: float, order: int) -> FloatArray:
-    """(n, k): time derivative of order `order`, within 0 to `band_hz`, computed in the frequency domain."""
+    """Compute (n, k): time derivative of order `order`, within 0 to `band_hz`, in the frequency domain."""
     return _differentiate_in_band(samples, rate_hz, (band_hz, 0.0), order, 0.0)
 
 
 def filter_spectrum(samples: FloatArray, rate_hz: float, gain: object, subtract_line: bool = True) -> FloatArray:
-    """(n, k): samples filtered in the frequency domain. gain: function of the frequencies in Hz (lines,) that returns
+    """Filter samples (n, k) in the frequency domain. gain: function of the frequencies in Hz (lines,) that returns
     the frequency response (lines,). Samples are continued beyond both ends by an odd extension. subtract_line: whether
     the line between the end points is subtracted before and added after filtering."""
     line = _fit_end_line(samples, rate_hz)[0] if subtract_line else np.zeros_like(samples)
-    extended = odd_extension(samples - line)
+    extended = extend_as_odd(samples - line)
     spectrum = rfft(extended, axis=0)
     frequency_hz = rfftfreq(len(extended), 1 / rate_hz)
     return np.asarray(irfft(gain(frequency_hz)[:, None] * spectrum, len(extended), axis=0)[: len(samples)] + line)  # type: ignore[operator]
 
 
 def _fit_end_line(samples: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray]:
-    """The straight line from the first to the last sample, (n, k), and its slope per second, (k,)."""
+    """Compute the straight line from the first to the last sample, (n, k), and its slope per second, (k,)."""
     fraction = np.linspace(0.0, 1.0, len(samples))[:, None]
     line = (1 - fraction) * samples[0] + fraction * samples[-1]
     return np.asarray(line), np.asarray((samples[-1] - samples[0]) / max(len(samples) - 1, 1) * rate_hz)
 
 
 def _standardise_conditions(records: Sequence[Observed]) -> tuple[tuple[Condition, ...], list[FloatArray]]:
-    """The conditions that change, and their samples (n, q) per record, standardised to mean 0 and standard deviation 1
-    over all records; none where the records differ in their conditions."""
+    """Standardise the conditions that change to mean 0 and standard deviation 1 over all records. Returns them and
+    their samples (n, q) per record; none where the records differ in their conditions."""
     signals = [getattr(record.recording, "condition", None) for record in records]
     if len({None if signal is None else signal.channels for signal in signals}) > 1 or signals[0] is None:
         return (), [np.zeros((len(record.command), 0)) for record in records]
-    filled = [fill_gaps(signal.samples) for signal in signals if signal is not None]
-    stacked = np.vstack(filled)
+    filled_samples = [fill_gaps(signal.samples) for signal in signals if signal is not None]
+    stacked = np.vstack(filled_samples)
     mean, spread = stacked.mean(axis=0), stacked.std(axis=0)
     names = condition_names(law_channels(records[0].recording))
     varying = np.flatnonzero(spread > 0)
     conditions = tuple(Condition(names[k], float(mean[k]), float(spread[k])) for k in varying)
-    return conditions, [(samples[:, varying] - mean[varying]) / spread[varying] for samples in filled]
+    return conditions, [(samples[:, varying] - mean[varying]) / spread[varying] for samples in filled_samples]

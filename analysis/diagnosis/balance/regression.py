@@ -5,7 +5,8 @@ is fitted and tested without another pass over the samples.
 
 The base is mass, damping and stiffness along every measured motion, linear dynamics of a higher order where there are
 any (`BaseTerms`), and a constant. Errors are sums of squares of the force within the band. In cross-validation, the
-error of a block is that of weights fitted to all other blocks (Stone, J. R. Stat. Soc. B 36:111, 1974).
+error of a block is that of weights fitted to all other blocks (Stone, J. R. Stat. Soc. B 36:111, 1974). Used by
+`structures` and `judge_laws`.
 """
 
 from collections.abc import Sequence
@@ -18,13 +19,13 @@ from analysis.diagnosis.balance.blocks import (
     RIDGE,
     Block,
     Prior,
-    blocks_of,
-    column_scale,
+    build_blocks,
+    compute_scale,
     compute_squared_errors,
-    products_per_block,
     solve_normal_equations,
     solve_ridge,
     solve_without_columns,
+    stack_products,
     sum_products,
     with_prior,
 )
@@ -33,7 +34,7 @@ from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
-RIDGES = tuple(10.0**exponent for exponent in range(-8, 1))
+RIDGE_PARAMETERS = tuple(10.0**exponent for exponent in range(-8, 1))
 """Ridge parameters relative to the mean power of a column; cross-validation chooses among them."""
 
 
@@ -73,37 +74,37 @@ class Regression:
     mass: float | None = None
     """Mass of a given model in kg (kg m^2); None = it is estimated, as the weight of the driven acceleration."""
 
-    def columns_of(self, laws: Sequence[int]) -> list[int]:
-        """Column indices of the base and of the laws with these indices. A law of the command has a negative index and
-        no columns."""
+    def select_columns(self, laws: Sequence[int]) -> list[int]:
+        """Select the indices of the columns of the base and of these laws. A law of the command has a negative index
+        and no columns."""
         law_columns = [k for law in laws if law >= 0 for k in range(self.places[law].start, self.places[law].stop)]
         return [*range(self.base), *law_columns]
 
-    def weights(self, columns: Sequence[int]) -> FloatArray:
-        """(len(columns),): weights fitted to all fit blocks, in the columns' own units."""
+    def fit_weights(self, columns: Sequence[int]) -> FloatArray:
+        """Fit weights (len(columns),) to all fit blocks, in the columns' own units."""
         return np.asarray(self._solve_nonnegative(sum_products(self.fit, columns)) / self.scale[list(columns)])
 
-    def cross_validated_errors(self, columns: Sequence[int]) -> FloatArray:
-        """(blocks,): residual sum of squares of each fit block, with weights fitted to the other blocks
+    def cross_validate(self, columns: Sequence[int]) -> FloatArray:
+        """Compute (blocks,): residual sum of squares of each fit block, with weights fitted to the other blocks
         (leave-one-block-out cross-validation)."""
-        products = products_per_block(self.fit, columns)
+        products = stack_products(self.fit, columns)
         weights = self._solve_nonnegative(
             (products[0].sum(axis=0) - products[0], products[1].sum(axis=0) - products[1])
         )
         return compute_squared_errors(self.fit, products, weights)
 
-    def held_out_errors(self, columns: Sequence[int]) -> FloatArray:
-        """(blocks,): residual sum of squares of each test block, with weights fitted to all fit blocks."""
+    def compute_test_errors(self, columns: Sequence[int]) -> FloatArray:
+        """Compute (blocks,): residual sum of squares of each test block, with weights fitted to all fit blocks."""
         return compute_squared_errors(
             self.test,
-            products_per_block(self.test, columns),
+            stack_products(self.test, columns),
             self._solve_nonnegative(sum_products(self.fit, columns)),
         )
 
     def _solve_nonnegative(self, products: tuple[FloatArray, FloatArray]) -> FloatArray:
-        """Weights (..., c) from products (..., c, c) and (..., c): least squares in which mass and damping of the
-        driven motion are fixed at zero where they would be negative (active-set method). A fixed weight is not freed
-        again."""
+        """Solve for weights (..., c) from products (..., c, c) and (..., c): least squares in which mass and damping of
+        the driven motion are fixed at zero where they would be negative (active-set method). A fixed weight is not
+        freed again."""
         gram, cross = products = with_prior(products, self.prior)
         weights = solve_normal_equations(products, RIDGE)
         nonnegative = list(self.positive)
@@ -119,15 +120,15 @@ class Regression:
                     weights[rows] = solve_without_columns(gram[rows], cross[rows], fixed)
         return np.where(bound, 0.0, weights)
 
-    def remainder(self, columns: Sequence[int]) -> tuple[FloatArray, ...]:
-        """Per motion, (kept samples,): the residual force f - X w, with the weights fitted to all fit blocks."""
-        weights = self.weights(columns)
+    def compute_residuals(self, columns: Sequence[int]) -> tuple[FloatArray, ...]:
+        """Compute, per motion, (kept samples,): the residual force f - X w, with weights fitted to all fit blocks."""
+        weights = self.fit_weights(columns)
         return tuple(
             force - rows[:, list(columns)] @ weights for force, rows in zip(self.force, self.columns, strict=True)
         )
 
 
-def regression_of(
+def build_regression(
     motions: Sequence[Motion],
     axis: int,
     laws: Sequence[Law],
@@ -135,107 +136,108 @@ def regression_of(
     base_terms: BaseTerms | None = None,
     bases: Sequence[FloatArray] | None = None,
 ) -> Regression:
-    """The regression of the force of one axis on mass, damping, stiffness and laws. turns: whether the shaft turns
+    """Build the regression of one axis's force on mass, damping, stiffness and laws. turns: whether the shaft turns
     freely (`Scales.turns`) and so has no stiffness. base_terms: further terms of the base; None = none, and the force
     drives the motion channel of the same index. bases: columns (n, k) per motion that replace mass, damping and
     stiffness. Laws whose columns vanish or are not finite are left out."""
-    d = len(motions[0].channels)
-    base_terms = base_terms or BaseTerms(min(axis, d - 1))
+    channel_count = len(motions[0].channels)
+    base_terms = base_terms or BaseTerms(min(axis, channel_count - 1))
     targets = [motion.decimate(motion.force[:, [axis]])[:, 0] for motion in motions]
-    linear = [_linear_columns(motion, turns, base_terms.laws) for motion in motions] if bases is None else bases
-    parts = [[_base_columns(motion, columns) for motion, columns in zip(motions, linear, strict=True)]]
-    kept_laws, places, first = [], [], parts[0][0].shape[1]
-    base = first
+    linear = [_make_linear_columns(motion, turns, base_terms.laws) for motion in motions] if bases is None else bases
+    parts = [[_make_base_columns(motion, columns) for motion, columns in zip(motions, linear, strict=True)]]
+    kept_laws, places, next_column = [], [], parts[0][0].shape[1]
+    base_width = next_column
     for law in laws:
-        columns = _law_columns(motions, law)
+        columns = _make_law_columns(motions, law)
         if columns is not None:
             parts.append(columns)
             kept_laws.append(law)
-            places.append(slice(first, first + columns[0].shape[1]))
-            first = places[-1].stop
+            places.append(slice(next_column, next_column + columns[0].shape[1]))
+            next_column = places[-1].stop
     rows = tuple(np.hstack([part[k] for part in parts]) for k in range(len(motions)))
-    fit = [motion.valid_samples(motion.fit) for motion in motions]
-    scale = column_scale(rows, fit)
-    test = [motion.valid_samples(motion.test) for motion in motions]
+    fit = [motion.mask_valid_samples(motion.fit) for motion in motions]
+    scale = compute_scale(rows, fit)
+    test = [motion.mask_valid_samples(motion.test) for motion in motions]
     mean = float(np.concatenate([target[mask] for target, mask in zip(targets, fit, strict=True)]).mean())
     driven = base_terms.driven_channel
     return Regression(
-        tuple(motions), axis, tuple(kept_laws), base_terms, base,
-        (2 if turns else 3) * d if bases is None else base - 1,
-        (driven, d + driven, driven) if bases is None else (0,), tuple(places),
+        tuple(motions), axis, tuple(kept_laws), base_terms, base_width,
+        (2 if turns else 3) * channel_count if bases is None else base_width - 1,
+        (driven, channel_count + driven, driven) if bases is None else (0,), tuple(places),
         scale, rows, tuple(targets),
-        blocks_of(rows, targets, fit, (scale, mean)), blocks_of(rows, targets, test, (scale, mean)),
+        build_blocks(rows, targets, fit, (scale, mean)), build_blocks(rows, targets, test, (scale, mean)),
     )  # fmt: skip
 
 
-def signal_power(blocks: Sequence[Block]) -> float:
-    """Sum of squares of the force about its mean, over the blocks."""
+def compute_signal_power(blocks: Sequence[Block]) -> float:
+    """Sum the squares of the force about its mean over the blocks."""
     return sum(block.signal for block in blocks)
 
 
-def _linear_columns(motion: Motion, turns: bool, linear_laws: Sequence[Law]) -> FloatArray:
-    """(n, k): acceleration, velocity, position and linear laws; no position where a shaft turns freely, because it has
-    no spring."""
+def _make_linear_columns(motion: Motion, turns: bool, linear_laws: Sequence[Law]) -> FloatArray:
+    """Make (n, k): columns of acceleration, velocity, position and linear laws; no position where a shaft turns freely,
+    because it has no stiffness."""
     law_columns = [law.columns(motion, law.numbers) for law in linear_laws]
     return np.hstack([motion.acceleration, motion.velocity, *([] if turns else [motion.position]), *law_columns])
 
 
-def _base_columns(motion: Motion, linear: FloatArray) -> FloatArray:
-    """(kept samples, k + 1): filtered and decimated base columns, then the constant."""
+def _make_base_columns(motion: Motion, linear: FloatArray) -> FloatArray:
+    """Make (kept samples, k + 1): filtered and decimated base columns, then the constant."""
     return np.hstack([motion.decimate(linear), np.ones((len(linear[:: motion.step]), 1))])
 
 
-def _law_columns(motions: Sequence[Motion], law: Law) -> list[FloatArray] | None:
-    """A law's filtered and decimated columns per motion; None where any vanishes or is not finite."""
+def _make_law_columns(motions: Sequence[Motion], law: Law) -> list[FloatArray] | None:
+    """Make a law's filtered and decimated columns per motion; None where any is zero or not finite."""
     columns = [motion.decimate(law.columns(motion, law.numbers)) for motion in motions]
-    usable = all(np.isfinite(column).all() for column in columns) and all(_has_size(columns))
+    usable = all(np.isfinite(column).all() for column in columns) and all(_is_above_rounding(columns))
     return columns if usable else None
 
 
-def _has_size(columns: Sequence[FloatArray]) -> Mask:
+def _is_above_rounding(columns: Sequence[FloatArray]) -> Mask:
     """(k,): whether each column's rms is above rounding errors of the law's largest column."""
-    size = np.sqrt(np.mean(np.vstack(columns) ** 2, axis=0))
-    return np.asarray(size > 1e-12 * max(float(size.max(initial=0.0)), 1e-290))
+    rms = np.sqrt(np.mean(np.vstack(columns) ** 2, axis=0))
+    return np.asarray(rms > 1e-12 * max(float(rms.max(initial=0.0)), 1e-290))
 
 
-def replace_law(regression: Regression, number: int, law: Law) -> Regression | None:
-    """The regression with the law of this index replaced; None where the new law's columns vanish, are not finite or
-    differ in number from those of the old law."""
-    place = regression.places[number]
-    columns = _law_columns(regression.motions, law)
-    if columns is None or columns[0].shape[1] != place.stop - place.start:
+def replace_law(regression: Regression, law_index: int, law: Law) -> Regression | None:
+    """Replace the law of this index; None where the new law's columns are zero, not finite or differ in number from
+    those of the old law."""
+    column_range = regression.places[law_index]
+    columns = _make_law_columns(regression.motions, law)
+    if columns is None or columns[0].shape[1] != column_range.stop - column_range.start:
         return None
     rows = tuple(
-        np.hstack([old_columns[:, : place.start], new_columns, old_columns[:, place.stop :]])
+        np.hstack([old_columns[:, : column_range.start], new_columns, old_columns[:, column_range.stop :]])
         for old_columns, new_columns in zip(regression.columns, columns, strict=True)
     )
     scale = regression.scale.copy()
-    scale[place] = column_scale(columns, [motion.valid_samples(motion.fit) for motion in regression.motions])
-    laws = (*regression.laws[:number], law, *regression.laws[number + 1 :])
-    updated = replace(regression, laws=laws, columns=rows, scale=scale)
+    scale[column_range] = compute_scale(
+        columns, [motion.mask_valid_samples(motion.fit) for motion in regression.motions]
+    )
+    laws = (*regression.laws[:law_index], law, *regression.laws[law_index + 1 :])
+    updated_regression = replace(regression, laws=laws, columns=rows, scale=scale)
     return replace(
-        updated,
-        fit=tuple(_renew_products(updated, block, place) for block in regression.fit),
-        test=tuple(_renew_products(updated, block, place) for block in regression.test),
+        updated_regression,
+        fit=tuple(_update_products(updated_regression, block, column_range) for block in regression.fit),
+        test=tuple(_update_products(updated_regression, block, column_range) for block in regression.test),
     )
 
 
 def append_laws(regression: Regression, laws: Sequence[Law]) -> Regression:
-    """The regression with laws added after the present ones. Laws whose columns vanish or are not finite are left
-    out."""
+    """Append laws to a regression. Laws whose columns are zero or not finite are left out."""
     added_laws, rows = [], [[part] for part in regression.columns]
     ends = [regression.columns[0].shape[1]]
     for law in laws:
-        columns = _law_columns(regression.motions, law)
+        columns = _make_law_columns(regression.motions, law)
         if columns is not None:
             added_laws.append(law)
             ends.append(ends[-1] + columns[0].shape[1])
-            for column_parts, new in zip(rows, columns, strict=True):
-                column_parts.append(new)
+            for column_parts, new_columns in zip(rows, columns, strict=True):
+                column_parts.append(new_columns)
     extended = tuple(np.hstack(part) for part in rows)
-    fit = [motion.valid_samples(motion.fit) for motion in regression.motions]
-    test = [motion.valid_samples(motion.test) for motion in regression.motions]
-    scale = np.concatenate([regression.scale, column_scale([part[:, ends[0] :] for part in extended], fit)])
+    fit = [motion.mask_valid_samples(motion.fit) for motion in regression.motions]
+    test = [motion.mask_valid_samples(motion.test) for motion in regression.motions]
+    scale = np.concatenate([regression.scale, compute_scale([part[:, ends[0] :] for part in extended], fit)])
     mean = np.concatenate([target[mask] for target, mask in zip(regression.force, fit, strict=True)]).mean()
     units = scale, float(mean)
     return replace(
@@ -244,16 +246,16 @@ def append_laws(regression: Regression, laws: Sequence[Law]) -> Regression:
         places=(*regression.places, *(slice(start, end) for start, end in pairwise(ends))),
         scale=scale,
         columns=extended,
-        fit=blocks_of(extended, regression.force, fit, units),
-        test=blocks_of(extended, regression.force, test, units),
+        fit=build_blocks(extended, regression.force, fit, units),
+        test=build_blocks(extended, regression.force, test, units),
     )
 
 
 def keep_laws(regression: Regression, laws: Sequence[int]) -> Regression:
-    """The regression with only the laws of these indices, in this order."""
-    columns = regression.columns_of(laws)
-    sizes = [regression.places[k].stop - regression.places[k].start for k in laws]
-    ends = np.cumsum([regression.base, *sizes]).tolist()
+    """Reduce a regression to the laws of these indices, in this order."""
+    columns = regression.select_columns(laws)
+    widths = [regression.places[k].stop - regression.places[k].start for k in laws]
+    ends = np.cumsum([regression.base, *widths]).tolist()
     return replace(
         regression,
         laws=tuple(regression.laws[k] for k in laws),
@@ -266,33 +268,33 @@ def keep_laws(regression: Regression, laws: Sequence[int]) -> Regression:
 
 
 def _select_columns(block: Block, columns: Sequence[int]) -> Block:
-    """The block with the products of these columns only, in this order."""
+    """Reduce a block to the products of these columns, in this order."""
     return replace(block, gram=block.gram[np.ix_(columns, columns)], cross=block.cross[list(columns)])
 
 
-def _renew_products(regression: Regression, block: Block, place: slice) -> Block:
-    """The block with the products of the columns in `place` recomputed."""
+def _update_products(regression: Regression, block: Block, column_range: slice) -> Block:
+    """Recompute the products of a block's columns in `column_range`."""
     x = regression.columns[block.motion][block.rows] / regression.scale
     gram, cross = block.gram.copy(), block.cross.copy()
-    gram[:, place] = x.T @ x[:, place]
-    gram[place, :] = gram[:, place].T
-    cross[place] = x[:, place].T @ regression.force[block.motion][block.rows]
+    gram[:, column_range] = x.T @ x[:, column_range]
+    gram[column_range, :] = gram[:, column_range].T
+    cross[column_range] = x[:, column_range].T @ regression.force[block.motion][block.rows]
     return replace(block, gram=gram, cross=cross)
 
 
 def fit_all_laws(regression: Regression, columns: Sequence[int]) -> tuple[float, FloatArray]:
     """Ridge regression on all these columns: the cross-validated sum of squares, and that of each test block (blocks,).
-    The ridge parameter is the one of `RIDGES` with the least cross-validated error; it does not act on the base. The
-    result estimates the least error that a sum of a few laws can reach."""
-    free = np.array([k < regression.base for k in columns])
-    products = products_per_block(regression.fit, columns)
+    The ridge parameter is the one of `RIDGE_PARAMETERS` with the least cross-validated error; it does not act on the
+    base. The result estimates the least error that a sum of a few laws can reach."""
+    is_base = np.array([k < regression.base for k in columns])
+    products = stack_products(regression.fit, columns)
     total = products[0].sum(axis=0), products[1].sum(axis=0)
     training = with_prior((total[0] - products[0], total[1] - products[1]), regression.prior)
     total = with_prior(total, regression.prior)
     errors = [
-        float(compute_squared_errors(regression.fit, products, solve_ridge(training, ridge, free)).sum())
-        for ridge in RIDGES
+        float(compute_squared_errors(regression.fit, products, solve_ridge(training, ridge, is_base)).sum())
+        for ridge in RIDGE_PARAMETERS
     ]
     best = int(np.argmin(errors))
-    weights = solve_ridge(total, RIDGES[best], free)
-    return errors[best], compute_squared_errors(regression.test, products_per_block(regression.test, columns), weights)
+    weights = solve_ridge(total, RIDGE_PARAMETERS[best], is_base)
+    return errors[best], compute_squared_errors(regression.test, stack_products(regression.test, columns), weights)

@@ -12,15 +12,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.balance.law import BaseTerms, Law, Scales, scales_of
-from analysis.diagnosis.balance.laws import cogging_law, laws_of, likely_pitches
-from analysis.diagnosis.balance.model_base import GivenBase, explains_enough, regression_with_model
+from analysis.diagnosis.balance.laws import find_likely_pitches, make_cogging_law, make_laws
+from analysis.diagnosis.balance.model_base import GivenBase, build_regression_with_model, explains_enough
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
 from analysis.diagnosis.balance.regression import (
     Regression,
     append_laws,
+    build_regression,
     fit_all_laws,
     keep_laws,
-    regression_of,
     replace_law,
 )
 from analysis.diagnosis.settings import (
@@ -79,23 +79,23 @@ def search_structures(
 ) -> StructureSearch:
     """Beam search for the sum of at most three laws with the least cross-validated error. excluded: effects that are
     left out. base: None = mass, damping and stiffness alone. Raises NoMotionError where nothing can be fitted."""
-    if not any(motion.valid_samples(motion.fit).any() for motion in motions):
+    if not any(motion.mask_valid_samples(motion.fit).any() for motion in motions):
         raise NoMotionError("too few samples with motion are available for the fit")
     scales = [scales_of(motions, c, rotational) for c in range(len(motions[0].channels))]
     turns = any(scale.turns for scale in scales)
     fixed = {(law.key, law.numbers) for law in (base.laws if isinstance(base, BaseTerms) else ())}
     laws = [
         law
-        for law in laws_of(motions, rotational)
+        for law in make_laws(motions, rotational)
         if law.effect not in excluded and (law.key, law.numbers) not in fixed
     ]
     if isinstance(base, GivenBase):
-        regression = regression_with_model(motions, axis, laws, base)
+        regression = build_regression_with_model(motions, axis, laws, base)
         if not explains_enough(regression, base.least_share):
             base_only = _fit_linear_structure(regression)
             return StructureSearch(regression, base_only, base_only, (base_only,), True)
     else:
-        regression = regression_of(motions, axis, laws, turns, base)
+        regression = build_regression(motions, axis, laws, turns, base)
     if "cogging" not in excluded:
         regression = _add_cogging_laws(regression, scales)
     linear = _fit_linear_structure(regression)
@@ -113,7 +113,7 @@ def _search(fit: Regression, linear: Structure, time_left: TimeBudget) -> tuple[
         if not sums:
             break
         fit = refine_parameters(fit, sums[:STRUCTURES_BEAM])
-        sums = [replace(s, errors=fit.cross_validated_errors(fit.columns_of(s.laws))) for s in sums]
+        sums = [replace(s, errors=fit.cross_validate(fit.select_columns(s.laws))) for s in sums]
         ranked += sums
         beam = sorted(sums, key=lambda s: s.error)[:STRUCTURES_BEAM]
         if not improves_significantly(best, beam[0]):
@@ -142,7 +142,7 @@ def _is_significant(gains: FloatArray, residuals: FloatArray) -> bool:
 
 
 def _fit_linear_structure(regression: Regression) -> Structure:
-    return Structure((), regression.cross_validated_errors(regression.columns_of(())))
+    return Structure((), regression.cross_validate(regression.select_columns(())))
 
 
 def _add_law_to_each(regression: Regression, beam: Sequence[Structure]) -> list[Structure]:
@@ -154,7 +154,7 @@ def _add_law_to_each(regression: Regression, beam: Sequence[Structure]) -> list[
             if law.key in keys or any(_overlaps(law.key, key) for key in keys):
                 continue
             laws = tuple(sorted((*structure.laws, number)))
-            extended = Structure(laws, regression.cross_validated_errors(regression.columns_of(laws)))
+            extended = Structure(laws, regression.cross_validate(regression.select_columns(laws)))
             effects = tuple(sorted(regression.laws[k].key for k in laws))
             if (effects not in best or extended.error < best[effects].error) and _is_physical(regression, laws):
                 best[effects] = extended
@@ -177,8 +177,8 @@ def _is_physical(regression: Regression, laws: Sequence[int]) -> bool:
 
 def fit_values(regression: Regression, laws: Sequence[int]) -> list[dict[str, float] | None]:
     """Parameters of each law, all fitted together; None where the signs of its weights are not physical."""
-    columns = regression.columns_of(laws)
-    weights = regression.weights(columns)
+    columns = regression.select_columns(laws)
+    weights = regression.fit_weights(columns)
     mass = float(weights[regression.base_terms.driven_channel]) if regression.mass is None else regression.mass
     first, values = regression.base, []
     for number in laws:
@@ -198,11 +198,11 @@ def _add_cogging_laws(regression: Regression, scales: Sequence[Scales]) -> Regre
 
 def _add_pitches(regression: Regression, scales: Sequence[Scales], laws: Sequence[int]) -> Regression:
     """The regression with cogging at the pitches that the residual of these laws shows."""
-    residuals = regression.remainder(regression.columns_of(laws))
+    residuals = regression.compute_residuals(regression.select_columns(laws))
     cogging = [
-        cogging_law(c, pitch, scale)
+        make_cogging_law(c, pitch, scale)
         for c, scale in enumerate(scales)
-        for pitch in likely_pitches(regression.motions, residuals, c, scale)
+        for pitch in find_likely_pitches(regression.motions, residuals, c, scale)
     ]
     return append_laws(regression, cogging) if cogging else regression
 
@@ -224,13 +224,13 @@ def refine_parameters(regression: Regression, structures: Sequence[Structure]) -
 def _refine_law(regression: Regression, place: int) -> Law:
     """One law of a structure, refined by steps to its best neighbour. regression: with the structure's laws alone."""
     laws = tuple(range(len(regression.laws)))
-    best = float(regression.cross_validated_errors(regression.columns_of(laws)).sum())
+    best = float(regression.cross_validate(regression.select_columns(laws)).sum())
     for _ in range(MOST_PASSES):
         trials = []
         for neighbour in _list_neighbours(regression.laws[place]):
             trial = replace_law(regression, place, neighbour)
             if trial is not None and _is_physical(trial, laws):
-                trials.append((float(trial.cross_validated_errors(trial.columns_of(laws)).sum()), trial))
+                trials.append((float(trial.cross_validate(trial.select_columns(laws)).sum()), trial))
         if not trials or min(trials, key=lambda pair: pair[0])[0] >= best * (1 - 1e-4):
             break
         best, regression = min(trials, key=lambda pair: pair[0])

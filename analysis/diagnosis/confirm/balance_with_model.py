@@ -18,16 +18,16 @@ from analysis.diagnosis.balance.structures import search_structures
 from analysis.diagnosis.data.measured_motion import has_motion
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.data.recorded_conditions import add_carried_weight, effects_under_conditions
-from analysis.diagnosis.errors.tuning import tuning_of
-from analysis.diagnosis.forces.inverse_dynamics import band_motion, compute_required_force
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, apply_conditions
+from analysis.diagnosis.errors.tuning import make_tuning
+from analysis.diagnosis.forces.inverse_dynamics import compute_band_motion, compute_required_force
 from analysis.diagnosis.settings import LAW_OF_SIGNAL, MOTION_OVERSAMPLED
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import PlacedEffect, Structure
 from equalizer.effects.placing import place_recorded_effects
 from equalizer.effects.simulation.bodies import build_bodies
 from equalizer.effects.simulation.forces_along_motion import actuator_force, effect_forces_along_motion
-from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -52,7 +52,7 @@ def find_balances_with_model(
         if len(motions[0].channels) < model.inputs or motions[0].order == 2 or not np.isfinite(motions[0].band_hz):
             return ()
         data = [_prepare_axis_data(record, motion, model) for record, motion in zip(records, motions, strict=True)]
-        axis_directions = driven_axes(model)
+        axis_directions = compute_driven_axes(model)
         mass = np.einsum("nm,nk,km->m", axis_directions, model.mass, axis_directions)
         return tuple(
             judge_laws(
@@ -89,9 +89,9 @@ def _prepare_axis_data(record: Observed, motion: Motion, model: MechanicalModel)
     """Motion, force and base columns of one record. Raises LinAlgError where the model's outputs do not determine its
     motion."""
     recording, rate_hz, m = record.recording, motion.rate_hz, model.inputs
-    known_effects = effects_under_conditions(place_recorded_effects(model, recording), recording)
+    known_effects = apply_conditions(place_recorded_effects(model, recording), recording)
     structure = _apply_structural_effects(add_carried_weight(model, recording), known_effects)
-    required = compute_required_force(structure, band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
+    required = compute_required_force(structure, compute_band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
     axis_motion = required.axis_position, required.axis_velocity, required.axis_acceleration
     applied = actuator_force(model, motion.force, rate_hz, known_effects, recording.hold)
     effect_force = effect_forces_along_motion(
@@ -102,7 +102,7 @@ def _prepare_axis_data(record: Observed, motion: Motion, model: MechanicalModel)
     decimated = replace(
         motion, rate_hz=rate_hz / stride, step=max(int(rate_hz / stride / (MOTION_OVERSAMPLED * motion.band_hz)), 1),
         channels=motion.channels[:m], position=position, velocity=velocity, acceleration=acceleration,
-        force=motion.band_pass(applied + effect_force)[::stride], condition=motion.condition[::stride],
+        force=motion.filter_to_band(applied + effect_force)[::stride], condition=motion.condition[::stride],
         fit=motion.fit[::stride], test=motion.test[::stride],
     )  # fmt: skip
     changes = [
@@ -116,7 +116,7 @@ def _prepare_axis_data(record: Observed, motion: Motion, model: MechanicalModel)
 def _compute_grounded_columns(motion: Motion, model: MechanicalModel, recording: Recording) -> Iterator[FloatArray]:
     """(n, m) each: change of the required force per standard deviation of each entry of mass, damping and stiffness at
     the driven axes, in the order of `Tuning`. It is exact, because the force is linear in these entries."""
-    tuning, m = tuning_of(model, recording.command.channels), model.inputs
+    tuning, m = make_tuning(model, recording.command.channels), model.inputs
     entries = [(i, j) for i in range(m) for j in range(i, m)]
     input_norms = np.linalg.norm(model.input, axis=0)
     for part, signal in enumerate((motion.acceleration, motion.velocity, motion.position)):
@@ -132,12 +132,12 @@ def _compute_mode_columns(
 ) -> Iterator[FloatArray]:
     """(n, m) each: change of the required force per standard deviation of each parameter of the modes, by forward
     differences."""
-    tuning, m = tuning_of(model, recording.command.channels), model.inputs
+    tuning, m = make_tuning(model, recording.command.channels), model.inputs
     first_mode_parameter = 3 * m * (m + 1) // 2
     if first_mode_parameter == len(tuning.names):
         return
-    output_position = motion.position @ (model.output[:m] @ driven_axes(model)).T
-    output_motion = band_motion(output_position, motion.rate_hz, motion.band_hz)
+    output_position = motion.position @ (model.output[:m] @ compute_driven_axes(model)).T
+    output_motion = compute_band_motion(output_position, motion.rate_hz, motion.band_hz)
     deviation_steps = DIFFERENCE_STEP * np.eye(len(tuning.names))[first_mode_parameter:]
     base_force, *shifted_forces = (
         compute_required_force(

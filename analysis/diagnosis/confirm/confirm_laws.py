@@ -26,18 +26,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
-from analysis.diagnosis.balance.judged_law import JudgedLaw, family_of
+from analysis.diagnosis.balance.judged_law import JudgedLaw, find_family
 from analysis.diagnosis.confirm.held_out_gain import explains_half
 from analysis.diagnosis.confirm.laws_for_simulation import (
     can_be_simulated,
-    constants_of,
+    compute_starting_deviations,
+    estimate_constant_forces,
     find_special_case,
-    hypothesis_of_judged,
-    parameters_beside_laws,
+    make_hypothesis,
     refit_laws,
 )
 from analysis.diagnosis.confirm.require_gain import CONSTANT
-from analysis.diagnosis.errors.hypothesis import combine
+from analysis.diagnosis.errors.hypothesis import combine_hypotheses
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
@@ -91,13 +91,13 @@ def search_by_balance(context: SearchContext, balances: Sequence[Balance], repea
     if not named_laws:
         return None
     full_context = context.fit_to_all()
-    constants = constants_of(balances)
+    constants = estimate_constant_forces(balances)
     given_fit = evaluate_fit(
         full_context.measure, full_context.tuning, np.zeros(len(full_context.tuning.names)), constants
     )
     as_given, retuned = (
-        full_context.with_test_score(full_context.candidate(given_fit)),
-        full_context.candidate(refine(full_context, given_fit)),
+        full_context.with_test_score(full_context.score_fit(given_fit)),
+        full_context.score_fit(refine(full_context, given_fit)),
     )
     confirmed = full_context.with_test_score(retuned)
     baseline = Explanation(as_given, confirmed, confirmed, (), ()).plain
@@ -120,7 +120,7 @@ def _confirm_by_simulation(
         )
         undetermined: int | None = len(named_laws) - 1
         errors: FloatArray | None = None
-        if _lowers_held_out_error(start.baseline, with_laws) and explains_half(context.whole, with_laws):
+        if _lowers_held_out_error(start.baseline, with_laws) and explains_half(context.full_measure, with_laws):
             errors = compute_final_errors(context, explanation)
             undetermined = _find_undetermined_law(explanation, errors[len(context.tuning.names) :], start.constants)
         if undetermined is None:
@@ -169,7 +169,7 @@ def _fit_from_starts(
     parameters of the balance, or, where that fit is not confirmed, from those of the model if these do better.
     reference_fits: the re-tuned model, and the better model without laws on held-out samples."""
     retuned, baseline = reference_fits
-    balance_deviations = parameters_beside_laws(context.tuning, balances, [law.place for _, law in named_laws])
+    balance_deviations = compute_starting_deviations(context.tuning, balances, [law.place for _, law in named_laws])
     steps = _fit_steps(context, retuned, named_laws, balance_deviations)
     with_laws = context.with_test_score(steps[-1])
     if np.any(balance_deviations) and not _lowers_held_out_error(baseline, with_laws):
@@ -192,10 +192,10 @@ def _fit_steps(
     steps = [retuned for _ in hypothesis.claims]
     recording = context.measure.records[0].recording
     for axis, law in named_laws:
-        extended = combine(hypothesis, hypothesis_of_judged(axis, law, recording))
+        extended = combine_hypotheses(hypothesis, make_hypothesis(axis, law, recording))
         start = evaluate_fit(context.measure, context.tuning, deviations, extended)
         fitted = refine(context, start)
-        steps.append(context.candidate(fitted))
+        steps.append(context.score_fit(fitted))
         hypothesis, deviations = fitted.hypothesis, fitted.deviations
     return steps
 
@@ -206,7 +206,7 @@ def _find_undetermined_law(explanation: Explanation, errors: FloatArray, constan
     case of it lacks. Where the law only refines another of its family, or is outside the catalogue, one parameter is
     enough. errors: standard errors of the parameters; constants: number of constant forces before the laws."""
     first_parameter, hypothesis = 0, explanation.steps[-1].fitted.hypothesis
-    law_families = [family_of(claim.effect.name) for claim in hypothesis.claims]
+    law_families = [find_family(claim.effect.name) for claim in hypothesis.claims]
     for index, claim in enumerate(hypothesis.claims):
         free_parameters = [parameter for parameter in claim.effect.parameters if not parameter.fixed]
         any_suffices = (

@@ -17,7 +17,7 @@ from analysis.diagnosis.balance.judge_laws import SIMULATED_AS, Balance
 from analysis.diagnosis.confirm.balance_with_model import find_balances_with_model
 from analysis.diagnosis.confirm.confirm_laws import search_by_balance
 from analysis.diagnosis.confirm.fitting_measures import FittingMeasure
-from analysis.diagnosis.confirm.held_out_gain import HeldOutGain, held_out_gain
+from analysis.diagnosis.confirm.held_out_gain import HeldOutGain, estimate_held_out_gain
 from analysis.diagnosis.errors.hypothesis import Claim
 from analysis.diagnosis.search.parsimony import only_refines
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
@@ -73,9 +73,9 @@ def find_objection(result: SearchResult, balances: Sequence[Balance]) -> str:
     context, explanation = result.context, result.found
     if not explanation.steps:
         return "it explains too little of the error to be added"
-    total_gain = held_out_gain(context.whole, explanation.plain, explanation.after)
+    total_gain = estimate_held_out_gain(context.full_measure, explanation.plain, explanation.after)
     previous = context.with_test_score(explanation.steps[-2]) if len(explanation.steps) > 1 else explanation.plain
-    last_gain = held_out_gain(context.whole, previous, explanation.after)
+    last_gain = estimate_held_out_gain(context.full_measure, previous, explanation.after)
     if total_gain is None or last_gain is None:
         return "too little data was held out to confirm it"
     if min(total_gain.low, last_gain.low) <= 0:
@@ -98,7 +98,7 @@ def find_objection(result: SearchResult, balances: Sequence[Balance]) -> str:
 
 def _is_indistinguishable(context: SearchContext, rival: FittedCandidate, with_effect: FittedCandidate) -> bool:
     """Whether the 95 % interval of the gain over the rival reaches zero, or the gain cannot be computed."""
-    gain_over_rival = held_out_gain(context.whole, rival, with_effect)
+    gain_over_rival = estimate_held_out_gain(context.full_measure, rival, with_effect)
     return gain_over_rival is None or gain_over_rival.low <= 0
 
 
@@ -140,7 +140,9 @@ def _list_unconfirmed(result: SearchResult, reason: str) -> tuple[Unconfirmed, .
         best_by_effect.setdefault(candidate.newest, candidate)
     unconfirmed = []
     for rank, candidate in enumerate([*best_by_effect.values()][:CANDIDATES_WITH_GAIN]):
-        gain = held_out_gain(result.context.whole, result.found.plain, result.context.with_test_score(candidate))
+        gain = estimate_held_out_gain(
+            result.context.full_measure, result.found.plain, result.context.with_test_score(candidate)
+        )
         if gain is not None and gain.gain > 0:
             unconfirmed.append(
                 Unconfirmed(candidate.fitted.hypothesis, gain.gain, reason if rank == 0 else _explain_not_best(gain))

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.errors.choose_measure import Compared, MeasureChoice, measure_of
-from analysis.diagnosis.errors.fit_score import fit_score
+from analysis.diagnosis.errors.choose_measure import Compared, MeasureChoice, make_measure
+from analysis.diagnosis.errors.fit_score import compute_fit_score
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit
-from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.settings import CONSTANT_LEAVES
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
@@ -51,7 +51,7 @@ def choose_fitting_measure(
     """The measure that `errors.choose_measure` selects. clean: recordings without the fault. compared: motion, force or
     automatic. about_mean: whether the model was fitted to deviations from the mean; a constant command is then added
     where that lowers the error."""
-    fitting = FittingMeasure(model, measure_of(recordings, model, clean, compared))
+    fitting = FittingMeasure(model, make_measure(recordings, model, clean, compared))
     if not about_mean or clean:
         return fitting
     measure = fitting.chosen.measure
@@ -62,7 +62,7 @@ def choose_fitting_measure(
         shifted_recordings = shift_to_mean_force(recordings, model, measure)
     if shifted_recordings is None:
         return fitting
-    shifted_choice = measure_of(shifted_recordings, model, clean, compared)
+    shifted_choice = make_measure(shifted_recordings, model, clean, compared)
     if shifted_choice.measure.name != measure.name or _compute_error_over_noise(
         model, shifted_choice
     ) > CONSTANT_LEAVES * _compute_error_over_noise(model, fitting.chosen):
@@ -85,9 +85,9 @@ def shift_to_mean_force(
 def _compute_error_over_noise(model: MechanicalModel, chosen: MeasureChoice) -> float:
     """Error of the unchanged model over the noise, on the samples to fit and to choose by."""
     measure = chosen.measure
-    tuning = tuning_of(model, measure.records[0].recording.command.channels)
+    tuning = make_tuning(model, measure.records[0].recording.command.channels)
     nominal_fit = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NO_EFFECTS)
-    return fit_score(measure, nominal_fit.residuals).worst_channel
+    return compute_fit_score(measure, nominal_fit.residuals).worst_channel
 
 
 LEAST_STIFFNESS_RATIO = 1e-6

@@ -16,8 +16,8 @@ import numpy as np
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.confirm.fitting_measures import CONSTANT_ADDED, FittingMeasure, shift_to_mean_force
 from analysis.diagnosis.data.measured_motion import is_quasi_static, is_read_as_free
-from analysis.diagnosis.errors.choose_measure import Compared, MeasureChoice, measure_by_force, measure_of
-from analysis.diagnosis.first_model.model_from_balance import first_model, law_power_share_in_band
+from analysis.diagnosis.errors.choose_measure import Compared, MeasureChoice, make_force_measure, make_measure
+from analysis.diagnosis.first_model.model_from_balance import build_first_model, compute_law_power_share
 from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduce_recordings
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.settings import LAWS_WITHIN
@@ -42,7 +42,7 @@ def list_fitting_measures(
     """
     if not any(balance.named for balance in balances):
         return
-    chosen = measure_of(recordings, model)
+    chosen = make_measure(recordings, model)
     if is_quasi_static(recordings[0]) or is_read_as_free(recordings[0]):
         yield FittingMeasure(model, chosen)
         return
@@ -53,14 +53,14 @@ def list_fitting_measures(
     try:
         reduced, linear = _model_of_balances(recordings, balances, model.name)
         if linear is not None:
-            narrow = measure_by_force(reduced, linear, None)
+            narrow = make_force_measure(reduced, linear, None)
             power_share = 0.0
             if isinstance(narrow.measure, PredictedForce):
-                power_share = law_power_share_in_band(balances, narrow.measure.band_hz)
+                power_share = compute_law_power_share(balances, narrow.measure.band_hz)
             if power_share >= LAWS_WITHIN:
                 yield FittingMeasure(linear, narrow, narrow=True)
             band_hz = balances[0].search.regression.motions[0].band_hz
-            yield FittingMeasure(linear, measure_by_force(reduced, linear, band_hz))
+            yield FittingMeasure(linear, make_force_measure(reduced, linear, band_hz))
     except (MechanicalModelError, np.linalg.LinAlgError):
         return  # the balances' parameters make no model, or none that can be inverted: nothing more can be tried
 
@@ -104,16 +104,16 @@ def _model_of_balances(
     """The recordings with one body per command, and the linear model that the balances' parameters make of it; None
     where they make no model."""
     reduced = reduce_recordings(recordings, balances) if is_reduced(balances) else recordings
-    return reduced, first_model(balances, reduced[0], name)
+    return reduced, build_first_model(balances, reduced[0], name)
 
 
 def _predict_about_mean(recordings: Sequence[Recording], model: MechanicalModel, band_hz: float) -> MeasureChoice:
     """The measure by force with a constant command that makes the mean error zero, because the regression of the
     balance has a constant, too."""
-    chosen = measure_by_force(recordings, model, band_hz)
+    chosen = make_force_measure(recordings, model, band_hz)
     if not isinstance(chosen.measure, PredictedForce):
         return chosen
-    return measure_by_force(shift_to_mean_force(recordings, model, chosen.measure), model, band_hz)
+    return make_force_measure(shift_to_mean_force(recordings, model, chosen.measure), model, band_hz)
 
 
 Prediction = tuple[MechanicalModel, PredictedForce]

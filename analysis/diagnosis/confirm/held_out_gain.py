@@ -4,16 +4,16 @@
 
 No model of a real device reaches the sensors' noise, so an effect is judged by its prediction of held-out samples, not
 by the residual in units of noise. Stretches are resampled as blocks, because residuals are correlated (Kunsch, Ann.
-Stat. 17:1217, 1989).
+Stat. 17:1217, 1989). Called by `decide_with_model`, `require_gain`, `confirm_laws` and `discovery`.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.data.correlated_residuals import bootstrap_draws
+from analysis.diagnosis.data.correlated_residuals import draw_bootstrap_blocks
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.fit_score import rms_over, signal_rms
+from analysis.diagnosis.errors.fit_score import compute_residual_rms, compute_signal_rms
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.settings import BOOTSTRAP_LEVEL, HELD_OUT_STRETCHES, HELD_OUT_SURPRISE, LEAST_HELD_OUT_STRETCHES
 from equalizer.signals.signal import FloatArray
@@ -31,20 +31,27 @@ class HeldOutGain:
     """Upper bound of the 95 % interval."""
 
 
-def held_out_gain(measure: ErrorMeasure, baseline: FittedCandidate, candidate: FittedCandidate) -> HeldOutGain | None:
-    """The gain of `candidate` over `baseline`, both fitted with this measure. None where fewer than
+def estimate_held_out_gain(
+    measure: ErrorMeasure, baseline: FittedCandidate, candidate: FittedCandidate
+) -> HeldOutGain | None:
+    """Estimate the gain of `candidate` over `baseline`, both fitted with this measure. None where fewer than
     `LEAST_HELD_OUT_STRETCHES` are held out, or where a residual is not finite."""
-    powers_without, powers_with = (_stretch_powers(measure, fit) for fit in (baseline, candidate))
+    powers_without, powers_with = (_compute_stretch_powers(measure, fit) for fit in (baseline, candidate))
     if len(powers_without) < LEAST_HELD_OUT_STRETCHES or not (
         np.isfinite(powers_without).all() and np.isfinite(powers_with).all()
     ):
         return None
     # Each channel in units of its residual without the effect, so that no channel dominates.
-    size = np.maximum(powers_without.sum(axis=0), np.finfo(float).tiny)
-    scaled_without, scaled_with = (powers_without / size).mean(axis=1), (powers_with / size).mean(axis=1)
-    draws = bootstrap_draws(len(scaled_without))
-    shares = 1 - scaled_with[draws].sum(axis=1) / np.maximum(scaled_without[draws].sum(axis=1), np.finfo(float).tiny)
-    low, high = np.quantile(shares, [BOOTSTRAP_LEVEL, 1 - BOOTSTRAP_LEVEL])
+    channel_powers = np.maximum(powers_without.sum(axis=0), np.finfo(float).tiny)
+    scaled_without, scaled_with = (
+        (powers_without / channel_powers).mean(axis=1),
+        (powers_with / channel_powers).mean(axis=1),
+    )
+    draws = draw_bootstrap_blocks(len(scaled_without))
+    gain_draws = 1 - scaled_with[draws].sum(axis=1) / np.maximum(
+        scaled_without[draws].sum(axis=1), np.finfo(float).tiny
+    )
+    low, high = np.quantile(gain_draws, [BOOTSTRAP_LEVEL, 1 - BOOTSTRAP_LEVEL])
     return HeldOutGain(float(1 - scaled_with.sum() / scaled_without.sum()), float(low), float(high))
 
 
@@ -52,39 +59,41 @@ def predicts_motion(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
     """Whether the model with its effects predicts a held-out motion better than the mean of that motion does. A law
     that only stabilises an unstable model fails this test. Channels that contain only noise are not counted. True
     without a test where forces are compared, or where no motion is held out."""
-    return measure.name == "predicted force" or _remaining_share(measure, candidate, 0.0) < 1
+    return measure.name == "predicted force" or _compute_remaining_share(measure, candidate, 0.0) < 1
 
 
 def explains_half(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
     """Whether the model with its effects explains more than half of the held-out power beyond noise. With less, its law
     may only be the best substitute for a law that was not found. True where no motion is held out."""
-    return predicts_motion(measure, candidate) and _remaining_share(measure, candidate, 1.0) < 0.5
+    return predicts_motion(measure, candidate) and _compute_remaining_share(measure, candidate, 1.0) < 0.5
 
 
-def _remaining_share(measure: ErrorMeasure, candidate: FittedCandidate, noise_factor: float) -> float:
-    """Mean over channels of (e^2 - k n^2) / (s^2 - k n^2) on held-out samples: rms residual e, rms signal s, rms noise
-    n, and k = noise_factor (1 subtracts the noise power, 0 does not). Channels with s up to `HELD_OUT_SURPRISE` n are
-    left out; 0 where none remains, or nothing is held out."""
+def _compute_remaining_share(measure: ErrorMeasure, candidate: FittedCandidate, noise_factor: float) -> float:
+    """Compute the mean over channels of (e^2 - k n^2) / (s^2 - k n^2) on held-out samples: rms residual e, rms signal
+    s, rms noise n, and k = noise_factor (1 subtracts the noise power, 0 does not). Channels with s up to
+    `HELD_OUT_SURPRISE` n are left out; 0 where none remains, or nothing is held out."""
     masks = [record.test for record in measure.records]
     if not any(mask.any() for mask in masks):
         return 0.0
-    residual_rms = rms_over(measure.records, candidate.fitted.residuals, masks) * measure.unit
-    size = signal_rms(measure.records, masks)
-    is_moving = size > HELD_OUT_SURPRISE * measure.noise
-    if not is_moving.any():
+    residual_rms = compute_residual_rms(measure.records, candidate.fitted.residuals, masks) * measure.unit
+    channel_rms = compute_signal_rms(measure.records, masks)
+    is_above_noise = channel_rms > HELD_OUT_SURPRISE * measure.noise
+    if not is_above_noise.any():
         return 0.0
-    noise = noise_factor * measure.noise[is_moving] ** 2
-    return float(np.mean((residual_rms[is_moving] ** 2 - noise) / (size[is_moving] ** 2 - noise)))
+    noise_power = noise_factor * measure.noise[is_above_noise] ** 2
+    return float(
+        np.mean((residual_rms[is_above_noise] ** 2 - noise_power) / (channel_rms[is_above_noise] ** 2 - noise_power))
+    )
 
 
-def _stretch_powers(measure: ErrorMeasure, candidate: FittedCandidate) -> FloatArray:
-    """(stretches, c): sums of squares of the held-out residuals, in units of `measure.unit`. All records together are
-    cut into about `HELD_OUT_STRETCHES` consecutive stretches, at least one per record."""
-    total = sum(int(record.test.sum()) for record in measure.records)
+def _compute_stretch_powers(measure: ErrorMeasure, candidate: FittedCandidate) -> FloatArray:
+    """Compute (stretches, c): sums of squares of the held-out residuals, in units of `measure.unit`. All records
+    together are cut into about `HELD_OUT_STRETCHES` consecutive stretches, at least one per record."""
+    total_samples = sum(int(record.test.sum()) for record in measure.records)
     sums = []
     for record, residuals in zip(measure.records, candidate.fitted.residuals, strict=True):
         indices = np.flatnonzero(record.test)
         if len(indices):
-            count = int(np.clip(round(HELD_OUT_STRETCHES * len(indices) / total), 1, len(indices)))
-            sums += [np.sum(residuals[part] ** 2, axis=0) for part in np.array_split(indices, count)]
+            count = int(np.clip(round(HELD_OUT_STRETCHES * len(indices) / total_samples), 1, len(indices)))
+            sums += [np.sum(residuals[stretch] ** 2, axis=0) for stretch in np.array_split(indices, count)]
     return np.array(sums).reshape(len(sums), -1)

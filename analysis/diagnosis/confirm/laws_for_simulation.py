@@ -1,4 +1,4 @@
-"""Converts laws that a force balance named to hypotheses of a simulation, with starting parameters.
+"""Convert laws that a force balance named to hypotheses of a simulation, with starting parameters.
 
 A law of the catalogue becomes the effect of the same name with the fitted parameters; a law outside the catalogue
 becomes a formula in the language of `equalizer.laws`. `confirm_laws` fits these hypotheses by output error.
@@ -14,16 +14,22 @@ from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.judged_law import JudgedLaw
 from analysis.diagnosis.balance.structures import fit_values
 from analysis.diagnosis.confirm.require_gain import CONSTANT
-from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, Hypothesis, combine, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import (
+    NO_EFFECTS,
+    Claim,
+    Hypothesis,
+    combine_hypotheses,
+    make_claim_hypothesis,
+)
 from analysis.diagnosis.errors.tuning import Tuning
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-_OWN_SIGNALS = re.compile(r"\b[qvf]\b")
-"""Position, velocity and command of the own axis in a formula."""
-_PREFIX = {"q": "", "v": "v", "f": "f"}
+_AXIS_SIGNALS = re.compile(r"\b[qvf]\b")
+"""Symbols of a formula for position (q), velocity (v) and command (f) of the law's axis."""
+_SIGNAL_PREFIX = {"q": "", "v": "v", "f": "f"}
 """Prefix of an axis's name in the language of laws, by the symbol in a formula of the balance: on axis x, q becomes x,
 v becomes vx and f becomes fx."""
 
@@ -43,17 +49,17 @@ def can_be_simulated(own_channel: int, judged_law: JudgedLaw) -> bool:
 
 
 def refit_laws(balances: Sequence[Balance], named_laws: Sequence[tuple[int, JudgedLaw]]) -> list[tuple[int, JudgedLaw]]:
-    """The laws with the parameters that the balances give when only these laws are fitted."""
+    """Fit the parameters of the laws again, with only these laws in each axis's balance. named_laws: axis and law."""
     refitted = []
     for axis, law in named_laws:
         if not law.has_column:
             refitted.append((axis, law))
             continue
         regression = balances[axis].search.regression
-        places = [
+        law_indices = [
             other_law.place for other_axis, other_law in named_laws if other_axis == axis and other_law.has_column
         ]
-        values = fit_values(regression, places)[places.index(law.place)]
+        values = fit_values(regression, law_indices)[law_indices.index(law.place)]
         refitted.append((axis, law if values is None else _with_values(law, values)))
     return refitted
 
@@ -65,37 +71,39 @@ def _with_values(judged_law: JudgedLaw, values: dict[str, float]) -> JudgedLaw:
 
 
 def find_special_case(
-    balances: Sequence[Balance], named_laws: Sequence[tuple[int, JudgedLaw]], refining: tuple[int, JudgedLaw]
+    balances: Sequence[Balance], named_laws: Sequence[tuple[int, JudgedLaw]], refining_law: tuple[int, JudgedLaw]
 ) -> tuple[int, JudgedLaw] | None:
-    """The special case of a law on the same axis, such as Coulomb friction of Stribeck friction, with the parameters of
-    the refining law until `refit_laws`. None where the balance does not contain it, or it is named already."""
-    axis, judged_law = refining
-    effect = EFFECTS.get(judged_law.law.effect)
+    """Find a special case of a law on the same axis, such as Coulomb friction of Stribeck friction; it has the
+    parameters of the refining law until `refit_laws`. None where the balance does not contain it, or it is named
+    already."""
+    axis, judged_law = refining_law
+    refining_effect = EFFECTS.get(judged_law.law.effect)
     named_effects = {law.law.effect for law_axis, law in named_laws if law_axis == axis}
-    for place, law in enumerate(balances[axis].search.regression.laws):
+    for law_index, law in enumerate(balances[axis].search.regression.laws):
         is_unnamed = law.channel == judged_law.law.channel and law.effect not in named_effects
-        if effect is not None and is_unnamed and law.effect in effect.simpler:
-            return axis, replace(judged_law, place=place, law=law)
+        if refining_effect is not None and is_unnamed and law.effect in refining_effect.simpler:
+            return axis, replace(judged_law, place=law_index, law=law)
     return None
 
 
-def constants_of(balances: Sequence[Balance]) -> Hypothesis:
-    """Constant forces along the axes: a weight, or the offset of an amplifier or sensor, which mass, damping and
-    stiffness do not describe."""
+def estimate_constant_forces(balances: Sequence[Balance]) -> Hypothesis:
+    """Estimate the constant forces along the axes, N (N m): a weight, or the offset of an amplifier or sensor. Axes
+    with a given model are left out."""
     hypothesis = NO_EFFECTS
     for axis, balance in enumerate(balances):
         regression = balance.search.regression
         if regression.prior is not None:
             continue
-        force = -float(regression.weights(regression.columns_of(()))[-1])
+        force = -float(regression.fit_weights(regression.select_columns(()))[-1])
         if force:
             claim = Claim(EFFECTS[CONSTANT], "one", (axis,))
-            hypothesis = combine(hypothesis, hypothesis_of_claim(claim, [{"force": force}]))
+            hypothesis = combine_hypotheses(hypothesis, make_claim_hypothesis(claim, [{"force": force}]))
     return hypothesis
 
 
-def hypothesis_of_judged(axis: int, judged_law: JudgedLaw, recording: Recording) -> Hypothesis:
-    """A named law of the balance as a hypothesis to simulate. recording: has the channels that a formula refers to."""
+def make_hypothesis(axis: int, judged_law: JudgedLaw, recording: Recording) -> Hypothesis:
+    """Convert a named law of the balance to a hypothesis to simulate. recording: has the channels that a formula refers
+    to."""
     if judged_law.formula is not None:
         # Imported here: few diagnoses have such a law.
         from analysis.diagnosis.errors.law_hypothesis import hypothesis_of_law
@@ -103,32 +111,33 @@ def hypothesis_of_judged(axis: int, judged_law: JudgedLaw, recording: Recording)
         from equalizer.laws.law import Law
 
         name, formula = axis_names(recording.command.channels)[axis], judged_law.formula
-        text = _OWN_SIGNALS.sub(lambda signal: f"{_PREFIX[signal[0]]}{name}", formula.text)
+        text = _AXIS_SIGNALS.sub(lambda signal: f"{_SIGNAL_PREFIX[signal[0]]}{name}", formula.text)
         return hypothesis_of_law(Law(text, formula.numbers, (), formula.acts_on, name), axis, recording)
     parameters = EFFECTS_BY_NAME[judged_law.law.effect].parameters
-    return hypothesis_of_claim(
+    return make_claim_hypothesis(
         Claim(EFFECTS[judged_law.law.effect], "one", (axis,)),
         [{p.name: judged_law.values[p.name] for p in parameters if p.name in judged_law.values}],
     )
 
 
-def parameters_beside_laws(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
-    """Starting deviations of mass, damping and stiffness, in standard deviations: from the model's values to those that
-    the balance fits together with the laws. Zeros unless there is a single balance, without a given model, and the
-    model has one coordinate. A mass is at least a tenth of the model's; deviations are clipped to the bound of 4."""
-    start = np.zeros(len(tuning.names))
+def compute_starting_deviations(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
+    """Compute the starting deviations of mass, damping and stiffness, in standard deviations: from the model's values
+    to those that the balance fits together with the laws. Zeros unless there is a single balance, without a given
+    model, and the model has one coordinate. A mass is at least a tenth of the model's; deviations are clipped to the
+    bound of 4."""
+    deviations = np.zeros(len(tuning.names))
     if any(balance.search.regression.prior is not None for balance in balances):
-        return start
+        return deviations
     model = tuning.model
     if len(balances) != 1 or model.coordinates != 1:
-        return start
+        return deviations
     regression = balances[0].search.regression
-    weights = regression.weights(regression.columns_of(laws))[: regression.matrices]
+    weights = regression.fit_weights(regression.select_columns(laws))[: regression.matrices]
     matrices = (model.mass, model.damping, model.stiffness)
-    for place, (weight, matrix) in enumerate(zip(weights, matrices, strict=False)):
-        if tuning.deviation[place] == 0:  # the parameter is not tuned
+    for parameter_index, (weight, matrix) in enumerate(zip(weights, matrices, strict=False)):
+        if tuning.deviation[parameter_index] == 0:  # the parameter is not tuned
             continue
-        if place == 0:
+        if parameter_index == 0:
             weight = max(weight, matrix[0, 0] / 10)
-        start[place] = np.clip((weight - matrix[0, 0]) / tuning.deviation[place], -3.9, 3.9)
-    return start
+        deviations[parameter_index] = np.clip((weight - matrix[0, 0]) / tuning.deviation[parameter_index], -3.9, 3.9)
+    return deviations

@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.confirm.held_out_gain import held_out_gain, predicts_motion
+from analysis.diagnosis.confirm.held_out_gain import estimate_held_out_gain, predicts_motion
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.revise_selection import without_effect
+from analysis.diagnosis.search.revise_selection import remove_effect
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import SearchResult, Unconfirmed, judge
 from analysis.diagnosis.settings import FURTHER_LAW_OF_ALL
@@ -39,7 +39,7 @@ def require_enough_gain(result: SearchResult, repeats: bool) -> SearchResult:
     of the model: where all effects are constants, `explained` is kept."""
     explanation = result.found
     while explanation.steps and not _removes_enough(result.context, explanation):
-        explanation = without_effect(result.context, explanation, len(explanation.steps) - 1)
+        explanation = remove_effect(result.context, explanation, len(explanation.steps) - 1)
         result = replace(result, found=explanation, judgement=judge(explanation), errors=None)
     names = {placed.effect.name for placed in explanation.after.fitted.hypothesis.list_placed_effects()}
     if repeats or result.judgement.verdict != "explained" or names <= set(CONSTANTS):
@@ -62,17 +62,17 @@ def unname_doubtful_effects(result: SearchResult) -> SearchResult:
     is reported with the gain of all effects up to it, if that is positive on the held-out samples."""
     explanation, context, candidates = result.found, result.context, []
     doubtful_indices = [number for number, step in enumerate(explanation.steps) if step.newest not in SHOWN_BY_SIGNAL]
-    if len(doubtful_indices) < len(explanation.steps) and not predicts_motion(context.whole, explanation.plain):
+    if len(doubtful_indices) < len(explanation.steps) and not predicts_motion(context.full_measure, explanation.plain):
         doubtful_indices = list(range(len(explanation.steps)))
     if not doubtful_indices:
         return result
     for number in reversed(doubtful_indices):  # the last first: the numbers of those before it stay
         step = explanation.steps[number]
-        gain = held_out_gain(context.whole, explanation.plain, context.with_test_score(step))
+        gain = estimate_held_out_gain(context.full_measure, explanation.plain, context.with_test_score(step))
         if gain is not None and gain.gain > 0:
             reason = BESIDE_DIVERGENCE if step.newest in SHOWN_BY_SIGNAL else ONLY_BESIDE_CALIBRATION
             candidates.append(Unconfirmed(step.fitted.hypothesis, gain.gain, reason))
-        explanation = without_effect(context, explanation, number)
+        explanation = remove_effect(context, explanation, number)
     ranked = tuple(sorted(candidates, key=lambda candidate: -candidate.gain))
     return replace(
         result, found=explanation, judgement=judge(explanation), errors=None, unconfirmed=(*result.unconfirmed, *ranked)

@@ -1,11 +1,11 @@
-"""Faults of an actuator, each as the change of the recorded command that undoes it.
+"""Faults of an actuator, each as the change of the recorded command that undoes it. Called by `rank_faults`.
 
 A recording holds the command u that was sent; a faulty actuator delivered a force g(u) instead. The faulty recording is
 explained by the intact device where u is replaced by g(u): "undoing" a fault therefore means to put the delivered force
 in the place of the command. The laws g at size 1 are as listed; other sizes s use u + s (g(u) - u):
 
-    force_gain        2 u                            force_offset      u + rms(u)
-    force_gain_drift  u (1 + ramp to 1 at the end)   actuator_cubic    u + u^3 / max(u)^2
+    force_gain        2 u                            force_offset      u + std(u)
+    force_gain_drift  u (1 + ramp to 1 at the end)   actuator_cubic    u + u^3 / max|u|^2
     transport_delay   u(t - T)                       amplifier_lag     u / (T s + 1)
     force_saturation  u clipped to +-limit           slew_limit        u with |du/dt| <= rate
     force_deadband    sgn(u) max(|u| - width, 0)
@@ -38,7 +38,7 @@ CommandChange = Callable[[FloatArray, float], FloatArray]
 SIZE_RANGE = (0.75, 1.35)
 """Range of sizes within which a change that is nonlinear in its size is scaled, before it is linearised about another
 size. By hand."""
-GRID = 12
+GRID_SIZE = 12
 """Number of sizes on the logarithmic grid of a fault that is nonlinear in its size."""
 EARLIER_DRIFT_SHARES = (0.0, 0.25, 0.5)
 """Shares of a drift that are assumed to have occurred before the recording began."""
@@ -46,155 +46,170 @@ EARLIER_DRIFT_SHARES = (0.0, 0.25, 0.5)
 
 @dataclass(frozen=True, slots=True)
 class _Axis:
-    """A driven axis."""
+    """A driven axis: its index among the commands, and its name."""
 
-    number: int
+    index: int
     name: str
 
-    def fault(self, effect: str, variants: Sequence[Variant]) -> Fault:
-        """A fault of this axis's actuator with these variants."""
-        return Fault(effect, "actuator", self.name, self.number, tuple(variants))
+    def make_fault(self, effect: str, variants: Sequence[Variant]) -> Fault:
+        """Make a fault of this axis's actuator with these variants."""
+        return Fault(effect, "actuator", self.name, self.index, tuple(variants))
 
-    def undo_by(self, delivered: CommandChange) -> Undo:
-        """The function that replaces this axis's command by the force that the faulty actuator delivered."""
+    def make_undo(self, delivered: CommandChange) -> Undo:
+        """Make the function that replaces this axis's command by the force that the faulty actuator delivered."""
 
         def undo(part: Part) -> Part:
             command = part.command.copy()
-            command[:, self.number] = delivered(command[:, self.number], part.rate_hz)
+            command[:, self.index] = delivered(command[:, self.index], part.rate_hz)
             return replace(part, command=command)
 
         return undo
 
 
-def actuator_faults(number: int, name: str, parts: Sequence[Part], by_force: bool, rows: Rows) -> Iterator[Fault]:
-    """All faults of the actuator of axis `number`. parts: all compared ones, whose range the grids span. by_force:
-    whether the base predicts the command, not the response."""
-    axis = _Axis(number, name)
-    commands = np.concatenate([part.command[:, number] for part in parts])
+def make_actuator_faults(
+    axis_index: int, name: str, parts: Sequence[Part], by_force: bool, rows: Rows
+) -> Iterator[Fault]:
+    """Make all faults of the actuator of an axis. parts: all compared ones, whose range the grids span. by_force:
+    whether the base predicts the command, not the response. rows: likely delays (`Rows.late_s`)."""
+    axis = _Axis(axis_index, name)
+    commands = np.concatenate([part.command[:, axis_index] for part in parts])
     peak = float(np.abs(commands).max(initial=0.0)) or 1.0
     rms = float(np.std(commands)) or peak
-    yield from _gains(axis, by_force)
-    yield axis.fault(
-        "force_offset", [Variant((axis.undo_by(lambda u, rate: u + rms),), proportional_parameter("offset", rms))]
+    yield from _make_gain_faults(axis, by_force)
+    yield axis.make_fault(
+        "force_offset", [Variant((axis.make_undo(lambda u, rate: u + rms),), proportional_parameter("offset", rms))]
     )
-    cubic = Variant((axis.undo_by(lambda u, rate: u + u**3 / peak**2),), proportional_parameter("cubic", 1 / peak**2))
-    yield axis.fault("actuator_cubic", [cubic])
-    longest = max(parts, key=lambda part: len(part.command))
-    times = delays_to_try(longest.command[:, number], longest.rate_hz)
-    yield axis.fault("transport_delay", [
-        *(_delay(axis, time_s) for time_s in times),
-        *(replace(fix_size(_delay(axis, time_s), rows.late_step_s), column_change=None) for time_s in rows.late_s),
+    cubic = Variant((axis.make_undo(lambda u, rate: u + u**3 / peak**2),), proportional_parameter("cubic", 1 / peak**2))
+    yield axis.make_fault("actuator_cubic", [cubic])
+    longest_part = max(parts, key=lambda part: len(part.command))
+    delays_s = choose_trial_delays_s(longest_part.command[:, axis_index], longest_part.rate_hz)
+    yield axis.make_fault("transport_delay", [
+        *(_make_delay(axis, time_s) for time_s in delays_s),
+        *(replace(fix_size(_make_delay(axis, time_s), rows.late_step_s), column_change=None) for time_s in rows.late_s),
     ])  # fmt: skip
-    yield axis.fault("amplifier_lag", [_lag(axis, time_s) for time_s in times])
-    shares = np.quantile(np.abs(commands), np.array([0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98])) / peak
-    limits = sorted(peak * share for share in (*shares.tolist(), 0.5, 0.6, 0.7, 0.8, 0.9) if 0 < share < 0.995)
-    yield axis.fault("force_saturation", [_saturation(axis, limit) for limit in limits])
-    fastest = max(float(np.abs(np.diff(part.command[:, number])).max(initial=0.0)) * part.rate_hz for part in parts)
+    yield axis.make_fault("amplifier_lag", [_make_lag(axis, time_s) for time_s in delays_s])
+    command_shares = np.quantile(np.abs(commands), np.array([0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98])) / peak
+    limits = sorted(peak * share for share in (*command_shares.tolist(), 0.5, 0.6, 0.7, 0.8, 0.9) if 0 < share < 0.995)
+    yield axis.make_fault("force_saturation", [_make_saturation(axis, limit) for limit in limits])
+    fastest = max(float(np.abs(np.diff(part.command[:, axis_index])).max(initial=0.0)) * part.rate_hz for part in parts)
     if fastest > 0:
-        yield axis.fault(
-            "slew_limit", [_slew_limit(axis, float(rate)) for rate in fastest * np.geomspace(0.01, 0.9, GRID)]
+        yield axis.make_fault(
+            "slew_limit", [_make_slew_limit(axis, float(rate)) for rate in fastest * np.geomspace(0.01, 0.9, GRID_SIZE)]
         )
-    yield axis.fault("force_deadband", [_deadband(axis, float(width)) for width in rms * np.geomspace(0.02, 1.5, GRID)])
+    yield axis.make_fault(
+        "force_deadband", [_make_deadband(axis, float(width)) for width in rms * np.geomspace(0.02, 1.5, GRID_SIZE)]
+    )
 
 
-def _gains(axis: _Axis, by_force: bool) -> Iterator[Fault]:
-    """Faults of the gain. Their size s scales what predicts the command in a force balance, so that the gain is
-    1 / (1 + s), and the delivered force elsewhere, so that it is 1 + s."""
+def _make_gain_faults(axis: _Axis, by_force: bool) -> Iterator[Fault]:
+    """Make the faults of the gain. Their size s scales what predicts the command in a force balance, so that the gain
+    is 1 / (1 + s), and the delivered force elsewhere, so that it is 1 + s."""
 
-    def gain(size: float) -> float:
+    def compute_gain(size: float) -> float:
         return 1 / (1 + size) if by_force else 1 + size
 
-    yield axis.fault("force_gain", [
-        Variant((axis.undo_by(lambda u, rate: 2 * u),), lambda s: {"gain": gain(float(s[0]))}, -0.9, 20.0,
+    yield axis.make_fault("force_gain", [
+        Variant((axis.make_undo(lambda u, rate: 2 * u),), lambda s: {"gain": compute_gain(float(s[0]))}, -0.9, 20.0,
                 column_change=lambda x, rate, part: 2 * x),
     ])  # fmt: skip
     drifts = [
-        _gain_drift(axis, earlier_share, lambda s: {"change": gain(float(s[0])) - 1})
+        _make_gain_drift(axis, earlier_share, lambda s: {"change": compute_gain(float(s[0])) - 1})
         for earlier_share in EARLIER_DRIFT_SHARES
     ]
-    yield replace(axis.fault("force_gain_drift", drifts), varies=True, simpler=("force_gain",))
+    yield replace(axis.make_fault("force_gain_drift", drifts), varies=True, simpler=("force_gain",))
 
 
-def _gain_drift(axis: _Axis, earlier_share: float, parameters_of: ParametersOf) -> Variant:
-    """A gain that drifts linearly. earlier_share: share of the drift before the file began."""
+def _make_gain_drift(axis: _Axis, earlier_share: float, parameters_of: ParametersOf) -> Variant:
+    """A gain that drifts linearly. earlier_share: share of the drift before the file began. parameters_of: maps the
+    size to the parameter of the effect."""
 
-    def ramp(part: Part, count: int) -> FloatArray:
+    def compute_gain_ramp(part: Part, count: int) -> FloatArray:
         """(count, 1): the gain at `count` evenly spaced times of a part, as rows may be decimated."""
-        gain = 1 + drift_shape(part, earlier_share)
+        gain = 1 + compute_drift_shape(part, earlier_share)
         return np.interp(np.linspace(0.0, 1.0, count), np.linspace(0.0, 1.0, len(gain)), gain)[:, None]
 
     def undo(part: Part) -> Part:
         command = part.command.copy()
-        command[:, [axis.number]] *= ramp(part, len(command))
+        command[:, [axis.index]] *= compute_gain_ramp(part, len(command))
         return replace(part, command=command)
 
-    return Variant((undo,), parameters_of, -0.9, 20.0, column_change=lambda x, rate, part: x * ramp(part, len(x)))
+    return Variant(
+        (undo,), parameters_of, -0.9, 20.0, column_change=lambda x, rate, part: x * compute_gain_ramp(part, len(x))
+    )
 
 
-def drift_shape(part: Part, earlier_share: float) -> FloatArray:
-    """(n,): a drift to 1 at the end of the file, of which `earlier_share` had occurred before the file began."""
+def compute_drift_shape(part: Part, earlier_share: float) -> FloatArray:
+    """Compute (n,): a linear drift to 1 at the end of the file, of which `earlier_share` occurred before its
+    beginning."""
     return np.asarray(earlier_share + (1 - earlier_share) * part.elapsed_share)
 
 
-def _delay(axis: _Axis, time_s: float) -> Variant:
-    # The command at t shows in the motion at t + T.
+def _make_delay(axis: _Axis, time_s: float) -> Variant:
+    """A transport delay by `time_s`: samples before it are no longer known."""
+    # The command at t acts on the motion at t + T.
     change: ColumnChange = lambda x, rate, part: shift_samples(x, -time_s * rate)  # noqa: E731
 
     def undo(part: Part) -> Part:
         delay_samples = time_s * part.rate_hz
-        undone = axis.undo_by(lambda u, rate: shift_samples(u[:, None], delay_samples)[:, 0])(part)
+        undone = axis.make_undo(lambda u, rate: shift_samples(u[:, None], delay_samples)[:, 0])(part)
         return replace(undone, known=part.known & (np.arange(len(part.known)) >= delay_samples))
 
-    at_size = lambda size: _delay(axis, size * time_s)  # noqa: E731
+    at_size = lambda size: _make_delay(axis, size * time_s)  # noqa: E731
     delay = proportional_parameter("delay", time_s)
     return Variant((undo,), delay, *SIZE_RANGE, column_change=change, at_size=at_size, exact=True)
 
 
-def _lag(axis: _Axis, time_s: float) -> Variant:
+def _make_lag(axis: _Axis, time_s: float) -> Variant:
+    """A first-order lag of the amplifier with the time constant `time_s`."""
     # The command is (1 + T s) times the delivered force.
-    undo = axis.undo_by(lambda u, rate: apply_lag(u, time_s * rate))
+    undo = axis.make_undo(lambda u, rate: apply_lag(u, time_s * rate))
     change: ColumnChange = lambda x, rate, part: x + time_s * rate * np.gradient(x, axis=0)  # noqa: E731
-    at_size = lambda size: _lag(axis, size * time_s)  # noqa: E731
+    at_size = lambda size: _make_lag(axis, size * time_s)  # noqa: E731
     return Variant(
         (undo,), proportional_parameter("time_constant", time_s), *SIZE_RANGE, column_change=change, at_size=at_size
     )
 
 
-def _saturation(axis: _Axis, limit: float) -> Variant:
-    return Variant((axis.undo_by(lambda u, rate: np.clip(u, -limit, limit)),), lambda s: {"limit": limit}, 0.6, 1.5)
+def _make_saturation(axis: _Axis, limit: float) -> Variant:
+    """A saturation at +-limit, in the command's unit."""
+    return Variant((axis.make_undo(lambda u, rate: np.clip(u, -limit, limit)),), lambda s: {"limit": limit}, 0.6, 1.5)
 
 
-def _slew_limit(axis: _Axis, limit: float) -> Variant:
-    undo = axis.undo_by(lambda u, rate: limit_slew(u, 1 / rate, limit, float(u[0]), at_end=True))
+def _make_slew_limit(axis: _Axis, limit: float) -> Variant:
+    """A slew-rate limit, in the command's unit per second."""
+    undo = axis.make_undo(lambda u, rate: limit_slew(u, 1 / rate, limit, float(u[0]), at_end=True))
     return Variant((undo,), lambda s: {"rate": limit}, 0.6, 1.5)
 
 
-def _deadband(axis: _Axis, width: float) -> Variant:
-    undo = axis.undo_by(lambda u, rate: np.sign(u) * np.maximum(np.abs(u) - width, 0.0))
-    at_size = lambda size: _deadband(axis, size * width)  # noqa: E731
+def _make_deadband(axis: _Axis, width: float) -> Variant:
+    """A dead band from -width to width, in the command's unit."""
+    undo = axis.make_undo(lambda u, rate: np.sign(u) * np.maximum(np.abs(u) - width, 0.0))
+    at_size = lambda size: _make_deadband(axis, size * width)  # noqa: E731
     return Variant((undo,), proportional_parameter("width", width), *SIZE_RANGE, at_size=at_size)
 
 
-def delays_to_try(samples: FloatArray, rate_hz: float) -> list[float]:
-    """Delays in s on a logarithmic grid, from a tenth of a sample to `LONGEST_DELAY`."""
-    shortest, longest = 0.1 / rate_hz, LONGEST_DELAY / median_frequency_hz(samples, rate_hz)
-    if longest <= shortest:
+def choose_trial_delays_s(samples: FloatArray, rate_hz: float) -> list[float]:
+    """Choose delays in s on a logarithmic grid, from a tenth of a sample to `LONGEST_DELAY` periods of the median
+    frequency of the samples (n,); empty where that range is empty."""
+    shortest_s, longest_s = 0.1 / rate_hz, LONGEST_DELAY / compute_median_frequency_hz(samples, rate_hz)
+    if longest_s <= shortest_s:
         return []
-    # So many that the ranges `SIZE_RANGE` of neighbouring delays overlap.
-    count = int(np.ceil(np.log(longest / shortest) / np.log(SIZE_RANGE[1] / SIZE_RANGE[0]))) + 1
-    return [float(time_s) for time_s in np.geomspace(shortest, longest, max(count, GRID))]
+    # As many as needed for the ranges `SIZE_RANGE` of neighbouring delays to overlap.
+    count = int(np.ceil(np.log(longest_s / shortest_s) / np.log(SIZE_RANGE[1] / SIZE_RANGE[0]))) + 1
+    return [float(time_s) for time_s in np.geomspace(shortest_s, longest_s, max(count, GRID_SIZE))]
 
 
-def median_frequency_hz(samples: FloatArray, rate_hz: float) -> float:
-    """The frequency in Hz below which half of the power of samples (n,) about their mean lies; at least one line."""
+def compute_median_frequency_hz(samples: FloatArray, rate_hz: float) -> float:
+    """Compute the frequency in Hz below which half of the power of samples (n,) about their mean lies; at least that of
+    the first spectral line."""
     power = np.abs(np.fft.rfft(samples - samples.mean())) ** 2
     line = int(np.searchsorted(np.cumsum(power), 0.5 * power.sum()))
     return max(line, 1) * rate_hz / len(samples)
 
 
-def apply_lag(samples: FloatArray, constant: float) -> FloatArray:
-    """Samples (n,) through a low pass of the first order, from the steady state of the first sample. constant: time
-    constant in samples, above 0."""
+def apply_lag(samples: FloatArray, time_constant_samples: float) -> FloatArray:
+    """Filter samples (n,) by a first-order low pass, from the steady state of the first sample. time_constant_samples:
+    above 0."""
     low_passed = np.empty((len(samples), 1))
-    filter_one_pole((samples - samples[0])[:, None], float(np.exp(-1 / constant)), low_passed)
+    filter_one_pole((samples - samples[0])[:, None], float(np.exp(-1 / time_constant_samples)), low_passed)
     return np.asarray(samples[0] + low_passed[:, 0])

@@ -3,7 +3,7 @@ from the past of all responses y and of all commands u,
 
     y_i(t) = sum over k = 1..n of a_k' y(t - k) + sum over k = 0..n of b_k' u(t - k) + c + e(t).
 
-Used for devices that no force balance describes: voltages as responses, many modes.
+Used by `bases` for devices that no force balance describes: voltages as responses, many modes.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.balance.motion import low_pass_filter
+from analysis.diagnosis.balance.motion import filter_low_pass
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.settings import RESPONSE_BAND_SHARE, RESPONSE_OVERSAMPLED
 from analysis.diagnosis.types import Mask
@@ -36,18 +36,18 @@ class AutoregressiveBase:
     responses: int
     """Number of response channels."""
 
-    def rows(
+    def build_rows(
         self, parts: Sequence[Part], reusable_rows: tuple[FloatArray, ...] | None = None
     ) -> tuple[FloatArray, ...]:
-        """Per part (n, 1 + columns): predicted value and regressors of each decimated sample from index `order` on.
-        reusable_rows: not used; a force balance reuses columns of it."""
-        return tuple(self._rows(part) for part in parts)
+        """Build the rows of each part, (n, 1 + columns): predicted value and regressors of each decimated sample from
+        index `order` on. reusable_rows: not used; only `ForceBase` reuses columns."""
+        return tuple(self._build_part_rows(part) for part in parts)
 
-    def command_columns(self, width: int) -> Mask:
-        """(width,): mask of the columns made from commands."""
+    def mask_command_columns(self, width: int) -> Mask:
+        """Mask (width,) of the columns that are made from commands. width: number of columns."""
         return (np.arange(width) > self.order * self.responses) & (np.arange(width) < width - 1)
 
-    def valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
+    def mask_valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
         """Per part (n,): mask of the rows whose own and past samples are known, without the first two and last two. A
         sample that was lost between those that decimation keeps is interpolated and low-passed with its neighbours, and
         does not count as lost."""
@@ -61,8 +61,8 @@ class AutoregressiveBase:
             masks.append(~invalid[self.order :])
         return tuple(masks)
 
-    def _rows(self, part: Part) -> FloatArray:
-        """(n, 1 + columns): the rows of one part, as `rows` returns them."""
+    def _build_part_rows(self, part: Part) -> FloatArray:
+        """Build the rows (n, 1 + columns) of one part, as `build_rows` returns them."""
         response, command = (decimate(samples, part.rate_hz, self.step) for samples in (part.response, part.command))
         row_count = max(len(response) - self.order, 0)
         first_difference = np.diff(response, axis=0, prepend=response[:1])
@@ -85,21 +85,20 @@ class AutoregressiveBase:
             ]
         )
 
-    def values(self, rows: FloatArray) -> FloatArray:
-        """(n,): the response itself: its second difference, the value before, and the difference before."""
+    def reconstruct_response(self, rows: FloatArray) -> FloatArray:
+        """Recover the response (n,) from rows: second difference + previous value + previous difference."""
         return np.asarray(rows[:, 0] + rows[:, 1 + self.channel] + rows[:, 1 + self.responses + self.channel])
 
 
 def decimate(samples: FloatArray, rate_hz: float, step: int) -> FloatArray:
-    """(n / step rounded up, k): every `step`-th sample, low-pass filtered to 0.4 times the new rate before
-    (anti-aliasing)."""
-    return samples if step == 1 else low_pass_filter(samples, rate_hz, 0.4 * rate_hz / step)[::step]
+    """Low-pass filter samples (n, k) to 0.4 times the new rate (anti-aliasing), then keep every `step`-th one."""
+    return samples if step == 1 else filter_low_pass(samples, rate_hz, 0.4 * rate_hz / step)[::step]
 
 
 def choose_decimation_step(parts: Sequence[Part]) -> int:
-    """Decimation step that keeps the band of the fastest response. This band ends where the cumulative power above the
-    noise floor reaches the share `RESPONSE_BAND_SHARE`; the floor is the median power of the upper quarter of the
-    spectrum."""
+    """Choose the decimation step that keeps the band of the fastest response. This band ends where the cumulative power
+    above the noise floor reaches the share `RESPONSE_BAND_SHARE`; the floor is the median power of the upper quarter of
+    the spectrum."""
     band_ends_hz = []
     for part in parts:
         line_hz = part.rate_hz / len(part.response)

@@ -8,7 +8,7 @@ import numpy as np
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motions
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase, choose_decimation_step
 from analysis.diagnosis.contrast.compared_base import FEWEST_ROWS, Base
-from analysis.diagnosis.contrast.force_base import force_base
+from analysis.diagnosis.contrast.force_base import build_force_base
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.settings import AUTOREGRESSIVE_ORDER, BALANCE_HOLDS, CONSTANT_SIGNAL, MOTIONS_APART
 from analysis.diagnosis.types import Mask
@@ -31,7 +31,7 @@ def bases_of(clean: tuple[Part, ...], faulty: tuple[Part, ...]) -> Iterator[tupl
     if motions and np.isfinite(motions[0].band_hz):
         with suppress(np.linalg.LinAlgError, ValueError):
             bases: list[Base] = [
-                force_base(motions, axis, rotational) for axis in range(len(recording.command.channels))
+                build_force_base(motions, axis, rotational) for axis in range(len(recording.command.channels))
             ]
             forces = bases if all(compute_unexplained_share(base, clean) < BALANCE_HOLDS for base in bases) else []
     if forces:
@@ -61,13 +61,13 @@ def _compute_detrended_mean_squares(part: Part) -> FloatArray:
 
 def compute_unexplained_share(base: Base, parts: tuple[Part, ...]) -> float:
     """Standard deviation of a base's residual over that of the signal; infinite where that is constant."""
-    return compute_unexplained_share_of_rows(base, base.rows(parts), base.valid_samples(parts))
+    return compute_unexplained_share_of_rows(base, base.build_rows(parts), base.mask_valid_samples(parts))
 
 
 def compute_unexplained_share_of_rows(base: Base, parts: Sequence[FloatArray], masks: Sequence[Mask]) -> float:
     """As `compute_unexplained_share`, from the rows (n, 1 + columns) of each part and the masks (n,) of valid rows."""
     rows = np.vstack([part[mask] for part, mask in zip(parts, masks, strict=True)])
-    signal = base.values(rows) if isinstance(base, AutoregressiveBase) else rows[:, 0]
+    signal = base.reconstruct_response(rows) if isinstance(base, AutoregressiveBase) else rows[:, 0]
     size = np.maximum(np.sqrt(np.mean(rows**2, axis=0)), 1e-300)
     spread = float(np.std(signal))
     if spread <= CONSTANT_SIGNAL * float(np.sqrt(np.mean(signal**2))):

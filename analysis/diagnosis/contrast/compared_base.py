@@ -21,7 +21,7 @@ from scipy.linalg import solve_toeplitz
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase
 from analysis.diagnosis.contrast.fault import ALL_CHANNELS, ColumnChange, Curve, Fault, Undo, Variant
 from analysis.diagnosis.contrast.force_base import ForceBase
-from analysis.diagnosis.contrast.joint_products import ColumnIndices, Grams, weights_of
+from analysis.diagnosis.contrast.joint_products import ColumnIndices, Grams, solve_residual_weights
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.contrast.sensor_base import SensorBase
 from analysis.diagnosis.data.correlated_residuals import compute_lagged_products
@@ -137,8 +137,8 @@ def compare_base(base: Base, clean: Sequence[Part], faulty: Sequence[Part]) -> C
     if isinstance(base, AutoregressiveBase):
         least_samples = (base.order + 2 * REACH) * base.step
         clean, faulty = ([part for part in parts if len(part.known) > least_samples] for parts in (clean, faulty))
-    rows = base.rows(clean), base.rows(faulty)
-    valid = tuple(base.valid_samples(parts) for parts in (clean, faulty))
+    rows = base.build_rows(clean), base.build_rows(faulty)
+    valid = tuple(base.mask_valid_samples(parts) for parts in (clean, faulty))
     gap_reach = min(_choose_gap_reach(side) for side in valid)
     masks = tuple(tuple(_mark_interior(mask, gap_reach) for mask in side) for side in valid)
     fewest = max(FEWEST_ROWS, 2 * rows[0][0].shape[1])
@@ -178,14 +178,14 @@ def _choose_gap_reach(valid: Sequence[Mask]) -> int:
 def _compute_residuals(rows: Sequence[FloatArray], masks: Sequence[Mask], columns: FloatArray) -> list[FloatArray]:
     """Per part (kept,): errors of a base fitted to the masked rows by ordinary least squares, in units of y."""
     scaled = np.vstack([part[mask] for part, mask in zip(rows, masks, strict=True)]) / columns
-    weights = weights_of(scaled.T @ scaled)
+    weights = solve_residual_weights(scaled.T @ scaled)
     return [part @ (weights / columns) * columns[0] for part in rows]
 
 
 def _compute_white_error(white: FloatArray) -> float:
     """Rms error of a base fitted to these whitened rows alone, over the rms of the predicted signal."""
     gram = white.T @ white / len(white)
-    weights = weights_of(gram)
+    weights = solve_residual_weights(gram)
     return max(float(np.sqrt(max(float(weights @ gram @ weights), 0.0))), 1e-9)
 
 
@@ -243,7 +243,7 @@ def _undo_in_recordings(compared: ComparedBase, side: RecordingSet, undo: Undo) 
     same_motion = all(
         undone_part.response is original.response for undone_part, original in zip(undone, side.parts, strict=True)
     )
-    rows = compared.base.rows(undone, side.rows if same_motion else None)
+    rows = compared.base.build_rows(undone, side.rows if same_motion else None)
     has_same_known = all(
         undone_part.known is original.known for undone_part, original in zip(undone, side.parts, strict=True)
     )
@@ -252,7 +252,7 @@ def _undo_in_recordings(compared: ComparedBase, side: RecordingSet, undo: Undo) 
 
 def _find_lost_rows(compared: ComparedBase, side: RecordingSet, undone: Sequence[Part]) -> tuple[Mask, ...]:
     """Per part: rows that were known, and that depend on samples which are unknown after undoing."""
-    valid = compared.base.valid_samples(undone)
+    valid = compared.base.mask_valid_samples(undone)
     return tuple(
         mask & ~_mark_interior(valid_mask, compared.gap_reach)
         for mask, valid_mask in zip(side.masks, valid, strict=True)
@@ -276,10 +276,12 @@ def _correct_for_slope(compared: ComparedBase, side: RecordingSet, curve: Curve)
     """Factor on the errors for a curve g, whose slope would scale them: the larger of 1 over the geometric mean of |g'|
     (the Jacobian) and 1 over the factor by which g scales the errors of the set's own base. Either factor alone would
     favour a curve that is flat where errors are large, or steep where the sets differ least."""
-    weights = weights_of(side.white.T @ side.white) * compared.columns[0] / compared.columns
+    weights = solve_residual_weights(side.white.T @ side.white) * compared.columns[0] / compared.columns
     rows = np.concatenate([part[mask] for part, mask in zip(side.rows, side.masks, strict=True)])
     errors = rows @ weights
-    predicted = (compared.base.values(rows) if isinstance(compared.base, AutoregressiveBase) else rows[:, 0]) - errors
+    predicted = (
+        compared.base.reconstruct_response(rows) if isinstance(compared.base, AutoregressiveBase) else rows[:, 0]
+    ) - errors
     rms = max(float(np.sqrt(np.mean(errors**2))), 1e-300)
     slope = np.maximum(np.abs(curve(predicted + rms) - curve(predicted - rms)) / (2 * rms), 1e-6)
     scaled = max(float(np.mean((curve(predicted + errors) - curve(predicted)) ** 2)), 1e-300)

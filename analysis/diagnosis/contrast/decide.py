@@ -13,8 +13,8 @@ from scipy.special import stdtrit
 
 from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
 from analysis.diagnosis.contrast.rank_faults import FOLDS
-from analysis.diagnosis.data.correlated_residuals import bootstrap_draws
-from analysis.diagnosis.effect_words import noun_of
+from analysis.diagnosis.data.correlated_residuals import draw_bootstrap_blocks
+from analysis.diagnosis.effect_words import get_noun
 from analysis.diagnosis.settings import (
     BOOTSTRAP_DRAWS,
     BOOTSTRAP_LEVEL,
@@ -82,7 +82,7 @@ def choose_fault(comparison: Comparison, responses: int) -> Decision:
     other_axes = [rival.fault.axis for rival in peers if rival.fault.effect == best.fault.effect]
     reason = ""
     if better_failed:
-        reason = f"{noun_of(better_failed[0].fault.effect)} explains more, but is not significant itself"
+        reason = f"{get_noun(better_failed[0].fault.effect)} explains more, but is not significant itself"
     elif best.share < FAULT_MAIN_PART:
         reason = (
             f"it explains {100 * best.share:.0f} % of the difference between these recordings: the main cause is "
@@ -156,7 +156,7 @@ def _is_inseparable(best: JudgedFault, rival: JudgedFault, comparison: Compariso
     """Whether the error of `rival` exceeds that of the best too little to distinguish them, or not significantly
     (bootstrap over blocks)."""
     excess_errors = rival.errors - best.errors
-    draws = bootstrap_draws(len(excess_errors))
+    draws = draw_bootstrap_blocks(len(excess_errors))
     return bool(
         excess_errors.sum() <= _least_gap(best, comparison)
         or np.quantile(excess_errors[draws].sum(axis=1), BOOTSTRAP_LEVEL) <= 0
@@ -167,7 +167,9 @@ def _is_significantly_better(refinement: JudgedFault, best: JudgedFault) -> bool
     """Whether a fault that contains the best as a special case has a significantly smaller error (bootstrap over
     blocks)."""
     error_reduction = best.errors - refinement.errors
-    return bool(np.quantile(error_reduction[bootstrap_draws(len(error_reduction))].sum(axis=1), BOOTSTRAP_LEVEL) > 0)
+    return bool(
+        np.quantile(error_reduction[draw_bootstrap_blocks(len(error_reduction))].sum(axis=1), BOOTSTRAP_LEVEL) > 0
+    )
 
 
 def _compute_gap(rival: JudgedFault, best: JudgedFault) -> float:
@@ -186,7 +188,7 @@ def _least_gap(best: JudgedFault, comparison: Comparison) -> float:
 
 def _estimate_probability_of_best(best: JudgedFault, rivals: Sequence[JudgedFault]) -> float:
     """Share of bootstrap draws over blocks in which no rival has a smaller error than the best."""
-    draws = bootstrap_draws(len(best.errors))
+    draws = draw_bootstrap_blocks(len(best.errors))
     is_first = np.ones(BOOTSTRAP_DRAWS, dtype=np.bool_)
     for rival in rivals:
         is_first &= (rival.errors - best.errors)[draws].sum(axis=1) >= 0

@@ -2,7 +2,7 @@
 
 Per driven axis, F = M a + D v + K q + c + sum of w phi(q, v): linear regression of the force on the motion of all
 measured channels, a constant, and nonlinear laws phi that lower the cross-validated error (`balance.regression`). The
-laws only make the base accurate; none of them is named.
+laws only make the base accurate; none of them is named. `bases` and `compared_base` use it.
 """
 
 from collections.abc import Sequence
@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.balance.law import Law, scales_of
-from analysis.diagnosis.balance.laws import cogging_law, laws_of, likely_pitches
-from analysis.diagnosis.balance.motion import Motion, band_pass, compute_motions
-from analysis.diagnosis.balance.regression import Regression, keep_laws, regression_of
+from analysis.diagnosis.balance.laws import find_likely_pitches, make_cogging_law, make_laws
+from analysis.diagnosis.balance.motion import Motion, compute_motions, filter_band_pass
+from analysis.diagnosis.balance.regression import Regression, build_regression, keep_laws
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.settings import BASE_LAW_GAIN, MOST_BASE_LAWS
 from analysis.diagnosis.types import Mask
@@ -35,14 +35,15 @@ class ForceBase:
     lowest_hz: float = 0.0
     """Lower end of the band (Hz), see `Motion`."""
 
-    def rows(
+    def build_rows(
         self, parts: Sequence[Part], reusable_rows: tuple[FloatArray, ...] | None = None
     ) -> tuple[FloatArray, ...]:
-        """Per part, (kept samples, 1 + columns): the force first. reusable_rows: rows of parts with the same motion,
-        whose columns are reused, so that only the force is filtered again."""
+        """Build the rows of each part, (kept samples, 1 + columns): the force first. reusable_rows: rows of parts with
+        the same motion, whose columns are reused, so that only the force is filtered again."""
         if reusable_rows is not None:
             commands = (
-                band_pass(part.command[:, [self.axis]], part.rate_hz, self.band_hz, self.lowest_hz) for part in parts
+                filter_band_pass(part.command[:, [self.axis]], part.rate_hz, self.band_hz, self.lowest_hz)
+                for part in parts
             )
             step = round(parts[0].rate_hz / self.rate_hz)
             return tuple(
@@ -51,37 +52,37 @@ class ForceBase:
             )
         motions = compute_motions([part.to_observed() for part in parts], self.band_hz)
         targets = [motion.decimate(motion.force[:, [self.axis]]) for motion in motions]
-        base_regression = regression_of(motions, self.axis, (), self.turns)
+        base_regression = build_regression(motions, self.axis, (), self.turns)
         part_rows = []
         for target, motion, base in zip(targets, motions, base_regression.columns, strict=True):
             law_columns = [motion.decimate(law.columns(motion, law.numbers)) for law in self.laws]
             part_rows.append(np.hstack([target, base, *law_columns]))
         return tuple(part_rows)
 
-    def valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
+    def mask_valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
         """Per part, mask of its rows (kept samples,): known samples more than a filter length from the part's ends."""
         return tuple(
-            motion.valid_samples(part.known)
+            motion.mask_valid_samples(part.known)
             for motion, part in zip(
                 compute_motions([part.to_observed() for part in parts], self.band_hz), parts, strict=True
             )
         )
 
 
-def force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceBase:
-    """Base model of one axis, with laws selected: first of the general laws, then with cogging at the pitches that the
-    residual force shows. motions: of the compared recordings; all known samples are fitted to."""
+def build_force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceBase:
+    """Build the base model of one axis: select laws first among the general laws, then with cogging at the pitches that
+    the residual force shows. motions: of the compared recordings; all known samples are fitted to."""
     scales = [scales_of(motions, channel, rotational) for channel in range(len(motions[0].channels))]
     turns = any(scale.turns for scale in scales)
-    regression = regression_of(motions, axis, list(laws_of(motions, rotational)), turns)
-    residuals = regression.remainder(regression.columns_of(_select_laws(regression)))
+    regression = build_regression(motions, axis, list(make_laws(motions, rotational)), turns)
+    residuals = regression.compute_residuals(regression.select_columns(_select_laws(regression)))
     cogging_laws = [
-        cogging_law(channel, pitch, scale)
+        make_cogging_law(channel, pitch, scale)
         for channel, scale in enumerate(scales)
-        for pitch in likely_pitches(motions, residuals, channel, scale)
+        for pitch in find_likely_pitches(motions, residuals, channel, scale)
     ]
     if cogging_laws:
-        regression = regression_of(motions, axis, (*regression.laws, *cogging_laws), turns)
+        regression = build_regression(motions, axis, (*regression.laws, *cogging_laws), turns)
     return ForceBase(
         axis,
         keep_laws(regression, _select_laws(regression)).laws,
@@ -93,18 +94,18 @@ def force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceB
 
 
 def _select_laws(regression: Regression) -> tuple[int, ...]:
-    """Indices of the laws by forward selection: adds the best law while it lowers the cross-validated squared error by
+    """Select laws (indices) by forward selection: add the best law while it lowers the cross-validated squared error by
     at least the share `BASE_LAW_GAIN`, up to `MOST_BASE_LAWS` laws."""
-    laws: tuple[int, ...] = ()
-    error = float(regression.cross_validated_errors(regression.columns_of(laws)).sum())
-    while len(laws) < MOST_BASE_LAWS:
+    selected: tuple[int, ...] = ()
+    error = float(regression.cross_validate(regression.select_columns(selected)).sum())
+    while len(selected) < MOST_BASE_LAWS:
         trials = [
-            (float(regression.cross_validated_errors(regression.columns_of((*laws, number))).sum()), number)
-            for number in range(len(regression.laws))
-            if number not in laws
+            (float(regression.cross_validate(regression.select_columns((*selected, law_index))).sum()), law_index)
+            for law_index in range(len(regression.laws))
+            if law_index not in selected
         ]
         if not trials or min(trials)[0] > (1 - BASE_LAW_GAIN) * error:
             break
-        error, best = min(trials)
-        laws = (*laws, best)
-    return laws
+        error, best_law = min(trials)
+        selected = (*selected, best_law)
+    return selected

@@ -3,7 +3,7 @@
 The base is fitted to both sets at once, so that it is never extrapolated to states that only one set has visited.
 Undoing a fault changes the rows of one set by (size) x (change for size 1): exactly where the fault is linear, and to
 first order about size 1 elsewhere. The products of the rows and of their changes, block by block, are sufficient
-statistics.
+statistics. `rank_faults` and `try_faults` call this.
 """
 
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ RIDGE = 1e-9
 """Ridge relative to the mean power of the columns. By hand."""
 LARGEST_PRODUCT = 1e16
 """Product of columns above which undoing a fault with bounded sizes counts as ill-conditioned. By hand."""
-ROUNDS = 3
+MOST_NEWTON_STEPS = 3
 """Largest number of Gauss-Newton steps."""
 
 
@@ -42,32 +42,34 @@ class Grams:
         limit = LARGEST_PRODUCT if np.isfinite(variant.upper_bound) else np.inf
         return bool(np.isfinite(self.blocks).all() and np.abs(self.blocks).max(initial=0.0) < limit)
 
-    def spread(self, sizes: FloatArray) -> FloatArray:
-        """(width, k): the matrix that turns the products into those of the rows with faults of these sizes undone."""
+    def build_undoing_matrix(self, sizes: FloatArray) -> FloatArray:
+        """Build the matrix T (width, k) for which T P T' are the products, with faults of these sizes undone, from the
+        products P (k, k) of the columns and their changes."""
         matrix = np.zeros((self.width, self.blocks.shape[1]))
         matrix[:, : self.width] = np.eye(self.width)
-        first = self.width
+        first_column = self.width
         for size, columns in zip(sizes, self.changed_columns, strict=True):
-            matrix[columns, first + np.arange(len(columns))] = size
-            first += len(columns)
+            matrix[columns, first_column + np.arange(len(columns))] = size
+            first_column += len(columns)
         return matrix
 
-    def change(self, weights: FloatArray) -> FloatArray:
-        """(sizes, k): the error's change with each size, as a sum of columns."""
+    def build_error_change(self, weights: FloatArray) -> FloatArray:
+        """Build (sizes, k): the derivative of the residual by each size, as weights of the columns and their changes.
+        weights: (width,) of the residual."""
         matrix = np.zeros((len(self.changed_columns), self.blocks.shape[1]))
-        first = self.width
-        for number, columns in enumerate(self.changed_columns):
-            matrix[number, first : first + len(columns)] = weights[columns]
-            first += len(columns)
+        first_column = self.width
+        for size_index, columns in enumerate(self.changed_columns):
+            matrix[size_index, first_column : first_column + len(columns)] = weights[columns]
+            first_column += len(columns)
         return matrix
 
     def undo_sizes(self, sizes: FloatArray) -> FloatArray:
-        """(blocks, width, width): products of the rows with faults of these sizes undone."""
-        spread = self.spread(sizes)
-        return np.asarray(spread @ self.blocks @ spread.T)
+        """Compute (blocks, width, width): products of the rows with faults of these sizes undone."""
+        undoing = self.build_undoing_matrix(sizes)
+        return np.asarray(undoing @ self.blocks @ undoing.T)
 
     def sum_blocks(self, blocks: Sequence[int]) -> FloatArray:
-        """(k, k): sum of the products of these blocks."""
+        """Sum the products of these blocks, (k, k)."""
         return np.asarray(self.blocks[list(blocks)].sum(axis=0))
 
 
@@ -111,15 +113,16 @@ class Fit:
 
 
 def fit_sizes(pairs: Sequence[Pair], variant: Variant | None) -> Fit:
-    """The sizes with the least error, with every base fitted to both sets. variant: None = no fault. Raises
-    numpy.linalg.LinAlgError where the normal equations are singular."""
+    """Fit the sizes by Gauss-Newton steps, with every base fitted to both sets (variable projection; Golub and Pereyra,
+    SIAM J. Numer. Anal. 10:413, 1973). variant: None = no fault. Raises numpy.linalg.LinAlgError where the normal
+    equations are singular."""
     if variant is None:
         return _fit_at(pairs, np.zeros(0))
     sizes = _find_starting_sizes(variant)
-    for _ in range(ROUNDS):
+    for _ in range(MOST_NEWTON_STEPS):
         gradients, grams = np.zeros(len(sizes)), np.zeros((len(sizes), len(sizes)))
         for pair in pairs:
-            gradient, gram = _newton_terms(pair, sizes)
+            gradient, gram = _compute_newton_terms(pair, sizes)
             gradients += gradient
             grams += gram
         grams += 1e-9 * max(float(np.trace(grams)) / len(grams), 1e-300) * np.eye(len(grams))
@@ -132,83 +135,94 @@ def fit_sizes(pairs: Sequence[Pair], variant: Variant | None) -> Fit:
 
 
 def _fit_at(pairs: Sequence[Pair], sizes: FloatArray) -> Fit:
-    return Fit(sizes, sum((_errors(pair, sizes) for pair in pairs), np.zeros(1)))
+    """Fit the bases with faults of these sizes undone; errors are summed over the pairs."""
+    return Fit(sizes, sum((_compute_block_errors(pair, sizes) for pair in pairs), np.zeros(1)))
 
 
-def error_with_sizes(pairs: Sequence[Pair], sizes: FloatArray) -> float:
-    """Sum of squares with faults of these sizes undone."""
-    return float(sum(_errors(pair, sizes).sum() for pair in pairs))
+def compute_error(pairs: Sequence[Pair], sizes: FloatArray) -> float:
+    """Compute the sum of squares over all blocks with faults of these sizes undone."""
+    return float(sum(_compute_block_errors(pair, sizes).sum() for pair in pairs))
 
 
 def _find_starting_sizes(variant: Variant) -> FloatArray:
+    """Starting sizes: 1 about which a variant is linearised (bounds above 0), else 0."""
     count = len(variant.undo)
     return np.ones(count) if variant.lower_bound > 0 else np.zeros(count)
 
 
-def weights_of(products: FloatArray) -> FloatArray:
-    """(width,): 1, then minus the least-squares weights of the other columns: rows times this vector are residuals."""
+def solve_residual_weights(products: FloatArray) -> FloatArray:
+    """Solve the ridge regression of the first column on the others. Returns (width,): 1, then minus their weights, so
+    that rows times this vector are residuals. products: (width, width)."""
     gram, cross = products[1:, 1:], products[1:, 0]
     weights = np.linalg.solve(_add_ridge(gram), cross)
     return np.concatenate([[1.0], -weights])
 
 
-def error_of_own_fit(gram: FloatArray) -> float:
-    """Residual sum of squares with weights fitted to these products alone."""
-    weights = weights_of(gram)
+def compute_own_fit_error(gram: FloatArray) -> float:
+    """Compute the residual sum of squares with weights fitted to these products (width, width) alone."""
+    weights = solve_residual_weights(gram)
     return max(float(weights @ gram @ weights), 0.0)
 
 
-def _joint_products(pair: Pair, sizes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Products with the fault (k, k), the matrix `Grams.spread`, and (width, width) those of all rows, fault undone."""
-    undone_products, spread = pair.undone_sum, pair.undone.spread(_pad_sizes(pair, sizes))
-    return undone_products, spread, np.asarray(spread @ undone_products @ spread.T + pair.unchanged_sum)
+def _compute_joint_products(pair: Pair, sizes: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Compute the products with the fault (k, k), the matrix of `Grams.build_undoing_matrix`, and the products
+    (width, width) of all rows with the fault undone."""
+    undone_products, undoing = pair.undone_sum, pair.undone.build_undoing_matrix(_pad_sizes(pair, sizes))
+    return undone_products, undoing, np.asarray(undoing @ undone_products @ undoing.T + pair.unchanged_sum)
 
 
 def _pad_sizes(pair: Pair, sizes: FloatArray) -> FloatArray:
+    """The sizes; zeros for every size of the pair where `sizes` is empty, as without a fault."""
     return sizes if len(sizes) else np.zeros(len(pair.undone.changed_columns))
 
 
-def _newton_terms(pair: Pair, sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Half the gradient and half the Gauss-Newton Hessian of the error by the sizes, with the base's weights eliminated
-    (variable projection)."""
-    undone_products, spread, joint = _joint_products(pair, sizes)
-    weights = weights_of(joint)
-    change = pair.undone.change(weights)
-    slope = change @ undone_products @ (spread.T @ weights)
-    cross = change @ undone_products @ spread.T[:, 1:]
+def _compute_newton_terms(pair: Pair, sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Compute half the gradient and half the Gauss-Newton Hessian of the error by the sizes, with the base's weights
+    eliminated (variable projection)."""
+    undone_products, undoing, joint = _compute_joint_products(pair, sizes)
+    weights = solve_residual_weights(joint)
+    change = pair.undone.build_error_change(weights)
+    slope = change @ undone_products @ (undoing.T @ weights)
+    cross = change @ undone_products @ undoing.T[:, 1:]
     squares = change @ undone_products @ change.T
     return np.asarray(slope), np.asarray(squares - cross @ np.linalg.solve(_add_ridge(joint[1:, 1:]), cross.T))
 
 
 def _add_ridge(gram: FloatArray) -> FloatArray:
+    """The Gram matrix (k, k) with `RIDGE` times its mean diagonal element added to its diagonal."""
     return np.asarray(gram + (RIDGE * float(np.trace(gram)) / len(gram) + 1e-300) * np.eye(len(gram)))
 
 
-def _errors(pair: Pair, sizes: FloatArray) -> FloatArray:
-    """(blocks with, then without): sums of squares, with weights fitted to all blocks with the fault undone."""
-    _, spread, joint = _joint_products(pair, sizes)
-    weights = weights_of(joint)
-    extended_weights = spread.T @ weights
+def _compute_block_errors(pair: Pair, sizes: FloatArray) -> FloatArray:
+    """Compute the sum of squares of each block, those with the fault first, then those without, with weights fitted to
+    all blocks with the fault undone."""
+    _, undoing, joint = _compute_joint_products(pair, sizes)
+    weights = solve_residual_weights(joint)
+    extended_weights = undoing.T @ weights
     blocks = pair.undone.blocks[list(pair.undone_blocks)]
-    undone_errors = np.einsum("i,bij,j->b", extended_weights, blocks, extended_weights) / _growth(pair, spread)
+    undone_errors = np.einsum("i,bij,j->b", extended_weights, blocks, extended_weights) / _compute_error_growth(
+        pair, undoing
+    )
     unchanged_errors = [float(weights @ products @ weights) for products in pair.unchanged]
     return np.asarray(np.maximum(np.concatenate([undone_errors, np.array(unchanged_errors)]), 0.0))
 
 
-def _growth(pair: Pair, spread: FloatArray) -> float:
-    """Factor by which undoing the fault raises the error of the blocks' own base, up to `may_grow`."""
+def _compute_error_growth(pair: Pair, undoing: FloatArray) -> float:
+    """Compute the factor (1 to `Pair.may_grow`) by which undoing the fault raises the error of a base that is fitted to
+    the blocks with the fault alone."""
     if pair.may_grow <= 1.0:
         return 1.0
     products = pair.undone_sum[: pair.undone.width, : pair.undone.width]
-    growth = error_of_own_fit(spread @ pair.undone_sum @ spread.T) / max(error_of_own_fit(products), 1e-300)
+    growth = compute_own_fit_error(undoing @ pair.undone_sum @ undoing.T) / max(compute_own_fit_error(products), 1e-300)
     return float(np.clip(growth, 1.0, pair.may_grow))
 
 
-def held_out_error(pairs: Sequence[Pair], sizes: FloatArray, left_out: Sequence[int]) -> float:
-    """Sum of squares of blocks that were left out, with sizes and base weights of the others."""
+def compute_held_out_error(pairs: Sequence[Pair], sizes: FloatArray, held_out_blocks: Sequence[int]) -> float:
+    """Compute the sum of squares of the held-out blocks (indices in `Pair.undone`), with weights of the base fitted to
+    the blocks of the pairs. sizes: fitted to these pairs."""
     error = 0.0
     for pair in pairs:
-        _, spread, joint = _joint_products(pair, sizes)
-        extended_weights = spread.T @ weights_of(joint)
-        error += max(float(extended_weights @ pair.undone.sum_blocks(left_out) @ extended_weights), 0.0)
+        _, undoing, joint = _compute_joint_products(pair, sizes)
+        extended_weights = undoing.T @ solve_residual_weights(joint)
+        error += max(float(extended_weights @ pair.undone.sum_blocks(held_out_blocks) @ extended_weights), 0.0)
     return error

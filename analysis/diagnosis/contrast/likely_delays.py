@@ -13,7 +13,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase
 from analysis.diagnosis.contrast.compared_base import REACH, ComparedBase, apply_filter
 from analysis.diagnosis.contrast.fault import ClockRate
-from analysis.diagnosis.contrast.joint_products import weights_of
+from analysis.diagnosis.contrast.joint_products import solve_residual_weights
 from analysis.diagnosis.contrast.sensor_base import SensorBase
 from analysis.diagnosis.settings import CLOCK_FASTEST, CONTRAST_BLOCKS, LATE_STEP
 from equalizer.effects.starts.response_starts import lateness
@@ -58,10 +58,10 @@ def _select_device_bases(compared_bases: Sequence[ComparedBase]) -> list[Compare
 def _split_errors(compared: ComparedBase, rows: FloatArray) -> FloatArray:
     """(n, 2): whitened contributions r of the responses and c of the commands to the errors r - c of a part's rows,
     with the weights fitted to the clean set; without `REACH` rows at either end."""
-    weights = weights_of(compared.clean.white.T @ compared.clean.white) / compared.columns
+    weights = solve_residual_weights(compared.clean.white.T @ compared.clean.white) / compared.columns
     is_command = np.arange(len(weights)) == 0
     if isinstance(compared.base, AutoregressiveBase):
-        is_command = compared.base.command_columns(len(weights))
+        is_command = compared.base.mask_command_columns(len(weights))
     return apply_filter(compared.whitening, rows @ np.column_stack([weights * ~is_command, -weights * is_command]))[
         REACH:-REACH
     ]

@@ -7,7 +7,7 @@ import numpy as np
 
 from analysis.diagnosis.data.measured_motion import fill_gaps
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.data.observed_parts import part_of, parts_of
+from analysis.diagnosis.data.observed_parts import cut_part, find_parts
 from analysis.diagnosis.settings import PART_LEAST_SAMPLES, PART_MOST_SAMPLES
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording
@@ -60,11 +60,11 @@ def split_into_parts(recordings: Sequence[Recording]) -> tuple[Part, ...]:
     of a recording are used, and parts shorter than `PART_LEAST_SAMPLES` are left out."""
     parts: list[Part] = []
     for recording in recordings:
-        for start, stop in parts_of(recording):
+        for start, stop in find_parts(recording):
             first = max(start, len(recording) - PART_MOST_SAMPLES)
             if first >= stop:
                 continue
-            known_indices = np.flatnonzero(_finite_samples(part_of(recording, first, stop)))
+            known_indices = np.flatnonzero(_finite_samples(cut_part(recording, first, stop)))
             if len(known_indices) and known_indices[-1] - known_indices[0] + 1 >= PART_LEAST_SAMPLES:
                 parts.append(_fill_part(recording, first + int(known_indices[0]), first + int(known_indices[-1]) + 1))
     return tuple(parts)
@@ -76,7 +76,7 @@ def _finite_samples(part: Recording) -> Mask:
 
 
 def _fill_part(recording: Recording, start: int, stop: int) -> Part:
-    part = part_of(recording, start, stop)
+    part = cut_part(recording, start, stop)
     position = None if part.position is None else fill_gaps(part.position.samples)
     return Part(
         part,

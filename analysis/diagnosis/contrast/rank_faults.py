@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.motion import Motion
-from analysis.diagnosis.contrast.actuator_faults import actuator_faults
+from analysis.diagnosis.contrast.actuator_faults import make_actuator_faults
 from analysis.diagnosis.contrast.bases import (
     bases_of,
     compute_unexplained_share,
@@ -34,25 +34,19 @@ from analysis.diagnosis.contrast.force_base import ForceBase
 from analysis.diagnosis.contrast.joint_products import (
     Fit,
     Pair,
-    error_of_own_fit,
-    error_with_sizes,
+    compute_error,
+    compute_held_out_error,
+    compute_own_fit_error,
     fit_sizes,
-    held_out_error,
 )
 from analysis.diagnosis.contrast.likely_delays import suggest_clock_rates, suggest_delays_s
-from analysis.diagnosis.contrast.mechanism_faults import mechanism_faults
+from analysis.diagnosis.contrast.mechanism_faults import make_mechanism_faults
 from analysis.diagnosis.contrast.part import Part, split_into_parts
-from analysis.diagnosis.contrast.sensor_base import sensor_bases
-from analysis.diagnosis.contrast.sensor_faults import faults_of_all, sensor_faults, sensor_misalignment
+from analysis.diagnosis.contrast.sensor_base import build_sensor_bases
+from analysis.diagnosis.contrast.sensor_faults import make_misalignment_fault, make_sensor_faults, make_shared_faults
 from analysis.diagnosis.contrast.try_faults import ALL_BLOCKS, TriedFaults, TriedVariant, restrict_sizes, try_faults
-from analysis.diagnosis.data.correlated_residuals import bootstrap_draws
-from analysis.diagnosis.settings import (
-    BALANCE_HOLDS,
-    BOOTSTRAP_LEVEL,
-    CONTRAST_BLOCKS,
-    LATE_STEP,
-    LEAST_FAULT_GAIN,
-)
+from analysis.diagnosis.data.correlated_residuals import draw_bootstrap_blocks
+from analysis.diagnosis.settings import BALANCE_HOLDS, BOOTSTRAP_LEVEL, CONTRAST_BLOCKS, LATE_STEP, LEAST_FAULT_GAIN
 from analysis.diagnosis.types import Mask, TimeBudget
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -99,7 +93,7 @@ def _prepare_bases(
     # `motions` is empty where none was measured.
     motion_of = {id(part.recording): motion for part, motion in zip((*clean, *faulty), motions, strict=False)}
     compared_bases = [compare_base(base, clean, faulty) for base in bases]
-    for base in sensor_bases(clean, band_hz, step):
+    for base in build_sensor_bases(clean, band_hz, step):
         with suppress(ValueError):  # too few valid rows: the other bases are compared
             compared_bases.append(compare_base(base, clean, faulty))
     row_s = compared_bases[0].row_s
@@ -109,15 +103,15 @@ def _prepare_bases(
     rotational = recording.is_rotational
     for axis, name in enumerate(recording.command.channels):
         if has_time_axis:
-            faults += mechanism_faults(axis, name, motions, lambda part: motion_of[id(part.recording)], rotational)
+            faults += make_mechanism_faults(axis, name, motions, lambda part: motion_of[id(part.recording)], rotational)
         if not recording.meta.get("imposed"):
-            faults += actuator_faults(axis, name, (*clean, *faulty), by_force, rows)
+            faults += make_actuator_faults(axis, name, (*clean, *faulty), by_force, rows)
     for channel, name in enumerate(recording.response.channels):
-        faults += sensor_faults(channel, name, (*clean, *faulty), rows)
+        faults += make_sensor_faults(channel, name, (*clean, *faulty), rows)
     if len(recording.response.channels) > 1:
-        faults += faults_of_all((*clean, *faulty), rows)
+        faults += make_shared_faults((*clean, *faulty), rows)
     if {name[-1:] for name in recording.response.channels} == {"x", "y", "z"}:
-        faults.append(sensor_misalignment())
+        faults.append(make_misalignment_fault())
     return compared_bases, faults
 
 
@@ -132,7 +126,7 @@ def _judge_faults(compared_bases: Sequence[ComparedBase], trial: TriedFaults) ->
         key=lambda judged_fault: float(judged_fault.errors.sum()),
     )
     folds = zip(SIXTHS, _leave_out_sixths(unchanged_pairs), strict=True)
-    held_out_squares = sum(held_out_error(fold_pairs, np.zeros(0), left_out) for left_out, fold_pairs in folds)
+    held_out_squares = sum(compute_held_out_error(fold_pairs, np.zeros(0), left_out) for left_out, fold_pairs in folds)
     clean, faulty = [pair.unchanged for pair in unchanged_pairs], [pair.undone.blocks for pair in unchanged_pairs]
     control_excesses = [
         max(_yield_control_excesses([np.array(products) for products in side])) for side in (clean, faulty)
@@ -189,7 +183,7 @@ def _yield_control_excesses(sides: Sequence[FloatArray]) -> Iterator[float]:
     over the sum of separate fits, less 1. sides: per base, the set's products (blocks, k, k)."""
 
     def error(blocks: Sequence[int]) -> float:
-        return sum(error_of_own_fit(side[list(blocks)].sum(axis=0)) for side in sides)
+        return sum(compute_own_fit_error(side[list(blocks)].sum(axis=0)) for side in sides)
 
     joint_error = error(ALL_BLOCKS)
     for stretch in CONTROL_STRETCHES:
@@ -209,7 +203,7 @@ def _judge_fault(
     allowed = restrict_sizes(variant)
     allowed_fits = [fit_sizes(fold_pairs, allowed) for fold_pairs in folds] if variant.exact else fits
     held_out_squares = sum(
-        held_out_error(fold_pairs, fold_fit.sizes, left_out)
+        compute_held_out_error(fold_pairs, fold_fit.sizes, left_out)
         for left_out, fold_pairs, fold_fit in zip(SIXTHS, folds, allowed_fits, strict=True)
     )
     # The negative control takes long, and a fault with hardly any gain needs none.
@@ -220,7 +214,7 @@ def _judge_fault(
     )
     median_control_gain = max(float(np.median(gains)), 0.0)
     errors = fit.errors * (1 + median_control_gain)
-    draws = bootstrap_draws(len(errors))
+    draws = draw_bootstrap_blocks(len(errors))
     drawn_gains = baseline_fit.errors[draws].sum(axis=1) / np.maximum(errors[draws].sum(axis=1), 1e-300) - 1
     # With a separate base for each set, errors are white with rms 1: their sum of squares is the number of samples.
     error, excess = float(errors.sum()), baseline_fit.error - samples
@@ -295,4 +289,4 @@ def _yield_control_gains(
         for stretch in CONTROL_STRETCHES:
             other_blocks = [block for block in ALL_BLOCKS if block not in stretch]
             pairs = [Pair(grams, stretch, tuple(grams.undo_sizes(common_sizes)[other_blocks])) for grams in products]
-            yield error_with_sizes(pairs, common_sizes) / max(fit_sizes(pairs, variant).error, 1e-300) - 1
+            yield compute_error(pairs, common_sizes) / max(fit_sizes(pairs, variant).error, 1e-300) - 1

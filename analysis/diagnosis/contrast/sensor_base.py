@@ -1,7 +1,8 @@
 """Base model that predicts one sensor from another: a velocity or acceleration from the differentiated position.
 
 The prediction is a linear regression on the differentiated position at neighbouring times (a short FIR filter) and a
-constant. No physics of the device is involved, so that a difference between recordings is a fault of a sensor.
+constant. No physics of the device is involved, so that a difference between recordings is a fault of a sensor. Used by
+`rank_faults`.
 """
 
 from collections.abc import Sequence
@@ -9,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.balance.motion import differentiate, low_pass_filter
+from analysis.diagnosis.balance.motion import differentiate, filter_low_pass
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.settings import SENSOR_TAPS
 from analysis.diagnosis.types import Mask
@@ -23,53 +24,54 @@ class SensorBase:
 
     channel: int
     """Index of the channel in the response and in the position."""
-    times: int
+    differentiations: int
     """Number of differentiations from the position channel's quantity to that of the response."""
     band_hz: float
     """Upper end of the band to which both signals are filtered, Hz."""
     step: int
     """Decimation after filtering: one of this many samples is kept."""
 
-    def rows(
+    def build_rows(
         self, parts: Sequence[Part], reusable_rows: tuple[FloatArray, ...] | None = None
     ) -> tuple[FloatArray, ...]:
-        """Per part (kept, 1 + columns): the filtered reading; its regressors, which are the differentiated position
-        from `SENSOR_TAPS` rows before to as many after, and 1. reusable_rows: not used."""
-        return tuple(self._rows(part) for part in parts)
+        """Build the rows of each part, (kept, 1 + columns): the filtered reading; its regressors, the differentiated
+        position from `SENSOR_TAPS` rows before to as many after, and 1. reusable_rows: not used."""
+        return tuple(self._build_part_rows(part) for part in parts)
 
-    def valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
+    def mask_valid_samples(self, parts: Sequence[Part]) -> tuple[Mask, ...]:
         """Per part, mask of its rows: known samples that are more than one period of `band_hz` from the part's ends."""
         masks = []
         for part in parts:
-            edge = int(part.rate_hz / self.band_hz) + 1
-            valid = part.known.copy()
-            valid[:edge] = False
-            valid[max(len(valid) - edge, 0) :] = False
-            masks.append(valid[:: self.step][SENSOR_TAPS:-SENSOR_TAPS])
+            edge_samples = int(part.rate_hz / self.band_hz) + 1
+            valid_mask = part.known.copy()
+            valid_mask[:edge_samples] = False
+            valid_mask[max(len(valid_mask) - edge_samples, 0) :] = False
+            masks.append(valid_mask[:: self.step][SENSOR_TAPS:-SENSOR_TAPS])
         return tuple(masks)
 
-    def _rows(self, part: Part) -> FloatArray:
+    def _build_part_rows(self, part: Part) -> FloatArray:
+        """Build the rows (kept, 1 + columns) of one part, see `build_rows`; the part must have a position."""
         assert part.position is not None
-        reading = low_pass_filter(part.response[:, [self.channel]], part.rate_hz, self.band_hz)[:: self.step]
-        differentiated = differentiate(part.position[:, [self.channel]], part.rate_hz, self.band_hz, self.times)[
-            :: self.step
-        ]
-        count = len(reading) - 2 * SENSOR_TAPS
-        neighbours = [differentiated[shift : shift + count] for shift in range(2 * SENSOR_TAPS + 1)]
-        return np.hstack([reading[SENSOR_TAPS : SENSOR_TAPS + count], *neighbours, np.ones((count, 1))])
+        reading = filter_low_pass(part.response[:, [self.channel]], part.rate_hz, self.band_hz)[:: self.step]
+        differentiated = differentiate(
+            part.position[:, [self.channel]], part.rate_hz, self.band_hz, self.differentiations
+        )[:: self.step]
+        row_count = len(reading) - 2 * SENSOR_TAPS
+        neighbours = [differentiated[shift : shift + row_count] for shift in range(2 * SENSOR_TAPS + 1)]
+        return np.hstack([reading[SENSOR_TAPS : SENSOR_TAPS + row_count], *neighbours, np.ones((row_count, 1))])
 
 
-def sensor_bases(parts: Sequence[Part], band_hz: float, step: int) -> tuple[SensorBase, ...]:
-    """One base per response channel whose quantity is a derivative of the measured position channel. None without a
-    position, without a time axis (infinite band), or where the numbers of channels differ."""
+def build_sensor_bases(parts: Sequence[Part], band_hz: float, step: int) -> tuple[SensorBase, ...]:
+    """Build a base for each response channel whose quantity is a time derivative of the position channel's quantity.
+    Empty without a position, without a time axis (infinite band), or where the numbers of channels differ."""
     recording = parts[0].recording
     if recording.position is None or parts[0].position is None or not np.isfinite(band_hz):
         return ()
     if parts[0].position.shape[1] != parts[0].response.shape[1]:
         return ()
     orders = [
-        (DERIVATIVE_OF_QUANTITY.get(response_order, -1), DERIVATIVE_OF_QUANTITY.get(position_order, 9))
-        for response_order, position_order in zip(
+        (DERIVATIVE_OF_QUANTITY.get(response_quantity, -1), DERIVATIVE_OF_QUANTITY.get(position_quantity, 9))
+        for response_quantity, position_quantity in zip(
             recording.response.quantities, recording.position.quantities, strict=True
         )
     ]

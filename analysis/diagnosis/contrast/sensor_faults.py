@@ -1,4 +1,4 @@
-"""Faults of a sensor, each as the transformation of its readings y that undoes it, given for size 1.
+"""Faults of a sensor, each as the transformation of its readings y that removes it, for size 1 (see `rank_faults`).
 
     sensor_gain    y / gain                  sensor_nonlinearity     x with y = x + c x^3
     sensor_offset  y - shift                 sensor_asymmetry        x with y = x + c x^2
@@ -7,7 +7,7 @@
     clock_drift    y(t / (1 + rate error))   sensor_misalignment     y + R y, R skew-symmetric (three axes)
     sensor_lag     (y(t) - k y(t - Dt)) / (1 - k), k = exp(-Dt / T)
 
-T: delay or time constant in s; Dt: time from one row of the base to the next; ramp: `actuator_faults.drift_shape`.
+T: delay or time constant in s; Dt: time from one row of the base to the next; ramp: `compute_drift_shape`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -18,11 +18,11 @@ import numpy as np
 
 from analysis.diagnosis.contrast.actuator_faults import (
     EARLIER_DRIFT_SHARES,
-    GRID,
+    GRID_SIZE,
     SIZE_RANGE,
-    delays_to_try,
-    drift_shape,
-    median_frequency_hz,
+    choose_trial_delays_s,
+    compute_drift_shape,
+    compute_median_frequency_hz,
 )
 from analysis.diagnosis.contrast.fault import (
     ALL_CHANNELS,
@@ -45,205 +45,213 @@ ReadingChange = Callable[[FloatArray, float], FloatArray]
 """Function that removes a fault: readings of one channel (n,) and their rate (Hz) to readings without the fault."""
 WIDE_RANGE = (0.5, 1.6)
 """Range of sizes, as `SIZE_RANGE`, for faults that act nearly in proportion to their size."""
-GAINS = (0.35, 0.5, 0.62, 0.75, 0.85, 0.92, 0.96, 1.04, 1.08, 1.15, 1.25, 1.4, 1.6, 2.0, 2.6)
-"""Gains about which the fault is linearised; the fit of its size covers the gains between neighbours."""
-SHIFTS = (0.03, 0.1, 0.3, 0.7, 1.2)
+TRIAL_GAINS = (0.35, 0.5, 0.62, 0.75, 0.85, 0.92, 0.96, 1.04, 1.08, 1.15, 1.25, 1.4, 1.6, 2.0, 2.6)
+"""Gains that are tried; the fit of the size covers the gains between neighbours."""
+OFFSET_SHARES = (0.03, 0.1, 0.3, 0.7, 1.2)
 """Offsets and drifts that are tried, relative to the standard deviation of the channel."""
 NONLINEARITY_SHARES = (0.02, 0.06, 0.15, 0.3)
 """Nonlinearity errors at the largest reading, as a share of it."""
-PLAYS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
+BACKLASH_SHARES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
 """Gaps of a backlash before the sensor, relative to the standard deviation of the channel."""
-CLOCK_DELAYS = (*np.geomspace(0.004, 0.2, GRID // 2).tolist(), *np.arange(0.35, 2.0, 0.15).tolist())
+CLOCK_DELAYS = (*np.geomspace(0.004, 0.2, GRID_SIZE // 2).tolist(), *np.arange(0.35, 2.0, 0.15).tolist())
 """Delays of a clock at the end of the file that are tried, in periods of the median frequency: first a logarithmic
 grid, then steps of less than half a period."""
-IN_UNITS = ("sensor_offset", "sensor_drift")
+UNIT_DEPENDENT_FAULTS = ("sensor_offset", "sensor_drift")
 """Faults that channels can share only if they have the same unit."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Channel:
-    """The response channels with a fault, and the size of their readings."""
+    """The response channels with a fault, and the magnitude of their readings in the channel's unit."""
 
-    numbers: tuple[int, ...]
+    indices: tuple[int, ...]
     """Indices of the channels: a single one, or all."""
     name: str
     """Name of the channel; empty for all."""
     rms: float
     """Standard deviation of the readings, of the largest channel."""
-    top: float
+    peak: float
     """Largest magnitude of the readings."""
 
-    def fault(self, effect: str, variants: Sequence[Variant], simpler: tuple[str, ...] = ()) -> Fault:
-        site = self.numbers[0] if self.name else ALL_CHANNELS
+    def make_fault(self, effect: str, variants: Sequence[Variant], simpler: tuple[str, ...] = ()) -> Fault:
+        """Make a fault of these channels. simpler: faults that it contains as special cases."""
+        site = self.indices[0] if self.name else ALL_CHANNELS
         return Fault(effect, "sensor", self.name, site, tuple(variants), simpler)
 
-    def undo_by(self, read: ReadingChange) -> Undo:
-        """The function that applies `read` to these channels of a part."""
+    def make_undo(self, undo_readings: ReadingChange) -> Undo:
+        """Make the function that applies `undo_readings` to these channels of a part."""
 
         def undo(part: Part) -> Part:
             response = part.response.copy()
-            for number in self.numbers:
-                response[:, number] = read(response[:, number], part.rate_hz)
+            for index in self.indices:
+                response[:, index] = undo_readings(response[:, index], part.rate_hz)
             return replace(part, response=response)
 
         return undo
 
 
-def sensor_faults(number: int, name: str, parts: Sequence[Part], rows: Rows) -> Iterator[Fault]:
-    """All faults of response channel `number`. parts: all compared ones, whose range the grids span. rows: spacing of
-    the base's rows, and likely delays and clock rates."""
-    readings = np.concatenate([part.response[:, number] for part in parts])
-    channel = _Channel((number,), name, float(np.std(readings)) or 1.0, float(np.abs(readings).max(initial=0.0)) or 1.0)
+def make_sensor_faults(index: int, name: str, parts: Sequence[Part], rows: Rows) -> Iterator[Fault]:
+    """Make all faults of response channel `index`. parts: all compared ones, whose range the grids span. rows: spacing
+    of the base's rows, and likely delays and clock rates."""
+    readings = np.concatenate([part.response[:, index] for part in parts])
+    channel = _Channel((index,), name, float(np.std(readings)) or 1.0, float(np.abs(readings).max(initial=0.0)) or 1.0)
     longest = max(parts, key=lambda part: len(part.response))
-    yield from _common_faults(channel, parts, longest.response[:, number], rows)
+    yield from _make_common_faults(channel, parts, longest.response[:, index], rows)
     shares = [side * share for share in NONLINEARITY_SHARES for side in (1.0, -1.0)]
-    yield channel.fault("sensor_nonlinearity", [_nonlinearity(channel, share, 3, "cubic") for share in shares])
-    yield channel.fault("sensor_asymmetry", [_nonlinearity(channel, share, 2, "square") for share in shares])
-    yield channel.fault("sensor_play", [_backlash(channel, share * channel.rms) for share in PLAYS])
+    yield channel.make_fault("sensor_nonlinearity", [_make_power_law(channel, share, 3, "cubic") for share in shares])
+    yield channel.make_fault("sensor_asymmetry", [_make_power_law(channel, share, 2, "square") for share in shares])
+    yield channel.make_fault("sensor_play", [_make_backlash(channel, share * channel.rms) for share in BACKLASH_SHARES])
     for other_channel in range(longest.response.shape[1]):
-        if other_channel != number:
-            yield _cross_axis_sensitivity(channel, other_channel)
+        if other_channel != index:
+            yield _make_cross_axis_fault(channel, other_channel)
 
 
-def faults_of_all(parts: Sequence[Part], rows: Rows) -> Iterator[Fault]:
-    """Faults that all channels share, as those of one supply, filter or logger. parts: as in `sensor_faults`."""
+def make_shared_faults(parts: Sequence[Part], rows: Rows) -> Iterator[Fault]:
+    """Make the faults of all channels together, as of one supply, filter or logger. See `make_sensor_faults`."""
     readings = np.vstack([part.response for part in parts])
-    sizes = np.std(readings, axis=0)
-    largest = int(np.argmax(sizes))
+    channel_rms = np.std(readings, axis=0)
+    loudest = int(np.argmax(channel_rms))
     peak = float(np.abs(readings).max(initial=0.0)) or 1.0
-    channel = _Channel(tuple(range(readings.shape[1])), "", float(sizes[largest]) or 1.0, peak)
+    channel = _Channel(tuple(range(readings.shape[1])), "", float(channel_rms[loudest]) or 1.0, peak)
     longest = max(parts, key=lambda part: len(part.response))
     has_one_unit = len(set(longest.recording.response.units)) == 1
-    for fault in _common_faults(channel, parts, longest.response[:, largest], rows):
-        if has_one_unit or fault.effect not in IN_UNITS:
+    for fault in _make_common_faults(channel, parts, longest.response[:, loudest], rows):
+        if has_one_unit or fault.effect not in UNIT_DEPENDENT_FAULTS:
             yield fault
 
 
-def _common_faults(channel: _Channel, parts: Sequence[Part], samples: FloatArray, rows: Rows) -> Iterator[Fault]:
-    """Faults that a single channel or all channels together may have. samples: (n,), readings of the longest part."""
+def _make_common_faults(channel: _Channel, parts: Sequence[Part], samples: FloatArray, rows: Rows) -> Iterator[Fault]:
+    """Make the faults that one channel or all together may have. samples: (n,), readings of the longest part."""
     longest = max(parts, key=lambda part: len(part.response))
-    times = delays_to_try(samples, longest.rate_hz)
-    yield channel.fault("sensor_gain", [_gain(channel, gain) for gain in GAINS])
-    shifts = [side * share * channel.rms for share in SHIFTS for side in (1.0, -1.0)]
-    yield channel.fault("sensor_offset", [_offset(channel, shift) for shift in shifts])
-    drifts = [_drift(channel, shift, earlier_share) for shift in shifts for earlier_share in EARLIER_DRIFT_SHARES]
-    yield replace(channel.fault("sensor_drift", drifts, ("sensor_offset",)), varies=True)
-    yield channel.fault("logger_offset", [
-        *(_logger_offset(channel, time_s, longest.rate_hz) for time_s in times),
-        *(fix_size(_logger_offset(channel, time_s, longest.rate_hz), rows.late_step_s) for time_s in rows.late_s),
+    delays_s = choose_trial_delays_s(samples, longest.rate_hz)
+    yield channel.make_fault("sensor_gain", [_make_gain(channel, gain) for gain in TRIAL_GAINS])
+    offsets = [side * share * channel.rms for share in OFFSET_SHARES for side in (1.0, -1.0)]
+    yield channel.make_fault("sensor_offset", [_make_offset(channel, offset) for offset in offsets])
+    drifts = [_make_drift(channel, offset, earlier) for offset in offsets for earlier in EARLIER_DRIFT_SHARES]
+    yield replace(channel.make_fault("sensor_drift", drifts, ("sensor_offset",)), varies=True)
+    yield channel.make_fault("logger_offset", [
+        *(_make_logger_offset(channel, time_s, longest.rate_hz) for time_s in delays_s),
+        *(fix_size(_make_logger_offset(channel, time_s, longest.rate_hz), rows.late_step_s) for time_s in rows.late_s),
     ])  # fmt: skip
-    lags = [time_s for time_s in times if time_s * longest.rate_hz >= 0.1 * rows.lag_samples]
-    yield channel.fault("sensor_lag", [_lag(channel, time_s, longest.rate_hz, rows.lag_samples) for time_s in lags])
-    period = longest.rate_hz / median_frequency_hz(samples, longest.rate_hz)
-    rates = [side * delay * period / longest.file_length for delay in CLOCK_DELAYS for side in (1.0, -1.0)]
+    lags = [time_s for time_s in delays_s if time_s * longest.rate_hz >= 0.1 * rows.lag_samples]
+    yield channel.make_fault(
+        "sensor_lag", [_make_lag(channel, time_s, longest.rate_hz, rows.lag_samples) for time_s in lags]
+    )
+    period_samples = longest.rate_hz / compute_median_frequency_hz(samples, longest.rate_hz)
+    rates = [side * delay * period_samples / longest.file_length for delay in CLOCK_DELAYS for side in (1.0, -1.0)]
     runs_on = (True, False) if any(part.start > 0 for part in parts) else (True,)
     clocks = [
-        _clock_drift(channel, rate, run_on, parts) for rate in rates if abs(rate) < CLOCK_FASTEST for run_on in runs_on
+        _make_skew(channel, rate, run_on, parts) for rate in rates if abs(rate) < CLOCK_FASTEST for run_on in runs_on
     ]
     clocks += [
-        fix_size(_clock_drift(channel, clock.rate, clock.runs_on, parts), 1e6 * clock.step) for clock in rows.clocks
+        fix_size(_make_skew(channel, clock.rate, clock.runs_on, parts), 1e6 * clock.step) for clock in rows.clocks
     ]
-    yield replace(channel.fault("clock_drift", clocks), varies=True)
+    yield replace(channel.make_fault("clock_drift", clocks), varies=True)
 
 
-def _backlash(channel: _Channel, gap: float) -> Variant:
+def _make_backlash(channel: _Channel, gap: float) -> Variant:
+    """A backlash before the sensor. gap: its full width, in the channel's unit."""
     return Variant(
-        (channel.undo_by(lambda y, rate: _undo_play(y, gap)),), proportional_parameter("gap", gap), *WIDE_RANGE
+        (channel.make_undo(lambda y, rate: _undo_play(y, gap)),), proportional_parameter("gap", gap), *WIDE_RANGE
     )
 
 
 def _undo_play(y: FloatArray, gap: float) -> FloatArray:
-    """(n,): the motion that drives a reading y (n,) through a backlash: it leads the reading by half the gap, reverses
-    at an extreme of the reading, and has crossed the gap when the reading reverses. In between, the lead changes with
-    the square of time."""
-    side = np.sign(bristle_bend(y, REVERSAL_OF_GAP * gap))
-    lead = 0.5 * side
-    reversals = np.flatnonzero(side[1:] * side[:-1] < 0) + 1
+    """Estimate (n,): the motion that drives a reading y (n,) through a backlash. It leads the reading by half the gap,
+    reverses at an extreme of the reading, and has crossed the gap when the reading reverses. In between, the lead
+    changes with the square of time."""
+    direction = np.sign(bristle_bend(y, REVERSAL_OF_GAP * gap))
+    lead = 0.5 * direction
+    reversals = np.flatnonzero(direction[1:] * direction[:-1] < 0) + 1
     for start, reversal in pairwise([0, *reversals.tolist()]):
-        excursion = side[reversal - 1] * y[start:reversal]
+        excursion = direction[reversal - 1] * y[start:reversal]
         extreme = start + int(np.argmax(excursion))
         end = extreme + int(np.flatnonzero(excursion[extreme - start :] > excursion.max() - REVERSAL_OF_GAP * gap)[-1])
-        crossed = (np.arange(extreme, reversal) - extreme) / max(end - extreme, 1)
-        lead[extreme:reversal] = side[reversal - 1] * (0.5 - np.minimum(crossed, 1.0) ** 2)
+        crossed_share = (np.arange(extreme, reversal) - extreme) / max(end - extreme, 1)
+        lead[extreme:reversal] = direction[reversal - 1] * (0.5 - np.minimum(crossed_share, 1.0) ** 2)
     return np.asarray(y + gap * lead)
 
 
-def _cross_axis_sensitivity(channel: _Channel, other_channel: int) -> Fault:
-    """Cross-talk: another channel's signal in this one."""
-    (own_channel,) = channel.numbers
+def _make_cross_axis_fault(channel: _Channel, other_channel: int) -> Fault:
+    """Cross-axis sensitivity: the reading of this channel contains that of another one, times the size."""
+    (own_channel,) = channel.indices
 
     def undo(part: Part) -> Part:
         response = part.response.copy()
         response[:, own_channel] -= part.response[:, other_channel]
         return replace(part, response=response)
 
-    return channel.fault("cross_axis_sensitivity", [Variant((undo,), proportional_parameter("from_next"))])
+    return channel.make_fault("cross_axis_sensitivity", [Variant((undo,), proportional_parameter("from_next"))])
 
 
-def _gain(channel: _Channel, gain: float) -> Variant:
-    undo = channel.undo_by(lambda y, rate: y / gain)
-    gain_at: Callable[[float], float] = lambda size: 1 / (1 + size * (1 / gain - 1))  # noqa: E731
-    at_size = lambda size: _gain(channel, gain_at(size))  # noqa: E731
-    return Variant((undo,), lambda s: {"gain": gain_at(float(s[0]))}, *SIZE_RANGE, gain, at_size=at_size)
+def _make_gain(channel: _Channel, gain: float) -> Variant:
+    """A wrong gain, linearised about `gain`; its size is 1 there, and 0 at gain 1."""
+    undo = channel.make_undo(lambda y, rate: y / gain)
+    compute_gain: Callable[[float], float] = lambda size: 1 / (1 + size * (1 / gain - 1))  # noqa: E731
+    at_size = lambda size: _make_gain(channel, compute_gain(size))  # noqa: E731
+    return Variant((undo,), lambda s: {"gain": compute_gain(float(s[0]))}, *SIZE_RANGE, gain, at_size=at_size)
 
 
-def _offset(channel: _Channel, shift: float) -> Variant:
-    return Variant((channel.undo_by(lambda y, rate: y - shift),), proportional_parameter("offset", shift), *WIDE_RANGE)
+def _make_offset(channel: _Channel, shift: float) -> Variant:
+    """A constant offset, in the channel's unit."""
+    return Variant(
+        (channel.make_undo(lambda y, rate: y - shift),), proportional_parameter("offset", shift), *WIDE_RANGE
+    )
 
 
-def _drift(channel: _Channel, total: float, earlier_share: float) -> Variant:
+def _make_drift(channel: _Channel, total: float, earlier_share: float) -> Variant:
+    """An offset that grows linearly to `total`. earlier_share: share of it before the file began."""
+
     def undo(part: Part) -> Part:
         response = part.response.copy()
-        response[:, list(channel.numbers)] -= total * drift_shape(part, earlier_share)[:, None]
+        response[:, list(channel.indices)] -= total * compute_drift_shape(part, earlier_share)[:, None]
         return replace(part, response=response)
 
     return Variant((undo,), proportional_parameter("total", total), *WIDE_RANGE)
 
 
-def _logger_offset(channel: _Channel, time_s: float, rate_hz: float) -> Variant:
+def _make_logger_offset(channel: _Channel, time_s: float, rate_hz: float) -> Variant:
+    """Readings recorded `time_s` late. rate_hz: of the longest part, for the noise gain of interpolation."""
+
     def undo(part: Part) -> Part:
         delay_samples = time_s * part.rate_hz
-        undone = channel.undo_by(lambda y, rate: shift_samples(y[:, None], -delay_samples)[:, 0])(part)
+        undone = channel.make_undo(lambda y, rate: shift_samples(y[:, None], -delay_samples)[:, 0])(part)
         return replace(undone, known=part.known & (np.arange(len(part.known)) < len(part.known) - delay_samples))
 
-    at_size = lambda size: _logger_offset(channel, size * time_s, rate_hz)  # noqa: E731
+    at_size = lambda size: _make_logger_offset(channel, size * time_s, rate_hz)  # noqa: E731
     noise_factor = noise_gain(time_s * rate_hz)
     return Variant(
-        (undo,),
-        proportional_parameter("offset", time_s),
-        *SIZE_RANGE,
-        noise_factor=noise_factor,
-        at_size=at_size,
-        exact=True,
-    )
+        (undo,), proportional_parameter("offset", time_s), *SIZE_RANGE, noise_factor=noise_factor,
+        at_size=at_size, exact=True,
+    )  # fmt: skip
 
 
-def _lag(channel: _Channel, time_s: float, rate_hz: float, samples: int) -> Variant:
-    """A first-order low pass, y += (1 - kept) (x - y) per `samples`, inverted exactly. An autoregression predicts a row
-    from earlier rows alone, so that samples between rows must not enter here either. The low pass reduces one-step
-    prediction errors by the geometric mean of its gain, 1 - kept (Kolmogorov's formula)."""
+def _make_lag(channel: _Channel, time_s: float, rate_hz: float, samples: int) -> Variant:
+    """A first-order low pass, y += (1 - decay) (x - y) per `samples`, inverted exactly. An autoregression predicts a
+    row from earlier rows alone, so that samples between rows are not used here either. The low pass reduces one-step
+    prediction errors by the geometric mean of its gain, 1 - decay (Kolmogorov's formula)."""
     decay = float(np.exp(-samples / (time_s * rate_hz)))
-    undo = channel.undo_by(
+    undo = channel.make_undo(
         lambda y, rate: (y - decay * np.concatenate([y[:1]] * samples + [y])[: len(y)]) / (1 - decay)
     )
     parameters_of: ParametersOf = lambda s: {"bandwidth": 1 / (2 * np.pi * time_s * float(s[0]))}  # noqa: E731
-    at_size = lambda size: _lag(channel, size * time_s, rate_hz, samples)  # noqa: E731
+    at_size = lambda size: _make_lag(channel, size * time_s, rate_hz, samples)  # noqa: E731
     return Variant((undo,), parameters_of, *SIZE_RANGE, 1 - decay, at_size=at_size)
 
 
-def _nonlinearity(channel: _Channel, share: float, power: int, number: str) -> Variant:
-    top = channel.top
-    curve: Curve = lambda y: _invert_power_law(y / top, share, power) * top  # noqa: E731
-    at_size = lambda size: _nonlinearity(channel, size * share, power, number)  # noqa: E731
-    parameters_of = proportional_parameter(number, share / top ** (power - 1))
+def _make_power_law(channel: _Channel, share: float, power: int, parameter_name: str) -> Variant:
+    """A term of power 2 or 3. share: its value at the largest reading, relative to that reading."""
+    peak = channel.peak
+    curve: Curve = lambda y: _invert_power_law(y / peak, share, power) * peak  # noqa: E731
+    at_size = lambda size: _make_power_law(channel, size * share, power, parameter_name)  # noqa: E731
+    parameters_of = proportional_parameter(parameter_name, share / peak ** (power - 1))
     return Variant(
-        (channel.undo_by(lambda y, rate: curve(y)),), parameters_of, *WIDE_RANGE, curve=curve, at_size=at_size
+        (channel.make_undo(lambda y, rate: curve(y)),), parameters_of, *WIDE_RANGE, curve=curve, at_size=at_size
     )
 
 
 def _invert_power_law(y: FloatArray, share: float, power: int) -> FloatArray:
-    """(n,): x that solves y = x + share x^power, by 20 steps of Newton's method; clipped to -3 to 3. y: readings over
-    the largest."""
+    """Solve y = x + share x^power for x (n,), clipped to -3 to 3, by 20 Newton steps. y: readings over the largest."""
     x = y.copy()
     for _ in range(20):
         slope = 1 + power * share * x ** (power - 1)
@@ -251,29 +259,25 @@ def _invert_power_law(y: FloatArray, share: float, power: int) -> FloatArray:
     return np.asarray(np.clip(x, -3.0, 3.0))
 
 
-def _clock_drift(channel: _Channel, rate_error: float, runs_on: bool, parts: Sequence[Part]) -> Variant:
-    """Readings taken at t (1 + rate_error), resampled to t. runs_on: t counts from the beginning of the file, else of
-    each part."""
+def _make_skew(channel: _Channel, rate_error: float, runs_on: bool, parts: Sequence[Part]) -> Variant:
+    """Clock skew: readings taken at t (1 + rate_error), resampled to t. runs_on: whether t counts from the beginning of
+    the file, else of each part."""
 
-    def read_times(part: Part) -> FloatArray:
+    def compute_read_times(part: Part) -> FloatArray:
         offset = part.start if runs_on else 0
         return np.asarray((offset + np.arange(len(part.response))) / (1 + rate_error) - offset)
 
     def undo(part: Part) -> Part:
-        times = read_times(part)
-        undone = channel.undo_by(lambda y, rate: resample(y, times))(part)
+        times = compute_read_times(part)
+        undone = channel.make_undo(lambda y, rate: resample(y, times))(part)
         return replace(undone, known=part.known & (times >= 0) & (times <= len(times) - 1))
 
-    at_size = lambda size: _clock_drift(channel, size * rate_error, runs_on, parts)  # noqa: E731
-    noise_factor = noise_gain(np.concatenate([read_times(part) for part in parts]))
+    at_size = lambda size: _make_skew(channel, size * rate_error, runs_on, parts)  # noqa: E731
+    noise_factor = noise_gain(np.concatenate([compute_read_times(part) for part in parts]))
     return Variant(
-        (undo,),
-        proportional_parameter("ppm", 1e6 * rate_error),
-        *SIZE_RANGE,
-        noise_factor=noise_factor,
-        at_size=at_size,
-        exact=True,
-    )
+        (undo,), proportional_parameter("ppm", 1e6 * rate_error), *SIZE_RANGE, noise_factor=noise_factor,
+        at_size=at_size, exact=True,
+    )  # fmt: skip
 
 
 ROTATIONS = (
@@ -281,15 +285,16 @@ ROTATIONS = (
     ((0.0, 0.0, -1.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
     ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
 )
-"""Generators of rotations about the three axes: undoing a small turn s (rad) adds s times generator times readings."""
+"""Generators of rotations about the three axes: undoing a rotation by a small angle s (rad) adds s x generator x
+readings."""
 
 
-def sensor_misalignment() -> Fault:
+def make_misalignment_fault() -> Fault:
     """A rotation of a three-axis sensor by small angles, to first order. Its three sizes are angles in rad."""
 
-    def make_undo(turn: FloatArray) -> Undo:
-        return lambda part: replace(part, response=part.response + part.response @ turn.T)
+    def make_undo(generator: FloatArray) -> Undo:
+        return lambda part: replace(part, response=part.response + part.response @ generator.T)
 
-    undo = tuple(make_undo(np.array(turn)) for turn in ROTATIONS)
+    undo = tuple(make_undo(np.array(generator)) for generator in ROTATIONS)
     variant = Variant(undo, lambda s: {"degrees": float(np.degrees(np.linalg.norm(s)))})
     return Fault("sensor_misalignment", "sensor", "", ALL_CHANNELS, (variant,))

@@ -1,5 +1,6 @@
 """Faults that a signal's own spectrum or values show: mains hum or white noise in a response that neither the clean
-recordings nor the command have, and a quantized command."""
+recordings nor the command have, and a quantized command. Called by
+`reference.compare_with_reference`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -35,8 +36,8 @@ class SignalFault:
 
 
 def find_hum(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
-    """Mains hum that is in the faulty parts alone, with the amplitude and frequency (Hz) of its strongest channel; None
-    where there is none."""
+    """Find mains hum that is in the faulty parts alone, with the amplitude and frequency (Hz) of its strongest channel;
+    None where there is none."""
     mains_lines = [
         (*mains_line, channel)
         for channel in range(faulty[0].response.shape[1])
@@ -50,22 +51,26 @@ def find_hum(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | Non
 
 
 def find_sensor_noise(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
-    """Added white noise, which has about the same power in the highest eighth of the spectrum as in the eighth above
-    its middle; None where there is none."""
+    """Find added white noise, which has about the same power in the highest eighth of the spectrum as in the eighth
+    above its middle; None where there is none."""
     noisy_channels: list[tuple[float, int]] = []
     for channel in range(faulty[0].response.shape[1]):
         faulty_floors, clean_floors = (
             np.array(
-                [_noise_floors(part.response[:, channel], stretch) for part in parts for stretch in _stretches(part)]
+                [
+                    _estimate_noise_floors(part.response[:, channel], stretch)
+                    for part in parts
+                    for stretch in _split_into_stretches(part)
+                ]
             )
             for parts in (faulty, clean)
         )
         if not len(faulty_floors) or not len(clean_floors):
             continue
-        added = np.median(faulty_floors, axis=0) - np.median(clean_floors, axis=0)
+        added_power = np.median(faulty_floors, axis=0) - np.median(clean_floors, axis=0)
         is_louder = bool(np.all(faulty_floors.min(axis=0) > NOISE_LOUDER * clean_floors.max(axis=0)))
-        if is_louder and 1 / NOISE_EVEN < added[0] / added[1] < NOISE_EVEN:
-            noisy_channels.append((float(np.sqrt(added.mean())), channel))
+        if is_louder and 1 / NOISE_EVEN < added_power[0] / added_power[1] < NOISE_EVEN:
+            noisy_channels.append((float(np.sqrt(added_power.mean())), channel))
     if not noisy_channels:
         return None
     return SignalFault(
@@ -74,8 +79,8 @@ def find_sensor_noise(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFa
 
 
 def find_quantization(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
-    """A command whose values are multiples of a coarser step than those of the clean command; None where there is none.
-    Clean commands with few different values, such as steps, are not used."""
+    """Find a command whose values are multiples of a coarser step than those of the clean command; None where there is
+    none. Clean commands with few different values, such as steps, are not used."""
     for channel in range(faulty[0].command.shape[1]):
         faulty_values, clean_values = (
             np.concatenate([part.command[:, channel] for part in parts]) for parts in (faulty, clean)
@@ -87,15 +92,19 @@ def find_quantization(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFa
     return None
 
 
-def _stretches(part: Part) -> list[slice]:
-    """About `NOISE_STRETCHES` stretches of at least 64 samples, without those with missing samples."""
-    count = max(len(part.response) // NOISE_STRETCHES, 64)
-    starts = range(0, len(part.response) - count + 1, count)
-    return [slice(start, start + count) for start in starts if part.known[start : start + count].all()]
+def _split_into_stretches(part: Part) -> list[slice]:
+    """Split a part into about `NOISE_STRETCHES` stretches of at least 64 samples; those with missing samples are left
+    out."""
+    stretch_length = max(len(part.response) // NOISE_STRETCHES, 64)
+    starts = range(0, len(part.response) - stretch_length + 1, stretch_length)
+    return [
+        slice(start, start + stretch_length) for start in starts if part.known[start : start + stretch_length].all()
+    ]
 
 
-def _noise_floors(samples: FloatArray, stretch: slice) -> tuple[float, float]:
-    """Variance of white noise, estimated in the highest eighth of the spectrum and in the one above its middle."""
+def _estimate_noise_floors(samples: FloatArray, stretch: slice) -> tuple[float, float]:
+    """Estimate the variance of white noise in the highest eighth of the spectrum, and in the eighth above its middle,
+    by the median power. samples: (n,)."""
     stretch_samples = samples[stretch]
     window = np.hanning(len(stretch_samples))
     detrended = stretch_samples - np.linspace(stretch_samples[0], stretch_samples[-1], len(stretch_samples))
@@ -107,43 +116,44 @@ def _noise_floors(samples: FloatArray, stretch: slice) -> tuple[float, float]:
 
 
 def _find_mains_line(faulty: Sequence[Part], clean: Sequence[Part], channel: int) -> tuple[float, float] | None:
-    """Amplitude and frequency (Hz) of the largest mains line of a response; None where no line exceeds the spectrum
-    around it, or the clean recordings or the commands have it as well."""
+    """Find the largest mains line of a response: its amplitude and frequency (Hz). None where no line exceeds the
+    spectrum around it, or the clean recordings or the commands have it as well."""
     longest = max(faulty, key=lambda part: len(part.response))
-    best: tuple[float, float] | None = None
-    for mains in MAINS_HZ:
-        if longest.rate_hz < 2.5 * mains:
+    strongest: tuple[float, float] | None = None
+    for mains_hz in MAINS_HZ:
+        if longest.rate_hz < 2.5 * mains_hz:
             continue
-        ratio, amplitude, frequency_hz = _line_power_ratio(longest.response[:, channel], longest.rate_hz, mains)
-        clean_ratios = [_line_power_ratio(part.response[:, channel], part.rate_hz, mains)[0] for part in clean]
-        command_ratios = [_line_power_ratio(column, longest.rate_hz, mains)[0] for column in longest.command.T]
+        ratio, amplitude, frequency_hz = _measure_mains_line(longest.response[:, channel], longest.rate_hz, mains_hz)
+        clean_ratios = [_measure_mains_line(part.response[:, channel], part.rate_hz, mains_hz)[0] for part in clean]
+        command_ratios = [_measure_mains_line(column, longest.rate_hz, mains_hz)[0] for column in longest.command.T]
         if (
             ratio > LINE_STANDS_OUT
             and ratio > LINE_IS_NEW * max([1.0, *clean_ratios, *command_ratios])
-            and (best is None or amplitude > best[0])
+            and (strongest is None or amplitude > strongest[0])
         ):
-            best = amplitude, frequency_hz
-    return best
+            strongest = amplitude, frequency_hz
+    return strongest
 
 
-def _line_power_ratio(samples: FloatArray, rate_hz: float, mains: float) -> tuple[float, float, float]:
-    """Power of the largest line near `mains` (Hz) over the median around it, its amplitude and its frequency (Hz)."""
+def _measure_mains_line(samples: FloatArray, rate_hz: float, mains_hz: float) -> tuple[float, float, float]:
+    """Measure the largest line near `mains_hz`: its power over the median around it, its amplitude and its frequency
+    (Hz). Ratio and amplitude are 0 where the spectrum has no line there, or none around it."""
     window = np.hanning(len(samples))
     detrended = samples - np.linspace(samples[0], samples[-1], len(samples))
     power = np.abs(np.fft.rfft((detrended - detrended.mean()) * window)) ** 2
-    frequency = np.fft.rfftfreq(len(samples), 1 / rate_hz)
-    resolution = rate_hz / len(samples)
-    line_mask = np.abs(frequency - mains) <= max(MAINS_OFF_HZ, 1.5 * resolution)
-    background_mask = (np.abs(frequency - mains) <= max(6.0, 24 * resolution)) & (
-        np.abs(frequency - mains) > max(2 * MAINS_OFF_HZ, 4 * resolution)
+    frequency_hz = np.fft.rfftfreq(len(samples), 1 / rate_hz)
+    resolution_hz = rate_hz / len(samples)
+    line_mask = np.abs(frequency_hz - mains_hz) <= max(MAINS_OFF_HZ, 1.5 * resolution_hz)
+    background_mask = (np.abs(frequency_hz - mains_hz) <= max(6.0, 24 * resolution_hz)) & (
+        np.abs(frequency_hz - mains_hz) > max(2 * MAINS_OFF_HZ, 4 * resolution_hz)
     )
     if not line_mask.any() or not background_mask.any():
-        return 0.0, 0.0, mains
-    top = int(np.flatnonzero(line_mask)[np.argmax(power[line_mask])])
-    floor = max(float(np.median(power[background_mask])), 1e-300)
+        return 0.0, 0.0, mains_hz
+    peak_line = int(np.flatnonzero(line_mask)[np.argmax(power[line_mask])])
+    median_power = max(float(np.median(power[background_mask])), 1e-300)
     # Parseval over the main lobe of the Hann window, less the noise in it (its mean power is its median over log 2): so
     # the amplitude depends neither on where the tone lies between two lines, nor on the noise.
-    lobe = power[max(top - 2, 1) : top + 3]
-    tone_power = max(float(lobe.sum()) - len(lobe) * floor / np.log(2), 0.0)
+    main_lobe = power[max(peak_line - 2, 1) : peak_line + 3]
+    tone_power = max(float(main_lobe.sum()) - len(main_lobe) * median_power / np.log(2), 0.0)
     amplitude = 2 * float(np.sqrt(tone_power / (len(samples) * float(np.sum(window**2)))))
-    return float(power[top]) / floor, amplitude, float(frequency[top])
+    return float(power[peak_line]) / median_power, amplitude, float(frequency_hz[peak_line])

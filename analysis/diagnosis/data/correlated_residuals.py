@@ -1,7 +1,8 @@
-"""Statistics of residuals that are correlated from sample to sample: autocovariances, and the bootstrap over blocks.
+"""Statistics of residuals that are correlated from sample to sample: sample autocovariances and the block bootstrap.
 
-An autoregression is fitted to sample autocovariances (Yule 1927, Walker 1931). The lower bound of a gain on held-out
-data is found by resampling whole blocks, not samples (Kunsch, Ann. Stat. 17:1217, 1989).
+The autocovariances are those to which the callers (`whitened_measure`, `compared_base`) fit an autoregression (Yule
+1927, Walker 1931). The lower bound of a gain on held-out data is found by resampling blocks of samples instead of
+single samples (Kunsch, Ann. Stat. 17:1217, 1989).
 """
 
 from collections.abc import Sequence
@@ -13,30 +14,34 @@ from analysis.diagnosis.settings import BOOTSTRAP_DRAWS, BOOTSTRAP_LEVEL, BOOTST
 from equalizer.signals.signal import FloatArray
 
 
-def bootstrap_draws(block_count: int) -> npt.NDArray[np.int64]:
-    """(`BOOTSTRAP_DRAWS`, blocks): indices of blocks drawn with replacement, always the same for a number of blocks."""
+def draw_bootstrap_blocks(block_count: int) -> npt.NDArray[np.int64]:
+    """(`BOOTSTRAP_DRAWS`, blocks): indices of blocks, drawn with replacement. The seed is fixed, so that the draws are
+    the same for the same number of blocks."""
     return np.random.default_rng(BOOTSTRAP_SEED).integers(block_count, size=(BOOTSTRAP_DRAWS, block_count))
 
 
-def gain_with_bound(errors_without: FloatArray, errors_with: FloatArray) -> tuple[float, float]:
-    """Share of the error power that a law removes, and its lower bound by bootstrap over blocks.
-    errors_without, errors_with: (blocks,), sums of squares without and with the law."""
-    draws = bootstrap_draws(len(errors_without))
+def bootstrap_gain(errors_without: FloatArray, errors_with: FloatArray) -> tuple[float, float]:
+    """Gain of a law, the share of the error power that it removes, and the lower bound of the gain: the quantile
+    `BOOTSTRAP_LEVEL` of a bootstrap over blocks. errors_without, errors_with: (blocks,), sums of squares without and
+    with the law."""
+    draws = draw_bootstrap_blocks(len(errors_without))
     shares = 1 - errors_with[draws].sum(axis=1) / np.maximum(errors_without[draws].sum(axis=1), 1e-300)
     return float(1 - errors_with.sum() / max(float(errors_without.sum()), 1e-300)), float(
         np.quantile(shares, BOOTSTRAP_LEVEL)
     )
 
 
-def agrees_with_folds(held_out: Sequence[FloatArray], folds: Sequence[FloatArray]) -> bool:
-    """Whether a law has a gain on the held-out blocks, and a significant gain on these and the folds of
-    cross-validation together. held_out, folds: each a pair of errors (blocks,), without the law and with it."""
-    _, lower_bound = gain_with_bound(*(np.concatenate(errors) for errors in zip(held_out, folds, strict=True)))
-    return lower_bound > 0 and gain_with_bound(*held_out)[0] > 0
+def is_confirmed_by_folds(held_out: Sequence[FloatArray], folds: Sequence[FloatArray]) -> bool:
+    """Whether the gain of a law is positive on the held-out blocks, and its lower bound is positive on the held-out
+    blocks and the folds of cross-validation together. held_out, folds: each a pair of errors (blocks,), without the law
+    and with it."""
+    _, lower_bound = bootstrap_gain(*(np.concatenate(errors) for errors in zip(held_out, folds, strict=True)))
+    return lower_bound > 0 and bootstrap_gain(*held_out)[0] > 0
 
 
 def compute_lagged_products(series: FloatArray, largest_lag: int) -> FloatArray:
-    """(lags + 1, c): sample autocovariances, not normalised, of a time series (n, c); missing samples count as 0."""
+    """(largest_lag + 1, c): sums of x[t + k] x[t] for lags k = 0..largest_lag of each channel of a time series (n, c):
+    autocovariances, neither centred nor divided by n. A sample with a NaN in any channel counts as 0 in all."""
     finite_series: FloatArray = np.where(np.isfinite(series).all(axis=1, keepdims=True), series, 0.0)
     return np.array(
         [

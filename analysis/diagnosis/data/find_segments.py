@@ -1,8 +1,9 @@
-"""Finds periodic segments in a recording that declares none: parts whose command repeats exactly.
+"""Find periodic segments in a recording that declares none: parts whose command repeats exactly.
 
 A candidate period is the first high peak of the command's autocorrelation. It is accepted only where the command
 itself, sample by sample, repeats with it throughout the part; commands that were measured with noise, or repeat
-approximately, are not used. Without such a part, no segments are declared.
+approximately, are not used. Without such a part, no segments are declared. `prepare_recordings` and the import of
+measurements (`study.importing`) call this.
 """
 
 from collections.abc import Sequence
@@ -10,17 +11,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.data.observed_parts import MOST_PERIODS, parts_of
+from analysis.diagnosis.data.observed_parts import MOST_PERIODS, find_parts
 from analysis.diagnosis.noise.rounding import rounding_step
 from analysis.wording import conjoin
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
 
-SHORTEST = 16
+SHORTEST_PERIOD = 16
 """Shortest period that is searched for, in samples."""
 FEWEST_PERIODS = 3
 """Least number of periods of a part: the first contains the transient, and noise needs two more."""
-SHORTEST_DECLARED = 256
+SHORTEST_DECLARED_PERIOD = 256
 """Least period in samples for a diagnosis: of a shorter one an odd multiple is declared, so that odd lines stay odd."""
 REPEAT_CORRELATION, DIP_CORRELATION = 0.98, 0.7
 """Least correlation of a command with itself one period later, and level below which it must fall in between."""
@@ -30,31 +31,37 @@ EXACT_TOLERANCE = 1e-6
 """Largest difference of a command between periods, relative to its peak: rounding of numbers stored with six digits."""
 ROUNDED_TOLERANCE = 1e-3
 """Largest rms difference between periods due to rounding, relative to the command's rms."""
-MOST_SAMPLES = 2**19
-"""Number of samples in which a period is searched for, which limits the time of the correlation."""
+MOST_SEARCHED_SAMPLES = 2**19
+"""Largest number of samples in which a period is searched for; limits the computing time of the correlation."""
 LARGEST_SAMPLE = 1e100
 """Largest sample whose squares can be summed without overflow; a damaged file may hold larger ones."""
 
 
 def find_segments(recording: Recording) -> tuple[Recording, str]:
-    """The recording with the segments found, and a sentence about them; unchanged and without a sentence where it has
-    segments, or no part of its command repeats."""
+    """Find the segments. Returns the recording with them, and a sentence about them; the recording unchanged, and no
+    sentence, where it has segments, or no part of its command repeats."""
     if recording.segments:
         return recording, ""
-    parts = parts_of(recording)
-    designed = find_designed_command(recording).samples
-    periods = [exact_period(designed[start:stop]) for start, stop in parts]
+    parts = find_parts(recording)
+    designed_samples = find_designed_command(recording).samples
+    periods = [find_exact_period(designed_samples[start:stop]) for start, stop in parts]
     if not any(periods):
         return recording, ""
     segments = tuple(
-        Segment(start, stop, _segment_kind(designed[start:stop], period), _peak(recording.command, start, stop), period)
+        Segment(
+            start,
+            stop,
+            _classify_segment(designed_samples[start:stop], period),
+            _compute_peak(recording.command, start, stop),
+            period,
+        )
         for (start, stop), period in zip(parts, periods, strict=True)
     )
-    return replace(recording, segments=segments), _segments_sentence(segments)
+    return replace(recording, segments=segments), _describe_segments(segments)
 
 
 def find_designed_command(recording: Recording) -> Signal:
-    """The signal that was designed beforehand: the excitation where it was recorded and varies, else the command."""
+    """Find the signal that was designed: the excitation where it was recorded and varies, else the command."""
     excitation = recording.excitation
     if excitation is None:
         return recording.command
@@ -62,59 +69,61 @@ def find_designed_command(recording: Recording) -> Signal:
     return excitation if len(finite_samples) and np.ptp(finite_samples, axis=0).max() > 0 else recording.command
 
 
-def exact_period(command: FloatArray) -> int:
-    """Period in samples after which the command (n, m) repeats exactly; 0 where it does not, or not often enough. Where
-    the shortest period has less than `SHORTEST_DECLARED` samples, an odd multiple of it."""
+def find_exact_period(command: FloatArray) -> int:
+    """Find the period in samples after which the command (n, m) repeats exactly; 0 where it does not, or not often
+    enough. Where the shortest period has less than `SHORTEST_DECLARED_PERIOD` samples, an odd multiple of it."""
     period = find_period(command)
     if (
         not period
         or len(command) // period < FEWEST_PERIODS
-        or not _repeats_exactly(command[period:], command[:-period])
+        or not _is_exact_repeat(command[period:], command[:-period])
     ):
         return 0
-    if period >= SHORTEST_DECLARED:
+    if period >= SHORTEST_DECLARED_PERIOD:
         return period
-    # The largest odd multiple of which `MOST_PERIODS` and a period of transient fit in; it is a period, too.
+    # The largest odd multiple of which `MOST_PERIODS` and one for the transient fit into the part; it is also a period.
     periods_per_part = len(command) // period // (MOST_PERIODS + 1)
     multiple = period * max(1, periods_per_part - 1 + periods_per_part % 2)
-    return multiple if multiple >= SHORTEST_DECLARED else 0
+    return multiple if multiple >= SHORTEST_DECLARED_PERIOD else 0
 
 
 def find_period(command: FloatArray) -> int:
-    """The shortest period in samples after which the command (n, m) nearly repeats, by autocorrelation; 0 = none."""
-    used = command[:MOST_SAMPLES]
-    largest = float(np.abs(used).max(initial=0.0))
+    """Find the shortest period in samples after which the command (n, m) nearly repeats, by autocorrelation; 0 =
+    none."""
+    searched = command[:MOST_SEARCHED_SAMPLES]
+    largest = float(np.abs(searched).max(initial=0.0))
     if LARGEST_SAMPLE < largest < np.inf:
-        used = used / largest
-    spread = np.std(used, axis=0) if used.size else np.zeros(command.shape[1])
-    if not np.isfinite(used).all() or not (spread > 0).any() or len(used) < 2 * SHORTEST:
+        searched = searched / largest
+    deviation = np.std(searched, axis=0) if searched.size else np.zeros(command.shape[1])
+    if not np.isfinite(searched).all() or not (deviation > 0).any() or len(searched) < 2 * SHORTEST_PERIOD:
         return 0
-    scaled = (used[:, spread > 0] - used[:, spread > 0].mean(axis=0)) / spread[spread > 0]
-    correlation = _correlation(scaled)[: len(used) // 2 + 1]
+    scaled = (searched[:, deviation > 0] - searched[:, deviation > 0].mean(axis=0)) / deviation[deviation > 0]
+    correlation = _compute_autocorrelation(scaled)[: len(searched) // 2 + 1]
     dips = np.flatnonzero(correlation < DIP_CORRELATION)
     if not len(dips):
         return 0
-    high = np.flatnonzero(correlation[dips[0] :] > REPEAT_CORRELATION) + dips[0]
-    if not len(high) or high[0] < SHORTEST:
+    high_lags = np.flatnonzero(correlation[dips[0] :] > REPEAT_CORRELATION) + dips[0]
+    if not len(high_lags) or high_lags[0] < SHORTEST_PERIOD:
         return 0
     # The maximum of the first run of consecutive lags that are high enough.
-    last = high[0] + int(np.argmax(np.diff(np.append(high, high[-1] + 2)) > 1))
-    return int(high[0] + np.argmax(correlation[high[0] : last + 1]))
+    last_high = high_lags[0] + int(np.argmax(np.diff(np.append(high_lags, high_lags[-1] + 2)) > 1))
+    return int(high_lags[0] + np.argmax(correlation[high_lags[0] : last_high + 1]))
 
 
-def _correlation(samples: FloatArray) -> FloatArray:
-    """(n,): autocorrelation by lag, normalised by the energy of both copies where they overlap."""
+def _compute_autocorrelation(samples: FloatArray) -> FloatArray:
+    """Compute (n,): autocorrelation of samples (n, m) by lag, summed over channels and normalised by the energy of both
+    copies where they overlap."""
     n = len(samples)
-    size = 2 ** int(np.ceil(np.log2(2 * n)))
-    spectrum = np.fft.rfft(samples, size, axis=0)
-    products = np.fft.irfft(np.sum(np.abs(spectrum) ** 2, axis=1), size)[:n]
+    fft_length = 2 ** int(np.ceil(np.log2(2 * n)))
+    spectrum = np.fft.rfft(samples, fft_length, axis=0)
+    products = np.fft.irfft(np.sum(np.abs(spectrum) ** 2, axis=1), fft_length)[:n]
     energy = np.concatenate([[0.0], np.cumsum(np.sum(samples**2, axis=1))])
     lags = np.arange(n)
     overlap_energy = energy[n - lags] * (energy[n] - energy[lags])
     return np.asarray(products / np.sqrt(np.maximum(overlap_energy, np.finfo(np.float64).tiny)))
 
 
-def _repeats_exactly(later_period: FloatArray, earlier_period: FloatArray) -> bool:
+def _is_exact_repeat(later_period: FloatArray, earlier_period: FloatArray) -> bool:
     """Whether each channel repeats, up to rounding: to six digits, or by one step of its own resolution with an rms
     difference of at most `ROUNDED_TOLERANCE`."""
     if not np.isfinite(later_period).all() or not np.isfinite(earlier_period).all():
@@ -129,22 +138,23 @@ def _repeats_exactly(later_period: FloatArray, earlier_period: FloatArray) -> bo
     return True
 
 
-def _segment_kind(command: FloatArray, period: int) -> str:
-    """Kind of a segment: noise without a period, sine with nearly all power on a single line, else multisine."""
+def _classify_segment(command: FloatArray, period: int) -> str:
+    """Classify a segment: "noise" without a period, "sine" with nearly all power on one line, else "multisine"."""
     if not period:
         return "noise"
     power = np.sum(np.abs(np.fft.rfft(command[:period] - command[:period].mean(axis=0), axis=0)) ** 2, axis=1)
     return "sine" if power.max() > SINE_SHARE * power.sum() else "multisine"
 
 
-def _peak(command: Signal, start: int, stop: int) -> float:
-    """Largest magnitude of the finite samples from start to stop, over all channels; 0 without any."""
+def _compute_peak(command: Signal, start: int, stop: int) -> float:
+    """Compute the largest magnitude of the finite samples from start to stop, over all channels; 0 without any."""
     samples = command.samples[start:stop]
     finite_samples = samples[np.isfinite(samples)]
     return float(np.abs(finite_samples).max()) if finite_samples.size else 0.0
 
 
-def _segments_sentence(segments: Sequence[Segment]) -> str:
+def _describe_segments(segments: Sequence[Segment]) -> str:
+    """Describe the segments, of which at least one is periodic, in a sentence."""
     periodic = [segment for segment in segments if segment.period]
     periods = conjoin([str(period) for period in sorted({segment.period for segment in periodic})])
     levels = conjoin([f"{level:.4g}" for level in sorted({segment.amplitude for segment in periodic})])

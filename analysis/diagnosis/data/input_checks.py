@@ -7,8 +7,8 @@ from itertools import combinations
 import numpy as np
 
 from analysis.diagnosis.data.driven_response import compute_response_significance
-from analysis.diagnosis.data.observed_parts import samples_to_fit
-from analysis.diagnosis.data.recorded_conditions import weight_problems
+from analysis.diagnosis.data.observed_parts import count_fit_samples
+from analysis.diagnosis.data.recorded_conditions import find_weight_problems
 from analysis.diagnosis.settings import (
     ANSWER_DEVIATIONS,
     CYCLES_SHARE,
@@ -21,11 +21,11 @@ from analysis.diagnosis.settings import (
     SHORTEST_SAMPLES,
 )
 from equalizer.effects.placing import PlacingError, place_recorded_effects
-from equalizer.plant.linear_simulation import free_motion_rates, growth_rate
+from equalizer.plant.linear_simulation import compute_growth_rate, compute_poles
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.recording import Recording
-from equalizer.signals.recording_checks import channels_text, unusable_channels
+from equalizer.signals.recording_checks import find_unusable_channels, format_channels
 from equalizer.signals.signal import Signal
 
 
@@ -43,8 +43,8 @@ def require_comparable(
     for recording, name in zip(recordings[1:], names[1:], strict=True):
         for property_name, expected, actual in (
             ("sample rate", f"{reference.sample_rate_hz:g} Hz", f"{recording.sample_rate_hz:g} Hz"),
-            ("command", channels_text(reference.command), channels_text(recording.command)),
-            ("response", channels_text(reference.response), channels_text(recording.response)),
+            ("command", format_channels(reference.command), format_channels(recording.command)),
+            ("response", format_channels(reference.response), format_channels(recording.response)),
         ):
             if expected != actual:
                 problems.append(f"{name} has the {property_name} {actual}, {names[0]} has {expected}; {remedy}")
@@ -76,7 +76,7 @@ def require_usable_data(
             )
         elif shortness and not allow_short:
             problems += shortness
-        elif (fitted := samples_to_fit(recordings)) < LEAST_SAMPLES_TO_FIT:
+        elif (fitted := count_fit_samples(recordings)) < LEAST_SAMPLES_TO_FIT:
             problems.append(
                 f"only {fitted} samples that may be fitted have a response (and a position, if one was recorded); the "
                 "others are missing or have the role of a test"
@@ -144,7 +144,7 @@ def require_model_of(model: MechanicalModel, recordings: Sequence[Recording]) ->
         *_compare_quantities(model, first),
         *_find_impossible_model_values(model),
     )
-    problems = problems or weight_problems(model, recordings, names)
+    problems = problems or find_weight_problems(model, recordings, names)
     if not problems:
         problems = (
             *_find_unconnected_channels(model, first),
@@ -190,7 +190,7 @@ def _find_constant_signals(recordings: Sequence[Recording]) -> Iterator[str]:
         )
     for side in ("response", "position"):
         signals = [signal for recording in recordings if (signal := getattr(recording, side)) is not None]
-        for name, is_empty in unusable_channels(signals):
+        for name, is_empty in find_unusable_channels(signals):
             if is_empty:
                 yield f"{side} {name} contains only missing values"
             elif side == "response":
@@ -227,7 +227,7 @@ def _compare_quantities(model: MechanicalModel, recording: Recording) -> Iterato
     if is_rotational is not None and is_rotational != model.rotational:
         descriptions = ("translational (kg, N, m)", "rotational (kg m^2, N m, rad)")
         model_kind, recording_kind = descriptions[model.rotational], descriptions[is_rotational]
-        yield f"the model is {model_kind}, but the recording is {recording_kind}: {channels_text(recording.response)}"
+        yield f"the model is {model_kind}, but the recording is {recording_kind}: {format_channels(recording.response)}"
 
 
 def _is_rotational(recording: Recording) -> bool | None:
@@ -265,7 +265,7 @@ def _find_unconnected_channels(model: MechanicalModel, recording: Recording) -> 
 
 def _find_instability(model: MechanicalModel, recordings: Sequence[Recording]) -> Iterator[str]:
     """A sentence for a model whose motion would grow by more than exp(`MOST_GROWTH`) within the longest recording."""
-    growth_per_s = growth_rate(model)
+    growth_per_s = compute_growth_rate(model)
     longest_s = max(len(recording) / recording.sample_rate_hz for recording in recordings)
     if growth_per_s * longest_s > MOST_GROWTH:
         yield (
@@ -277,7 +277,7 @@ def _find_instability(model: MechanicalModel, recordings: Sequence[Recording]) -
 def _find_too_fast_modes(model: MechanicalModel, recording: Recording) -> Iterator[str]:
     """A sentence for a slowest mode above half the sample rate (Nyquist frequency): most likely the rate is stated a
     thousand times too low."""
-    natural_hz = np.abs(free_motion_rates(model).imag) / (2 * np.pi)
+    natural_hz = np.abs(compute_poles(model).imag) / (2 * np.pi)
     slowest_hz = min((float(mode_hz) for mode_hz in natural_hz if mode_hz > 0), default=0.0)
     if slowest_hz > recording.sample_rate_hz / 2:
         yield (

@@ -1,7 +1,8 @@
 """The measured motion of the driven axes with its noise, and tests of what drives it.
 
 A recording may be driven by a force, by an imposed motion (the force is then the response; `as_force_driven` exchanges
-the two), or not at all (free motion). Positions are needed by the force balance and by `forces`.
+the two), or not at all (free motion). Positions are needed by the force balance (`balance.motion`) and by
+the package `forces`.
 """
 
 from collections.abc import Sequence
@@ -15,8 +16,8 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalM
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-# Forces; a recording whose response is one of these quantities was driven by an imposed motion.
 _FORCES = frozenset({"force", "torque"})
+"""Quantities of force: a recording with such a response was driven by an imposed motion."""
 
 FREE = "free"
 """Value of `meta["imposed"]` of a free (undriven) motion."""
@@ -41,38 +42,39 @@ def has_motion(recording: Recording, model: MechanicalModel) -> bool:
 
 
 def choose_measured_motion(recording: Recording, model: MechanicalModel, floor: NoiseFloor) -> MeasuredMotion:
-    """The position where it was measured, else the response: a velocity is integrated by the trapezoidal rule, and its
-    noise divided by (2 pi f)². floor: noise of the recording. See `has_motion`."""
-    m, rate_hz = model.inputs, recording.sample_rate_hz
+    """Choose the position where it was measured, else the response: a velocity is integrated by the trapezoidal rule,
+    and its noise divided by (2 pi f)². floor: noise of the recording. See `has_motion`."""
+    axis_count, rate_hz = model.inputs, recording.sample_rate_hz
     if _has_position(recording, model):
         assert recording.position is not None
         noise = floor.position if floor.position is not None else floor.response
-        return MeasuredMotion(fill_gaps(recording.position.samples[:, :m]), noise.density[:, :m])
-    samples = undo_low_pass(fill_gaps(recording.response.samples[:, :m]), rate_hz, model.sensor.bandwidth_hz)
-    density = floor.response.density[:, :m]
+        return MeasuredMotion(fill_gaps(recording.position.samples[:, :axis_count]), noise.density[:, :axis_count])
+    samples = undo_low_pass(fill_gaps(recording.response.samples[:, :axis_count]), rate_hz, model.sensor.bandwidth_hz)
+    density = floor.response.density[:, :axis_count]
     if DERIVATIVE_OF_QUANTITY[model.quantity] == 0:
         return MeasuredMotion(samples, density)
     # The lowest line has one period per recording; below it, f is held there to avoid a division by zero.
-    limited_hz = np.maximum(floor.frequency_hz, rate_hz / len(recording))[:, None]
+    frequency_hz = np.maximum(floor.frequency_hz, rate_hz / len(recording))[:, None]
     position = np.zeros(samples.shape)
     position[1:] = np.cumsum(samples[1:] + samples[:-1], axis=0) / (2 * rate_hz)
-    return MeasuredMotion(position, density / (2 * np.pi * limited_hz) ** 2)
+    return MeasuredMotion(position, density / (2 * np.pi * frequency_hz) ** 2)
 
 
 def _has_position(recording: Recording, model: MechanicalModel) -> bool:
+    """Whether a position was measured, with one channel per output of the model."""
     return recording.position is not None and recording.position.samples.shape[1] == model.outputs
 
 
 def fill_gaps(samples: FloatArray) -> FloatArray:
-    """Samples (n, k), interpolated across gaps; zero where a channel has no finite sample."""
-    filled, indices = np.array(samples, dtype=np.float64), np.arange(len(samples))
-    for column in filled.T:
+    """Interpolate samples (n, k) linearly across gaps; zero where a channel has no finite sample."""
+    filled_samples, indices = np.array(samples, dtype=np.float64), np.arange(len(samples))
+    for column in filled_samples.T:
         is_finite = np.isfinite(column)
         if is_finite.any() and not is_finite.all():
             column[:] = np.interp(indices, indices[is_finite], column[is_finite])
         elif not is_finite.any():
             column[:] = 0.0
-    return filled
+    return filled_samples
 
 
 def is_quasi_static(recording: Recording) -> bool:
@@ -91,8 +93,8 @@ def is_read_as_free(recording: Recording) -> bool:
     return recording.meta.get("imposed") == FREE
 
 
-def time_unit(recording: Recording) -> str:
-    """Unit of time: s, or "sample" where the time axis is unknown, so that rates are per sample."""
+def select_time_unit(recording: Recording) -> str:
+    """Select the unit of time: s, or "sample" where the time axis is unknown, so that rates are per sample."""
     return "s" if recording.is_timed else "sample"
 
 
@@ -104,8 +106,8 @@ def is_driven(recordings: Sequence[Recording]) -> bool:
 
 
 def as_force_driven(recording: Recording) -> Recording:
-    """The recording with the measured force as the command, the imposed motion as the response, and `imposed` in its
-    meta; a recording with a changing command is not changed."""
+    """Exchange command and response of a recording with an imposed motion: the measured force becomes the command, the
+    motion the response, and `imposed` is set in its meta. Other recordings are returned unchanged."""
     is_motion_command = set(recording.command.quantities) <= set(DERIVATIVE_OF_QUANTITY) - {"voltage"}
     is_force_response = set(recording.response.quantities) <= _FORCES
     if not (
@@ -121,6 +123,6 @@ def as_force_driven(recording: Recording) -> Recording:
     )
 
 
-def all_as_force_driven(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
-    """Each recording in the form of `as_force_driven`."""
+def convert_all_to_force_driven(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
+    """Convert each recording by `as_force_driven`."""
     return tuple(as_force_driven(recording) for recording in recordings)

@@ -1,12 +1,19 @@
 """States of a model, and the missing force along each axis, estimated from measurements by a Kalman smoother.
 
-With the state x, the force u along the axes and the missing force g (a latent force modelled as a random walk; Alvarez
-and others 2009; Rogers and Friis 2021), sample by sample:
+With the state x, the force u along the axes and the missing force g, a latent force modelled as a random walk (Alvarez
+and others, Latent force models, AISTATS 2009; Rogers and Friis, Mech. Syst. Signal Process. 180:109474, 2022):
 
-    x' = A x + B (u + g)      g' = g + w      y = C x + D (u of the step before + g) + e
+    x[k+1] = A x[k] + B (u[k] + g[k])      g[k+1] = g[k] + w[k]      y[k] = C x[k] + D (u[k-1] + g[k]) + e[k]
 
-Gains are those of the steady state: the Riccati equation is solved by doubling (Anderson 1978), and the backward pass
-is that of Rauch, Tung and Striebel (1965). Unlike deconvolution, this works for plants that drift.
+The smoother has constant gains, those of the steady state. With the augmented state z = (x, g), its transition matrix
+T = [[A, B], [0, 1]], H = [C, D], and the steady covariances P of the prediction z_p and Q of the filtered state z_f:
+
+    forward     z_f[k] = z_p[k] + K (y[k] - D u[k-1] - H z_p[k])      z_p[k+1] = T z_f[k] + (B u[k], 0)
+    backward    z_s[k] = z_f[k] + S (z_s[k+1] - z_p[k+1])             S = Q Tᵀ inv(P)
+
+with the Kalman gain K (Rauch, Tung and Striebel, AIAA J. 3:1445, 1965). P solves a Riccati equation, by doubling
+(Anderson, Int. J. Control 28:295, 1978). Unlike deconvolution, this works for plants that drift. Called by
+`errors.windows`.
 """
 
 from dataclasses import dataclass
@@ -17,43 +24,44 @@ from scipy.linalg import solve_discrete_are
 
 from analysis.diagnosis.data.observed import Observed
 from equalizer.effects.simulation.sensor_path import undo_low_pass
-from equalizer.plant.linear_simulation import LinearSteps, discretise_model
+from equalizer.plant.linear_simulation import DiscreteModel, discretise_model
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
-EXPECTED_SHARE = 0.1
-"""Rms change of a missing force within `CHANGES_S`, relative to the rms of the command. By hand."""
-CHANGES_S = 0.005
-"""Time in s in which a missing force may change by `EXPECTED_SHARE`."""
+EXPECTED_CHANGE_SHARE = 0.1
+"""Expected rms change of a missing force within `CHANGE_TIME_S`, relative to the rms of the command. Chosen by hand."""
+CHANGE_TIME_S = 0.005
+"""Time (s) in which a missing force is expected to change by `EXPECTED_CHANGE_SHARE`. Chosen by hand."""
 _LEAK_SHARE = 1e-5
-"""Share of the state that is forgotten per sample: without it, unobservable states have no steady-state filter."""
+"""Decay of the state per sample, relative: without it, unobservable states have no steady-state filter."""
 _PROCESS_NOISE = 1e-12
 """Process noise of all states per sample, relative to their size: without it the Riccati equation has no stabilising
 solution."""
 _DOUBLINGS = 40
-"""Largest number of doublings, which is equivalent to running the filter over 2^40 samples."""
+"""Largest number of doublings; 40 of them are equivalent to 2^40 samples of the filter."""
 _MATRIX = types.float64[:, ::1]
-_READ = types.Array(types.float64, 2, "C", readonly=True)
+_READONLY_MATRIX = types.Array(types.float64, 2, "C", readonly=True)
 
 
-@njit(types.void(_MATRIX, _MATRIX, _MATRIX, _MATRIX, _READ, _READ, _MATRIX), cache=True, nogil=True)
-def smooth(  # noqa: C901, PLR0913 - a kernel takes flat arrays and writes its products out
-    advance: FloatArray,
+@njit(
+    types.void(_MATRIX, _MATRIX, _MATRIX, _MATRIX, _READONLY_MATRIX, _READONLY_MATRIX, _MATRIX), cache=True, nogil=True
+)
+def run_smoother(  # noqa: C901, PLR0913 - a kernel takes flat arrays and writes its products out
+    transition: FloatArray,
     observation: FloatArray,
     gain: FloatArray,
-    back: FloatArray,
-    pushed: FloatArray,
+    smoother_gain: FloatArray,
+    step_input: FloatArray,
     measured: FloatArray,
-    out: FloatArray,
+    smoothed: FloatArray,
 ) -> None:
-    """Kalman smoother of constant gains, forwards, then backwards (Rauch, Tung and Striebel 1965).
+    """Run the smoother of the module's equations: fill `smoothed` (n, s), whose first row is the initial prediction.
 
-    Fill out (n, s), the smoothed states. advance (s, s), observation (c, s), gain (s, c), back (s, s): see
-    `motion_smoother`. pushed (n, s): input of the step that begins at a sample. measured (n, c): NaN where nothing was
-    measured."""
-    n, s, c = out.shape[0], out.shape[1], observation.shape[0]
+    transition (s, s): T; observation (c, s): H; gain (s, c): K; smoother_gain (s, s): S. step_input (n, s): (B u, 0)
+    of the step that begins at a sample. measured (n, c): y - D u; a sample with a NaN is skipped."""
+    n, s, c = smoothed.shape[0], smoothed.shape[1], observation.shape[0]
     predicted = np.empty((n, s))
-    state = out[0].copy()
+    state = smoothed[0].copy()
     for k in range(n):
         predicted[k] = state
         complete = True
@@ -69,19 +77,19 @@ def smooth(  # noqa: C901, PLR0913 - a kernel takes flat arrays and writes its p
             for j in range(s):
                 for i in range(c):
                     state[j] += gain[j, i] * innovation[i]
-        out[k] = state
+        smoothed[k] = state
         for j in range(s):
-            total = pushed[k, j]
+            total = step_input[k, j]
             for i in range(s):
-                total += advance[j, i] * out[k, i]
+                total += transition[j, i] * smoothed[k, i]
             state[j] = total
     for k in range(n - 2, -1, -1):
         for j in range(s):
             total = 0.0
             for i in range(s):
-                total += back[j, i] * (out[k + 1, i] - predicted[k + 1, i])
-            state[j] = out[k, j] + total
-        out[k] = state
+                total += smoother_gain[j, i] * (smoothed[k + 1, i] - predicted[k + 1, i])
+            state[j] = smoothed[k, j] + total
+        smoothed[k] = state
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,101 +106,118 @@ class SmoothedMotion:
     """(n, m): missing force along the driven axes, in N or N m."""
 
 
-def smooth_motion(model: MechanicalModel, record: Observed, forces: FloatArray, unit: FloatArray) -> SmoothedMotion:
-    """States and missing force of a record. forces: (n, m), force along the axes over each sample's time, effects
-    included. unit: (c,), standard deviations of the measured channels. Raises numpy.linalg.LinAlgError where no filter
-    exists."""
+def smooth_motion(
+    model: MechanicalModel, record: Observed, forces: FloatArray, channel_noise: FloatArray
+) -> SmoothedMotion:
+    """Estimate states and missing force of a record. forces: (n, m), force along the axes during the step that begins
+    at a sample, effects included. channel_noise: (c,), standard deviations of the measured channels. Raises
+    numpy.linalg.LinAlgError where no stable filter exists."""
     rate_hz, m = record.recording.sample_rate_hz, model.inputs
-    steps, size = discretise_model(model, 1 / rate_hz), 2 * model.coordinates
-    advance = np.eye(size + m)
-    advance[:size, :size], advance[:size, size:] = steps.advance, steps.by_axis_force
-    advance *= 1 - _LEAK_SHARE
-    observation, direct = _observation_matrices(steps, record.measured.shape[1])
-    expected = EXPECTED_SHARE * np.sqrt(np.mean(record.command**2, axis=0)) + 1e-12
-    walk_variance = np.concatenate([np.zeros(size), expected**2 / (CHANGES_S * rate_hz)])
-    gain, back = _smoother_gains(advance, observation / unit[:, None], walk_variance, _state_sizes(steps, expected))
-    gain = gain / unit[None, :]
-    measured = _subtract_feedthrough(model, record, forces, direct)
-    pushed = np.hstack([forces @ steps.by_axis_force.T, np.zeros((len(forces), m))])
-    out = np.zeros((len(forces), size + m))
-    first = measured[np.isfinite(measured).all(axis=1)][:1]
-    if len(first):
-        out[0] = np.linalg.pinv(observation, rcond=1e-6) @ first[0]
-    smooth(
-        advance,
+    steps, state_count = discretise_model(model, 1 / rate_hz), 2 * model.coordinates
+    transition = np.eye(state_count + m)
+    transition[:state_count, :state_count], transition[:state_count, state_count:] = (
+        steps.transition,
+        steps.by_axis_force,
+    )
+    transition *= 1 - _LEAK_SHARE
+    observation, feedthrough = _build_observation_matrices(steps, record.measured.shape[1])
+    expected_force = EXPECTED_CHANGE_SHARE * np.sqrt(np.mean(record.command**2, axis=0)) + 1e-12
+    walk_variance = np.concatenate([np.zeros(state_count), expected_force**2 / (CHANGE_TIME_S * rate_hz)])
+    gain, smoother_gain = _compute_smoother_gains(
+        transition, observation / channel_noise[:, None], walk_variance, _estimate_state_sizes(steps, expected_force)
+    )
+    gain = gain / channel_noise[None, :]
+    measured = _subtract_feedthrough(model, record, forces, feedthrough)
+    step_input = np.hstack([forces @ steps.by_axis_force.T, np.zeros((len(forces), m))])
+    smoothed = np.zeros((len(forces), state_count + m))
+    first_complete = measured[np.isfinite(measured).all(axis=1)][:1]
+    if len(first_complete):
+        smoothed[0] = np.linalg.pinv(observation, rcond=1e-6) @ first_complete[0]
+    run_smoother(
+        transition,
         observation,
         np.ascontiguousarray(gain),
-        back,
-        np.ascontiguousarray(pushed),
+        smoother_gain,
+        np.ascontiguousarray(step_input),
         np.ascontiguousarray(measured),
-        out,
+        smoothed,
     )
-    axis_motion = out[:, :size] @ steps.motion[: 2 * m].T
-    return SmoothedMotion(out[:, :size], axis_motion[:, :m], axis_motion[:, m:], out[:, size:])
+    axis_motion = smoothed[:, :state_count] @ steps.motion[: 2 * m].T
+    return SmoothedMotion(smoothed[:, :state_count], axis_motion[:, :m], axis_motion[:, m:], smoothed[:, state_count:])
 
 
-def _observation_matrices(steps: LinearSteps, channels: int) -> tuple[FloatArray, FloatArray]:
-    """Observation matrix (c, s + m) of state and missing force; and that (c, m) of the force over the step before."""
+def _build_observation_matrices(steps: DiscreteModel, channels: int) -> tuple[FloatArray, FloatArray]:
+    """Observation matrix H (c, s + m) of state and missing force, and feedthrough D (c, m) of the force during the step
+    before."""
     p, m = len(steps.position), steps.by_axis_force.shape[1]
-    of_state = np.vstack([steps.response, steps.position])[:channels]
-    of_force = np.vstack([steps.response_by_axis_force, np.zeros((p, m))])[:channels]
-    return np.ascontiguousarray(np.hstack([of_state, of_force])), of_force
+    response_by_state = np.vstack([steps.response, steps.position])[:channels]
+    response_by_force = np.vstack([steps.response_by_axis_force, np.zeros((p, m))])[:channels]
+    return np.ascontiguousarray(np.hstack([response_by_state, response_by_force])), response_by_force
 
 
 def _subtract_feedthrough(
-    model: MechanicalModel, record: Observed, forces: FloatArray, direct: FloatArray
+    model: MechanicalModel, record: Observed, forces: FloatArray, feedthrough: FloatArray
 ) -> FloatArray:
-    """(n, c): measured channels without the sensor's low pass, less the direct effect of the force just before."""
+    """(n, c): measured channels without the sensor's low pass, less the feedthrough of the force in the step before."""
     measured, responses = np.array(record.measured), model.outputs
     if model.sensor.bandwidth_hz > 0:
         measured[:, :responses] = undo_low_pass(
             measured[:, :responses], record.recording.sample_rate_hz, model.sensor.bandwidth_hz
         )
-    measured[1:] -= forces[:-1] @ direct.T
+    measured[1:] -= forces[:-1] @ feedthrough.T
     return measured
 
 
-def _state_sizes(steps: LinearSteps, expected: FloatArray) -> FloatArray:
-    """(s + m,): sizes of position, velocity and force that the expected missing force reaches within `CHANGES_S`."""
-    n = len(steps.advance) // 2
-    fast = np.abs(steps.by_axis_force[n:]) @ expected / steps.step_s * CHANGES_S
-    fast = np.maximum(fast, 1e-6 * fast.max())
-    return np.concatenate([fast * CHANGES_S, fast, expected])
+def _estimate_state_sizes(steps: DiscreteModel, expected_force: FloatArray) -> FloatArray:
+    """(s + m,): scales of position, velocity and missing force: what a force of `expected_force` causes within
+    `CHANGE_TIME_S`."""
+    n = len(steps.transition) // 2
+    velocity_size = np.abs(steps.by_axis_force[n:]) @ expected_force / steps.step_s * CHANGE_TIME_S
+    velocity_size = np.maximum(velocity_size, 1e-6 * velocity_size.max())
+    return np.concatenate([velocity_size * CHANGE_TIME_S, velocity_size, expected_force])
 
 
-def _smoother_gains(
-    advance: FloatArray, observation: FloatArray, walk_variance: FloatArray, sizes: FloatArray
+def _compute_smoother_gains(
+    transition: FloatArray, observation: FloatArray, walk_variance: FloatArray, sizes: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Gains of the Kalman filter (s, c) and of the backward pass (s, s). observation: observation matrix of channels in
-    units of their noise. Solved with all states scaled to about the same size."""
-    eye = np.eye(len(observation))
-    scaled, observed = advance * sizes[None, :] / sizes[:, None], observation * sizes[None, :]
-    process_noise = np.diag(walk_variance / sizes**2) + _PROCESS_NOISE * np.eye(len(advance))
+    """Gains K (s, c) of the Kalman filter and S (s, s) of the backward pass. observation: H for channels in units of
+    their noise. walk_variance: (s,), variance of w per sample. sizes: (s,), scales of the states, by which the
+    equations are made well-conditioned."""
+    noise_covariance = np.eye(len(observation))
+    scaled_transition, scaled_observation = transition * sizes[None, :] / sizes[:, None], observation * sizes[None, :]
+    process_noise = np.diag(walk_variance / sizes**2) + _PROCESS_NOISE * np.eye(len(transition))
     try:
-        predicted = _steady_covariance(scaled, observed, process_noise)
-    except np.linalg.LinAlgError:  # states of very different sizes: by an ordered Schur form, which is slower
-        predicted = _covariance_by_schur_form(scaled, observed, process_noise)
-    gain = np.linalg.solve(observed @ predicted @ observed.T + eye, observed @ predicted).T
-    if np.abs(np.linalg.eigvals(scaled - scaled @ gain @ observed)).max() >= 1:
+        predicted_covariance = _solve_riccati_by_doubling(scaled_transition, scaled_observation, process_noise)
+    except np.linalg.LinAlgError:  # ill-conditioned: an ordered Schur form is slower, but more accurate
+        predicted_covariance = _solve_riccati_by_schur_form(scaled_transition, scaled_observation, process_noise)
+    gain = np.linalg.solve(
+        scaled_observation @ predicted_covariance @ scaled_observation.T + noise_covariance,
+        scaled_observation @ predicted_covariance,
+    ).T
+    if np.abs(np.linalg.eigvals(scaled_transition - scaled_transition @ gain @ scaled_observation)).max() >= 1:
         raise np.linalg.LinAlgError("a filter for the motion is not stable in floating point")
-    filtered = predicted - gain @ observed @ predicted
-    back = np.linalg.lstsq(predicted, scaled @ filtered, rcond=1e-13)[0].T
-    return gain * sizes[:, None], np.ascontiguousarray(back * sizes[:, None] / sizes[None, :])
+    filtered_covariance = predicted_covariance - gain @ scaled_observation @ predicted_covariance
+    smoother_gain = np.linalg.lstsq(predicted_covariance, scaled_transition @ filtered_covariance, rcond=1e-13)[0].T
+    return gain * sizes[:, None], np.ascontiguousarray(smoother_gain * sizes[:, None] / sizes[None, :])
 
 
-def _covariance_by_schur_form(advance: FloatArray, observation: FloatArray, process_noise: FloatArray) -> FloatArray:
-    """Steady prediction covariance by an ordered Schur form (SciPy), slower than by doubling. Raises
-    numpy.linalg.LinAlgError."""
+def _solve_riccati_by_schur_form(
+    transition: FloatArray, observation: FloatArray, process_noise: FloatArray
+) -> FloatArray:
+    """Steady prediction covariance P (s, s) by an ordered Schur form (SciPy). Raises numpy.linalg.LinAlgError where it
+    does not exist."""
     try:
-        return np.asarray(solve_discrete_are(advance.T, observation.T, process_noise, np.eye(len(observation))))
-    except ValueError as problem:  # not finite
-        raise np.linalg.LinAlgError(str(problem)) from problem
+        return np.asarray(solve_discrete_are(transition.T, observation.T, process_noise, np.eye(len(observation))))
+    except ValueError as error:  # not finite
+        raise np.linalg.LinAlgError(str(error)) from error
 
 
-def _steady_covariance(advance: FloatArray, observation: FloatArray, process_noise: FloatArray) -> FloatArray:
-    """Steady prediction covariance by the doubling algorithm (Anderson 1978; noise of the channels is 1). Raises
-    numpy.linalg.LinAlgError where it does not converge."""
-    transition, information, covariance = advance.T, observation.T @ observation, process_noise
+def _solve_riccati_by_doubling(
+    state_transition: FloatArray, observation: FloatArray, process_noise: FloatArray
+) -> FloatArray:
+    """Steady prediction covariance P (s, s) by the doubling algorithm (Anderson 1978), for channels with unit noise.
+    Raises numpy.linalg.LinAlgError where it does not converge."""
+    transition, information, covariance = state_transition.T, observation.T @ observation, process_noise
     for _ in range(_DOUBLINGS):
         solutions = np.linalg.solve(
             np.eye(len(transition)) + information @ covariance, np.hstack([transition, information])

@@ -1,7 +1,8 @@
 """A recording ready for comparison with a model: its signals, and its samples split into three sets (`split_samples`).
 
 The sets are those of statistical learning: training (`fit`: parameters are fitted to it), validation (`choose`: among
-explanations the best is chosen by it) and test (`test`: held out until the end, for an unbiased error).
+explanations the best is chosen by it) and test (`test`: held out until the end, for an unbiased error). All errors and
+force balances are computed from these records.
 """
 
 from collections.abc import Sequence
@@ -20,7 +21,7 @@ from analysis.diagnosis.settings import (
 )
 from analysis.diagnosis.types import Mask
 from equalizer.signals.recording import Recording, Segment
-from equalizer.signals.signal import FloatArray, runs_of
+from equalizer.signals.signal import FloatArray, find_runs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,65 +46,72 @@ class Observed:
         thirds become fit samples, the last third validation samples."""
         mask = mask & self.test
         fit, choose = self.fit.copy(), self.choose.copy()
-        for start, stop in runs_of(mask):
-            chosen = start + 2 * (stop - start) // 3
-            fit[start:chosen] = True
-            choose[chosen:stop] = True
+        for start, stop in find_runs(mask):
+            choose_start = start + 2 * (stop - start) // 3
+            fit[start:choose_start] = True
+            choose[choose_start:stop] = True
         return replace(self, fit=fit, choose=choose, test=self.test & ~mask)
 
-    def longest_held_out(self) -> int:
-        """Number of samples of the longest held-out stretch; 0 where nothing is held out."""
-        return max((stop - start for start, stop in runs_of(self.test)), default=0)
+    def compute_longest_test_stretch(self) -> int:
+        """Count the samples of the longest held-out stretch; 0 where nothing is held out."""
+        return max((stop - start for start, stop in find_runs(self.test)), default=0)
 
-    def every_other_part(self, parts: int) -> Mask:
-        """(n,): mask of the first, third, fifth … part of each held-out stretch, which is divided into `parts` equal
-        parts."""
+    def mask_alternate_parts(self, part_count: int) -> Mask:
+        """Mask (n,) of the first, third, fifth … part of each held-out stretch, which is divided into `part_count`
+        equal parts."""
         mask = np.zeros(len(self.test), dtype=np.bool_)
-        for start, stop in runs_of(self.test):
-            mask[start:stop] = (np.arange(stop - start) * parts // (stop - start)) % 2 == 0
+        for start, stop in find_runs(self.test):
+            mask[start:stop] = (np.arange(stop - start) * part_count // (stop - start)) % 2 == 0
         return mask
 
-    def held_out_levels(self) -> list[tuple[Segment, float]]:
-        """Each segment with held-out samples, and the largest magnitude of its commands."""
-        parts = [(segment, slice(segment.start, segment.stop)) for segment in self.recording.segments]
+    def list_test_levels(self) -> list[tuple[Segment, float]]:
+        """List each segment with held-out samples, and the largest magnitude of its commands."""
+        segment_samples = [(segment, slice(segment.start, segment.stop)) for segment in self.recording.segments]
         return [
-            (segment, float(np.abs(self.command[part]).max(initial=0.0)))
-            for segment, part in parts
-            if self.test[part].any()
+            (segment, float(np.abs(self.command[samples]).max(initial=0.0)))
+            for segment, samples in segment_samples
+            if self.test[samples].any()
         ]
 
-    def held_out_below(self, level: float) -> Mask:
-        """(n,): mask of the held-out samples in segments whose commands stay below `level`."""
+    def mask_test_below(self, level: float) -> Mask:
+        """Mask (n,) of the held-out samples in segments whose commands are below `level` in magnitude."""
         mask = np.zeros(len(self.test), dtype=np.bool_)
-        for segment, largest in self.held_out_levels():
+        for segment, largest in self.list_test_levels():
             mask[segment.start : segment.stop] = largest < level
         return mask & self.test
 
     def fit_to_all(self) -> "Observed":
-        """The record with fit and validation samples joined, and used for both: for explanations that are chosen by
+        """Join fit and validation samples, and use them for both: for explanations that are chosen by
         other means than validation."""
         return replace(self, fit=self.fit | self.choose, choose=self.fit | self.choose)
 
     def shorten(self) -> "Observed":
-        """The record cut after its last fit or validation sample, without a test set; `recording` itself is not cut."""
-        end = int(np.flatnonzero(self.fit | self.choose)[-1]) + 1 if (self.fit | self.choose).any() else len(self.fit)
-        no_test = np.zeros(end, dtype=np.bool_)
+        """Cut the record after its last fit or validation sample, without a test set; `recording` itself is not cut."""
+        used_length = (
+            int(np.flatnonzero(self.fit | self.choose)[-1]) + 1 if (self.fit | self.choose).any() else len(self.fit)
+        )
+        no_test = np.zeros(used_length, dtype=np.bool_)
         return Observed(
-            self.recording, self.command[:end], self.measured[:end], self.fit[:end], self.choose[:end], no_test
+            self.recording,
+            self.command[:used_length],
+            self.measured[:used_length],
+            self.fit[:used_length],
+            self.choose[:used_length],
+            no_test,
         )
 
 
 def observe(recording: Recording, responses: int) -> Observed:
-    """A recording as one part, with its samples divided by `split_samples`. responses: number of the model's outputs; a
-    position with another number of channels is left out."""
+    """Make one record of a recording, with its samples divided by `split_samples`. responses: number of the model's
+    outputs; a position with another number of channels is left out."""
     measured, complete = stack_measured_signals(recording, responses)
     fit, choose, test = (mask & complete for mask in split_samples(recording.segments, len(recording)))
     return Observed(recording, recording.command.samples, measured, fit, choose, test)
 
 
 def stack_measured_signals(recording: Recording, responses: int) -> tuple[FloatArray, Mask]:
-    """Response and position side by side, (n, c), and the mask (n,) of samples where all are finite. A position whose
-    number of channels is not `responses` is left out."""
+    """Stack response and position side by side, (n, c), with the mask (n,) of samples where all are finite. A position
+    whose number of channels is not `responses` is left out."""
     signals = [recording.response.samples]
     if recording.position is not None and recording.position.samples.shape[1] == responses:
         signals.append(recording.position.samples)
@@ -123,13 +131,13 @@ class Span:
 
 
 def find_moving_spans(response: FloatArray, parts: Sequence[tuple[int, int]]) -> tuple[Span, ...]:
-    """Parts with the end of their motion: the last sample at which any channel differs from its rest value at the
+    """Find the end of each part's motion: the last sample at which any channel differs from its rest value at the
     part's end by more than `AT_REST` of its range. response: (n, p); parts: start and end (exclusive)."""
-    return tuple(Span(start, start + _end_of_motion(response[start:stop]), stop) for start, stop in parts)
+    return tuple(Span(start, start + _find_end_of_motion(response[start:stop]), stop) for start, stop in parts)
 
 
-def _end_of_motion(samples: FloatArray) -> int:
-    """Number of samples until the end of motion, at least half of them; all where the part does not come to rest before
+def _find_end_of_motion(samples: FloatArray) -> int:
+    """Count the samples until the end of motion, at least half of them; all where the part does not come to rest before
     its last `LONGEST_TAIL`. The rest value is the median over that tail."""
     samples = samples[:, np.isfinite(samples).any(axis=0)]
     tail_start = int((1 - LONGEST_TAIL) * len(samples))
@@ -149,8 +157,8 @@ def _end_of_motion(samples: FloatArray) -> int:
 def split_samples(
     segments: tuple[Segment, ...], length: int, test_elsewhere: bool = False, spans: Sequence[Span] = ()
 ) -> tuple[Mask, Mask, Mask]:
-    """Masks (length,) of the fit, validation and test samples. test_elsewhere: whether another recording is held out
-    for the test. spans: the recording's parts; empty = one part.
+    """Split samples into fit, validation and test: three masks (length,). test_elsewhere: whether another recording is
+    held out for the test. spans: the recording's parts; empty = one part.
 
     Segments marked as test are held out. Without such marks, the last quarter of each segment is held out, in whole
     periods, so that every level is tested; where all segments have the same level, the last quarter of the time. Of the
@@ -162,26 +170,26 @@ def split_samples(
     force but no motion, is fitted.
     """
     if not segments:
-        return _roles_without_segments(spans or (Span(0, length, length),), length, test_elsewhere)
+        return _split_without_segments(spans or (Span(0, length, length),), length, test_elsewhere)
     driven_segments = [s for s in segments if s.kind != "rest"]
-    test = _segment_mask([s for s in driven_segments if s.role == "test"], length)
+    test = _mask_segments([s for s in driven_segments if s.role == "test"], length)
     fitted = [s for s in driven_segments if s.role == "fit"] or [s for s in driven_segments if s.role != "test"]
-    fit = _segment_mask(fitted, length) if fitted else ~test
+    fit = _mask_segments(fitted, length) if fitted else ~test
     if driven_segments and all(s.role == "test" for s in driven_segments):
         fit[:] = False
     elif not test.any() and not test_elsewhere:
-        test = _segment_ends(fitted, length)
+        test = _mask_segment_ends(fitted, length)
         fit &= ~test
-    choose = _middle_level(fitted, length) & fit
+    choose = _mask_middle_level(fitted, length) & fit
     if not choose.any():
         indices = np.flatnonzero(fit)
         choose[indices[int((1 - CHOOSE_SHARE) * len(indices)) :]] = True
     return fit & ~choose, choose, test
 
 
-def _roles_without_segments(spans: Sequence[Span], length: int, test_elsewhere: bool) -> tuple[Mask, Mask, Mask]:
-    """Masks (length,) of the fit, validation and test samples, by shares of each part's motion. test_elsewhere: nothing
-    is held out."""
+def _split_without_segments(spans: Sequence[Span], length: int, test_elsewhere: bool) -> tuple[Mask, Mask, Mask]:
+    """Split samples by shares of each part's motion: masks (length,) of the fit, validation and test samples.
+    test_elsewhere: whether nothing is held out."""
     fit, choose, test = (np.zeros(length, dtype=np.bool_) for _ in range(3))
     for span in spans:
         test_start = (
@@ -193,49 +201,50 @@ def _roles_without_segments(spans: Sequence[Span], length: int, test_elsewhere: 
     return fit & ~choose & ~test, choose, test
 
 
-def error_units(measured: FloatArray, noise: FloatArray) -> FloatArray:
-    """(c,): unit by which each channel's errors are divided: sqrt(noise^2 + (MODEL_FLOOR rms)^2), with the rms of the
-    noise, and the share of the signal's rms that no model predicts. measured: (n, c); noise: (c,)."""
+def compute_error_units(measured: FloatArray, noise: FloatArray) -> FloatArray:
+    """Compute (c,): unit by which each channel's errors are divided, sqrt(noise^2 + (MODEL_FLOOR rms)^2), with the rms
+    of the noise, and the share of the signal's rms that no model predicts. measured: (n, c); noise: (c,), rms."""
     rms = np.sqrt(np.nanmean(measured**2, axis=0))
     return np.asarray(np.sqrt(noise**2 + (MODEL_FLOOR * rms) ** 2))
 
 
-def _segment_mask(segments: list[Segment], length: int) -> Mask:
-    """(length,): mask of the samples in these segments."""
+def _mask_segments(segments: list[Segment], length: int) -> Mask:
+    """Mask (length,) of the samples in these segments."""
     mask = np.zeros(length, dtype=np.bool_)
     for segment in segments:
         mask[segment.start : segment.stop] = True
     return mask
 
 
-def _segment_ends(segments: list[Segment], length: int) -> Mask:
-    """(length,): mask of the last quarter of each segment, rounded to whole periods but at least one period; of the
+def _mask_segment_ends(segments: list[Segment], length: int) -> Mask:
+    """Mask (length,) of the last quarter of each segment, rounded to whole periods but at least one period; of the
     last quarter of the time where there is one level or none."""
     mask = np.zeros(length, dtype=np.bool_)
-    if len(_levels(segments)) < LEVELS_TO_STRATIFY:
-        indices = np.flatnonzero(_segment_mask(segments, length)) if segments else np.arange(length)
+    if len(_list_levels(segments)) < LEVELS_TO_STRATIFY:
+        indices = np.flatnonzero(_mask_segments(segments, length)) if segments else np.arange(length)
         mask[indices[int((1 - TEST_SHARE) * len(indices)) :]] = True
         return mask
     for segment in segments:
-        length_of_segment = segment.stop - segment.start
-        fitted_length = int((1 - TEST_SHARE) * length_of_segment)
-        if segment.period and length_of_segment >= 2 * segment.period:
+        segment_length = segment.stop - segment.start
+        fitted_length = int((1 - TEST_SHARE) * segment_length)
+        if segment.period and segment_length >= 2 * segment.period:
             fitted_length = (
-                min(-(-fitted_length // segment.period), length_of_segment // segment.period - 1) * segment.period
+                min(-(-fitted_length // segment.period), segment_length // segment.period - 1) * segment.period
             )
         mask[segment.start + fitted_length : segment.stop] = True
     return mask
 
 
-def _levels(segments: list[Segment]) -> list[float]:
-    """The different amplitudes above 0, ascending."""
+def _list_levels(segments: list[Segment]) -> list[float]:
+    """List the different amplitudes of the segments above 0, ascending."""
     return sorted({segment.amplitude for segment in segments if segment.amplitude > 0})
 
 
-def _middle_level(segments: list[Segment], length: int) -> Mask:
-    """(length,): mask of the segments of the middle level; empty with fewer than `LEVELS_TO_HOLD_ONE_BACK` levels."""
-    levels = _levels(segments)
+def _mask_middle_level(segments: list[Segment], length: int) -> Mask:
+    """Mask (length,) of the segments of the middle level; all False with fewer than `LEVELS_TO_HOLD_ONE_BACK`
+    levels."""
+    levels = _list_levels(segments)
     if len(levels) < LEVELS_TO_HOLD_ONE_BACK:
         return np.zeros(length, dtype=np.bool_)
     middle = levels[len(levels) // 2]
-    return _segment_mask([segment for segment in segments if segment.amplitude == middle], length)
+    return _mask_segments([segment for segment in segments if segment.amplitude == middle], length)

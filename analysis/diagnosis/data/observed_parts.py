@@ -1,7 +1,8 @@
 """Recordings cut into their parts (continuous stretches between gaps); each part is compared with the model by itself.
 
 The samples of each part are split into those to fit, to choose and to test by (`observed.split_samples`). Periods of a
-segment after the first `MOST_PERIODS` are used for the test only.
+segment after the first `MOST_PERIODS` are used for the test only. Called wherever recordings are
+compared with a model (`choose_measure`, `balances`, `first_model`).
 """
 
 from collections.abc import Sequence
@@ -23,45 +24,48 @@ LEAST_SAMPLES = 32
 
 
 def observe_parts(recordings: Sequence[Recording], responses: int) -> tuple[Observed, ...]:
-    """Parts of all recordings, ready for comparison. responses: number of the model's outputs; a position with another
-    number of channels is not used. Roles are those of the whole set: where a segment of any recording is marked as
-    test, no other samples are held out; where all segments are marked as test, the marks are ignored."""
-    marked = [segment.role for recording in recordings for segment in recording.segments]
-    if marked and all(role == "test" for role in marked):
+    """Cut all recordings into parts, ready for comparison. responses: number of the model's outputs; a position with
+    another number of channels is not used. Roles are those of the whole set: where a segment of any recording is marked
+    as test, no other samples are held out; where all segments are marked as test, the marks are ignored."""
+    roles = [segment.role for recording in recordings for segment in recording.segments]
+    if roles and all(role == "test" for role in roles):
         recordings = [_clear_roles(recording) for recording in recordings]
     has_test_segment = any(segment.role == "test" for recording in recordings for segment in recording.segments)
     parts: list[Observed] = []
     for recording in recordings:
         measured, complete = stack_measured_signals(recording, responses)
-        spans = find_moving_spans(recording.response.samples, parts_of(recording))
+        spans = find_moving_spans(recording.response.samples, find_parts(recording))
         fit, choose, test = split_samples(recording.segments, len(recording), has_test_segment, spans)
-        masks = (*_without_repeats(fit & complete, choose & complete, ~_surplus_periods(recording)), test & complete)
-        for start, stop in parts_of(recording):
+        masks = (
+            *_exclude_surplus_periods(fit & complete, choose & complete, ~_mask_surplus_periods(recording)),
+            test & complete,
+        )
+        for start, stop in find_parts(recording):
             part_masks: tuple[Mask, ...] = tuple(mask[start:stop] for mask in masks)
-            part = part_of(recording, start, stop)
+            part = cut_part(recording, start, stop)
             parts.append(Observed(part, part.command.samples, measured[start:stop], *part_masks))
     return tuple(parts)
 
 
-def samples_to_fit(recordings: Sequence[Recording]) -> int:
-    """Number of samples to fit that have a response, and a position where its channels are as many as the responses."""
+def count_fit_samples(recordings: Sequence[Recording]) -> int:
+    """Count the samples to fit that have a response, and a position where its channels are as many as the responses."""
     return sum(int(record.fit.sum()) for record in observe_parts(recordings, len(recordings[0].response.channels)))
 
 
-def _without_repeats(fit: Mask, choose: Mask, new: Mask) -> tuple[Mask, Mask]:
-    """The masks without surplus periods. Where no validation samples are left, the last quarter of the fit samples is
-    used."""
-    if (choose & new).any() or not (fit & new).any():
-        return fit & new, choose & new
-    indices = np.flatnonzero(fit & new)
+def _exclude_surplus_periods(fit: Mask, choose: Mask, is_used: Mask) -> tuple[Mask, Mask]:
+    """Exclude surplus periods from the masks of fit and validation samples. Where no validation samples are left, the
+    last share `CHOOSE_SHARE` of the fit samples is used. is_used: (n,), False in surplus periods."""
+    if (choose & is_used).any() or not (fit & is_used).any():
+        return fit & is_used, choose & is_used
+    indices = np.flatnonzero(fit & is_used)
     chosen_indices = indices[int((1 - CHOOSE_SHARE) * len(indices)) :]
     chosen_mask: Mask = np.zeros(len(fit), dtype=np.bool_)
     chosen_mask[chosen_indices] = True
-    return fit & new & ~chosen_mask, chosen_mask
+    return fit & is_used & ~chosen_mask, chosen_mask
 
 
-def _surplus_periods(recording: Recording) -> Mask:
-    """(n,): samples after the first `MOST_PERIODS` periods of a segment."""
+def _mask_surplus_periods(recording: Recording) -> Mask:
+    """Mask (n,) of the samples after the first `MOST_PERIODS` periods of a segment."""
     mask = np.zeros(len(recording), dtype=np.bool_)
     for segment in recording.segments:
         if segment.period > 0:
@@ -69,8 +73,9 @@ def _surplus_periods(recording: Recording) -> Mask:
     return mask
 
 
-def parts_of(recording: Recording) -> tuple[tuple[int, int], ...]:
-    """Begin and end (exclusive) of each part, as sample indices; the whole recording where `meta` names no parts."""
+def find_parts(recording: Recording) -> tuple[tuple[int, int], ...]:
+    """Find begin and end (exclusive) of each part with at least `LEAST_SAMPLES`, as sample indices; the whole recording
+    where `meta` names no such part."""
     stated_parts = recording.meta.get("parts")
     parts = [
         (int(stretch["start"]), int(stretch["stop"]))
@@ -85,8 +90,8 @@ def parts_of(recording: Recording) -> tuple[tuple[int, int], ...]:
     )
 
 
-def part_of(recording: Recording, start: int, stop: int) -> Recording:
-    """The recording from sample start to stop (exclusive), with segments cut to this range."""
+def cut_part(recording: Recording, start: int, stop: int) -> Recording:
+    """Cut the recording to samples start to stop (exclusive), with its segments cut to this range."""
     if (start, stop) == (0, len(recording)):
         return recording
     segments = [
@@ -96,8 +101,8 @@ def part_of(recording: Recording, start: int, stop: int) -> Recording:
     ]
     return replace(
         recording,
-        command=recording.command.part(start, stop),
-        response=recording.response.part(start, stop),
+        command=recording.command.select_samples(start, stop),
+        response=recording.response.select_samples(start, stop),
         position=_cut_signal(recording.position, start, stop),
         excitation=_cut_signal(recording.excitation, start, stop),
         condition=_cut_signal(recording.condition, start, stop),
@@ -107,24 +112,26 @@ def part_of(recording: Recording, start: int, stop: int) -> Recording:
 
 
 def _cut_signal(signal: Signal | None, start: int, stop: int) -> Signal | None:
-    return None if signal is None else signal.part(start, stop)
+    """Cut a signal to samples start to stop (exclusive); None without a signal."""
+    return None if signal is None else signal.select_samples(start, stop)
 
 
 def _shift_segment(segment: Segment, start: int, stop: int) -> Segment:
+    """Cut a segment to samples start to stop, counted from `start`."""
     return replace(segment, start=max(segment.start, start) - start, stop=min(segment.stop, stop) - start)
 
 
 def _clear_roles(recording: Recording) -> Recording:
-    """The recording with unmarked segments."""
+    """Clear the roles (fit, test) of the recording's segments."""
     return replace(recording, segments=tuple(replace(segment, role="") for segment in recording.segments))
 
 
-def names_of_parts(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
-    """Names of the parts in the order of `observe_parts`: the recording's name, with the part's number where there are
+def name_parts(recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
+    """Name the parts in the order of `observe_parts`: the recording's name, with the part's number where there are
     several."""
     part_names: list[str] = []
     for number, recording in enumerate(recordings):
         name = names[number] if number < len(names) else f"recording {number + 1}"
-        count = len(parts_of(recording))
+        count = len(find_parts(recording))
         part_names += [name] if count == 1 else [f"{name}, part {part + 1}" for part in range(count)]
     return tuple(part_names)

@@ -1,7 +1,8 @@
 """The model and the effects as they were during a recording.
 
 Three things may differ between recordings of one device: a mass or inertia that it carried (keys of `meta`), recorded
-conditions such as a temperature, on which effects depend, and the sign of commands.
+conditions such as a temperature, on which effects depend, and the sign of commands. The simulations of `errors` call
+this for every recording.
 """
 
 from collections.abc import Sequence
@@ -14,51 +15,52 @@ from analysis.diagnosis.data.measured_motion import fill_gaps, is_read_as_free
 from analysis.diagnosis.settings import MOST_GROWTH
 from equalizer.effects.command_sign import with_reversed_commands
 from equalizer.effects.effect import PlacedEffect
-from equalizer.plant.linear_simulation import driven_axes, growth_rate
+from equalizer.plant.linear_simulation import compute_driven_axes, compute_growth_rate
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
 ADDED_MASS, ADDED_INERTIA = "added_mass_kg", "added_inertia_kg_m2"
-"""Keys of a recording's `meta`: mass or inertia that the device carried along every driven axis, not in the model."""
+"""Keys of a recording's `meta`: mass (kg) or inertia (kg m^2) that the device carried along every driven axis, in
+addition to the model's."""
 
 
-REVERSED = "turned commands"
+REVERSED_CHANNELS = "turned commands"
 """Key of a recording's `meta`: channels of its commands that were reversed."""
 
 
 def add_carried_weight(model: MechanicalModel, recording: Recording) -> MechanicalModel:
-    """The model with the mass or inertia that the device carried along every driven axis, as the recording's `meta`
-    states."""
-    added = recording.meta.get(_key(model), 0.0)
-    return add_mass(model, float(added)) if added else model
+    """Add the mass or inertia that the device carried along every driven axis, as the recording's `meta` states."""
+    added_mass = recording.meta.get(_choose_weight_key(model), 0.0)
+    return add_mass(model, float(added_mass)) if added_mass else model
 
 
-def add_mass(model: MechanicalModel, added: float) -> MechanicalModel:
-    """The model with `added` kg (kg m^2) more mass (inertia) along every driven axis."""
-    axes = driven_axes(model)
-    return replace(model, mass=model.mass + added * axes @ axes.T)
+def add_mass(model: MechanicalModel, added_mass: float) -> MechanicalModel:
+    """Add `added_mass` kg (kg m^2) of mass (inertia) along every driven axis."""
+    driven_axes = compute_driven_axes(model)
+    return replace(model, mass=model.mass + added_mass * driven_axes @ driven_axes.T)
 
 
 def is_unstable_within(model: MechanicalModel, longest_s: float) -> bool:
     """Whether undisturbed motion grows by more than `MOST_GROWTH` (growth rate x time) within `longest_s` seconds."""
-    return growth_rate(model) * longest_s > MOST_GROWTH
+    return compute_growth_rate(model) * longest_s > MOST_GROWTH
 
 
-def effects_under_conditions(effects: Sequence[PlacedEffect], recording: Recording) -> tuple[PlacedEffect, ...]:
-    """The effects with the recording's conditions, for those that depend on conditions; missing samples of these are
+def apply_conditions(effects: Sequence[PlacedEffect], recording: Recording) -> tuple[PlacedEffect, ...]:
+    """Apply the recording's conditions to the effects that depend on conditions; missing samples of these are
     interpolated. Without recorded conditions such effects are not changed, and cannot be simulated."""
-    signal = recording.condition
-    if signal is None or all(placed.effect.with_conditions is None for placed in effects):
+    condition = recording.condition
+    if condition is None or all(placed_effect.effect.with_conditions is None for placed_effect in effects):
         return tuple(effects)
-    samples, adapted = fill_gaps(signal.samples), []
-    for placed in effects:
-        under_conditions = placed.effect.with_conditions
-        if under_conditions is not None:
-            placed = replace(
-                placed, effect=replace(placed.effect, action=under_conditions(samples, recording.sample_rate_hz))
+    samples, adapted_effects = fill_gaps(condition.samples), []
+    for placed_effect in effects:
+        with_conditions = placed_effect.effect.with_conditions
+        if with_conditions is not None:
+            placed_effect = replace(
+                placed_effect,
+                effect=replace(placed_effect.effect, action=with_conditions(samples, recording.sample_rate_hz)),
             )
-        adapted.append(placed)
-    return tuple(adapted)
+        adapted_effects.append(placed_effect)
+    return tuple(adapted_effects)
 
 
 def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel:
@@ -66,16 +68,18 @@ def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel
     may have been reversed. For a free motion, whose command is a force per unit mass, the model with unit masses."""
     if is_read_as_free(recording):
         return replace(model, mass=np.eye(len(model.mass)))
-    channels, reversed_channels = recording.command.channels, recording.meta.get(REVERSED)
+    channels, reversed_channels = recording.command.channels, recording.meta.get(REVERSED_CHANNELS)
     if not isinstance(reversed_channels, Sequence) or not set(reversed_channels) & set(channels):
         return model
     signs = [-1.0 if channel in reversed_channels else 1.0 for channel in channels]
     return with_reversed_commands(model, signs, channels, recording.response.channels)
 
 
-def weight_problems(model: MechanicalModel, recordings: Sequence[Recording], names: Sequence[str]) -> tuple[str, ...]:
-    """Errors in the stated weights of the recordings, as sentences without a full stop; empty where there are none."""
-    key = _key(model)
+def find_weight_problems(
+    model: MechanicalModel, recordings: Sequence[Recording], names: Sequence[str]
+) -> tuple[str, ...]:
+    """Find errors in the stated masses and inertias, as sentences without a full stop; empty where there are none."""
+    key = _choose_weight_key(model)
     bad_key = ADDED_MASS if key == ADDED_INERTIA else ADDED_INERTIA
     problems = [
         f"{name} says {bad_key}, and the model's device {'turns' if model.rotational else 'moves straight'}: say {key}"
@@ -95,10 +99,11 @@ def has_carried_weight(recordings: Sequence[Recording]) -> bool:
     return any(key in recording.meta for recording in recordings for key in (ADDED_MASS, ADDED_INERTIA))
 
 
-def _key(model: MechanicalModel) -> str:
-    """Key of the carried mass of a linear device, or of the inertia of a rotational one."""
+def _choose_weight_key(model: MechanicalModel) -> str:
+    """Choose the key of the carried mass of a linear device, or of the inertia of a rotational one."""
     return ADDED_INERTIA if model.rotational else ADDED_MASS
 
 
 def _is_weight(value: object) -> bool:
+    """Whether a value of `meta` is a finite number from 0 on."""
     return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value) and value >= 0

@@ -3,7 +3,8 @@ noise.
 
 A linear device responds on driven lines only. Where all driven lines are odd multiples of one line, odd distortion
 falls on odd lines and even distortion on even ones (Schoukens, Vaes and Pintelon, IEEE Control Systems 36 (2016), 38).
-The lines are read from the measured excitation, so that any multisine with silent lines is suitable.
+The driven lines are found in the measured excitation, so that any multisine with silent lines is suitable.
+Used by `analysis.diagnosis.localisation`.
 
 Lines are tested in octaves that begin at powers of 2 Hz, the same for all recordings, so that results of different
 recordings can be compared band by band. The ratio of the power on silent lines to that of the noise is F-distributed.
@@ -25,10 +26,10 @@ _SILENT_SHARE = 3e-3
 all inputs if that is more. Chosen by hand."""
 _DRIVEN_SHARE = 0.01
 """Least power of a driven input, relative to the strongest. Chosen by hand."""
-_FEW_CHANGES = 16
-"""Up to so many changes of a command do not show for how many samples it holds a value."""
-_TINY = np.finfo(np.float64).tiny
-_LARGEST = 1e300
+_MAX_INCONCLUSIVE_CHANGES = 16
+"""Number of changes of a command up to which the length of its zero-order hold is not estimated. Chosen by hand."""
+_SMALLEST_POSITIVE = np.finfo(np.float64).tiny
+_MAX_F_RATIO = 1e300
 """Upper limit of an F ratio: SciPy returns NaN for infinity."""
 
 
@@ -48,50 +49,53 @@ class DetectionLines:
     """Greatest common divisor of the driven lines' numbers: lines between its multiples detect noise only."""
 
     @property
-    def any_silent(self) -> bool:
+    def has_silent(self) -> bool:
         """Whether there is a silent line that distortion would reach."""
         return bool((self.odd | self.even | self.either).any())
 
 
-def detection_lines(excitation: ComplexArray, hold_samples: int = 1) -> DetectionLines | None:
-    """Driven lines of a periodic excitation, and the silent ones on which distortion shows; None where nothing is
+def find_detection_lines(excitation: ComplexArray, hold_samples: int = 1) -> DetectionLines | None:
+    """Driven lines of a periodic excitation, and the silent lines on which distortion appears; None where no line is
     driven.
 
     excitation: (lines, inputs), spectrum of one period, line k in row k - 1. hold_samples: samples for which each value
-    of the command is held; above half of the rate at which it changes there are only images, which count as not driven.
+    of the command is held (zero-order hold); above half of its update rate there are only images, which do not count as
+    driven.
     """
-    size = np.abs(excitation)
-    size[(len(size) + 1) // hold_samples :] = 0
-    strongest = size.max()
-    if strongest == 0:
+    amplitude = np.abs(excitation)
+    amplitude[(len(amplitude) + 1) // hold_samples :] = 0
+    largest_amplitude = amplitude.max()
+    if largest_amplitude == 0:
         return None
-    driven = np.asarray((size > _SILENT_SHARE * np.maximum(size.max(axis=0), 0.1 * strongest)).any(axis=1))
+    driven = np.asarray(
+        (amplitude > _SILENT_SHARE * np.maximum(amplitude.max(axis=0), 0.1 * largest_amplitude)).any(axis=1)
+    )
     numbers = np.arange(1, len(driven) + 1)
     step = int(np.gcd.reduce(numbers[driven]))
     lowest, highest = numbers[driven][[0, -1]]
     silent_lines = ~driven & (numbers >= lowest) & (numbers <= highest) & (numbers % step == 0)
-    multiple = numbers // step
-    odd_only = bool((multiple[driven] % 2 == 1).all()) and highest > lowest
+    multiples = numbers // step
+    odd_only = bool((multiples[driven] % 2 == 1).all()) and highest > lowest
     no_lines = np.zeros(len(driven), dtype=np.bool_)
     if not odd_only:
         return DetectionLines(driven, no_lines, no_lines, np.asarray(silent_lines), step)
     return DetectionLines(
         driven,
-        np.asarray(silent_lines & (multiple % 2 == 1)),
-        np.asarray(silent_lines & (multiple % 2 == 0)),
+        np.asarray(silent_lines & (multiples % 2 == 1)),
+        np.asarray(silent_lines & (multiples % 2 == 0)),
         no_lines,
         step,
     )
 
 
-def hold_length(command: npt.NDArray[np.float64]) -> int:
-    """Number of samples for which each value of the command is held: the greatest common divisor of the distances
-    between its changes; 1 where it changes too seldom to show that. command: (n, inputs)."""
-    moves = np.flatnonzero(np.any(np.diff(command, axis=0) != 0, axis=1))
-    return int(np.gcd.reduce(np.diff(moves))) if len(moves) > _FEW_CHANGES else 1
+def compute_hold_samples(command: npt.NDArray[np.float64]) -> int:
+    """Length of the command's zero-order hold in samples: the greatest common divisor of the distances between its
+    changes; 1 where it changes at most `_MAX_INCONCLUSIVE_CHANGES` times. command: (n, inputs)."""
+    change_indices = np.flatnonzero(np.any(np.diff(command, axis=0) != 0, axis=1))
+    return int(np.gcd.reduce(np.diff(change_indices))) if len(change_indices) > _MAX_INCONCLUSIVE_CHANGES else 1
 
 
-def octaves_between(from_hz: float, to_hz: float) -> tuple[Band, ...]:
+def list_octaves(from_hz: float, to_hz: float) -> tuple[Band, ...]:
     """All octaves [2^k, 2^(k+1)) Hz that overlap the closed interval from `from_hz` to `to_hz`, both positive; so an
     upper end at 2^k adds the octave from 2^k."""
     first = int(np.floor(np.log2(from_hz) + 1e-9))
@@ -99,8 +103,8 @@ def octaves_between(from_hz: float, to_hz: float) -> tuple[Band, ...]:
     return tuple((2.0**power, 2.0 ** (power + 1)) for power in range(first, last + 1))
 
 
-def lines_in_band(frequency_hz: FloatArray, band_hz: Band) -> Mask:
-    """(lines,): lines within the band, its lower edge included and its upper edge excluded, apart from rounding."""
+def select_lines_in_band(frequency_hz: FloatArray, band_hz: Band) -> Mask:
+    """Mask (lines,) of the lines within the band: lower edge included, upper edge excluded, apart from rounding."""
     return np.asarray((frequency_hz >= band_hz[0] * (1 - 1e-9)) & (frequency_hz < band_hz[1] * (1 - 1e-9)))
 
 
@@ -109,27 +113,29 @@ def find_driven_inputs(power: FloatArray, channels: tuple[str, ...]) -> tuple[st
     strongest. An input that is only moved by feedback has less, where the excitation was recorded. power: (inputs,)."""
     if power.max(initial=0.0) == 0:
         return ()
-    return tuple(name for name, strength in zip(channels, power, strict=True) if strength > _DRIVEN_SHARE * power.max())
+    return tuple(
+        name for name, input_power in zip(channels, power, strict=True) if input_power > _DRIVEN_SHARE * power.max()
+    )
 
 
-def noncentral_f_sf(
+def compute_noncentral_f_sf(
     ratio: npt.ArrayLike, lines: npt.ArrayLike, freedom: npt.ArrayLike, noncentrality: npt.ArrayLike
 ) -> FloatArray:
-    """P(F >= ratio) of a noncentral F distribution with d = 2 `lines` and `freedom` degrees of freedom, by the central
-    F of equal first two moments (Patnaik, Biometrika 36 (1949) 202): with noncentrality c,
+    """Survival function P(F >= ratio) of a noncentral F distribution with d = 2 `lines` and `freedom` degrees of
+    freedom, by the central F of equal first two moments (Patnaik, Biometrika 36 (1949) 202): with noncentrality c,
 
         d' = (d + c)² / (d + 2 c),    P(F >= f) = P(F_central(d', freedom) >= f d / (d + c)).
 
     Exact for c = 0. Chosen over the series because it also holds for noncentralities of millions.
     """
-    degrees = 2 * np.asarray(lines, dtype=np.float64)
-    shift = np.asarray(noncentrality, dtype=np.float64)
-    equivalent = (degrees + shift) * ((degrees + shift) / (degrees + 2 * shift))
-    scaled = np.asarray(ratio, dtype=np.float64) * degrees / (degrees + shift)
-    return np.asarray(fdtrc(equivalent, freedom, np.minimum(scaled, _LARGEST)), dtype=np.float64)
+    numerator_freedom = 2 * np.asarray(lines, dtype=np.float64)
+    c = np.asarray(noncentrality, dtype=np.float64)
+    equivalent_freedom = (numerator_freedom + c) * ((numerator_freedom + c) / (numerator_freedom + 2 * c))
+    scaled_ratio = np.asarray(ratio, dtype=np.float64) * numerator_freedom / (numerator_freedom + c)
+    return np.asarray(fdtrc(equivalent_freedom, freedom, np.minimum(scaled_ratio, _MAX_F_RATIO)), dtype=np.float64)
 
 
-def excess_power(power: FloatArray, noise: FloatArray, freedom: float) -> tuple[float, float, float]:
+def compute_excess_power(power: FloatArray, noise: FloatArray, freedom: float) -> tuple[float, float, float]:
     """Summed power beyond noise, its detection limit (two standard errors of the noise), and the p-value.
 
     power: p (lines,), squared magnitudes. noise: s (lines,), their expectation without a signal, estimated with
@@ -139,7 +145,7 @@ def excess_power(power: FloatArray, noise: FloatArray, freedom: float) -> tuple[
     """
     if len(power) == 0 or not np.isfinite(noise).all():
         return 0.0, 0.0, 1.0
-    ratio = float(np.mean(power / np.maximum(noise, _TINY)))
-    p_value = float(fdtrc(2 * len(power), max(freedom, 1.0), min(ratio, _LARGEST)))
+    ratio = float(np.mean(power / np.maximum(noise, _SMALLEST_POSITIVE)))
+    p_value = float(fdtrc(2 * len(power), max(freedom, 1.0), min(ratio, _MAX_F_RATIO)))
     limit = 2 * float(np.sqrt(np.sum(noise**2) + 2 * np.sum(noise) ** 2 / max(freedom, 1.0)))
     return float(np.sum(power - noise)), limit, p_value

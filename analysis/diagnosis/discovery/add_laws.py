@@ -10,15 +10,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from analysis.diagnosis.confirm.held_out_gain import held_out_gain
+from analysis.diagnosis.confirm.held_out_gain import estimate_held_out_gain
+from analysis.diagnosis.discovery.convert_sum import list_fitted_laws
 from analysis.diagnosis.discovery.discover import Discovery, Round, depends_on_another_axis, discover
-from analysis.diagnosis.discovery.law_of_sum import list_fitted_laws
 from analysis.diagnosis.discovery.validation import (
     choose_on_held_out,
     find_failed_checks,
-    holds_on_held_out,
+    is_confirmed_on_held_out,
     is_shorter_and_as_good,
-    proof_sentence,
+    write_proof_sentence,
 )
 from analysis.diagnosis.errors.output_error import gather_evidence
 from analysis.diagnosis.search.explain import Explanation
@@ -121,7 +121,7 @@ def check_laws(result: SearchResult, discovery: Discovery, time_left: TimeBudget
         reasons = (*reasons, "the held-out data do not confirm it")
     if reasons:
         return replace(result, unconfirmed=(*result.unconfirmed, *_yield_candidates(context, discovery, reasons)))
-    remarks = (proof_sentence(context, identifiable, rivals, discovery.chosen_of),)
+    remarks = (write_proof_sentence(context, identifiable, rivals, discovery.chosen_of),)
     return SearchResult(
         context, identifiable, judgement, remarks, None if identifiable.errors is None else identifiable.errors[1]
     )
@@ -144,7 +144,7 @@ def _find_fit_objections(discovery: Discovery, explanation: Explanation) -> Iter
     if not all(round_.complete for round_ in discovery.rounds):
         yield "the time limit was reached before other laws were fitted"
     held_out_error = float(np.nanmax(explanation.after.score.test, initial=0.0))
-    if held_out_error > NAMED_ERROR and not holds_on_held_out(explanation):
+    if held_out_error > NAMED_ERROR and not is_confirmed_on_held_out(explanation):
         yield f"on held-out data its error is {held_out_error:.3g} times the noise"
 
 
@@ -177,7 +177,7 @@ def may_approximate_law(context: SearchContext, explanation: Explanation) -> boo
     forces = all(isinstance(claim.effect.action, AxisForce) for claim in claims)
     if len(claims) > 1 and forces and len({claim.sites for claim in claims}) == 1:
         return True
-    records = gather_evidence(context.whole, context.tuning, fitted)
+    records = gather_evidence(context.full_measure, context.tuning, fitted)
     within_data = (
         any(is_within_data(fitted.hypothesis, k, record, PITCHES_SEEN) for record in records)
         for k in range(len(claims))
@@ -209,7 +209,7 @@ def _list_rivals(context: SearchContext, catalogue_explanation: Explanation) -> 
 
 def _yield_candidates(context: SearchContext, discovery: Discovery, reasons: tuple[str, ...]) -> Iterator[Unconfirmed]:
     """Each law as an unconfirmed candidate, with the gain of all laws together."""
-    gain = held_out_gain(context.whole, discovery.explanation.retuned, discovery.explanation.after)
+    gain = estimate_held_out_gain(context.full_measure, discovery.explanation.retuned, discovery.explanation.after)
     hypothesis = discovery.explanation.after.fitted.hypothesis
     for number, law in enumerate(list_fitted_laws(hypothesis)):
         if law is not None:

@@ -3,7 +3,7 @@
 With velocities such a pair is a gyroscopic or Lorentz force, with positions a circulatory force (Merkin, Introduction
 to the Theory of Stability, 1997). A linear model has the symmetric coupling (coupled damping or stiffness) as a
 parameter. A force on one axis alone is half symmetric, half antisymmetric, and that parameter absorbs the symmetric
-half; therefore both forces of a pair are fitted together. Called by `discover`.
+half; therefore both forces of a pair are fitted together. Called by `discover`, `fit_laws` and `validation`.
 """
 
 import re
@@ -14,29 +14,31 @@ from itertools import combinations, product
 
 import numpy as np
 
+from analysis.diagnosis.discovery.convert_sum import convert_sum_to_hypothesis, list_fitted_laws
 from analysis.diagnosis.discovery.fit_sum import Sum, fit_sum
 from analysis.diagnosis.discovery.grammar import AXES, Term
-from analysis.diagnosis.discovery.law_of_sum import convert_sum_to_hypothesis, list_fitted_laws
 from analysis.diagnosis.discovery.matched_filter import View
-from analysis.diagnosis.discovery.screen_terms import products_of
+from analysis.diagnosis.discovery.screen_terms import build_normal_equations
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.hypothesis import combine, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit
 from analysis.diagnosis.errors.tuning import Tuning
 from equalizer.effects.discovered_law import axis_names
 
-_COUPLED = re.compile(rf"p0\*(v?)([{AXES}])")
-"""Formula of a force that is linear in the motion of an axis, here of another axis than that of the force."""
+_COUPLING_FORMULA = re.compile(rf"p0\*(v?)([{AXES}])")
+"""Formula of a force that is linear in the motion of an axis; groups: "v" for velocity or nothing for position, and the
+axis that moves."""
 _START_SHARE = 1e-9
-"""Size with which the opposite force begins in a fit, relative to the force."""
+"""Factor with which the opposite force of a pair enters a fit, relative to the factor of the force."""
 
 
 def find_antisymmetric_pairs(views: Sequence[View]) -> Iterator[Sum]:
-    """Antisymmetric sums of all pairs of axes whose two halves, fitted alone, have opposite signs."""
+    """Antisymmetric sums for all pairs of axes, with velocities and with positions, whose two forces, fitted one at a
+    time, have factors of opposite signs. views: one per axis and place; only those of forces are used."""
     forces = [view for view in views if view.acts_on == "force"][: len(AXES)]
     for (first_view, second_view), prefix in product(combinations(forces, 2), ("v", "")):
         halves = [
-            fit_sum(products_of(view), (Term(prefix + AXES[coupled_view.axis]),))
+            fit_sum(build_normal_equations(view), (Term(prefix + AXES[coupled_view.axis]),))
             for view, coupled_view in ((first_view, second_view), (second_view, first_view))
         ]
         force, partner = halves
@@ -47,7 +49,7 @@ def find_antisymmetric_pairs(views: Sequence[View]) -> Iterator[Sum]:
 
 
 def _combine_halves(force: Sum, partner: Sum, factor: float) -> Sum:
-    """Both halves as one sum with opposite factors; its errors are the means of the halves'."""
+    """Both forces as one sum with opposite factors; its errors are the means of the two fits."""
     return replace(
         force, factors=(factor,), cross_validated=(force.cross_validated + partner.cross_validated) / 2,
         base_error=(force.base_error + partner.base_error) / 2, spread=max(force.spread, partner.spread),
@@ -56,11 +58,12 @@ def _combine_halves(force: Sum, partner: Sum, factor: float) -> Sum:
 
 
 def list_pair_starts(pair: Sum) -> tuple[Sum, ...]:
-    """Starting values of a pair's fit: as found, and with half of the factor. Where the model couples the axes, each
-    half was fitted with the coupled parameter, which absorbed the other half, so that its factor is twice too large."""
+    """Starting values for the fit of a pair: with its factors, and with half of them. Where the model has a coupled
+    parameter, each force was fitted together with it, and the parameter took the place of the other force: the factor
+    is then twice the right one."""
     assert pair.partner is not None
-    half, opposite = pair.factors[0] / 2, replace(pair.partner, factors=(pair.partner.factors[0] / 2,))
-    return pair, replace(pair, factors=(half,), partner=opposite)
+    half_factor, partner_sum = pair.factors[0] / 2, replace(pair.partner, factors=(pair.partner.factors[0] / 2,))
+    return pair, replace(pair, factors=(half_factor,), partner=partner_sum)
 
 
 def is_coupling(term_sum: Sum) -> bool:
@@ -68,7 +71,7 @@ def is_coupling(term_sum: Sum) -> bool:
     return (
         term_sum.acts_on == "force"
         and len(term_sum.terms) == 1
-        and bool(_COUPLED.fullmatch(f"p0*{term_sum.terms[0].shape}"))
+        and bool(_COUPLING_FORMULA.fullmatch(f"p0*{term_sum.terms[0].shape}"))
     )
 
 
@@ -82,20 +85,20 @@ def sum_squared_coupling_deviations(tuning: Tuning, fitted: Fitted) -> float:
 
 
 def convert_to_pair(measure: ErrorMeasure, tuning: Tuning, single: tuple[Fitted, Sum], pair: Sum) -> Fitted | None:
-    """The fit of one force as a pair of half its size: the model's coupled parameter absorbs the symmetric half; the
-    prediction is the same. None where force and pair depend on different motions, or the parameter would leave its
-    bounds."""
+    """The fit of a single force, rewritten as a pair of half its factor with the same prediction: the model's coupled
+    parameter takes the symmetric half. single: fit and sum of that force. None where force and pair depend on different
+    motions, or the parameter would leave its bounds."""
     fitted, term_sum = single
     assert pair.partner is not None
     halves = {(half.axis, half.terms[0].shape): half for half in (replace(pair, partner=None), pair.partner)}
     if halves.pop((term_sum.axis, term_sum.terms[0].shape), None) is None:
         return None
     (opposite_half,) = halves.values()
-    size = list_fitted_laws(fitted.hypothesis)[-1].numbers[0]  # type: ignore[union-attr]
-    law = convert_sum_to_hypothesis(
-        replace(opposite_half, factors=(-_START_SHARE * size,)), measure.records[0].recording
+    force_factor = list_fitted_laws(fitted.hypothesis)[-1].numbers[0]  # type: ignore[union-attr]
+    partner_hypothesis = convert_sum_to_hypothesis(
+        replace(opposite_half, factors=(-_START_SHARE * force_factor,)), measure.records[0].recording
     )
-    start = replace(fitted, hypothesis=combine(fitted.hypothesis, law))
+    start = replace(fitted, hypothesis=combine_hypotheses(fitted.hypothesis, partner_hypothesis))
     antisymmetric = make_antisymmetric(measure, tuning, start)
     return None if antisymmetric is start else antisymmetric
 
@@ -108,46 +111,51 @@ def make_antisymmetric(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) ->
         [dict(placed_effect.values) for placed_effect in fitted.hypothesis.list_placed_effects()],
         fitted.deviations.copy(),
     )
-    for (prefix, axis, coupled_axis), (claim, factor) in couplings.items():
-        partner, opposite = couplings.get((prefix, coupled_axis, axis), (claim, 0.0))
-        if axis < coupled_axis and factor * opposite < 0:
-            shared, parameter_index = (
-                (factor + opposite) / 2,
+    for (prefix, axis, coupled_axis), (claim_index, factor) in couplings.items():
+        partner_index, partner_factor = couplings.get((prefix, coupled_axis, axis), (claim_index, 0.0))
+        if axis < coupled_axis and factor * partner_factor < 0:
+            mean_factor, parameter_index = (
+                (factor + partner_factor) / 2,
                 _find_coupled_parameter(tuning, prefix, axis, coupled_axis),
             )
-            deviations[parameter_index] -= shared / tuning.deviation[parameter_index]
-            values[claim]["p0"], values[partner]["p0"] = factor - shared, opposite - shared
+            deviations[parameter_index] -= mean_factor / tuning.deviation[parameter_index]
+            values[claim_index]["p0"], values[partner_index]["p0"] = factor - mean_factor, partner_factor - mean_factor
     if (deviations == fitted.deviations).all() or np.abs(deviations).max() > tuning.bound:
         return fitted
     parts = zip(fitted.hypothesis.claims, values, strict=True)
-    hypothesis = reduce(combine, [hypothesis_of_claim(claim, [claim_values]) for claim, claim_values in parts])
+    hypothesis = reduce(
+        combine_hypotheses, [make_claim_hypothesis(claim, [claim_values]) for claim, claim_values in parts]
+    )
     return evaluate_fit(measure, tuning, deviations, hypothesis)
 
 
 def can_coupling_imitate(tuning: Tuning, fitted: Fitted, inputs: tuple[str, ...]) -> bool:
-    """Whether a law is linear in the motion of another axis, and the model's coupled damping or stiffness could imitate
-    it: always for a force on a single axis; for an antisymmetric pair, if half of it is within the bound of re-tuning.
-    inputs: command channels."""
+    """Whether the model's coupled damping or stiffness could imitate a fitted law that is linear in the motion of
+    another axis. A force on a single axis: always. An antisymmetric pair: if re-tuning within its bound can reach its
+    factor. inputs: command channels."""
     couplings = _find_coupled_laws(fitted, inputs)
     for (prefix, axis, coupled_axis), (_, factor) in couplings.items():
-        opposite = couplings.get((prefix, coupled_axis, axis), (0, 0.0))[1]
-        half = abs(factor - opposite) / 2 if factor * opposite < 0 else 0.0
-        number = _find_coupled_parameter(tuning, prefix, axis, coupled_axis)
-        if half / tuning.deviation[number] - abs(fitted.deviations[number]) <= tuning.bound:
+        partner_factor = couplings.get((prefix, coupled_axis, axis), (0, 0.0))[1]
+        antisymmetric_factor = abs(factor - partner_factor) / 2 if factor * partner_factor < 0 else 0.0
+        parameter_index = _find_coupled_parameter(tuning, prefix, axis, coupled_axis)
+        if (
+            antisymmetric_factor / tuning.deviation[parameter_index] - abs(fitted.deviations[parameter_index])
+            <= tuning.bound
+        ):
             return True
     return False
 
 
 def _find_coupled_laws(fitted: Fitted, inputs: tuple[str, ...]) -> dict[tuple[str, int, int], tuple[int, float]]:
-    """Claim and factor of each force that is linear in the motion of another axis, by prefix of the motion ("v" or
-    empty), own axis and other axis."""
+    """Index of the claim and factor of each force that is linear in the motion of an axis, by prefix of the motion ("v"
+    or empty), axis of the force and axis of the motion."""
     names, couplings = axis_names(inputs), {}
-    for number, (claim, law) in enumerate(
+    for claim_index, (claim, law) in enumerate(
         zip(fitted.hypothesis.claims, list_fitted_laws(fitted.hypothesis), strict=True)
     ):
-        linear = None if law is None or law.acts_on != "force" else _COUPLED.fullmatch(law.expression)
-        if law is not None and linear is not None:
-            couplings[linear[1], claim.sites[0], names.index(linear[2])] = (number, law.numbers[0])
+        formula_match = None if law is None or law.acts_on != "force" else _COUPLING_FORMULA.fullmatch(law.expression)
+        if law is not None and formula_match is not None:
+            couplings[formula_match[1], claim.sites[0], names.index(formula_match[2])] = (claim_index, law.numbers[0])
     return couplings
 
 

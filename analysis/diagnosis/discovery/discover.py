@@ -13,13 +13,13 @@ from analysis.diagnosis.discovery.antisymmetric_pairs import (
     find_antisymmetric_pairs,
     make_antisymmetric,
 )
-from analysis.diagnosis.discovery.beam import best_sums
+from analysis.diagnosis.discovery.beam import search_best_sums
 from analysis.diagnosis.discovery.evaluate_shape import evaluate_shape
 from analysis.diagnosis.discovery.fit_laws import fit_sums, put_simplest_first, run_within_time
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import AXES
 from analysis.diagnosis.discovery.matched_filter import View, build_views
-from analysis.diagnosis.discovery.screen_terms import cross_validate_terms, products_of
+from analysis.diagnosis.discovery.screen_terms import build_normal_equations, cross_validate_terms
 from analysis.diagnosis.discovery.snap_exponents import snap_exponents
 from analysis.diagnosis.discovery.view_terms import view_terms
 from analysis.diagnosis.errors.hypothesis import remove_claim
@@ -51,7 +51,8 @@ class Round:
     sums: tuple[Sum, ...]
     """The screened sums in the order of `fitted_candidates`."""
     placebo: float
-    """Largest share of the held-out squares of a time-shuffled missing force that a term removes."""
+    """Negative control: largest share of the held-out squares that a term removes from the missing force after that was
+    shuffled in time."""
     complete: bool = True
     """Whether all sums were fitted before the time ended."""
 
@@ -59,10 +60,10 @@ class Round:
     def shares_above_noise(self) -> tuple[float, float]:
         """Shares (at most 1) of the held-out squares of the missing force above the noise that the law removes, and
         that chance removes."""
-        first = self.sums[0]
-        excess = max(first.base_error - 1.0, 1e-300)
-        removed, by_chance = first.base_error - first.cross_validated, self.placebo * first.base_error
-        return min(removed / excess, 1.0), min(by_chance / excess, 1.0)
+        best_sum = self.sums[0]
+        excess_error = max(best_sum.base_error - 1.0, 1e-300)
+        removed, removed_by_chance = best_sum.base_error - best_sum.cross_validated, self.placebo * best_sum.base_error
+        return min(removed / excess_error, 1.0), min(removed_by_chance / excess_error, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,37 +86,38 @@ def discover(
     max_laws: int = LAW_MOST_ROUNDS,
     single_term: bool = False,
 ) -> Discovery | None:
-    """The laws found, at most `max_laws`, fitted by output error; None where none is worth its parameters.
+    """Search laws by forward selection: at most `max_laws`, fitted by output error; None where none is worth its
+    parameters or, with single_term, where such a law does not suffice.
     catalogue_explanation: by named effects. single_term: only laws of single terms that are likely to explain the whole
     error; the search ends where a screen or a fit shows that they do not, unless such a law may act on another axis."""
     context = replace(context, map_=limit_map(context.map_, time_left))
     retuned = catalogue_explanation.retuned.fitted
-    base = context.candidate(evaluate_fit(context.measure, context.tuning, retuned.deviations, retuned.hypothesis))
+    best = context.score_fit(evaluate_fit(context.measure, context.tuning, retuned.deviations, retuned.hypothesis))
     rounds: list[Round] = []
     steps: list[FittedCandidate] = []
     target_error = EXPLAINED_ERROR if single_term else NOISE_ALONE
-    while len(rounds) < max_laws and time_left() and base.score.worst_channel > target_error:
+    while len(rounds) < max_laws and time_left() and best.score.worst_channel > target_error:
         progress("looking for a law outside the catalogue", 0.6 + 0.1 * len(rounds))
-        next_round = _find_next_law(context, base.fitted, time_left, single_term)
-        if next_round is None or not is_worthwhile(base, next_round.fitted_candidates[0]):
+        next_round = _find_next_law(context, best.fitted, time_left, single_term)
+        if next_round is None or not is_worthwhile(best, next_round.fitted_candidates[0]):
             break
         if next_round.sums[0].partner is not None:
-            steps.append(_first_half(context, next_round.fitted_candidates[0]))
-        base = next_round.fitted_candidates[0]
+            steps.append(_remove_partner_law(context, next_round.fitted_candidates[0]))
+        best = next_round.fitted_candidates[0]
         rounds.append(next_round)
-        steps.append(base)
+        steps.append(best)
         may_act_elsewhere = next_round.sums[0].partner is None and depends_on_another_axis(next_round.sums[0])
-        if single_term and base.score.worst_channel > target_error and not may_act_elsewhere:
+        if single_term and best.score.worst_channel > target_error and not may_act_elsewhere:
             return None
     if not rounds:
         return None
-    snapped = run_within_time(lambda: snap_exponents(context, base.fitted), base.fitted)
-    last = context.candidate(make_antisymmetric(context.measure, context.tuning, snapped))
-    steps[-1] = last
+    snapped = run_within_time(lambda: snap_exponents(context, best.fitted), best.fitted)
+    snapped_candidate = context.score_fit(make_antisymmetric(context.measure, context.tuning, snapped))
+    steps[-1] = snapped_candidate
     explanation = Explanation(
         catalogue_explanation.before,
         catalogue_explanation.retuned,
-        context.with_test_score(last),
+        context.with_test_score(snapped_candidate),
         tuple(round_.fitted_candidates for round_ in rounds for _ in range(1 if round_.sums[0].partner is None else 2)),
         tuple(steps),
     )
@@ -124,67 +126,80 @@ def discover(
 
 def depends_on_another_axis(term_sum: Sum) -> bool:
     """Whether a sum depends on the motion or the command of another axis than its own."""
-    names = {name for term in term_sum.terms for name in term.variables}
-    return any(name[-1:] in AXES and name[-1:] != AXES[term_sum.axis] for name in names)
+    signal_names = {signal_name for term in term_sum.terms for signal_name in term.variables}
+    return any(signal_name[-1:] in AXES and signal_name[-1:] != AXES[term_sum.axis] for signal_name in signal_names)
 
 
-def _first_half(context: SearchContext, pair: FittedCandidate) -> FittedCandidate:
-    """The candidate without the second law of its pair, because each named law needs a step in the explanation."""
+def _remove_partner_law(context: SearchContext, pair: FittedCandidate) -> FittedCandidate:
+    """The candidate without the second law of its antisymmetric pair: each law is a step of the explanation."""
     hypothesis = remove_claim(pair.fitted.hypothesis, len(pair.fitted.hypothesis.claims) - 1)
-    return context.candidate(evaluate_fit(context.measure, context.tuning, pair.fitted.deviations, hypothesis))
+    return context.score_fit(evaluate_fit(context.measure, context.tuning, pair.fitted.deviations, hypothesis))
 
 
-def _find_next_law(context: SearchContext, base: Fitted, time_left: TimeBudget, single_term: bool) -> Round | None:
+def _find_next_law(context: SearchContext, base_fit: Fitted, time_left: TimeBudget, single_term: bool) -> Round | None:
     """The next law: sums screened in the views with the largest excess, the best fitted. None where nothing fits."""
-    views = build_views(context.measure, context.tuning, base)
-    searched = [(view, best_sums(products_of(view), view_terms(view), time_left)) for view in _views_to_search(views)]
+    views = build_views(context.measure, context.tuning, base_fit)
+    ranked_by_view = [
+        (view, search_best_sums(build_normal_equations(view), view_terms(view), time_left))
+        for view in _select_views_to_search(views)
+    ]
     candidates = sorted(
         (
-            *(item for view, ranked_sums in searched for item in ranked_sums.sums if not _cancels_command(view, item)),
+            *(
+                candidate_sum
+                for view, ranked_sums in ranked_by_view
+                for candidate_sum in ranked_sums.sums
+                if not _cancels_command(view, candidate_sum)
+            ),
             *find_antisymmetric_pairs(views),
         ),
-        key=lambda item: _compute_explained_squares(views, item),
+        key=lambda candidate_sum: _compute_explained_squares(views, candidate_sum),
         reverse=True,
     )
-    chosen = _choose_sums_to_fit(_keep_close_to_best(_best_of_each_structure(candidates)))
-    if single_term and chosen and not _may_explain_alone(chosen[0]):
+    sums_to_fit = _choose_sums_to_fit(_keep_close_to_best(_select_best_of_each_structure(candidates)))
+    if single_term and sums_to_fit and not _may_explain_alone(sums_to_fit[0]):
         return None
-    pairs = fit_sums(context, base, chosen, time_left)
-    if not pairs:
+    fitted_sums = fit_sums(context, base_fit, sums_to_fit, time_left)
+    if not fitted_sums:
         return None
-    ranked = put_simplest_first(context, pairs)
-    first = ranked[0][1]
+    ranked_fits = put_simplest_first(context, fitted_sums)
+    best_sum = ranked_fits[0][1]
     # The negative control of the views that the best law, or either half of a pair, acts in.
-    acting_views = [(half.acts_on, half.axis) for half in (first, first.partner) if half is not None]
+    acting_views = [(half.acts_on, half.axis) for half in (best_sum, best_sum.partner) if half is not None]
     placebo = max(
-        (ranked_sums.placebo for view, ranked_sums in searched if (view.acts_on, view.axis) in acting_views),
+        (ranked_sums.placebo for view, ranked_sums in ranked_by_view if (view.acts_on, view.axis) in acting_views),
         default=0.0,
     )
-    return Round(tuple(item for item, _ in ranked), tuple(item for _, item in ranked), placebo, time_left())
+    return Round(
+        tuple(candidate for candidate, _ in ranked_fits),
+        tuple(term_sum for _, term_sum in ranked_fits),
+        placebo,
+        time_left(),
+    )
 
 
-def _may_explain_alone(best: Sum) -> bool:
+def _may_explain_alone(best_sum: Sum) -> bool:
     """Whether a single term leaves so little of the missing force in the screen that a fit is worth its time."""
-    leaves_little = best.cross_validated - 1 <= LAW_ALONE_LEAVES * (best.base_error - 1)
-    return leaves_little and len(best.terms) == 1
+    leaves_little = best_sum.cross_validated - 1 <= LAW_ALONE_LEAVES * (best_sum.base_error - 1)
+    return leaves_little and len(best_sum.terms) == 1
 
 
 def _choose_sums_to_fit(sums: Sequence[Sum]) -> list[Sum]:
     """The best few sums, and the best one that lacks a variable of the first, so that it has a rival."""
-    chosen = [*sums[:LAW_FITTED]]
-    if not chosen or any(not set(sums[0].variables) <= set(term_sum.variables) for term_sum in chosen):
-        return chosen
+    sums_to_fit = [*sums[:LAW_FITTED]]
+    if not sums_to_fit or any(not set(sums[0].variables) <= set(term_sum.variables) for term_sum in sums_to_fit):
+        return sums_to_fit
     rival = next((term_sum for term_sum in sums if not set(sums[0].variables) <= set(term_sum.variables)), None)
-    return chosen if rival is None else [*chosen, rival]
+    return sums_to_fit if rival is None else [*sums_to_fit, rival]
 
 
-def _views_to_search(views: Sequence[View]) -> list[View]:
+def _select_views_to_search(views: Sequence[View]) -> list[View]:
     """Views in which laws are searched: at most two of axes and two of readings, by falling excess error."""
     selected: list[View] = []
     for acts_on in ("force", "response"):
-        missing = [(_excess(view), view.output) for view in views if view.acts_on == acts_on]
-        largest_excess = max((excess for excess, _ in missing), default=0.0)
-        significant = [(excess, output) for excess, output in missing if excess > LAW_ALMOST_NOISE]
+        excess_by_output = [(_compute_excess_error(view), view.output) for view in views if view.acts_on == acts_on]
+        largest_excess = max((excess for excess, _ in excess_by_output), default=0.0)
+        significant = [(excess, output) for excess, output in excess_by_output if excess > LAW_ALMOST_NOISE]
         selected += [
             views[output]
             for excess, output in sorted(significant, reverse=True)[:2]
@@ -198,29 +213,29 @@ def _cancels_command(view: View, term_sum: Sum) -> bool:
     stiffness shrink in proportion, the force balance then approaches its trivial solution 0 = 0."""
     if term_sum.acts_on != "force":
         return False
-    cancelled = power = 0.0
+    cancelled = command_power = 0.0
     for record in view.records:
         command = record.columns[f"f{AXES[term_sum.axis]}"]
         for term, factor in zip(term_sum.terms, term_sum.factors, strict=True):
             force = factor * evaluate_shape(term.shape, term.numbers, record.columns, record.rate_hz)
             cancelled -= float(force @ command)
-        power += float(command @ command)
-    return cancelled > LAW_COMMAND_TAKEN * power
+        command_power += float(command @ command)
+    return cancelled > LAW_COMMAND_TAKEN * command_power
 
 
-def _excess(view: View) -> float:
+def _compute_excess_error(view: View) -> float:
     """Excess error of a view: held-out squares of the re-tuned model over those of noise alone; 1 = noise."""
-    base = products_of(view)
-    base_squares = cross_validate_terms(base, view.residual[None, :]).base_squares
+    model_equations = build_normal_equations(view)
+    base_squares = cross_validate_terms(model_equations, view.residual[None, :]).base_squares
     return float(base_squares.sum()) / (view.noise * len(view.residual))
 
 
 def _compute_explained_squares(views: Sequence[View], term_sum: Sum) -> float:
     """Held-out squares that a sum removes, in units of its view."""
     view = next(view for view in views if (view.acts_on, view.axis) == (term_sum.acts_on, term_sum.axis))
-    squares = (term_sum.base_error - term_sum.cross_validated) * view.noise * len(view.residual)
+    explained_squares = (term_sum.base_error - term_sum.cross_validated) * view.noise * len(view.residual)
     # The errors of a pair are the means of those of its halves.
-    return squares if term_sum.partner is None else 2 * squares
+    return explained_squares if term_sum.partner is None else 2 * explained_squares
 
 
 def _keep_close_to_best(sums: Sequence[Sum]) -> list[Sum]:
@@ -232,7 +247,7 @@ def _keep_close_to_best(sums: Sequence[Sum]) -> list[Sum]:
     ]
 
 
-def _best_of_each_structure(sums: Sequence[Sum]) -> list[Sum]:
+def _select_best_of_each_structure(sums: Sequence[Sum]) -> list[Sum]:
     """The best sum of each structure: same axis or reading, same shapes, a pair or not. sums: the best first."""
     best_by_structure: dict[object, Sum] = {}
     for term_sum in sums:

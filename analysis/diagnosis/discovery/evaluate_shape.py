@@ -12,7 +12,7 @@ from analysis.diagnosis.discovery.grammar import AXES, Columns
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.laws.evaluate import evaluate
 from equalizer.laws.law import Law
-from equalizer.laws.parse import MEMORY, parse_formula
+from equalizer.laws.parse import MEMORY_OPERATORS, parse_formula
 from equalizer.laws.tree import Apply, Free, Node, Number, iterate_nodes
 from equalizer.signals.signal import FloatArray
 
@@ -41,7 +41,7 @@ def evaluate_shape(shape: str, numbers: Sequence[float], columns: Columns, rate_
     (n,)."""
     tree = parse_formula(shape, template=True)[0]
     with np.errstate(all="ignore"):
-        if any(isinstance(node, Apply) and node.name in MEMORY for node in iterate_nodes(tree)):
+        if any(isinstance(node, Apply) and node.name in MEMORY_OPERATORS for node in iterate_nodes(tree)):
             return evaluate(Law(shape, tuple(numbers), (), "force", "x"), columns, rate_hz)
         return np.array(np.broadcast_to(_value(tree, numbers, columns), columns["t"].shape))
 

@@ -17,10 +17,10 @@ from analysis.diagnosis.discovery.antisymmetric_pairs import (
     list_pair_starts,
     sum_squared_coupling_deviations,
 )
+from analysis.diagnosis.discovery.convert_sum import convert_sum_to_hypothesis, list_fitted_laws
 from analysis.diagnosis.discovery.fit_sum import Sum
-from analysis.diagnosis.discovery.law_of_sum import convert_sum_to_hypothesis, list_fitted_laws
 from analysis.diagnosis.discovery.snap_exponents import is_full_limit
-from analysis.diagnosis.errors.hypothesis import combine
+from analysis.diagnosis.errors.hypothesis import combine_hypotheses
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.parsimony import are_inseparable
@@ -61,10 +61,10 @@ def fit_sums(
     best = fits[0]
     # Of the starts of a law, that with the lower cost may converge to the fit of the re-tuned model without the law.
     converged = [_refine(context, start) for start, term_sum in fits if term_sum is best[1] and np.isfinite(start.cost)]
-    refined = [(context.candidate(min(converged, key=lambda end: end.cost)), best[1])]
+    refined = [(context.score_fit(min(converged, key=lambda end: end.cost)), best[1])]
     other_fits = {id(term_sum): (start, term_sum) for start, term_sum in reversed(fits) if term_sum is not best[1]}
     other_candidates = [
-        (context.candidate(_convert_to_pair(context, best, refined[0][0], pair)), pair[1])
+        (context.score_fit(_convert_to_pair(context, best, refined[0][0], pair)), pair[1])
         for pair in sorted(other_fits.values(), key=lambda pair: pair[0].cost)
     ]
     simpler_candidates = [
@@ -74,7 +74,7 @@ def fit_sums(
         and _count_parameters(pair) < _count_parameters(refined[0])
         and are_inseparable(refined[0][0], pair[0])
     ]
-    refined += [(context.candidate(_refine(context, candidate.fitted)), item) for candidate, item in simpler_candidates]
+    refined += [(context.score_fit(_refine(context, candidate.fitted)), item) for candidate, item in simpler_candidates]
     return (*refined, *(pair for pair in other_candidates if pair not in simpler_candidates))
 
 
@@ -92,7 +92,7 @@ def _make_starting_fits(context: SearchContext, base: Fitted, term_sum: Sum) -> 
     for deviation_sets in ((base.deviations, shifted), *([(calibrated,)] if at_bound else [])):
         fits: list[Fitted] = []
         for start, deviations in product(starts, deviation_sets):
-            hypothesis = combine(base.hypothesis, convert_sum_to_hypothesis(start, recording))
+            hypothesis = combine_hypotheses(base.hypothesis, convert_sum_to_hypothesis(start, recording))
             try:
                 fits.append(evaluate_fit(context.measure, context.tuning, deviations, hypothesis))
             except (MechanicalModelError, np.linalg.LinAlgError):

@@ -2,7 +2,8 @@
 
 The residual is approximated by P d + sum of w_j phi_j(a_j): P the columns of the model's own parameters, w the factors
 and a the nonlinear parameters of the terms. At each step, d and w are solved for by least squares, so that only a is
-searched (variable projection, Golub and Pereyra 1973). Held-out errors are cross-validated over blocks.
+searched (variable projection, Golub and Pereyra 1973). Held-out errors are cross-validated over blocks. Called by
+`beam` and `antisymmetric_pairs`, which screen sums; `fit_laws` then fits the best of them by output error.
 """
 
 from collections.abc import Sequence
@@ -13,16 +14,22 @@ import numpy as np
 from analysis.diagnosis.discovery.evaluate_shape import evaluate_shape
 from analysis.diagnosis.discovery.grammar import Term
 from analysis.diagnosis.discovery.matched_filter import View
-from analysis.diagnosis.discovery.screen_terms import Products, Solution, add_columns, cross_validate_terms, solve
+from analysis.diagnosis.discovery.screen_terms import (
+    NormalEquations,
+    Solution,
+    add_columns,
+    cross_validate_terms,
+    solve_all_blocks,
+)
 from equalizer.laws.law import ActsOn
 from equalizer.signals.signal import FloatArray
 
-_STEP, _STEP_OF_FREQUENCY = 1e-3, 1e-5
+_DIFFERENCE_STEP, _FREQUENCY_DIFFERENCE_STEP = 1e-3, 1e-5
 """Steps of the finite differences, absolute or relative (`_shift_parameter`). The factor of time, a frequency, has the
 smaller step, because a change of 0.1 % would shift the phase too far at the end of a recording."""
-_ROUNDS = 8
+_MOST_STEPS = 8
 """Largest number of Gauss-Newton steps."""
-_CONVERGED = 1e-3
+_LEAST_DECREASE = 1e-3
 """Relative decrease of the cost below which a step is the last."""
 
 
@@ -50,58 +57,61 @@ class Sum:
     @property
     def variables(self) -> tuple[str, ...]:
         """Signals in the terms and in those of the partner, sorted."""
-        names = frozenset[str]().union(*(term.variables for term in self.terms))
-        return tuple(sorted(names.union(() if self.partner is None else self.partner.variables)))
+        signal_names = frozenset[str]().union(*(term.variables for term in self.terms))
+        return tuple(sorted(signal_names.union(() if self.partner is None else self.partner.variables)))
 
 
-def column_of(view: View, term: Term) -> FloatArray | None:
-    """(s,): the term through the view's filter; None where it is not finite."""
-    parts = []
+def compute_term_column(view: View, term: Term) -> FloatArray | None:
+    """(s,): the term of all records, filtered to the unit of the view's residual, joined; None where it is not
+    finite."""
+    filtered_by_record = []
     for record in view.records:
         force = evaluate_shape(term.shape, term.numbers, record.columns, record.rate_hz)
         if not np.isfinite(force).all():
             return None
-        parts.append(record.column(force, view.output))
-    return np.concatenate(parts)
+        filtered_by_record.append(record.column(force, view.output))
+    return np.concatenate(filtered_by_record)
 
 
-def fit_sum(base: Products, terms: Sequence[Term]) -> Sum | None:
-    """The sum with its parameters, factors and held-out errors. base: products of the model's parameters alone. None
-    where the terms are not finite at their starting parameters."""
-    view = base.view
-    point = _Point(tuple(terms), *_columns(view, terms))
+def fit_sum(model_equations: NormalEquations, terms: Sequence[Term]) -> Sum | None:
+    """Fit a sum of terms: its nonlinear parameters, factors and held-out errors. model_equations: normal equations of
+    the model's own parameters alone. None where the terms are not finite at their starting parameters."""
+    view = model_equations.view
+    point = _Point(tuple(terms), *_compute_term_columns(view, terms))
     if point.columns is None:
         return None
-    best = _solve_columns(base, point.columns)
-    for _ in range(_ROUNDS if any(term.numbers for term in terms) else 0):
-        improved = _gauss_newton_step(base, point, best)
+    solution = _solve_columns(model_equations, point.columns)
+    for _ in range(_MOST_STEPS if any(term.numbers for term in terms) else 0):
+        improved = _take_gauss_newton_step(model_equations, point, solution)
         if improved is None:
             break
-        decrease = 1 - improved[1].cost / best.cost
-        point, best = improved
-        if decrease < _CONVERGED:
+        decrease = 1 - improved[1].cost / solution.cost
+        point, solution = improved
+        if decrease < _LEAST_DECREASE:
             break
     assert point.columns is not None
-    return _score_sum(base, point.terms, point.columns, best)
+    return _score_sum(model_equations, point.terms, point.columns, solution)
 
 
-def _score_sum(base: Products, terms: tuple[Term, ...], columns: Sequence[FloatArray], best: Solution) -> Sum:
+def _score_sum(
+    model_equations: NormalEquations, terms: tuple[Term, ...], columns: Sequence[FloatArray], solution: Solution
+) -> Sum:
     """The sum with cross-validated errors and the jackknife error of its first factor."""
-    view = base.view
-    base_and_others = add_columns(base, columns[1:])
-    joint_errors = cross_validate_terms(base_and_others, columns[0][None, :])
-    single_errors = cross_validate_terms(base, columns[0][None, :])
-    size = view.noise * len(view.residual)
+    view = model_equations.view
+    other_equations = add_columns(model_equations, columns[1:])
+    joint_errors = cross_validate_terms(other_equations, columns[0][None, :])
+    single_errors = cross_validate_terms(model_equations, columns[0][None, :])
+    noise_squares = view.noise * len(view.residual)
     factors = joint_errors.factors[:, 0]
-    spread = float(np.std(factors) * np.sqrt(len(factors) - 1) / max(abs(float(np.mean(factors))), 1e-300))
+    relative_error = float(np.std(factors) * np.sqrt(len(factors) - 1) / max(abs(float(np.mean(factors))), 1e-300))
     return Sum(
         view.axis,
         terms,
-        tuple(best.weights[len(view.parameter_columns) :].tolist()),
-        float(joint_errors.term_squares.sum()) / size,
-        float(single_errors.base_squares.sum()) / size,
-        spread,
-        tuple(best.weights[: len(view.parameter_columns) - 1].tolist()),
+        tuple(solution.weights[len(view.parameter_columns) :].tolist()),
+        float(joint_errors.term_squares.sum()) / noise_squares,
+        float(single_errors.base_squares.sum()) / noise_squares,
+        relative_error,
+        tuple(solution.weights[: len(view.parameter_columns) - 1].tolist()),
         view.acts_on,
     )
 
@@ -114,56 +124,63 @@ class _Point:
     columns: tuple[FloatArray, ...] | None
 
 
-def _columns(view: View, terms: Sequence[Term]) -> tuple[tuple[FloatArray, ...] | None]:
-    columns = [column_of(view, term) for term in terms]
+def _compute_term_columns(view: View, terms: Sequence[Term]) -> tuple[tuple[FloatArray, ...] | None]:
+    """The second field of `_Point`, as a tuple of one: the columns of all terms; None where one is not finite."""
+    columns = [compute_term_column(view, term) for term in terms]
     return (None if any(column is None for column in columns) else tuple(c for c in columns if c is not None),)
 
 
-def _solve_columns(base: Products, columns: Sequence[FloatArray]) -> Solution:
+def _solve_columns(model_equations: NormalEquations, columns: Sequence[FloatArray]) -> Solution:
     """Least squares with the model's own parameters and these columns."""
-    return solve(add_columns(base, columns))
+    return solve_all_blocks(add_columns(model_equations, columns))
 
 
-def _gauss_newton_step(base: Products, point: _Point, best: Solution) -> tuple[_Point, Solution] | None:
-    """A Gauss-Newton step, shortened until the cost falls; None where it does not fall or nothing is nonlinear."""
-    view, k = base.view, len(base.view.parameter_columns)
+def _take_gauss_newton_step(
+    model_equations: NormalEquations, point: _Point, solution: Solution
+) -> tuple[_Point, Solution] | None:
+    """Take a Gauss-Newton step in the nonlinear parameters, shortened until the cost falls; None where it does not
+    fall, a column is not finite or no parameter is nonlinear."""
+    view, model_columns = model_equations.view, len(model_equations.view.parameter_columns)
     assert point.columns is not None
-    factors = best.weights[k:]
-    parameters, slopes = [], []
-    for number, term in enumerate(point.terms):
+    term_factors = solution.weights[model_columns:]
+    parameter_indices, slopes = [], []
+    for term_index, term in enumerate(point.terms):
         for parameter_index in range(len(term.numbers)):
-            shift = _STEP_OF_FREQUENCY if f"p{parameter_index}*t" in term.shape else _STEP
-            column = column_of(view, _shift_parameter(term, parameter_index, shift))
+            shift = _FREQUENCY_DIFFERENCE_STEP if f"p{parameter_index}*t" in term.shape else _DIFFERENCE_STEP
+            column = compute_term_column(view, _shift_parameter(term, parameter_index, shift))
             if column is None:
                 return None
-            slopes.append(factors[number] * (column - point.columns[number]) / shift)
-            parameters.append((number, parameter_index))
-    if not parameters:
+            slopes.append(term_factors[term_index] * (column - point.columns[term_index]) / shift)
+            parameter_indices.append((term_index, parameter_index))
+    if not parameter_indices:
         return None
-    sizes = np.array([max(float(np.linalg.norm(slope)), 1e-300) for slope in slopes])
-    joint = add_columns(base, [*point.columns, *(slope / size for slope, size in zip(slopes, sizes, strict=True))])
-    damped = solve(_damp_slopes(joint, len(slopes)))
-    step = np.clip(damped.weights[-len(slopes) :] / sizes, -0.7, 0.7)
-    for share in (1.0, 0.4, 0.15, 0.05):
+    slope_norms = np.array([max(float(np.linalg.norm(slope)), 1e-300) for slope in slopes])
+    joint_equations = add_columns(
+        model_equations,
+        [*point.columns, *(slope / slope_norm for slope, slope_norm in zip(slopes, slope_norms, strict=True))],
+    )
+    damped_solution = solve_all_blocks(_damp_slopes(joint_equations, len(slopes)))
+    step = np.clip(damped_solution.weights[-len(slopes) :] / slope_norms, -0.7, 0.7)
+    for step_share in (1.0, 0.4, 0.15, 0.05):
         terms = point.terms
-        for (number, parameter_index), shift in zip(parameters, step, strict=True):
-            shifted_term = _shift_parameter(terms[number], parameter_index, share * float(shift))
-            terms = (*terms[:number], shifted_term, *terms[number + 1 :])
-        columns = _columns(view, terms)[0]
+        for (term_index, parameter_index), shift in zip(parameter_indices, step, strict=True):
+            shifted_term = _shift_parameter(terms[term_index], parameter_index, step_share * float(shift))
+            terms = (*terms[:term_index], shifted_term, *terms[term_index + 1 :])
+        columns = _compute_term_columns(view, terms)[0]
         if columns is None:
             continue
-        candidate = _solve_columns(base, columns)
-        if candidate.cost < best.cost * (1 - 1e-6):
+        candidate = _solve_columns(model_equations, columns)
+        if candidate.cost < solution.cost * (1 - 1e-6):
             return _Point(terms, columns), candidate
     return None
 
 
-def _damp_slopes(joint: Products, count: int) -> Products:
+def _damp_slopes(joint_equations: NormalEquations, slope_count: int) -> NormalEquations:
     """Levenberg damping of the slopes (of norm 1), so that slopes nearly collinear with other columns make no step."""
-    squares = joint.squares.copy()
-    slope_indices = np.arange(squares.shape[1] - count, squares.shape[1])
-    squares[:, slope_indices, slope_indices] += 1e-4 / len(squares)
-    return replace(joint, squares=squares)
+    gram = joint_equations.gram.copy()
+    slope_indices = np.arange(gram.shape[1] - slope_count, gram.shape[1])
+    gram[:, slope_indices, slope_indices] += 1e-4 / len(gram)
+    return replace(joint_equations, gram=gram)
 
 
 def _shift_parameter(term: Term, parameter_index: int, shift: float) -> Term:

@@ -23,14 +23,14 @@ from analysis.diagnosis.discovery.grammar import AXES, Columns
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.output_error import DIFFERENCE_STEP, Fitted
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.forces.missing_force import axis_transfer
+from analysis.diagnosis.forces.missing_force import compute_axis_transfer
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.settings import LAW_BLOCKS, LAW_POWER_KEPT, SETTLED_CONSTANTS
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.laws.law import ActsOn
 from equalizer.plant.linear_simulation import discretise_model
 from equalizer.plant.mechanical_model import MechanicalModelError
-from equalizer.signals.band_limited import low_pass_gain
+from equalizer.signals.band_limited import compute_low_pass_gain
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _SETTLING_S = 2.0
@@ -242,9 +242,11 @@ def _compute_force_response(measure: ErrorMeasure, evidence: Evidence, lines: Fl
     """(lines, c, m), 1/N: see `FilteredRecord`. lines: frequencies, Hz."""
     if isinstance(measure, PredictedForce):
         m = evidence.command.shape[1]
-        band_gain = low_pass_gain(lines, measure.band_hz)[:, None, None] if np.isfinite(measure.band_hz) else 1.0
+        band_gain = (
+            compute_low_pass_gain(lines, measure.band_hz)[:, None, None] if np.isfinite(measure.band_hz) else 1.0
+        )
         return np.asarray(-np.ones((len(lines), 1, 1)) * np.eye(m) * band_gain / measure.unit[:, None], dtype=complex)
-    transfer = axis_transfer(evidence.model, evidence.sample_rate_hz, lines)
+    transfer = compute_axis_transfer(evidence.model, evidence.sample_rate_hz, lines)
     c = len(measure.unit)
     return np.asarray(np.concatenate([transfer.response, transfer.position], axis=1)[:, :c] / measure.unit[:, None])
 
@@ -254,7 +256,7 @@ def _count_settling_samples(measure: ErrorMeasure, evidence: Evidence) -> int:
     if isinstance(measure, PredictedForce):
         return 0
     slowest = float(
-        np.abs(np.linalg.eigvals(discretise_model(evidence.model, 1 / evidence.sample_rate_hz).advance)).max()
+        np.abs(np.linalg.eigvals(discretise_model(evidence.model, 1 / evidence.sample_rate_hz).transition)).max()
     )
     return int(SETTLED_CONSTANTS / -np.log(slowest)) if slowest < 1 else len(evidence.command)
 

@@ -7,28 +7,28 @@ from functools import reduce
 
 import numpy as np
 
-from analysis.diagnosis.discovery.law_of_sum import list_fitted_laws
-from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, combine, hypothesis_of_claim
-from analysis.diagnosis.errors.intervals import sensitivity_to_all, standard_errors
+from analysis.diagnosis.discovery.convert_sum import list_fitted_laws
+from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, combine_hypotheses, make_claim_hypothesis
+from analysis.diagnosis.errors.intervals import compute_full_sensitivity, compute_standard_errors
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.search.search_context import FIRST_FIT_ROUNDS, SearchContext
 from analysis.diagnosis.settings import INTERVAL_FACTOR, LAW_SNAP
 from equalizer.effects.discovered_law import law_channels, law_effect, law_values
-from equalizer.laws.law import Law, roles
+from equalizer.laws.law import Law, find_parameter_roles
 
 _CUBE_WITH_MEMORY = re.compile(r"\b(\w+)\*lag\(\1\*\*2, (?:p(\d+)|0)\)")
 _LIMIT = re.compile(r"(\w+) \+ p0\*\((.+) - \1\)")
-"""signal + p0 * (soft limit of the signal - signal); see `grammar.soft_limit_terms`."""
+"""signal + p0 * (soft limit of the signal - signal); see `grammar.generate_soft_limit_terms`."""
 
 
 def snap_exponents(context: SearchContext, fitted: Fitted) -> Fitted:
     """The fit repeated with exponents fixed at whole or half numbers; unchanged where no exponent is near one, or where
     the cost rises too much."""
     t = len(fitted.deviations)
-    sensitivity = sensitivity_to_all(
+    sensitivity = compute_full_sensitivity(
         context.measure, context.tuning, fitted.deviations, fitted.hypothesis, context.map_
     )
-    errors = standard_errors(context.measure, fitted, sensitivity)[t:]
+    errors = compute_standard_errors(context.measure, fitted, sensitivity)[t:]
     simplified = _round_exponents(context, fitted.hypothesis, errors)
     if simplified is None:
         return fitted
@@ -53,15 +53,15 @@ def _round_exponents(context: SearchContext, hypothesis: Hypothesis, errors: np.
         simple = _simplify_exponents(law, claim_errors) if simple is law else simple
         any_simplified |= simple is not law
         effect = law_effect(simple, law_channels(recording))
-        parts.append(hypothesis_of_claim(Claim(effect, "one", claim.sites), [law_values(simple)]))
+        parts.append(make_claim_hypothesis(Claim(effect, "one", claim.sites), [law_values(simple)]))
     if not any_simplified:
         return None
-    return reduce(combine, parts)
+    return reduce(combine_hypotheses, parts)
 
 
 def _extract_claim(hypothesis: Hypothesis, number: int) -> Hypothesis:
     claim = hypothesis.claims[number]
-    return hypothesis_of_claim(claim, [dict(placed.values) for placed in hypothesis.list_effects_of(number)])
+    return make_claim_hypothesis(claim, [dict(placed.values) for placed in hypothesis.list_effects_of(number)])
 
 
 def _drop_short_memory(law: Law, sample_s: float) -> Law:
@@ -78,7 +78,7 @@ def _simplify_exponents(law: Law, errors: np.ndarray) -> Law:
     """The law with exponents near half or whole numbers rounded to these in the formula. errors: standard errors of
     their logarithms."""
     simplified = law
-    for index, role in sorted(roles(law.tree).items(), reverse=True):
+    for index, role in sorted(find_parameter_roles(law.tree).items(), reverse=True):
         value = law.numbers[index]
         if role != "exponent" or value <= 0:
             continue

@@ -2,7 +2,8 @@
 
 Among so many formulas, some fit any data. A law is named only where held-out stretches of another kind than the fitted
 ones confirm it (extrapolation), where its parameters agree between stretches (stability), where the same search in a
-time-shuffled force finds nothing (negative control), and where no law of other variables fits as well.
+time-shuffled force finds nothing (negative control), and where no law of other variables fits as well. Called by
+`add_laws`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,14 +11,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.confirm.held_out_gain import held_out_gain
+from analysis.diagnosis.confirm.held_out_gain import estimate_held_out_gain
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.discovery.antisymmetric_pairs import can_coupling_imitate
+from analysis.diagnosis.discovery.convert_sum import convert_sum_to_law, list_fitted_laws
 from analysis.diagnosis.discovery.discover import Discovery, Round
 from analysis.diagnosis.discovery.fit_sum import Sum
-from analysis.diagnosis.discovery.law_of_sum import convert_sum_to_law, list_fitted_laws
 from analysis.diagnosis.discovery.snap_exponents import snap_exponents
-from analysis.diagnosis.effect_words import noun_of
+from analysis.diagnosis.effect_words import get_noun
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import are_inseparable
@@ -28,12 +29,12 @@ from equalizer.effects.discovered_law import axis_names
 from equalizer.signals.recording import Segment
 from equalizer.signals.signal import FloatArray
 
-SAME_KIND = (
+NO_OTHER_EXCITATION = (
     "the held-out data contain no other kind of excitation than the data in which it was found, such as a stronger "
     "one or one on several axes"
 )
 
-HALF_TAKEN = (
+COUPLING_EXPLAINS_HALF = (
     "the model's own coupled damping or stiffness, which acts on both axes alike, can explain half of such a force: "
     "a force on one axis and an antisymmetric pair of half its size fit equally well"
 )
@@ -44,73 +45,76 @@ def find_failed_checks(
 ) -> tuple[str, ...]:
     """Why the laws are only candidates; empty where they pass. rivals: the best of the catalogue, with held-out
     error."""
-    return tuple(dict.fromkeys(_failed_checks(context, discovery, rivals)))
+    return tuple(dict.fromkeys(_run_checks(context, discovery, rivals)))
 
 
 def choose_on_held_out(context: SearchContext, discovery: Discovery) -> Discovery:
     """The discovery with its last law replaced by an inseparable law of the same round whose held-out error is
     significantly smaller, if there is one: formulas that agree on the fitted data may differ on stronger commands. The
     alternatives are few and fixed beforehand, and the chosen law must still pass all other checks."""
-    last_round, best, law_count = discovery.rounds[-1], discovery.explanation.after, 1
-    chosen = last_round.sums[0]
+    last_round, best_candidate, law_count = discovery.rounds[-1], discovery.explanation.after, 1
+    chosen_sum = last_round.sums[0]
     for candidate, term_sum in zip(last_round.fitted_candidates[1:], last_round.sums[1:], strict=True):
-        is_pair = chosen.partner is not None or term_sum.partner is not None
+        is_pair = chosen_sum.partner is not None or term_sum.partner is not None
         if is_pair or not are_inseparable(last_round.fitted_candidates[0], candidate):
             continue
         law_count += 1
         refined = snap_exponents(context, refine(context, candidate.fitted))
-        alternative = context.with_test_score(context.candidate(refined))
-        gain = held_out_gain(context.whole, best, alternative)
+        alternative = context.with_test_score(context.score_fit(refined))
+        gain = estimate_held_out_gain(context.full_measure, best_candidate, alternative)
         if gain is not None and gain.low > 0:
-            best, chosen = alternative, term_sum
-    if chosen is last_round.sums[0]:
+            best_candidate, chosen_sum = alternative, term_sum
+    if chosen_sum is last_round.sums[0]:
         return discovery
-    reordered = _put_first(last_round, chosen)
+    reordered = _put_first(last_round, chosen_sum)
     explanation = replace(
         discovery.explanation,
-        after=best,
+        after=best_candidate,
         rounds=(*discovery.explanation.rounds[:-1], reordered.fitted_candidates),
-        steps=(*discovery.explanation.steps[:-1], best),
+        steps=(*discovery.explanation.steps[:-1], best_candidate),
     )
     return Discovery(explanation, (*discovery.rounds[:-1], reordered), law_count)
 
 
-def _put_first(round_: Round, chosen: Sum) -> Round:
-    order = sorted(range(len(round_.sums)), key=lambda number: round_.sums[number] is not chosen)
+def _put_first(round_: Round, chosen_sum: Sum) -> Round:
+    """The round with the chosen sum and its candidate first, the others in their order."""
+    order = sorted(range(len(round_.sums)), key=lambda index: round_.sums[index] is not chosen_sum)
     return replace(
         round_,
-        fitted_candidates=tuple(round_.fitted_candidates[number] for number in order),
-        sums=tuple(round_.sums[number] for number in order),
+        fitted_candidates=tuple(round_.fitted_candidates[index] for index in order),
+        sums=tuple(round_.sums[index] for index in order),
     )
 
 
-def _failed_checks(context: SearchContext, discovery: Discovery, rivals: Sequence[FittedCandidate]) -> Iterator[str]:
-    if not held_out_kinds(context.whole.records):
-        yield SAME_KIND
-    for number, round_ in enumerate(discovery.rounds):
+def _run_checks(context: SearchContext, discovery: Discovery, rivals: Sequence[FittedCandidate]) -> Iterator[str]:
+    """Sentences on the checks that fail, some possibly repeated: extrapolation, stability, negative control, equally
+    good laws, coupling of the model, and the gain over the re-tuned model and over the rivals."""
+    if not describe_held_out_kinds(context.full_measure.records):
+        yield NO_OTHER_EXCITATION
+    for round_index, round_ in enumerate(discovery.rounds):
         best_sum = round_.sums[0]
-        if best_sum.spread > LAW_STABLE and not holds_on_held_out(discovery.explanation):
+        if best_sum.spread > LAW_STABLE and not is_confirmed_on_held_out(discovery.explanation):
             yield f"its parameters differ by {100 * best_sum.spread:.0f} % from stretch to stretch"
-        removed, by_chance = round_.shares_above_noise
-        if 1 - removed > LAW_PLACEBO * (1 - by_chance):
+        removed_share, chance_share = round_.shares_above_noise
+        if 1 - removed_share > LAW_PLACEBO * (1 - chance_share):
             yield (
-                f"it explains {100 * removed:.0f} % of the missing force above the noise, and the same search explains "
-                f"{100 * by_chance:.0f} % of the force when it is shuffled in time"
+                f"it explains {100 * removed_share:.0f} % of the missing force above the noise, and the same search "
+                f"explains {100 * chance_share:.0f} % of the force when it is shuffled in time"
             )
-        yield from _equally_good_laws(context, discovery, number)
-    inputs = context.whole.records[0].recording.command.channels
+        yield from _check_rival_laws(context, discovery, round_index)
+    inputs = context.full_measure.records[0].recording.command.channels
     if can_coupling_imitate(context.tuning, discovery.explanation.after.fitted, inputs):
-        yield HALF_TAKEN
-    yield from _insignificant_gain(
+        yield COUPLING_EXPLAINS_HALF
+    yield from _check_held_out_gain(
         context, discovery.explanation.after, (discovery.explanation.retuned, "the re-tuned model")
     )
     for rival in rivals:
-        yield from _insignificant_gain(
-            context, discovery.explanation.after, (rival, f"{noun_of(rival.newest)} alone or with what it needs")
+        yield from _check_held_out_gain(
+            context, discovery.explanation.after, (rival, f"{get_noun(rival.newest)} alone or with what it needs")
         )
 
 
-def holds_on_held_out(explanation: Explanation) -> bool:
+def is_confirmed_on_held_out(explanation: Explanation) -> bool:
     """Whether the held-out error is so small that the law's factor, fitted to other stretches, must be correct within
     `LAW_STABLE`: a relative error s of the factor leaves the share s^2 of the error power above the noise."""
     retuned_excess, remaining_excess = (
@@ -120,11 +124,11 @@ def holds_on_held_out(explanation: Explanation) -> bool:
     return retuned_excess > 0 and remaining_excess <= LAW_STABLE**2 * retuned_excess
 
 
-def _insignificant_gain(
+def _check_held_out_gain(
     context: SearchContext, law: FittedCandidate, rival: tuple[FittedCandidate, str]
 ) -> Iterator[str]:
     """A reason, as a sentence, where the gain on held-out data is not significant (bootstrap over stretches)."""
-    gain = held_out_gain(context.whole, rival[0], law)
+    gain = estimate_held_out_gain(context.full_measure, rival[0], law)
     if gain is None:
         yield "too little data was held out to confirm it"
     elif gain.low <= 0:
@@ -134,37 +138,37 @@ def _insignificant_gain(
         )
 
 
-def _equally_good_laws(context: SearchContext, discovery: Discovery, number: int) -> Iterator[str]:
-    """Laws of other variables that fit as well, that held-out data do not distinguish from it either, and that predict
-    something else."""
-    round_ = discovery.rounds[number]
-    best = round_.fitted_candidates[0]
+def _check_rival_laws(context: SearchContext, discovery: Discovery, round_index: int) -> Iterator[str]:
+    """A reason, as a sentence, for each law of other variables that fits as well as the best of the round, that
+    held-out data do not distinguish from it either, and whose prediction differs."""
+    round_ = discovery.rounds[round_index]
+    best_candidate = round_.fitted_candidates[0]
     equally_good = [
         (candidate, term_sum)
         for candidate, term_sum in zip(round_.fitted_candidates[1:], round_.sums[1:], strict=True)
-        if are_inseparable(best, candidate) and term_sum.variables != round_.sums[0].variables
+        if are_inseparable(best_candidate, candidate) and term_sum.variables != round_.sums[0].variables
     ]
     if not equally_good:
         return
-    law = context.with_test_score(best)
+    law = context.with_test_score(best_candidate)
     for candidate, term_sum in equally_good:
         rival = context.with_test_score(candidate)
-        gain = held_out_gain(context.whole, rival, law)
+        gain = estimate_held_out_gain(context.full_measure, rival, law)
         is_distinguished = gain is not None and gain.low > 0
-        if not is_distinguished and not _predict_the_same(discovery.explanation.retuned, law, rival):
+        if not is_distinguished and not _are_predictions_equal(discovery.explanation.retuned, law, rival):
             names = convert_sum_to_law(term_sum, context.measure.records[0].recording).variables
             yield f"a law of {' and '.join(names)} fits equally well"
 
 
-def _predict_the_same(retuned: FittedCandidate, law: FittedCandidate, rival: FittedCandidate) -> bool:
-    """Whether two laws predict the same residuals in all samples, including the held-out ones: then they are one law in
-    two notations, such as a relaxation of position or of speed."""
-    difference = contribution = 0.0
+def _are_predictions_equal(retuned: FittedCandidate, law: FittedCandidate, rival: FittedCandidate) -> bool:
+    """Whether two laws predict the same residuals in all samples, including the held-out ones, within `LAW_SAME` of the
+    law's contribution: then they are one law in two notations, such as a relaxation of position or of speed."""
+    difference_squares = law_squares = 0.0
     residual_sets = retuned.fitted.residuals, law.fitted.residuals, rival.fitted.residuals
     for base_residual, law_residual, rival_residual in zip(*residual_sets, strict=True):
-        difference += float(np.nansum((law_residual - rival_residual) ** 2))
-        contribution += float(np.nansum((law_residual - base_residual) ** 2))
-    return difference <= LAW_SAME**2 * contribution
+        difference_squares += float(np.nansum((law_residual - rival_residual) ** 2))
+        law_squares += float(np.nansum((law_residual - base_residual) ** 2))
+    return difference_squares <= LAW_SAME**2 * law_squares
 
 
 def is_shorter_and_as_good(context: SearchContext, discovery: Discovery, rival: FittedCandidate) -> bool:
@@ -178,17 +182,17 @@ def is_shorter_and_as_good(context: SearchContext, discovery: Discovery, rival: 
         for term_sum in (round_.sums[0], round_.sums[0].partner)
         if term_sum is not None
     ]
-    numbers = sum(1 + len(term.numbers) for term_sum in sums for term in term_sum.terms)
-    if numbers >= len(rival.fitted.hypothesis.parameters) or not are_inseparable(rival, law):
+    parameter_count = sum(1 + len(term.numbers) for term_sum in sums for term in term_sum.terms)
+    if parameter_count >= len(rival.fitted.hypothesis.parameters) or not are_inseparable(rival, law):
         return False
-    rival_gain = held_out_gain(context.whole, law, rival)
+    rival_gain = estimate_held_out_gain(context.full_measure, law, rival)
     log_error_change = np.mean(np.log(law.score.test)) - np.mean(np.log(rival.score.test))
     return (
         rival_gain is not None and rival_gain.low <= 0.1 * NOISE_KNOWN_TO and bool(log_error_change <= NOISE_KNOWN_TO)
     )
 
 
-def held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:
+def describe_held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:
     """In words, how the held-out stretches differ from those in which laws are searched (stronger commands, axes driven
     together, another kind of command); empty where they do not. A segment of which only the end is held out counts as
     both; rest counts as neither."""
@@ -196,13 +200,13 @@ def held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:
     held_out_segments: list[tuple[str, tuple[int, ...], float]] = []
     for record in records:
         for segment in record.recording.segments:
-            part = slice(segment.start, segment.stop)
-            description = _describe_segment(segment, record.command[part])
+            samples = slice(segment.start, segment.stop)
+            description = _describe_segment(segment, record.command[samples])
             if not description[1]:
                 continue
-            if record.test[part].any():
+            if record.test[samples].any():
                 held_out_segments.append(description)
-            if (record.fit | record.choose)[part].any():
+            if (record.fit | record.choose)[samples].any():
                 fitted_kinds.append(description)
     if not fitted_kinds:
         return ()
@@ -213,54 +217,67 @@ def held_out_kinds(records: Sequence[Observed]) -> tuple[str, ...]:
         (any(driven not in axes and len(driven) > 1 for _, driven, _ in held_out_segments), "axes driven together"),
         (any(kind not in kinds for kind, _, _ in held_out_segments), "another kind of command"),
     ]
-    return tuple(words for applies, words in differences if applies)
+    return tuple(phrase for applies, phrase in differences if applies)
 
 
 def _describe_segment(segment: Segment, command: FloatArray) -> tuple[str, tuple[int, ...], float]:
+    """Kind of excitation, indices of the driven axes, and largest magnitude of the command (n, m), in its unit."""
     driven = np.flatnonzero(np.abs(command).max(axis=0, initial=0.0) > 0)
     return segment.kind, tuple(driven.tolist()), float(np.abs(command).max(initial=0.0))
 
 
-def proof_sentence(
+def write_proof_sentence(
     context: SearchContext, explanation: Explanation, rivals: Sequence[FittedCandidate], chosen_of: int = 1
 ) -> str:
     """One to three sentences: on which data a named law was tested, its error compared with the best law of the
     catalogue, the number of equally good laws, and the range of motion within which it was tested."""
-    measure, final = context.whole, explanation.after
+    measure, final = context.full_measure, explanation.after
     laws = [law for law in list_fitted_laws(final.fitted.hypothesis) if law is not None]
-    kinds = conjoin(held_out_kinds(measure.records))
-    text = f"The formula was tested on {kinds}, to which nothing was fitted: {_error_text(context, explanation, final)}"
-    closest = min((_held_out_error_share(context, explanation, rival) for rival in rivals), default=None)
-    if closest is not None:
-        text += f", that of the best law of the catalogue {100 * closest:.3g} %"
+    kinds = conjoin(describe_held_out_kinds(measure.records))
+    text = (
+        f"The formula was tested on {kinds}, to which nothing was fitted: "
+        f"{_format_held_out_error(context, explanation, final)}"
+    )
+    least_rival_share = min(
+        (_compute_held_out_error_share(context, explanation, rival) for rival in rivals), default=None
+    )
+    if least_rival_share is not None:
+        text += f", that of the best law of the catalogue {100 * least_rival_share:.3g} %"
     if chosen_of > 1:
         text += f". Of {chosen_of} formulas that fitted equally well, it is the one that these data confirm"
-    ranges = _range_of_motion(context, explanation, {name for law in laws for name in law.variables})
+    ranges = _format_ranges_of_motion(context, explanation, {name for law in laws for name in law.variables})
     return f"{text}. Beyond {conjoin(ranges)} the formula is not tested." if ranges else f"{text}."
 
 
-def _error_text(context: SearchContext, fitted: Explanation, law: FittedCandidate) -> str:
-    return f"there its error is {100 * _held_out_error_share(context, fitted, law):.3g} % of the re-tuned model's error"
+def _format_held_out_error(context: SearchContext, explanation: Explanation, law: FittedCandidate) -> str:
+    """Clause with the law's held-out rms error in per cent of that of the re-tuned model."""
+    return (
+        f"there its error is {100 * _compute_held_out_error_share(context, explanation, law):.3g} % of the re-tuned "
+        "model's error"
+    )
 
 
-def _held_out_error_share(context: SearchContext, explanation: Explanation, law: FittedCandidate) -> float:
-    """Held-out rms error over the re-tuned model's, in the mean over the channels."""
-    gain = held_out_gain(context.whole, explanation.retuned, law)
+def _compute_held_out_error_share(context: SearchContext, explanation: Explanation, law: FittedCandidate) -> float:
+    """Held-out rms error over the re-tuned model's, by the mean error power over the channels; NaN where too little was
+    held out."""
+    gain = estimate_held_out_gain(context.full_measure, explanation.retuned, law)
     return float("nan") if gain is None else float(np.sqrt(max(1 - gain.gain, 0.0)))
 
 
-def _range_of_motion(context: SearchContext, explanation: Explanation, names: set[str]) -> tuple[str, ...]:
+def _format_ranges_of_motion(
+    context: SearchContext, explanation: Explanation, signal_names: set[str]
+) -> tuple[str, ...]:
     """The largest position and speed of each axis that the law uses, held-out samples included, as text."""
-    measure, fitted = context.whole, explanation.after.fitted
+    measure, fitted = context.full_measure, explanation.after.fitted
     model, placed = context.tuning.tune(fitted.deviations), fitted.hypothesis.list_placed_effects()
     evidence = measure.evidence(model, placed, fitted.residuals)
     letters = axis_names(measure.records[0].recording.command.channels)
-    length, time = model.system.length, model.system.time
+    length_unit, time_unit = model.system.length, model.system.time
     ranges = []
     for axis, letter in enumerate(letters):
-        for name, unit in ((letter, length), (f"v{letter}", f"{length}/{time}")):
-            if name in names:
+        for name, unit in ((letter, length_unit), (f"v{letter}", f"{length_unit}/{time_unit}")):
+            if name in signal_names:
                 motions = [record.axis_velocity if name != letter else record.axis_position for record in evidence]
-                largest = max(float(np.abs(motion[:, axis]).max()) for motion in motions)
-                ranges.append(f"{name} = ± {largest:.3g} {unit}")
+                largest_value = max(float(np.abs(motion[:, axis]).max()) for motion in motions)
+                ranges.append(f"{name} = ± {largest_value:.3g} {unit}")
     return tuple(ranges)

@@ -11,15 +11,15 @@ import numpy as np
 
 from analysis.diagnosis.discovery.grammar import (
     AXES,
-    POWER,
+    POWER_BOUNDS,
     Columns,
     Term,
-    axes_of,
-    even_power,
-    odd_power,
-    periodic_terms,
-    soft_limit_terms,
-    terms_of,
+    find_periodic_terms,
+    format_even_power,
+    format_odd_power,
+    generate_soft_limit_terms,
+    list_terms,
+    measure_axes,
 )
 from analysis.diagnosis.discovery.matched_filter import View
 
@@ -29,9 +29,9 @@ def view_terms(view: View) -> tuple[Term, ...]:
     record = view.records[0]
     if view.acts_on == "response":
         return terms_of_readings(record.columns, view.axis, len(record.reading_units))
-    axes = axes_of(record.columns, record.missing_force.shape[1])
-    terms = terms_of(axes, view.axis, len(record.missing_force) / record.rate_hz, record.rate_hz)
-    lines = periodic_terms(record.columns, axes[view.axis], record.missing_force[:, view.axis], record.rate_hz)
+    axes = measure_axes(record.columns, record.missing_force.shape[1])
+    terms = list_terms(axes, view.axis, len(record.missing_force) / record.rate_hz, record.rate_hz)
+    lines = find_periodic_terms(record.columns, axes[view.axis], record.missing_force[:, view.axis], record.rate_hz)
     return (*terms, *lines)
 
 
@@ -48,10 +48,10 @@ def _own_terms(reading: str, size: float) -> Iterator[Term]:
     """Terms of one channel's own reading. size: its largest magnitude."""
     yield Term(f"sign({reading})")
     for start in (0.5, 1.5, 2.0, 3.0, 5.0):
-        yield Term(odd_power(reading, 0), (start,), (POWER,), (0,))
+        yield Term(format_odd_power(reading, 0), (start,), (POWER_BOUNDS,), (0,))
     for start in (1.0, 2.0, 4.0):
-        yield Term(even_power(reading, 0), (start,), (POWER,), (0,))
-    yield from soft_limit_terms(reading, size)
+        yield Term(format_even_power(reading, 0), (start,), (POWER_BOUNDS,), (0,))
+    yield from generate_soft_limit_terms(reading, size)
     for share in (0.2, 0.5, 0.8):
         edge = (share * size,), ((0.0, size),)
         yield Term(f"maximum(abs({reading}) - p0, 0)*sign({reading})", *edge)

@@ -2,7 +2,8 @@
 
 Compared is ln a, with a² the mean power density in a band of half an octave (Welch's method, windows of 1 s); the
 noise's power is added to a predicted a². Impacts make the motion chaotic: the waveforms of two simulations whose
-initial states differ by less than any sensor resolves diverge; their band amplitudes agree to a few per cent.
+initial states differ by less than any sensor resolves diverge; their band amplitudes agree to a few per cent. Fitted
+by `band_power_fit`; candidates are compared by `band_power_comparison`.
 """
 
 from collections.abc import Sequence
@@ -16,7 +17,7 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
-from equalizer.signals.spectral_density import spectral_density
+from equalizer.signals.spectral_density import estimate_spectral_density
 
 WINDOW_S, OCTAVES = 1.0, 0.5
 """Length of a Welch window in s, and width of a band in octaves."""
@@ -53,18 +54,18 @@ class BandPower:
         """Per segment (rest left out) and role, the longest run of its samples, where that has `LEAST_SAMPLES` or more.
         A record without segments is divided into pieces of `LONGEST_S`."""
         return tuple(
-            Stretch(number, first, last, part)
-            for number, record in enumerate(self.measure.records)
-            for first, last in self._spans(number)
+            Stretch(record_index, first, last, part)
+            for record_index, record in enumerate(self.measure.records)
+            for first, last in self._list_spans(record_index)
             for part in PARTS
-            for first, last in _longest_run(getattr(record, part), first, last)
+            for first, last in _find_longest_run(getattr(record, part), first, last)
         )
 
     @cached_property
     def measured(self) -> FloatArray:
         """(stretches, bands, c): ln a of the measured signals; NaN where the power is below `LEAST_POWER_RATIO` times
         the noise."""
-        power = self._power([record.measured for record in self.measure.records])
+        power = self._compute_band_power([record.measured for record in self.measure.records])
         with np.errstate(divide="ignore"):
             return np.where(power > LEAST_POWER_RATIO * self._noise, 0.5 * np.log(power), np.nan)
 
@@ -74,21 +75,21 @@ class BandPower:
         predicted = [
             record.measured - residual * unit for record, residual in zip(self.measure.records, residuals, strict=True)
         ]
-        return np.asarray(0.5 * np.log(self._power(predicted) + self._noise))
+        return np.asarray(0.5 * np.log(self._compute_band_power(predicted) + self._noise))
 
-    def misfits(self, log_errors: FloatArray) -> FitScore:
+    def compute_misfits(self, log_errors: FloatArray) -> FitScore:
         """Rms per channel of differences of ln a, (stretches, bands, c), by role; NaN without a compared band."""
         compared_errors = np.where(np.isnan(self.measured), np.nan, log_errors)
         return FitScore(
-            *(_rms(compared_errors[[stretch.part == part for stretch in self.stretches]]) for part in PARTS)
+            *(_compute_rms(compared_errors[[stretch.part == part for stretch in self.stretches]]) for part in PARTS)
         )
 
     @cached_property
     def _edges(self) -> FloatArray:
         """(bands + 1,), Hz: edges of the bands, at constant ratios."""
         rate_hz = self.measure.records[0].recording.sample_rate_hz
-        count = int(np.log2(HIGHEST_SHARE * rate_hz * WINDOW_S / LOWEST_LINE) / OCTAVES)
-        return np.asarray(LOWEST_LINE / WINDOW_S * 2.0 ** (OCTAVES * np.arange(max(count, 1) + 1)))
+        band_count = int(np.log2(HIGHEST_SHARE * rate_hz * WINDOW_S / LOWEST_LINE) / OCTAVES)
+        return np.asarray(LOWEST_LINE / WINDOW_S * 2.0 ** (OCTAVES * np.arange(max(band_count, 1) + 1)))
 
     @property
     def _noise(self) -> FloatArray:
@@ -96,36 +97,44 @@ class BandPower:
         rate_hz = self.measure.records[0].recording.sample_rate_hz
         return np.asarray(self.measure.noise**2 / (rate_hz / 2))
 
-    def _power(self, predicted: Sequence[FloatArray]) -> FloatArray:
+    def _compute_band_power(self, predicted: Sequence[FloatArray]) -> FloatArray:
         """(stretches, bands, c): a², mean power density over the lines of each band, in units squared per hertz. A
         band between two lines takes the line above it. predicted: signals (n, c), per record."""
         rate_hz = self.measure.records[0].recording.sample_rate_hz
-        rows = np.empty((len(self.stretches), len(self._edges) - 1, len(self.measure.noise)))
-        for row, stretch in zip(rows, self.stretches, strict=True):
-            window = min(int(WINDOW_S * rate_hz), stretch.last - stretch.first)
-            lines, density = spectral_density(predicted[stretch.record][stretch.first : stretch.last], rate_hz, window)
-            first_lines = np.searchsorted(lines, self._edges)
+        band_powers = np.empty((len(self.stretches), len(self._edges) - 1, len(self.measure.noise)))
+        for stretch_powers, stretch in zip(band_powers, self.stretches, strict=True):
+            window_samples = min(int(WINDOW_S * rate_hz), stretch.last - stretch.first)
+            frequency_hz, density = estimate_spectral_density(
+                predicted[stretch.record][stretch.first : stretch.last], rate_hz, window_samples
+            )
+            first_lines = np.searchsorted(frequency_hz, self._edges)
             for band, (first_line, stop_line) in enumerate(pairwise(first_lines)):
-                row[band] = density[first_line : max(stop_line, first_line + 1)].mean(axis=0)
-        return rows
+                stretch_powers[band] = density[first_line : max(stop_line, first_line + 1)].mean(axis=0)
+        return band_powers
 
-    def _spans(self, number: int) -> list[tuple[int, int]]:
+    def _list_spans(self, record_index: int) -> list[tuple[int, int]]:
         """Start and stop of the segments of a record in motion, or of pieces of it where it has none."""
-        record = self.measure.records[number]
+        record = self.measure.records[record_index]
         segments = [(segment.start, segment.stop) for segment in record.recording.segments if segment.kind != "rest"]
-        length, longest = len(record.measured), int(LONGEST_S * record.recording.sample_rate_hz)
-        return segments or [(first, min(first + longest, length)) for first in range(0, length, longest)]
+        length, longest_samples = len(record.measured), int(LONGEST_S * record.recording.sample_rate_hz)
+        return segments or [
+            (first, min(first + longest_samples, length)) for first in range(0, length, longest_samples)
+        ]
 
 
-def _longest_run(mask: Mask, first: int, last: int) -> list[tuple[int, int]]:
-    """Start and stop of the longest run of masked samples between first and last; empty below `LEAST_SAMPLES`."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask[first:last].astype(np.int8), [0]]))).reshape(-1, 2)
-    runs = [(first + int(start), first + int(stop)) for start, stop in edges if stop - start >= LEAST_SAMPLES]
+def _find_longest_run(mask: Mask, start: int, stop: int) -> list[tuple[int, int]]:
+    """Start and stop of the longest run of masked samples between start and stop; empty below `LEAST_SAMPLES`."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask[start:stop].astype(np.int8), [0]]))).reshape(-1, 2)
+    runs = [
+        (start + int(run_start), start + int(run_stop))
+        for run_start, run_stop in edges
+        if run_stop - run_start >= LEAST_SAMPLES
+    ]
     return [max(runs, key=lambda run: run[1] - run[0])] if runs else []
 
 
-def _rms(log_errors: FloatArray) -> FloatArray:
+def _compute_rms(log_errors: FloatArray) -> FloatArray:
     """(c,): rms over stretches and bands, without NaN; NaN where all are NaN."""
-    count = np.sum(np.isfinite(log_errors), axis=(0, 1))
+    compared_count = np.sum(np.isfinite(log_errors), axis=(0, 1))
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(np.sqrt(np.nansum(log_errors**2, axis=(0, 1)) / count))
+        return np.asarray(np.sqrt(np.nansum(log_errors**2, axis=(0, 1)) / compared_count))

@@ -2,6 +2,7 @@
 
 In this order: the samples of each recording are divided into those to fit, to choose and to test by; the noise of each
 channel is estimated; errors get their unit from the noise; the rule selects free simulation, windows or forces.
+Called at the start of a diagnosis (`diagnose`) and wherever models are compared on recordings (`prediction_error`).
 """
 
 from collections.abc import Sequence
@@ -11,9 +12,9 @@ from typing import Literal
 import numpy as np
 
 from analysis.diagnosis.data.measured_motion import has_motion
-from analysis.diagnosis.data.observed import Observed, error_units
+from analysis.diagnosis.data.observed import Observed, compute_error_units
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.effect_words import noun_of
+from analysis.diagnosis.effect_words import get_noun
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.error_measure_rule import UNTIMED, Choice, choose_measure, count_samples_to_settle
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
@@ -29,19 +30,19 @@ from equalizer.signals.signal import FloatArray
 Compared = Literal["auto", "motion", "force"]
 """Signals that the user sets to be compared; auto: by the rule."""
 
-DITHER = 0.02
+LEAST_DITHER = 0.02
 """Rms noise over the step of a converter below which differences between repeats do not show the noise."""
 UNTIMED_BAND_SHARE = 0.45
 """End of the band relative to the sample rate, for samples without a time axis."""
-BY_FORCE = (
+FORCE_REMARK = (
     "The force that the model needs along the measured motion is compared with the force that was applied: the "
     "motion was measured, and small errors of a model that was fitted to it would grow in a simulation."
 )
-ASKED_MOTION = (
+REQUESTED_MOTION_REMARK = (
     "As requested, the motion is compared in short windows, each from a state estimated from the measured motion; "
     "the automatic choice would have compared forces."
 )
-NO_STATE = (
+NO_STATE_REMARK = (
     "The model integrates freely and the sensors do not show its state, so it was simulated from rest; errors grow "
     "with time."
 )
@@ -58,7 +59,7 @@ class MeasureChoice:
     """Sentences on the choice, and on the effects that the model itself names."""
 
 
-def measure_of(
+def make_measure(
     recordings: Sequence[Recording],
     model: MechanicalModel,
     companions: Sequence[Recording] = (),
@@ -68,23 +69,23 @@ def measure_of(
     measure but are not part of it. Windows without an estimable state become a free simulation or, by the rule,
     forces."""
     if compared == "force":
-        return measure_by_force(recordings, model, None)
+        return make_force_measure(recordings, model, None)
     records, companion_records = (
         tuple(_leave_out_beginning(record, model) for record in observe_parts(group, model.outputs)) if group else ()
         for group in (recordings, companions)
     )
     floors = tuple(estimate_noise_floor(record.recording) for record in records)
-    noise = _noise(floors, records)
-    unit = error_units(np.vstack([record.measured for record in records]), noise)
+    noise = _estimate_noise(floors, records)
+    unit = compute_error_units(np.vstack([record.measured for record in records]), noise)
     choice = choose_measure((*records, *companion_records), model)
     if compared == "motion" and choice.measure == "predicted force":
-        choice = Choice("windows", ASKED_MOTION)
+        choice = Choice("windows", REQUESTED_MOTION_REMARK)
     model_effects = place_recorded_effects(model, recordings[0])
-    remarks = (*((choice.reason,) if choice.reason else ()), *_remark_on_model_effects(model_effects))
+    remarks = (*((choice.reason,) if choice.reason else ()), *_describe_model_effects(model_effects))
     if choice.measure == "free simulation":
         return MeasureChoice(FreeSimulation(records, unit, noise, model_effects=model_effects), floors, remarks)
     if choice.measure == "windows":
-        # Imported here, as in `_by_force`: most diagnoses compare a free simulation.
+        # Imported here, as in `_build_force_measure`: most diagnoses compare a free simulation.
         from analysis.diagnosis.errors.windows import build_windows
 
         try:
@@ -95,22 +96,24 @@ def measure_of(
                 return MeasureChoice(
                     FreeSimulation(records, unit, noise, model_effects=model_effects),
                     floors,
-                    (NO_STATE, *_remark_on_model_effects(model_effects)),
+                    (NO_STATE_REMARK, *_describe_model_effects(model_effects)),
                 )
     band_hz = UNTIMED_BAND_SHARE * recordings[0].sample_rate_hz if choice.reason == UNTIMED else None
-    return _by_force(records, model, floors, remarks, band_hz)
+    return _build_force_measure(records, model, floors, remarks, band_hz)
 
 
-def measure_by_force(recordings: Sequence[Recording], model: MechanicalModel, band_hz: float | None) -> MeasureChoice:
+def make_force_measure(recordings: Sequence[Recording], model: MechanicalModel, band_hz: float | None) -> MeasureChoice:
     """The error measure by force without the rule. band_hz: forces are compared up to it; None = by the noise. The
     recordings must have a motion (`has_motion`)."""
     records = observe_parts(recordings, model.outputs)
     model_effects = place_recorded_effects(model, recordings[0])
     floors = [estimate_noise_floor(record.recording) for record in records]
-    return _by_force(records, model, floors, (BY_FORCE, *_remark_on_model_effects(model_effects)), band_hz)
+    return _build_force_measure(
+        records, model, floors, (FORCE_REMARK, *_describe_model_effects(model_effects)), band_hz
+    )
 
 
-def _by_force(
+def _build_force_measure(
     records: Sequence[Observed],
     model: MechanicalModel,
     floors: Sequence[NoiseFloor],
@@ -118,22 +121,22 @@ def _by_force(
     band_hz: float | None = None,
 ) -> MeasureChoice:
     """The error measure by force, with the end of its band among the remarks."""
-    from analysis.diagnosis.forces.force_views import force_views
+    from analysis.diagnosis.forces.force_views import build_force_views
 
     model_effects = place_recorded_effects(model, records[0].recording)
-    views = force_views(records, model, floors, band_hz)
-    text = "" if UNTIMED in remarks else f"The forces are compared up to {views.measure.band_hz:.3g} Hz."
+    views = build_force_views(records, model, floors, band_hz)
+    band_remark = "" if UNTIMED in remarks else f"The forces are compared up to {views.measure.band_hz:.3g} Hz."
     return MeasureChoice(
-        replace(views.measure, model_effects=model_effects), views.floors, tuple(filter(None, (*remarks, text)))
+        replace(views.measure, model_effects=model_effects), views.floors, tuple(filter(None, (*remarks, band_remark)))
     )
 
 
-def _remark_on_model_effects(model_effects: Sequence[PlacedEffect]) -> tuple[str, ...]:
+def _describe_model_effects(model_effects: Sequence[PlacedEffect]) -> tuple[str, ...]:
     """Remark on the effects that the model's file names; none without any."""
     if not model_effects:
         return ()
-    kinds = ", ".join(dict.fromkeys(noun_of(placed.effect.name) for placed in model_effects))
-    return (f"The given model contains these effects, which are part of every simulation: {kinds}.",)
+    effect_nouns = ", ".join(dict.fromkeys(get_noun(placed.effect.name) for placed in model_effects))
+    return (f"The given model contains these effects, which are part of every simulation: {effect_nouns}.",)
 
 
 def _leave_out_beginning(record: Observed, model: MechanicalModel) -> Observed:
@@ -147,27 +150,29 @@ def _leave_out_beginning(record: Observed, model: MechanicalModel) -> Observed:
     )
 
 
-def _noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -> FloatArray:
+def _estimate_noise(floors: Sequence[NoiseFloor], records: Sequence[Observed]) -> FloatArray:
     """(c,): rms noise of each channel in the quietest recording; `UNKNOWN_NOISE_SHARE` of the signal where unknown."""
-    count = records[0].measured.shape[1]
-    rows = [
+    channel_count = records[0].measured.shape[1]
+    noise_by_record = [
         np.concatenate(
-            [_noise_before_rounding(floor, record), floor.position_rms if floor.position_rms is not None else []]
-        )[:count]
+            [_subtract_rounding_noise(floor, record), floor.position_rms if floor.position_rms is not None else []]
+        )[:channel_count]
         for floor, record in zip(floors, records, strict=True)
     ]
-    signal = np.sqrt(np.nanmean(np.vstack([record.measured for record in records]) ** 2, axis=0))
-    quietest = np.fmin.reduce(rows)
-    return np.asarray(np.where(np.isfinite(quietest) & (quietest > 0), quietest, UNKNOWN_NOISE_SHARE * signal))
+    signal_rms = np.sqrt(np.nanmean(np.vstack([record.measured for record in records]) ** 2, axis=0))
+    least_noise = np.fmin.reduce(noise_by_record)
+    return np.asarray(
+        np.where(np.isfinite(least_noise) & (least_noise > 0), least_noise, UNKNOWN_NOISE_SHARE * signal_rms)
+    )
 
 
-def _noise_before_rounding(floor: NoiseFloor, record: Observed) -> FloatArray:
+def _subtract_rounding_noise(floor: NoiseFloor, record: Observed) -> FloatArray:
     """(p,): rms noise of the response before a converter rounded it (rounding adds step² / 12), because quantisation is
     an effect that the model may lack. Positions keep their rounding, which every encoder has. Noise that was not
     estimated from repeats is unchanged, because it cannot be separated from rounding."""
-    noise = floor.response_rms
+    rms_noise = floor.response_rms
     if floor.method != "repeats":
-        return noise
-    steps = np.array([rounding_step(record.measured[:, c]) for c in range(len(noise))])
-    unrounded_noise = np.asarray(np.sqrt(np.maximum(noise**2 - steps**2 / 12, 0.0)))
-    return np.where(unrounded_noise > DITHER * steps, unrounded_noise, noise)
+        return rms_noise
+    steps = np.array([rounding_step(record.measured[:, c]) for c in range(len(rms_noise))])
+    unrounded_noise = np.asarray(np.sqrt(np.maximum(rms_noise**2 - steps**2 / 12, 0.0)))
+    return np.where(unrounded_noise > LEAST_DITHER * steps, unrounded_noise, rms_noise)

@@ -1,6 +1,8 @@
-"""Protocol of the error measures: residuals of a model with effects, sample by sample, in units of the noise.
+"""Protocol of the error measures of a diagnosis: residuals of a model with effects, sample by sample, scaled by the
+noise.
 
-Three measures, one per file: `free_simulation`, `windows`, `predicted_force`; `choose_measure` selects one.
+`choose_measure` selects one of three: `free_simulation`, `windows` and `forces.predicted_force`. `whitened_measure`
+wraps any of them with a whitening filter that was learned from reference recordings.
 """
 
 from collections.abc import Sequence
@@ -14,7 +16,8 @@ from equalizer.signals.signal import FloatArray
 
 
 class ErrorMeasure(Protocol):
-    """A comparison of measurements with simulated responses, with windows of them, or with predicted forces."""
+    """A comparison of measured signals with predictions of a model: responses simulated over the whole record or over
+    short windows, or the forces that the measured motion requires."""
 
     @property
     def name(self) -> str:
@@ -26,35 +29,35 @@ class ErrorMeasure(Protocol):
 
     @property
     def noise(self) -> FloatArray:
-        """(c,): rms of the unpredictable part (noise), in each channel's own unit."""
+        """(c,): rms of the noise, the part that no model predicts, in each channel's physical unit."""
 
     @property
     def unit(self) -> FloatArray:
-        """(c,): unit of a residual, in each channel's own unit."""
+        """(c,): divisor that scales the residuals, in each channel's physical unit; usually the rms noise."""
 
     @property
     def least(self) -> float:
-        """Least error in units of the noise: smaller errors are set to it."""
+        """Lower limit of rms errors relative to the noise: smaller errors are set to it."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
         """The measure on the same records with other sample roles."""
 
     def with_floor(self, rms: FloatArray) -> Self:
-        """The measure with further noise added to its own (root sum of squares), and 1 as its least error. rms: (c,),
-        in each channel's own unit."""
+        """The measure with an error floor: further noise, added to its own as a root sum of squares, and 1 as its least
+        error. rms: (c,), of the further noise, in each channel's physical unit."""
 
     def shorten(self) -> Self:
-        """The measure on records cut after their last sample to fit or to choose by."""
+        """The measure on records without the samples after the last fit or validation sample, to save time."""
 
     def can_observe(self, effect: Effect) -> bool:
         """Whether the effect changes the compared signals; an effect that does not is not a candidate."""
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
-        """Per record (n, c): measured less predicted, in units of `unit`. Forces raise numpy.linalg.LinAlgError where
-        the model's outputs do not determine its motion."""
+        """Per record (n, c): measured minus predicted, divided by `unit`. With predicted forces, raises
+        numpy.linalg.LinAlgError where the model's outputs do not determine its motion."""
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
-        """Per record, the motion and missing force from which starting values are estimated; `residuals` are those of
-        the same model and effects."""
+        """Per record, the motion and the missing force from which starting values of further effects are estimated.
+        residuals: those of the same model and effects."""

@@ -31,7 +31,7 @@ from analysis.diagnosis.data.measured_motion import has_motion, is_quasi_static
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.recorded_conditions import is_unstable_within
 from analysis.diagnosis.settings import DIES_OUT_SHARE, MOST_LEFT_OUT, REST_S, REST_SHARE, SETTLED_CONSTANTS
-from equalizer.plant.linear_simulation import free_motion_rates
+from equalizer.plant.linear_simulation import compute_poles
 from equalizer.plant.mechanical_model import MechanicalModel
 
 Measure = Literal["free simulation", "windows", "predicted force"]
@@ -129,7 +129,7 @@ def _count_settling_samples(record: Observed, model: MechanicalModel) -> float:
 
 def _compute_slowest_decay_rate(model: MechanicalModel) -> float:
     """Decay rate of the slowest free motion, 1/s; negative where a motion grows."""
-    return -float(free_motion_rates(model).real.max())
+    return -float(compute_poles(model).real.max())
 
 
 def _begins_in_motion(record: Observed) -> bool:

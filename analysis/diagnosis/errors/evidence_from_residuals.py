@@ -1,13 +1,14 @@
 """Convert the residuals of a simulation to `Evidence`, from which an effect's starting values are estimated.
 
-A Wiener deconvolution (`missing_force`) gives the force along each driven axis that would explain the residuals, and
-the motion that it adds to the simulated one. The laws of the effects are then regressed on this force and motion.
+A Wiener deconvolution (`estimate_missing_force`) gives the force along each driven axis that would explain the
+residuals, and the motion that it adds to the simulated one. The laws of the effects are then regressed on this force
+and motion.
 """
 
 import numpy as np
 
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.forces.missing_force import missing_force
+from analysis.diagnosis.forces.missing_force import estimate_missing_force
 from equalizer.effects.simulation.simulator import SimulationResult
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -32,7 +33,7 @@ def evidence_of(
     filled_residuals = np.where(np.isfinite(residuals), residuals, 0.0)
     rate_hz, p = record.recording.sample_rate_hz, model.outputs
     expected = EXPECTED_FORCE_SHARE * np.maximum(np.sqrt(np.mean(record.command**2, axis=0)), 1e-12)
-    missing = missing_force(model, filled_residuals, unit, rate_hz, expected)
+    missing = estimate_missing_force(model, filled_residuals, unit, rate_hz, expected)
     measured, predicted = fill_gaps(record.measured, residuals * unit, simulated)
     has_position = measured.shape[1] > p
     return Evidence(

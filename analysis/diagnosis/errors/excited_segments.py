@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.data.observed_parts import part_of
+from analysis.diagnosis.data.observed_parts import cut_part
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from equalizer.signals.recording import Segment
 
@@ -49,6 +49,6 @@ def _cut_record(record: Observed, segment: Segment) -> Observed:
     first, last = segment.start, min(segment.stop, segment.start + max_samples)
     samples = slice(first, last)
     return Observed(
-        part_of(record.recording, first, last), record.command[samples], record.measured[samples],
+        cut_part(record.recording, first, last), record.command[samples], record.measured[samples],
         record.fit[samples], record.choose[samples], record.test[samples],
     )  # fmt: skip

@@ -1,7 +1,8 @@
 """Scores of a fit: rms error over rms noise per channel, on the samples to fit, to choose and to test by.
 
 `FitScore.mean_log_error` is the criterion by which fits are compared; the functions below compute rms errors and the
-rms of the measured signals that errors are normalised by.
+rms of the measured signals that errors are normalised by. Used by the search (`search_context`) and by the tables of
+errors (`error_table`).
 """
 
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from analysis.diagnosis.types import Mask
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import FloatArray
 
-_TINY = 1e-6
+_LEAST_ERROR = 1e-6
 """Lower limit of an error in `mean_log_error`, so that its logarithm is finite."""
 
 
@@ -35,28 +36,31 @@ class FitScore:
     def mean_log_error(self) -> float:
         """Mean log error power: mean over channels of ln(fit * choose); 0 = only noise. Up to constants this is the
         negative log-likelihood with a free error variance per channel, so that no channel dominates the others."""
-        return float(np.mean(np.log(np.maximum(self.fit, _TINY))) + np.mean(np.log(np.maximum(self.choose, _TINY))))
+        return float(
+            np.mean(np.log(np.maximum(self.fit, _LEAST_ERROR))) + np.mean(np.log(np.maximum(self.choose, _LEAST_ERROR)))
+        )
 
-    def larger(self, factors: FloatArray) -> "FitScore":
+    def scale_errors(self, factors: FloatArray) -> "FitScore":
         """The score with its errors multiplied by `factors`, (c,)."""
         return FitScore(self.fit * factors, self.choose * factors, self.test * factors)
 
 
-def fit_score(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FitScore:
+def compute_fit_score(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FitScore:
     """The score of residuals, per record (n, c), in units of `measure.unit`; errors are at least `measure.least`."""
-    scale = measure.unit / measure.noise
+    noise_units = measure.unit / measure.noise
     return FitScore(
         *(
             np.maximum(
-                rms_over(measure.records, residuals, [getattr(record, part) for record in measure.records]) * scale,
+                compute_residual_rms(measure.records, residuals, [getattr(record, role) for record in measure.records])
+                * noise_units,
                 measure.least,
             )
-            for part in ("fit", "choose", "test")
+            for role in ("fit", "choose", "test")
         )
     )
 
 
-def signal_rms(records: tuple[Observed, ...], masks: list[Mask]) -> FloatArray:
+def compute_signal_rms(records: tuple[Observed, ...], masks: list[Mask]) -> FloatArray:
     """(c,): standard deviation of the measured signals over the masked samples of all records, by which errors are
     normalised. Positions are taken relative to the mean of each record, because encoders start anywhere; forces, speeds
     and accelerations relative to the mean of all records, because recordings at different constant speeds differ only
@@ -78,10 +82,14 @@ def signal_rms(records: tuple[Observed, ...], masks: list[Mask]) -> FloatArray:
     return np.asarray(np.sqrt(np.mean(np.concatenate(deviations) ** 2, axis=0)))
 
 
-def rms_over(records: tuple[Observed, ...], residuals: tuple[FloatArray, ...], masks: list[Mask]) -> FloatArray:
+def compute_residual_rms(
+    records: tuple[Observed, ...], residuals: tuple[FloatArray, ...], masks: list[Mask]
+) -> FloatArray:
     """(c,): rms residual over the masked samples of all records; NaN where the masks are empty."""
-    squares = sum(
+    sum_of_squares = sum(
         np.einsum("nc,nc->c", residual[mask], residual[mask]) for residual, mask in zip(residuals, masks, strict=True)
     )
-    count = sum(int(mask.sum()) for mask in masks)
-    return np.asarray(np.sqrt(squares / count)) if count else np.full(residuals[0].shape[1], np.nan)
+    sample_count = sum(int(mask.sum()) for mask in masks)
+    return (
+        np.asarray(np.sqrt(sum_of_squares / sample_count)) if sample_count else np.full(residuals[0].shape[1], np.nan)
+    )

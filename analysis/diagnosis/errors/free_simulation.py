@@ -3,7 +3,7 @@
     e(t) = (y(t) - yhat(t)) / unit        yhat: simulated from rest at the first sample, without measured feedback
 
 The residual holds the noise and the whole effect of the missing physics, because no measured sample corrects the
-simulation. The other measures of `error_measure` compare windows, or forces.
+simulation. Made by `choose_measure`; the other measures compare short windows (`windows`) or forces (`force_views`).
 """
 
 from collections.abc import Callable, Sequence
@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.data.recorded_conditions import add_carried_weight, effects_under_conditions
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, apply_conditions
 from analysis.diagnosis.errors.evidence_from_residuals import evidence_of
 from equalizer.effects.effect import AxisForce, Effect, JointForce, PlacedEffect
 from equalizer.effects.simulation.bodies import Restarts
@@ -53,7 +53,7 @@ class FreeSimulation:
     record consists of parts."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
-        """The measure on other records, of any length. Each counts as a single part: `pieces` is emptied."""
+        """The measure on other records, of any length. Each counts as a single part: `restarts` is emptied."""
         return replace(self, records=records, restarts=())
 
     def with_floor(self, rms: FloatArray) -> Self:
@@ -87,9 +87,9 @@ class FreeSimulation:
         record: Observed,
         sample_indices: npt.NDArray[np.int64],
     ) -> FloatArray:
-        """States just before the samples `at` (k,) of a record: positions, then velocities (k, 2n)."""
+        """(k, 2n): positions, then velocities of the n coordinates just before the samples `sample_indices` (k,)."""
         signals = record.recording
-        all_effects = effects_under_conditions((*self.model_effects, *effects), signals)
+        all_effects = apply_conditions((*self.model_effects, *effects), signals)
         model = add_carried_weight(model, signals)
         return simulate_states_before(
             model, record.command, (signals.sample_rate_hz, signals.hold), all_effects, sample_indices
@@ -110,7 +110,7 @@ class FreeSimulation:
         model = add_carried_weight(model, signals)
         all_effects = [
             _lengthen_steps(placed_effect, self.step_factor)
-            for placed_effect in effects_under_conditions((*self.model_effects, *effects), signals)
+            for placed_effect in apply_conditions((*self.model_effects, *effects), signals)
         ]
         if restarts is not None:
             sampling = signals.sample_rate_hz, signals.hold
@@ -148,6 +148,6 @@ def _subtract_prediction(measured: FloatArray, simulated: SimulationResult) -> F
     return difference
 
 
-def predict_channels(simulated: SimulationResult, count: int) -> FloatArray:
-    """(n, count): the first `count` simulated channels, the response before the position."""
-    return np.hstack([simulated.response, simulated.position])[:, :count]
+def predict_channels(simulated: SimulationResult, channel_count: int) -> FloatArray:
+    """(n, count): the first `channel_count` simulated channels, the response before the position."""
+    return np.hstack([simulated.response, simulated.position])[:, :channel_count]

@@ -2,7 +2,8 @@
 
 A hypothesis is a list of claims (effect and sites) and a point: one coordinate per free parameter. A coordinate is the
 logarithm of a parameter on a log scale, else the parameter over its unit, so that a fit can step along it. Hypotheses
-are immutable: the functions below make new ones.
+are immutable: the functions below make new ones. `output_error` fits them; the search (`analysis/diagnosis/search`)
+proposes and compares them.
 """
 
 from collections.abc import Iterator, Sequence
@@ -42,13 +43,13 @@ class FreeParameter:
     unit: float
     """Change of the value per unit of the coordinate where it is not logarithmic (SI)."""
 
-    def value(self, coordinate: float) -> float:
+    def to_value(self, coordinate: float) -> float:
         """The parameter's value (SI) at a coordinate, within its limits."""
         p = self.parameter
         value = float(np.exp(min(coordinate, 700.0))) if p.scale == "log" else coordinate * self.unit
         return min(max(value, p.lower), p.upper)
 
-    def coordinate(self, value: float) -> float:
+    def to_coordinate(self, value: float) -> float:
         """The coordinate of a value (SI): its logarithm on a log scale, else the value over `unit`."""
         p = self.parameter
         clipped = min(max(value, p.lower), p.upper)
@@ -62,7 +63,7 @@ class FreeParameter:
     @property
     def bounds(self) -> tuple[float, float]:
         """Lower and upper limit of the coordinate."""
-        return self.coordinate(self.parameter.lower), self.coordinate(self.parameter.upper)
+        return self.to_coordinate(self.parameter.lower), self.to_coordinate(self.parameter.upper)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +75,7 @@ class Hypothesis:
     """Per group of each claim, values by parameter name: those of fixed parameters, and the magnitudes that are the
     units of parameters of either sign."""
     point: FloatArray
-    """(k,): coordinates of the free parameters, claim by claim, group by group (`FreeParameter.coordinate`)."""
+    """(k,): coordinates of the free parameters, claim by claim, group by group (`FreeParameter.to_coordinate`)."""
 
     @property
     def key(self) -> tuple[tuple[str, str, tuple[int, ...]], ...]:
@@ -86,7 +87,7 @@ class Hypothesis:
         """The free parameters, one per coordinate of the point."""
         groups = [claim.effect.parameters for claim in self.claims for _ in range(claim.groups)]
         return tuple(
-            FreeParameter(p, _unit(p, start))
+            FreeParameter(p, _compute_coordinate_unit(p, start))
             for group, start in zip(groups, self.starts, strict=True)
             for p in group
             if not p.fixed
@@ -104,15 +105,15 @@ class Hypothesis:
                 values = dict(next(starts))
                 for p in claim.effect.parameters:
                     if not p.fixed:
-                        values[p.name] = free_parameters.pop(0).value(float(coordinates.pop(0)))
+                        values[p.name] = free_parameters.pop(0).to_value(float(coordinates.pop(0)))
                 sites = (claim.sites[group],) if claim.spread == "each" else claim.sites
                 effects.append(PlacedEffect(claim.effect, sites, values))
         return tuple(effects)
 
-    def list_effects_of(self, number: int) -> tuple[PlacedEffect, ...]:
-        """The placed effects of one claim."""
-        first = sum(claim.groups for claim in self.claims[:number])
-        return self.list_placed_effects()[first : first + self.claims[number].groups]
+    def list_effects_of(self, claim_index: int) -> tuple[PlacedEffect, ...]:
+        """The placed effects of one claim, one per group, with the values at the hypothesis's own point."""
+        first = sum(claim.groups for claim in self.claims[:claim_index])
+        return self.list_placed_effects()[first : first + self.claims[claim_index].groups]
 
 
 def has_motion_forces(hypothesis: Hypothesis) -> bool:
@@ -120,18 +121,18 @@ def has_motion_forces(hypothesis: Hypothesis) -> bool:
     return any(isinstance(claim.effect.action, (AxisForce, JointForce)) for claim in hypothesis.claims)
 
 
-def remove_claim(hypothesis: Hypothesis, number: int) -> Hypothesis:
+def remove_claim(hypothesis: Hypothesis, claim_index: int) -> Hypothesis:
     """The hypothesis without the claim of this number, and without the claim's starts and parameters."""
-    group_start = sum(claim.groups for claim in hypothesis.claims[:number])
-    group_stop = group_start + hypothesis.claims[number].groups
+    group_start = sum(claim.groups for claim in hypothesis.claims[:claim_index])
+    group_stop = group_start + hypothesis.claims[claim_index].groups
     coordinate_counts = [
         sum(not p.fixed for p in claim.effect.parameters) * claim.groups for claim in hypothesis.claims
     ]
-    coordinate_start = sum(coordinate_counts[:number])
+    coordinate_start = sum(coordinate_counts[:claim_index])
     return Hypothesis(
-        hypothesis.claims[:number] + hypothesis.claims[number + 1 :],
+        hypothesis.claims[:claim_index] + hypothesis.claims[claim_index + 1 :],
         hypothesis.starts[:group_start] + hypothesis.starts[group_stop:],
-        np.delete(hypothesis.point, slice(coordinate_start, coordinate_start + coordinate_counts[number])),
+        np.delete(hypothesis.point, slice(coordinate_start, coordinate_start + coordinate_counts[claim_index])),
     )
 
 
@@ -147,20 +148,20 @@ def move_point(hypothesis: Hypothesis, step: FloatArray, along_values: bool) -> 
     return replace(hypothesis, point=np.clip(hypothesis.point + increments, low, high))
 
 
-def hypothesis_of_claim(claim: Claim, values: Sequence[Values]) -> Hypothesis:
-    """A hypothesis of one claim. values: one set per group."""
+def make_claim_hypothesis(claim: Claim, values: Sequence[Values]) -> Hypothesis:
+    """The hypothesis of one claim, its point at the given values. values: parameter values (SI) by name, per group."""
     free_parameters = [(p, group_values) for group_values in values for p in claim.effect.parameters if not p.fixed]
     point = np.array(
         [
-            FreeParameter(p, _unit(p, group_values)).coordinate(group_values[p.name])
+            FreeParameter(p, _compute_coordinate_unit(p, group_values)).to_coordinate(group_values[p.name])
             for p, group_values in free_parameters
         ]
     )
     return Hypothesis((claim,), tuple(dict(group_values) for group_values in values), point)
 
 
-def combine(leading: Hypothesis, added: Hypothesis) -> Hypothesis:
-    """A hypothesis with the claims of both; those of `leading` come first."""
+def combine_hypotheses(leading: Hypothesis, added: Hypothesis) -> Hypothesis:
+    """The hypothesis with the claims, starts and coordinates of both; those of `leading` come first."""
     return Hypothesis(
         leading.claims + added.claims, leading.starts + added.starts, np.concatenate([leading.point, added.point])
     )
@@ -178,12 +179,14 @@ def generate_near_equivalents(hypothesis: Hypothesis) -> Iterator[Hypothesis]:
         stop = start + sum(not p.fixed for p in placed.effect.parameters)
         for alternative in placed.effect.near_equivalents(placed.values):
             point = hypothesis.point.copy()
-            point[start:stop] = [free.coordinate(alternative[free.parameter.name]) for free in parameters[start:stop]]
+            point[start:stop] = [
+                free.to_coordinate(alternative[free.parameter.name]) for free in parameters[start:stop]
+            ]
             yield replace(hypothesis, point=point)
         start = stop
 
 
-def _unit(p: Parameter, start: Values) -> float:
+def _compute_coordinate_unit(p: Parameter, start: Values) -> float:
     """Unit of a coordinate that is not logarithmic: the magnitude of the start where either sign is possible (1 where
     it is 0), else the parameter's own step."""
     if p.scale == "signed":

@@ -6,10 +6,10 @@ than `CONVERGED_DECREASE`. Sensitivities are central differences: parameters wit
 added mass and the model's own) must have proportional columns; curvature in one-sided differences would seem to
 separate them.
 
-Random errors (`standard_errors`): sandwich estimate of Huber (1967) and White (1980), with scores summed over stretches
-longer than the residuals' correlation time. Under periodic excitation model errors repeat: the same stretch of all
-periods of a segment is one cluster (Liang and Zeger, Biometrika 73:13, 1986), where that gives the larger error.
-Systematic errors (`segment_errors`): no law is exact, so that another level or axis would give other estimates;
+Random errors (`compute_standard_errors`): sandwich estimate of Huber (1967) and White (1980), with scores summed over
+stretches longer than the residuals' correlation time. Under periodic excitation model errors repeat: the same stretch
+of all periods of a segment is one cluster (Liang and Zeger, Biometrika 73:13, 1986), where that gives the larger error.
+Systematic errors (`compute_segment_errors`): no law is exact, so that another level or axis would give other estimates;
 delete-one jackknife over segments (Efron and Stein, Ann. Stat. 9:586, 1981), each estimate by one Gauss-Newton step,
 
     theta_g - theta = -(A - A_g)^-1 b_g,   A = sum of A_g + prior,   A_g = X_g X_g',   b_g = X_g r_g,
@@ -26,7 +26,7 @@ import numpy.typing as npt
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import Hypothesis
-from analysis.diagnosis.errors.output_error import DIFFERENCE_STEP, Fitted, Sensitivity, residuals_to_fit, take_step
+from analysis.diagnosis.errors.output_error import DIFFERENCE_STEP, Fitted, Sensitivity, stack_fit_residuals, take_step
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.noise.periods import find_settled_periods
 from analysis.diagnosis.types import Mapper, Mask, TimeBudget
@@ -34,7 +34,7 @@ from equalizer.effects.effect import Structure
 from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.signal import FloatArray
 
-Places = npt.NDArray[np.int64]
+IndexArray = npt.NDArray[np.int64]
 
 STRETCH_S = 0.5
 """Length (s) of the stretches over which scores are summed: longer than the residuals' correlation time."""
@@ -46,7 +46,7 @@ error."""
 FINAL_DAMPINGS = ((1e-13, True), (1e-13, False), (1e-9, True), (1e-3, False), (0.1, False))
 """Dampings of the final steps (see `DAMPINGS`), smaller than in a search: in a direction that the data do not
 determine, the prior of the calibration must decide, not the damping."""
-LARGEST_ROUNDS, STEPS_PER_ROUND = 4, 3
+MOST_ROUNDS, STEPS_PER_ROUND = 4, 3
 """Largest number of rounds, each with a newly computed sensitivity, and of Gauss-Newton steps per round."""
 STEP_FACTOR_LINEAR, STEP_FACTOR = 0.02, 0.2
 """Steps of the central differences, relative to those of a search. Linear simulation: short, because curvature is the
@@ -54,7 +54,7 @@ only error. Other effects, with thresholds or forces that are solved for: longer
 numerical errors of the simulation."""
 
 
-def sensitivity_to_all(
+def compute_full_sensitivity(
     measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, hypothesis: Hypothesis, map_: Mapper = map
 ) -> Sensitivity:
     """Sensitivity (t + parameters, samples) to the model's parameters, then to the hypothesis's parameters, by central
@@ -63,41 +63,48 @@ def sensitivity_to_all(
     linear = all(isinstance(placed_effect.effect.action, Structure) for placed_effect in placed_effects)
     step_factor = STEP_FACTOR_LINEAR if linear else STEP_FACTOR
 
-    def residuals_at(number: int, step: float) -> FloatArray | None:
+    def compute_residuals(parameter_index: int, displacement: float) -> FloatArray | None:
+        """(samples,): residuals to fit with one coordinate displaced; None where model or residuals are not valid."""
         displaced, point = deviations.copy(), hypothesis.point.copy()
-        (displaced if number < t else point)[number if number < t else number - t] += step
+        (displaced if parameter_index < t else point)[
+            parameter_index if parameter_index < t else parameter_index - t
+        ] += displacement
         try:
             with np.errstate(over="ignore", invalid="ignore"):
-                residuals = residuals_to_fit(
+                residuals = stack_fit_residuals(
                     measure, measure.residuals(tuning.tune(displaced), hypothesis.list_placed_effects(point))
                 )
         except (MechanicalModelError, np.linalg.LinAlgError):
             return None
         return residuals if np.isfinite(residuals).all() else None
 
-    def column(number: int) -> FloatArray:
-        sides = [(step, residuals_at(number, step)) for step in _bounded_steps(hypothesis, number - t, step_factor)]
-        valid = [(step, residuals) for step, residuals in sides if residuals is not None]
-        if len(valid) == 1 and (unchanged := residuals_at(number, 0.0)) is not None:
-            valid.append((0.0, unchanged))
-        if len(valid) < 2 or valid[0][0] == valid[1][0]:
-            return np.zeros(samples)
-        (first_step, first_residuals), (second_step, second_residuals) = valid
+    def compute_column(parameter_index: int) -> FloatArray:
+        """(samples,): change of the prediction per unit of one coordinate."""
+        trial_sides = [
+            (displacement, compute_residuals(parameter_index, displacement))
+            for displacement in _limit_steps(hypothesis, parameter_index - t, step_factor)
+        ]
+        valid_sides = [(displacement, residuals) for displacement, residuals in trial_sides if residuals is not None]
+        if len(valid_sides) == 1 and (unchanged := compute_residuals(parameter_index, 0.0)) is not None:
+            valid_sides.append((0.0, unchanged))
+        if len(valid_sides) < 2 or valid_sides[0][0] == valid_sides[1][0]:
+            return np.zeros(sample_count)
+        (first_step, first_residuals), (second_step, second_residuals) = valid_sides
         return np.asarray((first_residuals - second_residuals) / (second_step - first_step))
 
-    samples = sum(int(record.fit.sum()) * record.measured.shape[1] for record in measure.records)
-    count = t + len(hypothesis.parameters)
-    columns = np.array(list(map_(column, range(count)))).reshape(count, samples)
+    sample_count = sum(int(record.fit.sum()) * record.measured.shape[1] for record in measure.records)
+    parameter_count = t + len(hypothesis.parameters)
+    columns = np.array(list(map_(compute_column, range(parameter_count)))).reshape(parameter_count, sample_count)
     return Sensitivity(deviations, columns, columns @ columns.T)
 
 
-def _bounded_steps(hypothesis: Hypothesis, number: int, step_factor: float) -> tuple[float, float]:
-    """Steps down and up within the bounds. number: index among the hypothesis's parameters; below 0: a parameter of the
-    model."""
-    if number < 0:
+def _limit_steps(hypothesis: Hypothesis, parameter_index: int, step_factor: float) -> tuple[float, float]:
+    """Steps of the coordinate down and up, limited to its bounds. parameter_index: among the hypothesis's parameters;
+    below 0: a parameter of the model, which has no bounds here."""
+    if parameter_index < 0:
         return -step_factor * DIFFERENCE_STEP, step_factor * DIFFERENCE_STEP
-    (low, high), coordinate = hypothesis.parameters[number].bounds, hypothesis.point[number]
-    step = step_factor * hypothesis.parameters[number].difference_step
+    (low, high), coordinate = hypothesis.parameters[parameter_index].bounds, hypothesis.point[parameter_index]
+    step = step_factor * hypothesis.parameters[parameter_index].difference_step
     return max(-step, low - coordinate), min(step, high - coordinate)
 
 
@@ -105,40 +112,44 @@ def finish_fit(
     measure: ErrorMeasure,
     tuning: Tuning,
     fitted: Fitted,
-    sensitivity_of: Callable[[Fitted], Sensitivity],
+    compute_sensitivity: Callable[[Fitted], Sensitivity],
     time_left: TimeBudget,
 ) -> tuple[Fitted, Sensitivity]:
-    """The fit at its minimum, and the sensitivity to all its parameters there. sensitivity_of: as `sensitivity_to_all`;
-    called once, and again after each round that lowered the sum of squares by `CONVERGED_DECREASE` or more, even where
-    no time is left for further steps."""
-    jacobian, samples = sensitivity_of(fitted), len(residuals_to_fit(measure, fitted.residuals))
-    for _ in range(LARGEST_ROUNDS):
+    """The fit at its minimum, and the sensitivity to all its parameters there. compute_sensitivity:
+    `compute_full_sensitivity` of a fit; called once, and again after each round that lowered the sum of squares by
+    `CONVERGED_DECREASE` or more, even where no time is left for further steps."""
+    jacobian, sample_count = compute_sensitivity(fitted), len(stack_fit_residuals(measure, fitted.residuals))
+    for _ in range(MOST_ROUNDS):
         round_start_cost = fitted.cost
         for _ in range(STEPS_PER_ROUND):
-            next_fit = take_step(measure, tuning, fitted, _normal_equations(measure, fitted, jacobian), FINAL_DAMPINGS)
+            next_fit = take_step(
+                measure, tuning, fitted, _build_normal_equations(measure, fitted, jacobian), FINAL_DAMPINGS
+            )
             if next_fit is None:
                 break
-            decrease, fitted = samples * (fitted.cost - next_fit.cost), next_fit
+            decrease, fitted = sample_count * (fitted.cost - next_fit.cost), next_fit
             if decrease < CONVERGED_DECREASE:
                 break
         if (
-            not samples * (round_start_cost - fitted.cost) >= CONVERGED_DECREASE
+            not sample_count * (round_start_cost - fitted.cost) >= CONVERGED_DECREASE
         ):  # also where both costs are infinite (NaN)
             break
-        jacobian = sensitivity_of(fitted)
+        jacobian = compute_sensitivity(fitted)
         if not time_left():
             break
     return fitted, jacobian
 
 
-def _normal_equations(measure: ErrorMeasure, fitted: Fitted, jacobian: Sensitivity) -> tuple[FloatArray, FloatArray]:
+def _build_normal_equations(
+    measure: ErrorMeasure, fitted: Fitted, jacobian: Sensitivity
+) -> tuple[FloatArray, FloatArray]:
     """Normal matrix and right side of a Gauss-Newton step in all parameters, with the calibration as prior."""
-    rhs, t = jacobian.multiply(residuals_to_fit(measure, fitted.residuals)), len(fitted.deviations)
+    rhs, t = jacobian.multiply(stack_fit_residuals(measure, fitted.residuals)), len(fitted.deviations)
     rhs[:t] -= fitted.deviations
-    return _with_calibration(jacobian.gram, t), rhs
+    return _add_calibration_prior(jacobian.gram, t), rhs
 
 
-def _with_calibration(squares: FloatArray, t: int) -> FloatArray:
+def _add_calibration_prior(squares: FloatArray, t: int) -> FloatArray:
     """Normal matrix with the prior of the calibration: one observation of each of the model's t parameters, with a
     standard deviation of 1 in its coordinate."""
     normal_matrix = squares.copy()
@@ -146,58 +157,66 @@ def _with_calibration(squares: FloatArray, t: int) -> FloatArray:
     return normal_matrix
 
 
-def standard_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sensitivity) -> FloatArray:
+def compute_standard_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sensitivity) -> FloatArray:
     """(t + parameters,): standard errors of the deviations and of the hypothesis's point; 0 for parameters at a bound.
-    jacobian: sensitivity to all parameters (`sensitivity_to_all`).
+    jacobian: sensitivity to all parameters (`compute_full_sensitivity`).
 
     Scores sum to zero at the minimum, so that few clusters underestimate the variance. The larger of two estimates is
     returned: with all periods of a segment in common clusters, and with separate ones."""
-    t, free = len(fitted.deviations), _free(fitted)
-    errors = residuals_to_fit(measure, fitted.residuals)
-    information = _with_calibration(jacobian.gram * np.outer(free, free), t)
-    scale = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
-    inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-12) / np.outer(scale, scale)
+    t, is_free = len(fitted.deviations), _find_free_parameters(fitted)
+    residuals = stack_fit_residuals(measure, fitted.residuals)
+    information = _add_calibration_prior(jacobian.gram * np.outer(is_free, is_free), t)
+    diagonal_roots = np.sqrt(np.maximum(np.diagonal(information), np.finfo(float).tiny))
+    inverse = np.linalg.pinv(information / np.outer(diagonal_roots, diagonal_roots), rcond=1e-12) / np.outer(
+        diagonal_roots, diagonal_roots
+    )
     variances = []
     for pool_periods in (False, True):
-        scores = _scores(measure, jacobian, errors, pool_periods) * free[:, None]
-        variances.append(np.diagonal(inverse @ _with_calibration(scores @ scores.T, t) @ inverse))
+        scores = _sum_scores(measure, jacobian, residuals, pool_periods) * is_free[:, None]
+        variances.append(np.diagonal(inverse @ _add_calibration_prior(scores @ scores.T, t) @ inverse))
     return np.asarray(np.sqrt(np.maximum(np.max(variances, axis=0), 0.0)))
 
 
-def segment_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sensitivity) -> FloatArray | None:
+def compute_segment_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sensitivity) -> FloatArray | None:
     """(t + parameters,): jackknife standard errors over segments; None where there is a single segment. jacobian: as in
-    `standard_errors`."""
-    errors, free = residuals_to_fit(measure, fitted.residuals), _free(fitted)
+    `compute_standard_errors`."""
+    residuals, free = stack_fit_residuals(measure, fitted.residuals), _find_free_parameters(fitted)
     products, scores = [], []
-    for begin, end in _segments(measure):
-        segment_columns = jacobian.select_samples(begin, end) * free[:, None]
+    for first, stop in _list_segment_ranges(measure):
+        segment_columns = jacobian.select_samples(first, stop) * free[:, None]
         products.append(segment_columns @ segment_columns.T)
-        scores.append(segment_columns @ errors[begin:end])
+        scores.append(segment_columns @ residuals[first:stop])
     if len(products) < 2:
         return None
-    normal_matrix = _with_calibration(np.sum(products, axis=0), len(fitted.deviations))
-    scale = np.sqrt(np.maximum(np.diagonal(normal_matrix), np.finfo(float).tiny))
+    normal_matrix = _add_calibration_prior(np.sum(products, axis=0), len(fitted.deviations))
+    diagonal_roots = np.sqrt(np.maximum(np.diagonal(normal_matrix), np.finfo(float).tiny))
     omission_steps = []
     for segment_matrix, rhs in zip(products, scores, strict=True):
-        remaining_matrix = (normal_matrix - segment_matrix) / np.outer(scale, scale)
-        omission_steps.append(np.linalg.pinv(remaining_matrix, rcond=1e-12, hermitian=True) @ (rhs / scale) / scale)
-    steps, count = np.array(omission_steps), len(omission_steps)
-    return np.asarray(np.sqrt((count - 1) / count * np.sum((steps - steps.mean(axis=0)) ** 2, axis=0)))
+        remaining_matrix = (normal_matrix - segment_matrix) / np.outer(diagonal_roots, diagonal_roots)
+        omission_steps.append(
+            np.linalg.pinv(remaining_matrix, rcond=1e-12, hermitian=True) @ (rhs / diagonal_roots) / diagonal_roots
+        )
+    steps, segment_count = np.array(omission_steps), len(omission_steps)
+    return np.asarray(np.sqrt((segment_count - 1) / segment_count * np.sum((steps - steps.mean(axis=0)) ** 2, axis=0)))
 
 
-def _segments(measure: ErrorMeasure) -> Iterator[tuple[int, int]]:
+def _list_segment_ranges(measure: ErrorMeasure) -> Iterator[tuple[int, int]]:
     """Ranges (begin, end) of the residuals to fit: one per segment, up to the next, or one per recording without
     segments."""
-    first = 0
+    record_start = 0
     for record in measure.records:
-        width, samples = record.measured.shape[1], np.flatnonzero(record.fit)
+        channel_count, fit_samples = record.measured.shape[1], np.flatnonzero(record.fit)
         starts = np.sort([segment.start for segment in record.recording.segments[1:]])
-        edges = [0, *np.searchsorted(samples, starts), len(samples)]
-        yield from ((first + width * a, first + width * b) for a, b in pairwise(edges) if b > a)
-        first += width * len(samples)
+        edges = [0, *np.searchsorted(fit_samples, starts), len(fit_samples)]
+        yield from (
+            (record_start + channel_count * start, record_start + channel_count * stop)
+            for start, stop in pairwise(edges)
+            if stop > start
+        )
+        record_start += channel_count * len(fit_samples)
 
 
-def _free(fitted: Fitted) -> Mask:
+def _find_free_parameters(fitted: Fitted) -> Mask:
     """(t + parameters,): whether a parameter is away from its bounds; always true for the model's parameters."""
     point, bounds = fitted.hypothesis.point, [free.bounds for free in fitted.hypothesis.parameters]
     is_interior = [
@@ -207,32 +226,34 @@ def _free(fitted: Fitted) -> Mask:
     return np.array([True] * len(fitted.deviations) + is_interior, dtype=np.bool_)
 
 
-def _scores(measure: ErrorMeasure, jacobian: Sensitivity, errors: FloatArray, pool_periods: bool) -> FloatArray:
+def _sum_scores(measure: ErrorMeasure, jacobian: Sensitivity, residuals: FloatArray, pool_periods: bool) -> FloatArray:
     """(t + parameters, clusters): score of each parameter (column times residual), summed per cluster. pool_periods: as
-    in `_clusters`."""
+    in `_assign_clusters`."""
     sums: list[FloatArray] = []
-    first = 0
+    record_start = 0
     for record in measure.records:
-        width, clusters = record.measured.shape[1], _clusters(record, pool_periods)[record.fit]
+        channel_count, clusters = record.measured.shape[1], _assign_clusters(record, pool_periods)[record.fit]
         by_cluster = np.zeros((int(clusters.max(initial=-1)) + 1, len(jacobian.columns)))
         edges = [0, *(np.flatnonzero(np.diff(clusters)) + 1).tolist(), len(clusters)]
-        for begin, end in pairwise(edges):
-            if end > begin:
-                part = slice(first + width * begin, first + width * end)
-                by_cluster[clusters[begin]] += jacobian.select_samples(part.start, part.stop) @ errors[part]
-        first += width * len(clusters)
+        for start, stop in pairwise(edges):
+            if stop > start:
+                sample_range = slice(record_start + channel_count * start, record_start + channel_count * stop)
+                by_cluster[clusters[start]] += (
+                    jacobian.select_samples(sample_range.start, sample_range.stop) @ residuals[sample_range]
+                )
+        record_start += channel_count * len(clusters)
         sums.append(by_cluster)
     return np.concatenate(sums).T
 
 
-def _clusters(record: Observed, pool_periods: bool) -> Places:
+def _assign_clusters(record: Observed, pool_periods: bool) -> IndexArray:
     """(n,): number of the cluster of each sample: stretches of `STRETCH_S`. pool_periods: the same stretch of all
     periods of a segment is one cluster."""
-    width = max(int(STRETCH_S * record.recording.sample_rate_hz), 1)
-    position = np.arange(len(record.fit))
+    stretch_samples = max(int(STRETCH_S * record.recording.sample_rate_hz), 1)
+    sample_position = np.arange(len(record.fit))
     for periods in find_settled_periods(record.recording) if pool_periods else ():
-        segment_samples = slice(periods.segment.start, min(periods.segment.stop, len(position)))
-        position[segment_samples] = (
-            periods.segment.start + (position[segment_samples] - periods.segment.start) % periods.length
+        segment_samples = slice(periods.segment.start, min(periods.segment.stop, len(sample_position)))
+        sample_position[segment_samples] = (
+            periods.segment.start + (sample_position[segment_samples] - periods.segment.start) % periods.length
         )
-    return np.asarray(np.unique(position // width, return_inverse=True)[1])
+    return np.asarray(np.unique(sample_position // stretch_samples, return_inverse=True)[1])

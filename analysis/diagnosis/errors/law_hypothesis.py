@@ -3,7 +3,7 @@
 The free numbers of the formula become the parameters of an effect (`law_effect`) at one axis or response channel.
 """
 
-from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, make_claim_hypothesis
 from equalizer.effects.discovered_law import law_channels, law_effect, law_values
 from equalizer.laws.law import Law
 from equalizer.signals.recording import Recording
@@ -13,4 +13,4 @@ def hypothesis_of_law(law: Law, axis: int, recording: Recording) -> Hypothesis:
     """Hypothesis with a single claim: the law at an axis, or at a channel for a law of the response. The fit starts
     from the law's own values. axis: index, from 0."""
     effect = law_effect(law, law_channels(recording))
-    return hypothesis_of_claim(Claim(effect, "one", (axis,)), [law_values(law)])
+    return make_claim_hypothesis(Claim(effect, "one", (axis,)), [law_values(law)])

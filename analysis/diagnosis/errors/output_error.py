@@ -98,13 +98,13 @@ class Fitted:
     """The cost J of the module's equation."""
 
 
-def residuals_to_fit(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FloatArray:
+def stack_fit_residuals(measure: ErrorMeasure, residuals: tuple[FloatArray, ...]) -> FloatArray:
     """(samples,): the residuals of the samples to fit, of all records and channels in one row."""
-    parts = [residual[record.fit].ravel() for residual, record in zip(residuals, measure.records, strict=True)]
-    return np.concatenate(parts)
+    fit_residuals = [residual[record.fit].ravel() for residual, record in zip(residuals, measure.records, strict=True)]
+    return np.concatenate(fit_residuals)
 
 
-def sensitivity(
+def build_jacobian(
     measure: ErrorMeasure,
     tuning: Tuning,
     deviations: FloatArray,
@@ -112,33 +112,32 @@ def sensitivity(
     map_: object = map,
     known_columns: tuple[FloatArray, Sequence[int]] | None = None,
 ) -> Sensitivity:
-    """Sensitivity to the model's own parameters by finite differences. map_: `map`, or a parallel equivalent.
+    """Jacobian of the prediction by the model's own parameters, by finite differences. map_: `map` or a parallel one.
     known_columns: columns (t, samples), and the indices of those that must be computed; None = all."""
-    base = residuals_to_fit(measure, measure.residuals(tuning.tune(deviations), hypothesis.list_placed_effects()))
+    base = stack_fit_residuals(measure, measure.residuals(tuning.tune(deviations), hypothesis.list_placed_effects()))
 
-    def difference_column(number: int) -> FloatArray:
+    def compute_column(parameter_index: int) -> FloatArray:
         for step in (DIFFERENCE_STEP, -DIFFERENCE_STEP):
             displaced = deviations.copy()
-            displaced[number] += step
+            displaced[parameter_index] += step
             try:
                 with np.errstate(over="ignore", invalid="ignore"):
-                    change = base - residuals_to_fit(
+                    change = base - stack_fit_residuals(
                         measure, measure.residuals(tuning.tune(displaced), hypothesis.list_placed_effects())
                     )
             except (MechanicalModelError, np.linalg.LinAlgError):
                 continue
             if np.isfinite(change).all():
                 return np.divide(change, step, out=change)
-        # Neither direction gives a valid model: the parameter stays fixed.
-        return np.zeros(len(base))
+        return np.zeros(len(base))  # Neither direction gives a valid model: the parameter stays fixed.
 
-    columns, numbers = (
+    columns, indices = (
         (np.zeros((len(deviations), len(base))), range(len(deviations)))
         if known_columns is None
         else (known_columns[0].copy(), known_columns[1])
     )
-    for number, column in zip(numbers, map_(difference_column, numbers), strict=True):  # type: ignore[operator]
-        columns[number] = column
+    for parameter_index, column in zip(indices, map_(compute_column, indices), strict=True):  # type: ignore[operator]
+        columns[parameter_index] = column
     return Sensitivity(deviations, columns, columns @ columns.T)
 
 
@@ -146,10 +145,10 @@ def fit(
     measure: ErrorMeasure, tuning: Tuning, start: Fitted, jacobian: Sensitivity, rounds: int, map_: object = map
 ) -> Fitted:
     """The best fit within a number of Gauss-Newton steps; never worse than the start. jacobian: sensitivity to the
-    model's parameters, computed at a point nearby. map_: as for `sensitivity`."""
+    model's parameters, computed at a point nearby. map_: as for `build_jacobian`."""
     best = start
     for _ in range(rounds):
-        next_fit = _gauss_newton_step(measure, tuning, best, jacobian, map_)
+        next_fit = _take_gauss_newton_step(measure, tuning, best, jacobian, map_)
         if next_fit is None:
             return best
         cost_decrease = best.cost - next_fit.cost
@@ -159,7 +158,7 @@ def fit(
     return best
 
 
-def expect_gain(last_decrease: float, previous_decrease: float) -> float:
+def predict_decrease(last_decrease: float, previous_decrease: float) -> float:
     """Expected decrease of the cost by the next fit, from those by the last two: they shrink about geometrically."""
     return last_decrease * min(last_decrease / previous_decrease, 1.0) if previous_decrease > 0 else last_decrease
 
@@ -167,29 +166,29 @@ def expect_gain(last_decrease: float, previous_decrease: float) -> float:
 def evaluate_fit(measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, hypothesis: Hypothesis) -> Fitted:
     """Residuals and cost of a hypothesis at given deviations, by simulation without fitting."""
     residuals = measure.residuals(tuning.tune(deviations), hypothesis.list_placed_effects())
-    return Fitted(hypothesis, deviations, residuals, _cost(residuals_to_fit(measure, residuals), deviations))
+    return Fitted(hypothesis, deviations, residuals, _compute_cost(stack_fit_residuals(measure, residuals), deviations))
 
 
-def _cost(errors: FloatArray, deviations: FloatArray) -> float:
+def _compute_cost(residuals: FloatArray, deviations: FloatArray) -> float:
+    """The cost J of the module's equation, infinite where the simulation diverged. residuals: (samples,) to fit."""
     with np.errstate(over="ignore", invalid="ignore"):  # A simulation may have diverged.
-        cost = float(errors @ errors + deviations @ deviations) / max(len(errors), 1)
+        cost = float(residuals @ residuals + deviations @ deviations) / max(len(residuals), 1)
     return cost if np.isfinite(cost) else np.inf
 
 
-def _gauss_newton_step(
+def _take_gauss_newton_step(
     measure: ErrorMeasure, tuning: Tuning, iterate: Fitted, jacobian: Sensitivity, map_: object
 ) -> Fitted | None:
     """The fit after one step; None where no step lowers the cost, or a derivative is not finite."""
-    errors = residuals_to_fit(measure, iterate.residuals)
-    effect_columns = hypothesis_sensitivity(measure, tuning, iterate, errors, map_)
+    errors = stack_fit_residuals(measure, iterate.residuals)
+    effect_columns = compute_effect_columns(measure, tuning, iterate, errors, map_)
     t = len(iterate.deviations)
     with np.errstate(over="ignore", invalid="ignore"):
         cross = jacobian.multiply(effect_columns)
         products = np.block([[jacobian.gram + np.eye(t), cross], [cross.T, effect_columns @ effect_columns.T]])
         rhs = np.concatenate([jacobian.multiply(errors) - iterate.deviations, effect_columns @ errors])
     if not (np.isfinite(products).all() and np.isfinite(rhs).all()):
-        # A parameter made the simulation diverge.
-        return None
+        return None  # A parameter made the simulation diverge.
     return take_step(measure, tuning, iterate, (products, rhs))
 
 
@@ -204,13 +203,13 @@ def take_step(
     matrix and right side, of the model's parameters, then the hypothesis's."""
     t = len(iterate.deviations)
     unknowns = np.concatenate([iterate.deviations, iterate.hypothesis.point])
-    low, high = (bound - unknowns for bound in _bounds(iterate.hypothesis, tuning))
-    largest_steps = _largest_steps(iterate.hypothesis)
+    low, high = (bound - unknowns for bound in _list_bounds(iterate.hypothesis, tuning))
+    largest_steps = _list_largest_steps(iterate.hypothesis)
     low[t:], high[t:] = np.maximum(low[t:], -largest_steps), np.minimum(high[t:], largest_steps)
     next_fit, impossible = _search_damping(measure, tuning, iterate, system, (low, high), dampings)
     if next_fit is None and impossible:
         # A mass whose best value is negative must not stop the other parameters: it stays fixed.
-        mass_indices = [index for index, name in enumerate(tuning.names) if name.startswith("mass")]
+        mass_indices = [index for index, parameter_name in enumerate(tuning.names) if parameter_name.startswith("mass")]
         low[mass_indices] = high[mass_indices] = 0.0
         next_fit, _ = _search_damping(measure, tuning, iterate, system, (low, high), dampings)
     return next_fit
@@ -228,13 +227,13 @@ def _search_damping(
     led to an invalid mechanical model. system: normal matrix and right side."""
     (products, rhs), t, impossible = system, len(iterate.deviations), False
     # Steps that make the model less stable are refused, unless it is unstable already.
-    already_unstable = is_unstable_within(tuning.tune(iterate.deviations), _longest_s(measure))
+    already_unstable = is_unstable_within(tuning.tune(iterate.deviations), _find_longest_s(measure))
     for damping, along_values in dampings:
         step = solve_bounded_step(products + damping * np.diag(np.diagonal(products)), rhs, *bounds)
         trial_hypothesis = move_point(iterate.hypothesis, step[t:], along_values)
         try:
             model = tuning.tune(iterate.deviations + step[:t])
-            if not already_unstable and is_unstable_within(model, _longest_s(measure)):
+            if not already_unstable and is_unstable_within(model, _find_longest_s(measure)):
                 continue
             trial = evaluate_fit(measure, tuning, iterate.deviations + step[:t], trial_hypothesis)
         except (MechanicalModelError, np.linalg.LinAlgError):
@@ -245,36 +244,37 @@ def _search_damping(
     return None, impossible
 
 
-def _longest_s(measure: ErrorMeasure) -> float:
+def _find_longest_s(measure: ErrorMeasure) -> float:
+    """Length (s) of the longest record."""
     return max(len(record.command) / record.recording.sample_rate_hz for record in measure.records)
 
 
-def hypothesis_sensitivity(
+def compute_effect_columns(
     measure: ErrorMeasure, tuning: Tuning, iterate: Fitted, errors: FloatArray, map_: object = map
 ) -> FloatArray:
     """(parameters, samples): -de/dp, change of the prediction per coordinate. errors: residuals to fit at `iterate`."""
     model: MechanicalModel = tuning.tune(iterate.deviations)
     steps = [free.difference_step for free in iterate.hypothesis.parameters]
 
-    def difference_column(number: int) -> FloatArray:
-        point, step = iterate.hypothesis.point.copy(), steps[number]
-        point[number] += step
+    def compute_column(parameter_index: int) -> FloatArray:
+        point, step = iterate.hypothesis.point.copy(), steps[parameter_index]
+        point[parameter_index] += step
         with np.errstate(over="ignore", invalid="ignore"):
             residuals = measure.residuals(model, iterate.hypothesis.list_placed_effects(point))
-            change = errors - residuals_to_fit(measure, residuals)
+            change = errors - stack_fit_residuals(measure, residuals)
             return np.divide(change, step, out=change)
 
-    columns = list(map_(difference_column, range(len(steps))))  # type: ignore[operator]
+    columns = list(map_(compute_column, range(len(steps))))  # type: ignore[operator]
     return np.array(columns).reshape(len(steps), len(errors))
 
 
-def _bounds(hypothesis: Hypothesis, tuning: Tuning) -> tuple[FloatArray, FloatArray]:
+def _list_bounds(hypothesis: Hypothesis, tuning: Tuning) -> tuple[FloatArray, FloatArray]:
     limits = np.array([free.bounds for free in hypothesis.parameters]).reshape(-1, 2)
     largest = np.full(len(tuning.names), tuning.bound)
     return np.concatenate([-largest, limits[:, 0]]), np.concatenate([largest, limits[:, 1]])
 
 
-def _largest_steps(hypothesis: Hypothesis) -> FloatArray:
+def _list_largest_steps(hypothesis: Hypothesis) -> FloatArray:
     return np.array([LARGEST_STEPS[free.parameter.scale] for free in hypothesis.parameters])
 
 

@@ -1,4 +1,7 @@
-"""Prediction error of a finished model on a recording that it was not fitted to, and the best gain factor."""
+"""Prediction error of a finished model on a recording that it was not fitted to, without and with a fitted gain factor.
+
+The signals that are compared, and how, are chosen by `choose_measure` as in a diagnosis.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -6,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.errors.choose_measure import make_measure
 from analysis.diagnosis.types import Mask
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -43,10 +46,10 @@ class PredictionError:
     """Errors by channel, without the gain factor; empty where they are not finite."""
 
 
-def prediction_error(recording: Recording, model: MechanicalModel, part: Part) -> PredictionError:
+def compute_prediction_error(recording: Recording, model: MechanicalModel, part: Part) -> PredictionError:
     """Error of a finished model, with its own effects, on a recording. part: the samples that are predicted; of "test",
     the gain factor is fitted to the other samples."""
-    measure = measure_of((recording,), model).measure
+    measure = make_measure((recording,), model).measure
     measured, predicted, tested, fitted = [], [], [], []
     for record, residual in zip(measure.records, measure.residuals(model, ()), strict=True):
         is_complete = np.isfinite(record.measured).all(axis=1)
@@ -57,16 +60,16 @@ def prediction_error(recording: Recording, model: MechanicalModel, part: Part) -
     # y: measured, f: predicted, (n, c) each.
     y, f = np.vstack(measured), np.vstack(predicted)
     test, fit = np.concatenate(tested), np.concatenate(fitted)
-    gain = _gain(y, f, fit if part == "test" and fit.any() else test)
+    gain = _fit_gain(y, f, fit if part == "test" and fit.any() else test)
     return PredictionError(
         measure.name,
-        _normalised_rms(y, f, test),
-        None if gain is None else _normalised_rms(y, gain * f, test),
-        tuple(_channels(recording, y[test], f[test])),
+        _compute_normalised_rms(y, f, test),
+        None if gain is None else _compute_normalised_rms(y, gain * f, test),
+        tuple(_compute_channel_errors(recording, y[test], f[test])),
     )
 
 
-def _channels(recording: Recording, y: FloatArray, f: FloatArray) -> Iterator[ChannelRms]:
+def _compute_channel_errors(recording: Recording, y: FloatArray, f: FloatArray) -> Iterator[ChannelRms]:
     """Errors of the response channels, where responses were compared."""
     signal = recording.response
     if y.shape[1] < len(signal.channels) or not len(y) or not np.isfinite(f).all():
@@ -75,20 +78,22 @@ def _channels(recording: Recording, y: FloatArray, f: FloatArray) -> Iterator[Ch
         yield ChannelRms(name, unit, float(np.std(y[:, c])), float(np.sqrt(np.mean((y - f)[:, c] ** 2))))
 
 
-def _gain(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
+def _fit_gain(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
     """Least-squares gain from prediction f to measurement y, (n, c) each, every channel in units of its rms; None where
     the prediction is zero or not finite."""
-    size = np.maximum(np.sqrt(np.mean(y[mask] ** 2, axis=0)), np.finfo(float).tiny)
-    predicted, measured = (f[mask] / size).ravel(), (y[mask] / size).ravel()
-    power = float(predicted @ predicted)
-    return float(predicted @ measured) / power if np.isfinite(power) and power > 0 else None
+    channel_rms = np.maximum(np.sqrt(np.mean(y[mask] ** 2, axis=0)), np.finfo(float).tiny)
+    predicted, measured = (f[mask] / channel_rms).ravel(), (y[mask] / channel_rms).ravel()
+    predicted_power = float(predicted @ predicted)
+    return (
+        float(predicted @ measured) / predicted_power if np.isfinite(predicted_power) and predicted_power > 0 else None
+    )
 
 
-def _normalised_rms(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
+def _compute_normalised_rms(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
     """Normalised rms error of prediction f of y, (n, c) each: sqrt(mean over channels of (rms error / std of y)²)."""
     if not mask.any():
         return None
     with np.errstate(over="ignore", invalid="ignore"):
-        size = np.maximum(np.std(y[mask], axis=0), np.finfo(float).tiny)
-        mean_error = float(np.sqrt(np.mean(np.mean((y - f)[mask] ** 2, axis=0) / size**2)))
-    return mean_error if np.isfinite(mean_error) else None
+        channel_std = np.maximum(np.std(y[mask], axis=0), np.finfo(float).tiny)
+        normalised_rms = float(np.sqrt(np.mean(np.mean((y - f)[mask] ** 2, axis=0) / channel_std**2)))
+    return normalised_rms if np.isfinite(normalised_rms) else None

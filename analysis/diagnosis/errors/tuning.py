@@ -9,7 +9,8 @@ of Craig and Bampton (AIAA Journal 6 (1968), 1313): the m driven axes, and the m
 * of each mode k its frequency f, mass and damping ratio (relative changes df, dm, dz):  K_kk (1 + df)², the coupling to
   the axes times sqrt(1 + dm), and B_kk (1 + df) (1 + dz).
 
-`tuning_of` makes a `Tuning`, whose function `tune` maps deviations, in standard deviations, to a model.
+`make_tuning` makes a `Tuning`, whose function `tune` maps deviations, in standard deviations, to a model. The
+deviations are fitted together with hypotheses by `output_error`.
 """
 
 from collections.abc import Callable
@@ -25,17 +26,17 @@ from analysis.diagnosis.settings import (
     UNSTATED_SHARE,
     WIDER_RETUNING_BOUND,
 )
-from equalizer.plant.effect_vocabulary import MATRIX_UNITS, matrix_unit
-from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.effect_vocabulary import MATRIX_UNITS, find_matrix_unit
+from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.signal import FloatArray
 
-UNSTATED = Tolerance(modes=UNSTATED_MODES)
+UNSTATED_TOLERANCE = Tolerance(modes=UNSTATED_MODES)
 """Tolerance of a model that states none; for parameters of the axes it is `UNSTATED_SHARE` of the largest entry."""
-DAMPING_PER_MODES = 10.0
+DAMPING_UNCERTAINTY_RATIO = 10.0
 """Relative uncertainty of a mode's damping over that of its frequency. Chosen by hand: damping is identified far less
 accurately."""
-ROUNDING = 1e-9
+ROUNDING_SHARE = 1e-9
 """Share of a matrix's largest element by which an eigenvalue may be negative by rounding."""
 _LEAST_MASS = 1e-3
 """Least factor on a mode's mass, so that its square root exists for any deviation."""
@@ -76,58 +77,60 @@ class Tuning:
         tuned, original = self.tune(deviations), self.model
         return _is_as_definite(tuned.damping, original.damping) and _is_as_definite(tuned.stiffness, original.stiffness)
 
-    def values(self, deviations: FloatArray) -> FloatArray:
+    def to_changes(self, deviations: FloatArray) -> FloatArray:
         """(parameters,): deviations, in standard deviations, as changes of the parameters, SI or relative."""
         return np.asarray(deviations * self.deviation)
 
 
-def tuning_of(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning:
+def make_tuning(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuning:
     """The free parameters of a model. Where it states no tolerance of mass, damping or stiffness, `UNSTATED_SHARE` of
     the largest at any axis is one standard deviation. input_channels: names of the driven axes."""
-    split = _split(model)
+    modal_model = _transform_to_craig_bampton(model)
     m = model.inputs
-    pairs = [(i, j) for i in range(m) for j in range(i, m)]
-    axes = [f"{input_channels[i]}{'' if i == j else ' ' + input_channels[j]}" for i, j in pairs]
-    modes = range(len(split.frequency_hz))
-    names = [f"{quantity} {axis}" for quantity in ("mass", "damping", "stiffness") for axis in axes]
+    axis_pairs = [(i, j) for i in range(m) for j in range(i, m)]
+    axis_names = [f"{input_channels[i]}{'' if i == j else ' ' + input_channels[j]}" for i, j in axis_pairs]
+    mode_indices = range(len(modal_model.frequency_hz))
+    names = [f"{quantity} {axis}" for quantity in ("mass", "damping", "stiffness") for axis in axis_names]
     names += [
-        f"{quantity} of the mode at {split.frequency_hz[k]:.3g} Hz"
+        f"{quantity} of the mode at {modal_model.frequency_hz[k]:.3g} Hz"
         for quantity in ("frequency", "mass", "damping")
-        for k in modes
+        for k in mode_indices
     ]
-    tolerance = model.tolerance or UNSTATED
-    relative = UNSTATED.modes if tolerance.modes is None else tolerance.modes
-    assert relative is not None
-    grounded = [
+    tolerance = model.tolerance or UNSTATED_TOLERANCE
+    relative_deviation = UNSTATED_TOLERANCE.modes if tolerance.modes is None else tolerance.modes
+    assert relative_deviation is not None
+    axis_deviations = [
         _read_stated_deviation(stated_deviation, matrix[:m, :m])
         for stated_deviation, matrix in (
-            (tolerance.mass_kg, split.mass),
-            (tolerance.damping_n_s_per_m, split.damping),
-            (tolerance.stiffness_n_per_m, split.stiffness),
+            (tolerance.mass_kg, modal_model.mass),
+            (tolerance.damping_n_s_per_m, modal_model.damping),
+            (tolerance.stiffness_n_per_m, modal_model.stiffness),
         )
     ]
     deviation = np.concatenate(
-        [np.full(len(pairs), deviation) for deviation in grounded]
-        + [np.full(len(modes), relative * factor) for factor in (1.0, 1.0, DAMPING_PER_MODES)]
+        [np.full(len(axis_pairs), deviation) for deviation in axis_deviations]
+        + [np.full(len(mode_indices), relative_deviation * factor) for factor in (1.0, 1.0, DAMPING_UNCERTAINTY_RATIO)]
     )
-    units = [matrix_unit(part, model.system) for part in MATRIX_UNITS]
+    units = [find_matrix_unit(part, model.system) for part in MATRIX_UNITS]
     return Tuning(
         model,
         tuple(names),
         deviation,
-        tuple(unit for unit in units for _ in pairs) + ("1",) * (3 * len(modes)),
-        lambda deviations: _tune(model, split, pairs, np.asarray(deviations) * deviation),
+        tuple(unit for unit in units for _ in axis_pairs) + ("1",) * (3 * len(mode_indices)),
+        lambda deviations: _tune(model, modal_model, axis_pairs, np.asarray(deviations) * deviation),
     )
 
 
 def _is_as_definite(matrix: FloatArray, original: FloatArray) -> bool:
     """Whether the smallest eigenvalue of the symmetric part is not negative, or no smaller than that of `original`."""
-    smallest, original_smallest = (float(eigvalsh((square + square.T) / 2)[0]) for square in (matrix, original))
-    return smallest >= min(original_smallest, 0.0) - ROUNDING * float(np.abs(original).max())
+    least_eigenvalue, original_least = (
+        float(eigvalsh((candidate + candidate.T) / 2)[0]) for candidate in (matrix, original)
+    )
+    return least_eigenvalue >= min(original_least, 0.0) - ROUNDING_SHARE * float(np.abs(original).max())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Split:
+class _CraigBamptonModel:
     """Mass, damping and stiffness in Craig-Bampton coordinates: the driven axes first, then the modes of unit mass."""
 
     mass: FloatArray
@@ -139,18 +142,18 @@ class _Split:
     """(modes,): natural frequencies with the driven axes held."""
 
 
-def _read_stated_deviation(deviation: float | None, grounded: FloatArray) -> float:
+def _read_stated_deviation(deviation: float | None, axis_block: FloatArray) -> float:
     """One standard deviation of the entries of a block (m, m) at the driven axes: as stated, else `UNSTATED_SHARE` of
     the largest diagonal entry; above 0 even where the block is 0."""
     if deviation is not None:
         return deviation
-    return UNSTATED_SHARE * float(np.abs(np.diagonal(grounded)).max()) or UNSTATED_SHARE
+    return UNSTATED_SHARE * float(np.abs(np.diagonal(axis_block)).max()) or UNSTATED_SHARE
 
 
-def _split(model: MechanicalModel) -> _Split:
+def _transform_to_craig_bampton(model: MechanicalModel) -> _CraigBamptonModel:
     """The model in Craig-Bampton coordinates: constraint modes (static shapes) of the driven axes, then fixed-interface
     modes."""
-    driven = driven_axes(model)
+    driven = compute_driven_axes(model)
     interior_basis = null_space(driven.T)
     m = driven.shape[1]
     # Dual basis of the driven axes, so that a force along one axis moves that axis alone.
@@ -172,28 +175,30 @@ def _split(model: MechanicalModel) -> _Split:
     )
     # The remaining stiffness between driven axes and modes is rounding.
     stiffness[:m, m:] = stiffness[m:, :m] = 0.0
-    return _Split(mass, damping, stiffness, np.linalg.inv(basis), frequency)
+    return _CraigBamptonModel(mass, damping, stiffness, np.linalg.inv(basis), frequency)
 
 
-def _tune(model: MechanicalModel, split: _Split, pairs: list[tuple[int, int]], values: FloatArray) -> MechanicalModel:
-    """The model with its parameters changed by `values` (parameters,), in their units; equations: module docstring."""
-    m, modes = model.inputs, len(split.frequency_hz)
-    grounded = values[: 3 * len(pairs)].reshape(3, len(pairs))
-    frequency_change, mass_change, damping_change = values[3 * len(pairs) :].reshape(3, modes)
-    matrices = [split.mass.copy(), split.damping.copy(), split.stiffness.copy()]
-    for matrix, added in zip(matrices, grounded, strict=True):
-        for (i, j), value in zip(pairs, added, strict=True):
+def _tune(
+    model: MechanicalModel, modal_model: _CraigBamptonModel, axis_pairs: list[tuple[int, int]], changes: FloatArray
+) -> MechanicalModel:
+    """The model with its parameters changed by `changes` (parameters,), in their units; equations: module docstring."""
+    m, mode_count = model.inputs, len(modal_model.frequency_hz)
+    axis_changes = changes[: 3 * len(axis_pairs)].reshape(3, len(axis_pairs))
+    frequency_change, mass_change, damping_change = changes[3 * len(axis_pairs) :].reshape(3, mode_count)
+    matrices = [modal_model.mass.copy(), modal_model.damping.copy(), modal_model.stiffness.copy()]
+    for matrix, matrix_changes in zip(matrices, axis_changes, strict=True):
+        for (i, j), value in zip(axis_pairs, matrix_changes, strict=True):
             matrix[i, j] += value
             matrix[j, i] += value if i != j else 0.0
     mass, damping, stiffness = matrices
-    for k in range(modes):
-        row = m + k
-        coupling, factor = split.mass[:m, row], max(1 + mass_change[k], _LEAST_MASS)
+    for k in range(mode_count):
+        mode_row = m + k
+        coupling, mass_factor = modal_model.mass[:m, mode_row], max(1 + mass_change[k], _LEAST_MASS)
         # A mode of unit mass adds coupling coupling^T to the mass that the axes carry at low frequencies.
-        mass[:m, :m] += (factor - 1) * np.outer(coupling, coupling)
-        mass[:m, row] *= np.sqrt(factor)
-        mass[row, :m] *= np.sqrt(factor)
-        stiffness[row, row] *= (1 + frequency_change[k]) ** 2
-        damping[row, row] *= (1 + frequency_change[k]) * (1 + damping_change[k])
-    mass, damping, stiffness = (split.back.T @ matrix @ split.back for matrix in matrices)
+        mass[:m, :m] += (mass_factor - 1) * np.outer(coupling, coupling)
+        mass[:m, mode_row] *= np.sqrt(mass_factor)
+        mass[mode_row, :m] *= np.sqrt(mass_factor)
+        stiffness[mode_row, mode_row] *= (1 + frequency_change[k]) ** 2
+        damping[mode_row, mode_row] *= (1 + frequency_change[k]) * (1 + damping_change[k])
+    mass, damping, stiffness = (modal_model.back.T @ matrix @ modal_model.back for matrix in matrices)
     return replace(model, mass=(mass + mass.T) / 2, damping=damping, stiffness=stiffness)

@@ -34,8 +34,8 @@ MOST_LAGS, SAMPLES_PER_LAG = 64, 50
 """Largest order p of the autoregression, and least samples per lag: with fewer, the coefficients are mostly noise.
 Both were set by hand."""
 WHITE_SHARE = 1e-4
-"""White noise added to the residual before the fit, as a share of its power: no frequency weighs more than 1 / FLAT
-times what it would in a flat spectrum of this power, and the Toeplitz matrix stays well conditioned."""
+"""White noise added to the residual before the fit, as a share of its power: no frequency weighs more than
+1 / WHITE_SHARE times what it would in a flat spectrum of this power, and the Toeplitz matrix stays well conditioned."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,16 +73,16 @@ class WhiteningFilter:
 def fit_whitening_filter(residuals: Sequence[FloatArray], white_noise_rms: FloatArray) -> WhiteningFilter:
     """Autoregression fitted to residuals by Yule-Walker, channel by channel. residuals: (n, c) each, NaN where not
     known. white_noise_rms: (c,), rms of white noise in the residuals' unit, which bounds the spectrum from below."""
-    count = sum(int(np.isfinite(residual).all(axis=1).sum()) for residual in residuals)
-    lags = int(np.clip(count // SAMPLES_PER_LAG, 1, MOST_LAGS))
+    sample_count = sum(int(np.isfinite(residual).all(axis=1).sum()) for residual in residuals)
+    lags = int(np.clip(sample_count // SAMPLES_PER_LAG, 1, MOST_LAGS))
     autocovariance: FloatArray = np.sum(
         [compute_lagged_products(residual, lags) for residual in residuals], axis=0
-    ) / max(count, 1)
+    ) / max(sample_count, 1)
     autocovariance[0] = autocovariance[0] * (1 + WHITE_SHARE) + white_noise_rms**2
     coefficients = np.zeros((lags + 1, len(white_noise_rms)))
     coefficients[0] = 1.0
-    for c, row in enumerate(autocovariance.T):
-        coefficients[1:, c] = -solve_toeplitz(row[:-1], row[1:])
+    for c, channel_autocovariance in enumerate(autocovariance.T):
+        coefficients[1:, c] = -solve_toeplitz(channel_autocovariance[:-1], channel_autocovariance[1:])
     return WhiteningFilter(coefficients)
 
 
@@ -103,27 +103,34 @@ class WhitenedMeasure:
 
     @property
     def name(self) -> str:
+        """Name of the measure whose residuals are whitened."""
         return self.base_measure.name
 
     @property
     def records(self) -> tuple[Observed, ...]:
+        """The compared records; samples without full history of the filter have no role."""
         return self.base_measure.records
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
+        """The measure on other records, with the same filter."""
         return replace(self, base_measure=self.base_measure.with_records(records))
 
     def with_floor(self, rms: FloatArray) -> Self:
+        """The measure with noise of this rms (c,) added in power, and 1 as its least error."""
         return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
 
     def shorten(self) -> Self:
+        """The measure without the samples after the last to fit or to choose by."""
         return replace(self, base_measure=self.base_measure.shorten())
 
     def can_observe(self, effect: Effect) -> bool:
+        """Whether the effect changes the compared signals: as in the base measure."""
         return self.base_measure.can_observe(effect)
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
+        """Per record (n, c): residuals of the base measure through the filter, in `unit`; NaN where missing."""
         base_residuals = self.base_measure.residuals(model, effects)
-        # The filter was fitted to residuals in the channels' units, those of the plain measure are in units of noise.
+        # The filter was fitted to residuals in the channels' units, those of the base measure are in units of noise.
         return tuple(self.whitening.apply(residual * self.base_measure.unit) / self.unit for residual in base_residuals)
 
     def evidence(

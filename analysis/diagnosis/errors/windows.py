@@ -13,7 +13,7 @@ import numpy as np
 
 from analysis.diagnosis.data.motion_smoother import SmoothedMotion, smooth_motion
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.data.recorded_conditions import add_carried_weight, effects_under_conditions
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, apply_conditions
 from analysis.diagnosis.errors.error_measure_rule import WINDOW_S
 from analysis.diagnosis.errors.evidence_from_residuals import fill_gaps
 from analysis.diagnosis.errors.free_simulation import predict_channels
@@ -29,8 +29,6 @@ from equalizer.signals.signal import FloatArray
 
 _LEAST_SINGULAR_SHARE = 1e-9
 """Least singular value of the free motions, over the largest, for which a direction of the state is fitted."""
-
-
 READINGS_PER_STATE = 10.0
 """Least readings of a window per fitted state: the fit then absorbs a tenth of the power of random errors at most."""
 
@@ -56,15 +54,19 @@ class Windows:
 
     @property
     def name(self) -> str:
+        """Name with the length of a window, as in `diagnosis.json`."""
         return f"windows of {self.window_s:g} s"
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
+        """The measure on other records, which must match `states` in number and length."""
         return replace(self, records=records)
 
     def with_floor(self, rms: FloatArray) -> Self:
+        """The measure with noise of this rms (c,) added in power, and 1 as its least error."""
         return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
 
     def shorten(self) -> "Windows":
+        """The measure without the samples after the last to fit or to choose by, and without records that have none."""
         used_records = [
             (record.shorten(), states)
             for record, states in zip(self.records, self.states, strict=True)
@@ -77,9 +79,12 @@ class Windows:
         )
 
     def can_observe(self, effect: Effect) -> bool:
+        """True for every effect: each changes the simulated response or position."""
         return True
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
+        """Per record (n, c): residuals after the fit of each window's initial state, in units of `unit`; NaN where a
+        sample is missing."""
         all_effects = (*self.model_effects, *effects)
         return tuple(
             self._simulate_from_states(model, all_effects, *pair)[1]
@@ -89,6 +94,8 @@ class Windows:
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
+        """Per record, the motion and missing force from which starting values are estimated. residuals: not used,
+        because the simulation gives them again."""
         return tuple(
             self._gather_evidence(model, (*self.model_effects, *effects), record, states)
             for record, states in zip(self.records, self.states, strict=True)
@@ -106,7 +113,7 @@ class Windows:
             model,
             record.command,
             (recording.sample_rate_hz, recording.hold),
-            effects_under_conditions(effects, recording),
+            apply_conditions(effects, recording),
             Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording)),
             Restarts(length * np.arange(len(states)), states),
         )
@@ -145,6 +152,8 @@ class Windows:
     def _gather_evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, states: FloatArray
     ) -> Evidence:
+        """The evidence of one record: motion and missing force by the smoother, driven by the actuator's force and the
+        effects' forces on the axes."""
         simulated, residual = self._simulate_from_states(model, effects, record, states)
         recording, p = record.recording, model.outputs
         model = add_carried_weight(model, recording)
@@ -194,22 +203,26 @@ def count_window_samples(window_s: float, sample_rate_hz: float) -> int:
     return max(round(window_s * sample_rate_hz), 1)
 
 
-def _compute_free_motion(structure: MechanicalModel, sample_rate_hz: float, length: int, count: int) -> FloatArray:
+def _compute_free_motion(
+    structure: MechanicalModel, sample_rate_hz: float, window_samples: int, channel_count: int
+) -> FloatArray:
     """(length, c, 2n): free response of the channels to each unit initial state."""
     steps = discretise_model(structure, 1 / sample_rate_hz)
-    states = np.empty((length, *steps.advance.shape))
-    states[0] = np.eye(len(steps.advance))
-    for k in range(1, length):
-        states[k] = steps.advance @ states[k - 1]
+    states = np.empty((window_samples, *steps.transition.shape))
+    states[0] = np.eye(len(steps.transition))
+    for k in range(1, window_samples):
+        states[k] = steps.transition @ states[k - 1]
     response = low_pass(states.transpose(0, 2, 1) @ steps.response.T, sample_rate_hz, structure.sensor.bandwidth_hz)
     outputs = np.concatenate([response, states.transpose(0, 2, 1) @ steps.position.T], axis=2)
-    return np.asarray(outputs[:, :, :count].transpose(0, 2, 1))
+    return np.asarray(outputs[:, :, :channel_count].transpose(0, 2, 1))
 
 
 def _project_out(residual: FloatArray, free_motion: FloatArray) -> FloatArray:
     """(windows, samples): residuals without their least-squares projection on the columns of `free_motion`, (samples,
     k)."""
-    size = np.linalg.norm(free_motion, axis=0)
-    basis, singular_values, _ = np.linalg.svd(free_motion / np.where(size > 0, size, 1.0), full_matrices=False)
+    column_norms = np.linalg.norm(free_motion, axis=0)
+    basis, singular_values, _ = np.linalg.svd(
+        free_motion / np.where(column_norms > 0, column_norms, 1.0), full_matrices=False
+    )
     basis = basis[:, singular_values > _LEAST_SINGULAR_SHARE * max(float(singular_values[0]), np.finfo(float).tiny)]
     return np.asarray(residual - (residual @ basis) @ basis.T)

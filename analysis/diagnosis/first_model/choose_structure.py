@@ -1,4 +1,9 @@
-"""Chooses the structure of a first model: the one asked for, or the plainest by held-out error."""
+"""Chooses the structure of a first model: the requested one, or the plainest that fits held-out data about as well.
+
+The structures are those of `model_structures`, fitted by force balance where a motion was measured along the commands,
+else by spectra. A sentence states what the remaining error depends on (`describe_remaining_error`). Called where a user
+asks for a model alone (`study/workflows/diagnosis/fit_first_model`); a diagnosis uses `fit_without_model`.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -20,16 +25,17 @@ from analysis.diagnosis.first_model.model_structures import (
 )
 from analysis.diagnosis.settings import MODES_GAIN, REMAINDER_REPORTED, RICHER_STRUCTURE_GAIN
 from equalizer.identification.mechanical.mechanical_free_simulation import simulation_errors
-from equalizer.identification.mechanical.mechanical_lines import segment_lines, split_fit_and_test
+from equalizer.identification.mechanical.mechanical_lines import compute_segment_lines, split_fit_and_test
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-SHAPES: dict[str, Callable[[Motion], FloatArray]] = {
+REMAINDER_REGRESSORS: dict[str, Callable[[Motion], FloatArray]] = {
     "the direction of motion, as dry friction does": lambda m: smooth_sign(m.velocity, 0.01 * float(m.velocity.std())),
     "the square of the speed": lambda m: m.velocity * np.abs(m.velocity),
     "the square of the position": lambda m: (m.position - m.position.mean(axis=0)) ** 2,
     "the cube of the position, as a hardening spring does": lambda m: (m.position - m.position.mean(axis=0)) ** 3,
 }
+"""Functions of a motion, (n, d) each, by the words for the remaining error that is correlated with them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,10 +68,10 @@ def choose_structure(
     except NoMotionError as problem:
         balanced, no_balance_reason = None, str(problem)
     if requested_kind is not None:
-        by_force = balanced is not None and requested_kind != "two-mode"
+        is_fitted_by_force = balanced is not None and requested_kind != "two-mode"
         fit = (
             fit_structure(balanced, requested_kind)
-            if by_force and balanced
+            if is_fitted_by_force and balanced
             else fit_modal_structure(recordings, requested_kind, on_progress)
         )
         return Choice(
@@ -76,18 +82,20 @@ def choose_structure(
         )
     fits, trials = _fit_structures(balanced, recordings, on_progress)
     if not fits:
-        raise StructureRefused("; ".join(f"{item.kind}: {item.refusal}" for item in trials))
+        raise StructureRefused("; ".join(f"{trial.kind}: {trial.refusal}" for trial in trials))
     if balanced is None:
         ordered = sorted(fits, key=lambda fitted: fitted.model.coordinates)
         best = ordered[-1] if ordered[-1].error < (1 - MODES_GAIN) * ordered[0].error else ordered[0]
-        text = f"Structures were compared by the held-out error of a free simulation, because {no_balance_reason}."
-        return Choice(best, trials, text, describe_remaining_error(None, best))
+        sentence = f"Structures were compared by the held-out error of a free simulation, because {no_balance_reason}."
+        return Choice(best, trials, sentence, describe_remaining_error(None, best))
     best = choose_simplest(fits)
     reason = (
         f"{best.kind} is the structure of fewest parameters; no structure with more parameters lowers its "
         f"cross-validated error power significantly (by more than {100 * RICHER_STRUCTURE_GAIN:.0f} %)."
     )
-    return _with_modes(Choice(best, trials, reason, describe_remaining_error(balanced, best)), recordings, on_progress)
+    return _compare_with_two_modes(
+        Choice(best, trials, reason, describe_remaining_error(balanced, best)), recordings, on_progress
+    )
 
 
 def describe_remaining_error(balanced: BalancedRecordings | None, fit: StructureFit) -> str:
@@ -96,23 +104,29 @@ def describe_remaining_error(balanced: BalancedRecordings | None, fit: Structure
     if balanced is None or fit.joint is None or balanced.untimed:
         return f"An error of {error_text} remains."
     motions = balanced.regressions[0].motions
-    remainders = [rows[m.valid_samples(m.fit)] for rows, m in zip(fit.joint.remainders, motions, strict=True)]
-    shares = {
-        name: _share([m.decimate(shape(m))[m.valid_samples(m.fit)] for m in motions], remainders)
-        for name, shape in SHAPES.items()
+    remainders = [
+        remainder[motion.mask_valid_samples(motion.fit)]
+        for remainder, motion in zip(fit.joint.remainders, motions, strict=True)
+    ]
+    shares_by_cause = {
+        cause: _compute_explained_share(
+            [motion.decimate(compute_regressor(motion))[motion.mask_valid_samples(motion.fit)] for motion in motions],
+            remainders,
+        )
+        for cause, compute_regressor in REMAINDER_REGRESSORS.items()
     }
-    name, share = max(shares.items(), key=lambda item: item[1])
-    if share < REMAINDER_REPORTED:
+    cause, explained_share = max(shares_by_cause.items(), key=lambda item: item[1])
+    if explained_share < REMAINDER_REPORTED:
         return f"An error of {error_text} remains; it depends on neither speed nor position."
-    return f"An error of {error_text} remains; {100 * share:.0f} % of its power is explained by {name}."
+    return f"An error of {error_text} remains; {100 * explained_share:.0f} % of its power is explained by {cause}."
 
 
-def _share(columns: Sequence[FloatArray], remainders: Sequence[FloatArray]) -> float:
+def _compute_explained_share(columns: Sequence[FloatArray], remainders: Sequence[FloatArray]) -> float:
     """Squared correlation of columns with the remainder, the largest over the axes."""
     x, y = np.vstack(columns), np.vstack(remainders)
     x, y = x - x.mean(axis=0), y - y.mean(axis=0)
-    size = np.maximum((x**2).sum(axis=0) * (y**2).sum(axis=0), 1e-300)
-    return float(((x * y).sum(axis=0) ** 2 / size).max())
+    power_product = np.maximum((x**2).sum(axis=0) * (y**2).sum(axis=0), 1e-300)
+    return float(((x * y).sum(axis=0) ** 2 / power_product).max())
 
 
 def _fit_structures(
@@ -120,52 +134,63 @@ def _fit_structures(
 ) -> tuple[list[StructureFit], tuple[TriedStructure, ...]]:
     """Fit every structure that the recordings allow. balanced: for force balances; None where only spectra can be
     fitted."""
-    kinds: tuple[Kind, ...] = ("mass-spring", "two-mode") if balanced is None else ("massless", "motor", "mass-spring")
-    kinds = ("motor", "mass-spring") if balanced is not None and balanced.free else kinds
+    structure_kinds: tuple[Kind, ...] = (
+        ("mass-spring", "two-mode") if balanced is None else ("massless", "motor", "mass-spring")
+    )
+    structure_kinds = ("motor", "mass-spring") if balanced is not None and balanced.free else structure_kinds
     fits, trials = [], []
-    for kind in kinds:
+    for structure_kind in structure_kinds:
         try:
             fit = (
-                fit_modal_structure(recordings, kind, on_progress)
+                fit_modal_structure(recordings, structure_kind, on_progress)
                 if balanced is None
-                else fit_structure(balanced, kind)
+                else fit_structure(balanced, structure_kind)
             )
         except StructureRefused as refusal:
-            trials.append(TriedStructure(kind, None, str(refusal)))
+            trials.append(TriedStructure(structure_kind, None, str(refusal)))
             continue
         fits.append(fit)
-        trials.append(TriedStructure(kind, fit.error, ""))
+        trials.append(TriedStructure(structure_kind, fit.error, ""))
     return fits, tuple(trials)
 
 
-def _with_modes(choice: Choice, recordings: Sequence[Recording], on_progress: Callable[[float], None]) -> Choice:
+def _compare_with_two_modes(
+    choice: Choice, recordings: Sequence[Recording], on_progress: Callable[[float], None]
+) -> Choice:
     """The choice; a structure with two modes in its place where that leaves less, by `MODES_GAIN`, in a free simulation
     of held-out samples."""
     if choice.fit.kind != "mass-spring":
         return choice
     if any(is_in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings):
         reason = "it is fitted to spectra, which a controller or an imposed motion biases"
-        return _with_tried(choice, TriedStructure("two-mode", None, reason))
+        return _append_trial(choice, TriedStructure("two-mode", None, reason))
     try:
         modal_fit = fit_modal_structure(recordings, "two-mode", on_progress)
     except StructureRefused as refusal:
-        return _with_tried(choice, TriedStructure("two-mode", None, str(refusal)))
+        return _append_trial(choice, TriedStructure("two-mode", None, str(refusal)))
     fit, test = split_fit_and_test(recordings)
-    lines = [segment for part in test or fit if (segment := segment_lines(*part)) is not None]
-    ends = [float(bound(line.frequency_hz[line.excited])) for line in lines for bound in (np.min, np.max)]
-    errors = [
-        float(simulation_errors(model, lines, (min(ends), max(ends)))[0][-1])
+    lines = [
+        segment for recording_part in test or fit if (segment := compute_segment_lines(*recording_part)) is not None
+    ]
+    band_edges_hz = [
+        float(select_bound(line.frequency_hz[line.excited])) for line in lines for select_bound in (np.min, np.max)
+    ]
+    simulation_rms = [
+        float(simulation_errors(model, lines, (min(band_edges_hz), max(band_edges_hz)))[0][-1])
         for model in (choice.fit.model, modal_fit.model)
     ]
-    text = (
-        f"In a free simulation the error of mass-spring is {100 * errors[0]:.3g} %, that of two-mode "
-        f"{100 * errors[1]:.3g} %."
+    comparison = (
+        f"In a free simulation the error of mass-spring is {100 * simulation_rms[0]:.3g} %, that of two-mode "
+        f"{100 * simulation_rms[1]:.3g} %."
     )
-    if errors[1] < (1 - MODES_GAIN) * errors[0]:
+    if simulation_rms[1] < (1 - MODES_GAIN) * simulation_rms[0]:
         trials = (*choice.tried, TriedStructure("two-mode", modal_fit.error, ""))
-        return Choice(modal_fit, trials, text, describe_remaining_error(None, modal_fit))
-    return _with_tried(choice, TriedStructure("two-mode", modal_fit.error, "modes lower the error too little"), text)
+        return Choice(modal_fit, trials, comparison, describe_remaining_error(None, modal_fit))
+    return _append_trial(
+        choice, TriedStructure("two-mode", modal_fit.error, "modes lower the error too little"), comparison
+    )
 
 
-def _with_tried(choice: Choice, trial: TriedStructure, text: str = "") -> Choice:
-    return Choice(choice.fit, (*choice.tried, trial), f"{choice.reason} {text}".rstrip(), choice.remains)
+def _append_trial(choice: Choice, trial: TriedStructure, sentence: str = "") -> Choice:
+    """The choice with a further trial, and a sentence appended to its reason."""
+    return Choice(choice.fit, (*choice.tried, trial), f"{choice.reason} {sentence}".rstrip(), choice.remains)

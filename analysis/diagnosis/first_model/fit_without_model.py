@@ -1,9 +1,9 @@
 """Fits the model that a diagnosis starts from where the user gave none.
 
 In this order: the weights of the force balances, where these name laws along the motion of one body per command; rigid
-bodies fitted to forces, for recordings in closed loop or of an imposed motion (`rigid_model`); a mechanical model
+bodies fitted to forces, for recordings in closed loop or of an imposed motion (`fit_rigid_model`); a mechanical model
 fitted to frequency responses (`mechanical_fit`), which takes longest. Their tolerances are wide, because missing
-physics biases the fitted parameters.
+physics biases the fitted parameters. Called by `study/workflows/diagnosis/fit_without_model`.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,7 +17,7 @@ from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.data.measured_motion import fill_gaps, is_quasi_static, is_read_as_free
 from analysis.diagnosis.data.recorded_conditions import has_carried_weight
 from analysis.diagnosis.first_model.first_model import FirstModel
-from analysis.diagnosis.first_model.model_from_balance import plain_model
+from analysis.diagnosis.first_model.model_from_balance import build_plain_model
 from analysis.diagnosis.first_model.model_structures import (
     FIXED_SHARE,
     Kind,
@@ -25,7 +25,7 @@ from analysis.diagnosis.first_model.model_structures import (
     balance_recordings,
     fit_structure,
 )
-from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, should_use_rigid_model
+from analysis.diagnosis.forces.rigid_model import can_be_rigid, fit_rigid_model, should_use_rigid_model
 from analysis.diagnosis.settings import LEAST_MODEL_ANSWER
 from analysis.diagnosis.types import Mapper, Progress, TimeBudget
 from analysis.wording import format_sentence
@@ -55,7 +55,7 @@ FREE_REMARK = (
 )
 
 
-def first_model_of(
+def fit_first_model(
     recordings: Sequence[Recording],
     without: Sequence[str],
     time_left: TimeBudget,
@@ -72,11 +72,11 @@ def first_model_of(
     if (
         not is_free
         and any(map(is_quasi_static, recordings))
-        and (static_model := _plain_structure(recordings, "massless")) is not None
+        and (static_model := _fit_structure_by_balance(recordings, "massless")) is not None
     ):
         return FirstModel(static_model, (UNTIMED_REMARK,), balances)
-    model = plain_model(balances, recordings[0], "fitted to these recordings")
-    if is_free and (free_model := model or _free_model(recordings)) is not None:
+    model = build_plain_model(balances, recordings[0], "fitted to these recordings")
+    if is_free and (free_model := model or _fit_free_model(recordings)) is not None:
         return FirstModel(_hold_mass(free_model), (FREE_REMARK,), balances)
     if model is not None:
         return FirstModel(model, (BALANCE_REMARK,), balances)
@@ -93,13 +93,13 @@ def _hold_mass(model: MechanicalModel) -> MechanicalModel:
     return replace(model, tolerance=replace(model.tolerance, mass_kg=FIXED_SHARE * float(np.abs(model.mass).max())))
 
 
-def _free_model(recordings: Sequence[Recording]) -> MechanicalModel | None:
+def _fit_free_model(recordings: Sequence[Recording]) -> MechanicalModel | None:
     """A mass with damper and spring for a free motion, or without the spring where that fit fails; None without
     both."""
-    return _plain_structure(recordings, "mass-spring") or _plain_structure(recordings, "motor")
+    return _fit_structure_by_balance(recordings, "mass-spring") or _fit_structure_by_balance(recordings, "motor")
 
 
-def _plain_structure(recordings: Sequence[Recording], kind: Kind) -> MechanicalModel | None:
+def _fit_structure_by_balance(recordings: Sequence[Recording], kind: Kind) -> MechanicalModel | None:
     """The model of a structure, fitted by force balance; None where no motion was measured along the commands, or where
     the fit fails."""
     try:
@@ -114,24 +114,24 @@ def fit_first_linear_model(
     """A linear model fitted by forces or spectra, with remarks. source: the recordings in words. Raises
     NothingToDiagnose where no model can be fitted."""
     _require_no_weight(recordings)
-    if should_use_rigid_model(recordings) and (rigid := _rigid_model(recordings, source)) is not None:
+    if should_use_rigid_model(recordings) and (rigid := _try_rigid_model(recordings, source)) is not None:
         return rigid, (RIGID_REMARK,)
     try:
         fit = fit_mechanical_model(recordings, on_progress=on_progress, name=f"fitted to {source}")
         if not any(_responds_to_commands(fit.model, recording) for recording in recordings):
             raise MechanicalFitRefused("the model that fits best hardly responds to the commands")
     except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as refusal:
-        if (rigid := _rigid_model(recordings, source)) is not None:
+        if (rigid := _try_rigid_model(recordings, source)) is not None:
             return rigid, (RIGID_REMARK,)
         raise NothingToDiagnose((f"no model was given, and none can be fitted: {refusal}",)) from refusal
-    tested = "" if fit.held_out is None else f" and of {100 * fit.held_out:.1f} % on held-out data"
-    text = (
+    held_out_text = "" if fit.held_out is None else f" and of {100 * fit.held_out:.1f} % on held-out data"
+    first_remark = (
         f"No model was given. A linear model was fitted to {source} first, with an error of {100 * fit.error:.1f} "
-        f"%{tested}, and its masses, dampers and springs may change by much more than that. Physics that its "
+        f"%{held_out_text}, and its masses, dampers and springs may change by much more than that. Physics that its "
         "parameters can represent, such as friction at one level as damping, is part of this model and is therefore "
         "not named."
     )
-    return widen_tolerance(fit.model), (text, *(format_sentence(remark) for remark in fit.remarks))
+    return widen_tolerance(fit.model), (first_remark, *(format_sentence(remark) for remark in fit.remarks))
 
 
 def _responds_to_commands(model: MechanicalModel, recording: Recording) -> bool:
@@ -155,11 +155,11 @@ def _require_no_weight(recordings: Sequence[Recording]) -> None:
         )
 
 
-def _rigid_model(recordings: Sequence[Recording], source: str) -> MechanicalModel | None:
+def _try_rigid_model(recordings: Sequence[Recording], source: str) -> MechanicalModel | None:
     """A rigid body per command; None where the recordings do not determine it."""
     if not can_be_rigid(recordings):
         return None
     try:
-        return rigid_model(recordings, f"fitted to {source}")
+        return fit_rigid_model(recordings, f"fitted to {source}")
     except (MechanicalModelError, np.linalg.LinAlgError):
         return None

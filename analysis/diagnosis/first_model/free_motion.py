@@ -11,11 +11,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from analysis.diagnosis.balance.band import band_end_hz
+from analysis.diagnosis.balance.band import compute_band_end_hz
 from analysis.diagnosis.balance.motion import differentiate
 from analysis.diagnosis.data.measured_motion import FREE, fill_gaps, is_driven, is_quasi_static
 from analysis.diagnosis.data.observed import find_moving_spans
-from analysis.diagnosis.data.observed_parts import parts_of
+from analysis.diagnosis.data.observed_parts import find_parts
 from analysis.diagnosis.settings import DECAY_LEAST_CYCLES, DECAY_MOST_LEVELS
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording, Segment
@@ -39,13 +39,13 @@ def read_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recording, 
     order, rate_hz = DERIVATIVE_OF_QUANTITY[response.quantities[0]], response.sample_rate_hz
     motions = [fill_gaps(recording.response.samples) for recording in recordings]
     # The motion is discontinuous between two parts.
-    parts = [parts_of(recording) for recording in recordings]
+    parts = [find_parts(recording) for recording in recordings]
     part_samples = [
         samples[start:stop]
         for samples, recording_parts in zip(motions, parts, strict=True)
         for start, stop in recording_parts
     ]
-    band_hz = band_end_hz(part_samples, rate_hz, order)
+    band_hz = compute_band_end_hz(part_samples, rate_hz, order)
     is_rotational = response.units[0].startswith("rad")
     converted = []
     for recording, samples, recording_parts in zip(recordings, motions, parts, strict=True):
@@ -71,7 +71,7 @@ def _levels(recording: Recording, samples: FloatArray) -> tuple[Segment, ...]:
     """Segments of at least `DECAY_LEAST_CYCLES` cycles each, with their amplitude: a decaying motion passes through all
     levels, and every level should be among the samples to fit and to test by. samples: (n, p)."""
     segments = []
-    for span in find_moving_spans(samples, parts_of(recording)):
+    for span in find_moving_spans(samples, find_parts(recording)):
         motion = samples[span.start : span.end_of_motion]
         displacement = motion[:, int(np.argmax(np.ptp(motion, axis=0)))]
         rest_position = float(np.median(samples[span.start : span.stop, int(np.argmax(np.ptp(motion, axis=0)))]))

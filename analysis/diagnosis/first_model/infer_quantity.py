@@ -4,7 +4,7 @@ From the channel's name where that is clear; force where the commands are motion
 response y and its derivatives, f = m y'' + c y' + k y. With a position, mass makes y'' significant; with a velocity,
 mass multiplies y' and damping y, so that y'' is not needed. A response is a velocity where y'' explains less than
 `DERIVATIVE_NEEDED` of the force's power in cross-validation and y at least that much, otherwise a position. A sensor's
-voltage is treated likewise.
+voltage is treated likewise. Called by `one_motion_per_force`.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.motion import NoMotionError, compute_motions
-from analysis.diagnosis.balance.regression import regression_of
+from analysis.diagnosis.balance.regression import build_regression
 from analysis.diagnosis.data.measured_motion import is_driven
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.settings import DERIVATIVE_NEEDED
@@ -26,36 +26,36 @@ BALANCE_QUANTITIES = (frozenset(DERIVATIVE_OF_QUANTITY) | {"force", "torque"}) -
 """Quantities that a force balance can use. A voltage is a sensor's reading of an unknown quantity."""
 
 
-def name_motion(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
+def infer_quantities(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
     """The recordings with the quantity of their responses, and a sentence about the assumption; unchanged, with an
     empty sentence, where a quantity was stated or none can be assumed. recordings: alike in channels, units and
     rate."""
-    first = recordings[0]
-    if set(first.response.quantities) & BALANCE_QUANTITIES:
+    first_recording = recordings[0]
+    if set(first_recording.response.quantities) & BALANCE_QUANTITIES:
         return recordings, ""
-    if quantities_in_names := _quantities_in_names(first):
-        return tuple(_with_quantity(recording, quantities_in_names) for recording in recordings), _sentence_of_names(
-            first, quantities_in_names
-        )
+    if quantities_in_names := _infer_from_names(first_recording):
+        return tuple(
+            _with_quantity(recording, quantities_in_names) for recording in recordings
+        ), _format_names_sentence(first_recording, quantities_in_names)
     if not is_driven(recordings):
-        if set(first.response.units) != {UNSTATED}:
+        if set(first_recording.response.units) != {UNSTATED}:
             return recordings, ""
         return tuple(_with_quantity(recording, "position") for recording in recordings), (
-            f"The recording does not state what {conjoin(list(first.response.channels))} measures; it was taken for a "
-            "position that moves freely; if it is a speed, state that in the map (quantity)."
+            f"The recording does not state what {conjoin(list(first_recording.response.channels))} measures; it was "
+            "taken for a position that moves freely; if it is a speed, state that in the map (quantity)."
         )
-    is_imposed_motion = set(first.command.quantities) <= set(DERIVATIVE_OF_QUANTITY) - {"voltage"}
-    quantity = "force" if is_imposed_motion else _likely_quantity(recordings)
-    if quantity == "position" and set(first.response.quantities) == {"voltage"}:
+    is_imposed_motion = set(first_recording.command.quantities) <= set(DERIVATIVE_OF_QUANTITY) - {"voltage"}
+    quantity = "force" if is_imposed_motion else _infer_from_balance(recordings)
+    if quantity == "position" and set(first_recording.response.quantities) == {"voltage"}:
         return recordings, ""
-    names = conjoin(list(first.response.channels))
+    names = conjoin(list(first_recording.response.channels))
     return tuple(_with_quantity(recording, quantity) for recording in recordings), (
         f"The recording does not state what {names} measures; it was taken for a {quantity}, as its time series "
         "suggests; if it is another quantity, state that in the map (quantity)."
     )
 
 
-def _quantities_in_names(recording: Recording) -> tuple[str, ...]:
+def _infer_from_names(recording: Recording) -> tuple[str, ...]:
     """Quantities of the responses by the channels' names and units; empty where these determine none."""
     from equalizer.signals.quantity_words import quantity_in  # only where a quantity is missing
 
@@ -67,7 +67,7 @@ def _quantities_in_names(recording: Recording) -> tuple[str, ...]:
     return tuple(quantities) if set(quantities) & BALANCE_QUANTITIES else ()
 
 
-def _sentence_of_names(recording: Recording, quantities: Sequence[str]) -> str:
+def _format_names_sentence(recording: Recording, quantities: Sequence[str]) -> str:
     """Sentence on the quantities that were taken from names, with the way to correct them."""
     phrases = [
         f"{name} was taken for {'an' if quantity.startswith('a') else 'a'} {quantity}"
@@ -77,30 +77,34 @@ def _sentence_of_names(recording: Recording, quantities: Sequence[str]) -> str:
     return f"From the name alone, {conjoin(phrases)}; if it is another quantity, state that in the map (quantity)."
 
 
-def _likely_quantity(recordings: Sequence[Recording]) -> str:
+def _infer_from_balance(recordings: Sequence[Recording]) -> str:
     """Quantity of the first response by the force balance of the first command (see above); a position where the
     balance cannot be computed."""
-    count = len(recordings[0].response.channels)
+    channel_count = len(recordings[0].response.channels)
     as_positions = [replace(_with_quantity(recording, "position"), position=None) for recording in recordings]
     try:
-        motions = compute_motions(observe_parts(as_positions, count))
-        regression = regression_of(motions, 0, (), turns=False)
+        motions = compute_motions(observe_parts(as_positions, channel_count))
+        regression = build_regression(motions, 0, (), turns=False)
     except (NoMotionError, np.linalg.LinAlgError):
         return "position"
-    all_columns = regression.columns_of(())
-    power = max(sum(block.signal for block in regression.fit), 1e-300)
+    all_columns = regression.select_columns(())
+    force_power = max(sum(block.signal for block in regression.fit), 1e-300)
     if not np.isfinite(motions[0].band_hz):
         return "position"
 
-    def error_without(columns: Sequence[int]) -> float:
+    def compute_error_increase(columns: Sequence[int]) -> float:
         """Increase of the cross-validated error without these columns, relative to the power."""
-        errors_without = regression.cross_validated_errors([k for k in all_columns if k not in columns])
-        return float((errors_without - regression.cross_validated_errors(all_columns)).sum()) / power
+        errors_without = regression.cross_validate([k for k in all_columns if k not in columns])
+        return float((errors_without - regression.cross_validate(all_columns)).sum()) / force_power
 
-    d = len(motions[0].channels)
-    derivative_needed, response_needed = error_without(range(d)), error_without(range(2 * d, 3 * d))
+    motion_count = len(motions[0].channels)
+    derivative_needed, response_needed = (
+        compute_error_increase(range(motion_count)),
+        compute_error_increase(range(2 * motion_count, 3 * motion_count)),
+    )
     return "velocity" if derivative_needed < DERIVATIVE_NEEDED <= response_needed else "position"
 
 
 def _with_quantity(recording: Recording, quantity: str | tuple[str, ...]) -> Recording:
+    """The recording with this quantity of all response channels, or with one per channel."""
     return replace(recording, response=replace(recording.response, quantity=quantity))

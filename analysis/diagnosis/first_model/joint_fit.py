@@ -5,7 +5,7 @@ For the forces f of d axes and the motion q along them,
     f = M q'' + D q' + K q + f0 + e,        M, D, K symmetric; minimal: sum over axes of |e_i|² / power of f_i
 
 so that every axis has the same weight. Standard errors are sandwich estimates over blocks of samples, because residuals
-are correlated (White, Econometrica 48:817, 1980).
+are correlated (White, Econometrica 48:817, 1980). Called by `model_structures`.
 """
 
 from collections.abc import Sequence
@@ -15,10 +15,10 @@ from typing import Literal
 import numpy as np
 from scipy.special import stdtrit
 
-from analysis.diagnosis.balance.blocks import Block, block_products, compute_squared_error
-from analysis.diagnosis.balance.judge_laws import held_out_moves
+from analysis.diagnosis.balance.blocks import Block, compute_squared_error, select_products
+from analysis.diagnosis.balance.judge_laws import has_held_out_motion
 from analysis.diagnosis.balance.motion import Motion
-from analysis.diagnosis.balance.regression import Regression, regression_of, signal_power
+from analysis.diagnosis.balance.regression import Regression, build_regression, compute_signal_power
 from analysis.diagnosis.settings import ACCELERATION_NOISE_SHARE, LEAST_TEST_BLOCKS
 from equalizer.signals.signal import FloatArray
 
@@ -59,127 +59,148 @@ class _Parametrisation:
     """Matrix, row and column of each parameter; the constant forces follow them."""
 
 
-def regressions_of(motions: Sequence[Motion], turns: bool) -> tuple[Regression, ...]:
+def build_regressions(motions: Sequence[Motion], turns: bool) -> tuple[Regression, ...]:
     """Regression of the force of each axis on mass, damping and stiffness alone, without laws. turns: see `Scales`."""
-    return tuple(regression_of(motions, axis, (), turns) for axis in range(motions[0].force.shape[1]))
+    return tuple(build_regression(motions, axis, (), turns) for axis in range(motions[0].force.shape[1]))
 
 
-def joint_fit(regressions: Sequence[Regression], parts: Sequence[Part]) -> JointFit:
+def fit_jointly(regressions: Sequence[Regression], parts: Sequence[Part]) -> JointFit:
     """The joint fit. parts: the matrices to fit; a constant force per axis is always fitted, too. Held-out errors are
     those of cross-validation where too little was held out. Raises numpy.linalg.LinAlgError where the motion does not
     determine them."""
-    shape = _parametrisation(regressions[0], parts)
-    powers = [max(signal_power(regression.fit), 1e-300) for regression in regressions]
-    block_equations = _products([regression.fit for regression in regressions], shape, powers)
+    parametrisation = _build_parametrisation(regressions[0], parts)
+    powers = [max(compute_signal_power(regression.fit), 1e-300) for regression in regressions]
+    block_equations = _build_block_equations([regression.fit for regression in regressions], parametrisation, powers)
     normal_equations = (
         np.sum([equations[0] for equations in block_equations], axis=0),
         np.sum([equations[1] for equations in block_equations], axis=0),
     )
-    parameters, spread = _solve(normal_equations), _standard_errors(block_equations, normal_equations)
-    fit = [regression.fit for regression in regressions]
+    parameters, parameter_errors = _solve(normal_equations), _compute_standard_errors(block_equations, normal_equations)
+    fit_blocks = [regression.fit for regression in regressions]
     fold_parameters = [
         _solve((normal_equations[0] - gram, normal_equations[1] - cross)) for gram, cross in block_equations
     ]
-    folds = _errors(fit, shape, fold_parameters)
-    test = [regression.test for regression in regressions]
-    has_test = len(test[0]) >= LEAST_TEST_BLOCKS and any(map(held_out_moves, regressions))
-    test_errors = _errors(test, shape, [parameters] * len(test[0])) if has_test else folds
-    sizes = np.array([max(signal_power(blocks), 1e-300) for blocks in (test if has_test else fit)])
+    folds = _compute_squared_errors(fit_blocks, parametrisation, fold_parameters)
+    test_blocks = [regression.test for regression in regressions]
+    has_test = len(test_blocks[0]) >= LEAST_TEST_BLOCKS and any(map(has_held_out_motion, regressions))
+    test_errors = (
+        _compute_squared_errors(test_blocks, parametrisation, [parameters] * len(test_blocks[0])) if has_test else folds
+    )
+    force_powers = np.array(
+        [max(compute_signal_power(blocks), 1e-300) for blocks in (test_blocks if has_test else fit_blocks)]
+    )
     fold_errors = (folds / np.array(powers)).mean(axis=1)
-    matrices, deviations = (_matrices(regressions[0], shape, values) for values in (parameters, spread))
+    matrices, deviations = (
+        _assemble_matrices(regressions[0], parametrisation, values) for values in (parameters, parameter_errors)
+    )
     t_factor = float(stdtrit(max(len(block_equations) - 1, 1), 0.975))
-    biases = {part: ACCELERATION_NOISE_SHARE * np.abs(matrices[part]) for part in PARTS}
-    halves = {part: np.hypot(t_factor * deviations[part], biases[part]) for part in PARTS}
+    bias_limits = {part: ACCELERATION_NOISE_SHARE * np.abs(matrices[part]) for part in PARTS}
+    halves = {part: np.hypot(t_factor * deviations[part], bias_limits[part]) for part in PARTS}
     return JointFit(
         matrices, halves, {part: float(np.diagonal(deviations[part]).max()) for part in PARTS}, fold_errors,
-        float(np.sqrt(fold_errors.sum())), np.sqrt(test_errors.sum(axis=0) / sizes),
-        _remainders(regressions, shape, parameters),
+        float(np.sqrt(fold_errors.sum())), np.sqrt(test_errors.sum(axis=0) / force_powers),
+        _compute_remainders(regressions, parametrisation, parameters),
     )  # fmt: skip
 
 
-def _parametrisation(regression: Regression, parts: Sequence[Part]) -> _Parametrisation:
+def _build_parametrisation(regression: Regression, parts: Sequence[Part]) -> _Parametrisation:
+    """The parameters of these symmetric matrices: entries on and above the diagonal, then one constant force per
+    axis."""
     axes = len(regression.motions[0].channels)
     columns = [PARTS.index(part) * axes + k for part in parts for k in range(axes)] + [regression.base - 1]
     entries = tuple((part, i, k) for part in parts for i in range(axes) for k in range(i, axes))
-    rows = []
+    axis_maps = []
     for axis in range(axes):
-        row = np.zeros((len(columns), len(entries) + axes))
-        for number, (part, i, k) in enumerate(entries):
+        axis_map = np.zeros((len(columns), len(entries) + axes))
+        for parameter_index, (part, i, k) in enumerate(entries):
             first_row = list(parts).index(part) * axes
             if axis in (i, k):
-                row[first_row + (k if axis == i else i), number] = 1.0
-        row[-1, len(entries) + axis] = 1.0
-        rows.append(regression.scale[columns][:, None] * row)
-    return _Parametrisation(columns, tuple(rows), entries)
+                axis_map[first_row + (k if axis == i else i), parameter_index] = 1.0
+        axis_map[-1, len(entries) + axis] = 1.0
+        axis_maps.append(regression.scale[columns][:, None] * axis_map)
+    return _Parametrisation(columns, tuple(axis_maps), entries)
 
 
-def _products(
-    blocks: Sequence[Sequence[Block]], shape: _Parametrisation, powers: Sequence[float]
+def _build_block_equations(
+    blocks: Sequence[Sequence[Block]], parametrisation: _Parametrisation, powers: Sequence[float]
 ) -> list[tuple[FloatArray, FloatArray]]:
     """Normal equations of the joint parameters, per block. powers: of each axis's force."""
     equations = []
     for axis_blocks in zip(*blocks, strict=True):
-        count = shape.rows[0].shape[1]
-        gram, cross = np.zeros((count, count)), np.zeros(count)
-        for block, row, power in zip(axis_blocks, shape.rows, powers, strict=True):
-            products = block_products(block, shape.columns)
-            gram, cross = gram + row.T @ products[0] @ row / power, cross + row.T @ products[1] / power
+        parameter_count = parametrisation.rows[0].shape[1]
+        gram, cross = np.zeros((parameter_count, parameter_count)), np.zeros(parameter_count)
+        for block, axis_map, power in zip(axis_blocks, parametrisation.rows, powers, strict=True):
+            products = select_products(block, parametrisation.columns)
+            gram, cross = gram + axis_map.T @ products[0] @ axis_map / power, cross + axis_map.T @ products[1] / power
         equations.append((gram, cross))
     return equations
 
 
-def _solve(products: tuple[FloatArray, FloatArray]) -> FloatArray:
+def _solve(equations: tuple[FloatArray, FloatArray]) -> FloatArray:
     """(parameters,): solution of the normal equations, scaled to a unit diagonal."""
-    size = np.sqrt(np.maximum(np.diagonal(products[0]), 1e-300))
-    return np.asarray(np.linalg.solve(products[0] / np.outer(size, size), products[1] / size) / size)
+    column_norms = np.sqrt(np.maximum(np.diagonal(equations[0]), 1e-300))
+    return np.asarray(
+        np.linalg.solve(equations[0] / np.outer(column_norms, column_norms), equations[1] / column_norms) / column_norms
+    )
 
 
-def _standard_errors(
+def _compute_standard_errors(
     block_equations: Sequence[tuple[FloatArray, FloatArray]], normal_equations: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
     """(parameters,): sandwich standard errors, the root of the diagonal of G^-1 (sum of s s') G^-1 b / (b - 1), with
     the normal matrix G, and the gradient s of each of the b blocks."""
     parameters = _solve(normal_equations)
-    size = np.sqrt(np.maximum(np.diagonal(normal_equations[0]), 1e-300))
-    inverse = np.linalg.inv(normal_equations[0] / np.outer(size, size)) / np.outer(size, size)
+    column_norms = np.sqrt(np.maximum(np.diagonal(normal_equations[0]), 1e-300))
+    inverse = np.linalg.inv(normal_equations[0] / np.outer(column_norms, column_norms)) / np.outer(
+        column_norms, column_norms
+    )
     scores = np.array([cross - gram @ parameters for gram, cross in block_equations])
     correction = len(block_equations) / max(len(block_equations) - 1, 1)
     return np.asarray(np.sqrt(np.maximum(np.diagonal(inverse @ (correction * scores.T @ scores) @ inverse), 0.0)))
 
 
-def _errors(blocks: Sequence[Sequence[Block]], shape: _Parametrisation, numbers: Sequence[FloatArray]) -> FloatArray:
-    """(blocks, axes): sums of squared force errors. numbers: parameters for each block."""
+def _compute_squared_errors(
+    blocks: Sequence[Sequence[Block]], parametrisation: _Parametrisation, block_parameters: Sequence[FloatArray]
+) -> FloatArray:
+    """(blocks, axes): sums of squared force errors. block_parameters: parameters for each block."""
     return np.array(
         [
             [
-                compute_squared_error(block_products(block, shape.columns), row @ weights, block.power)
-                for block, row in zip(axis_blocks, shape.rows, strict=True)
+                compute_squared_error(
+                    select_products(block, parametrisation.columns), axis_map @ parameters, block.power
+                )
+                for block, axis_map in zip(axis_blocks, parametrisation.rows, strict=True)
             ]
-            for axis_blocks, weights in zip(zip(*blocks, strict=True), numbers, strict=True)
+            for axis_blocks, parameters in zip(zip(*blocks, strict=True), block_parameters, strict=True)
         ]
     )
 
 
-def _matrices(regression: Regression, shape: _Parametrisation, values: FloatArray) -> dict[Part, FloatArray]:
+def _assemble_matrices(
+    regression: Regression, parametrisation: _Parametrisation, parameters: FloatArray
+) -> dict[Part, FloatArray]:
     """The symmetric matrices (d, d) that hold the values of the parameters."""
     axes = len(regression.motions[0].channels)
     matrices = {part: np.zeros((axes, axes)) for part in PARTS}
-    for (part, i, k), value in zip(shape.entries, values, strict=False):
+    for (part, i, k), value in zip(parametrisation.entries, parameters, strict=False):
         matrices[part][i, k] = matrices[part][k, i] = value
     return matrices
 
 
-def _remainders(
-    regressions: Sequence[Regression], shape: _Parametrisation, parameters: FloatArray
+def _compute_remainders(
+    regressions: Sequence[Regression], parametrisation: _Parametrisation, parameters: FloatArray
 ) -> tuple[FloatArray, ...]:
     """See `JointFit.remainders`."""
-    weights = [row @ parameters / regressions[0].scale[shape.columns] for row in shape.rows]
+    regression_weights = [
+        axis_map @ parameters / regressions[0].scale[parametrisation.columns] for axis_map in parametrisation.rows
+    ]
     return tuple(
         np.column_stack(
             [
-                regression.force[number] - regression.columns[number][:, shape.columns] @ axis_weights
-                for regression, axis_weights in zip(regressions, weights, strict=True)
+                regression.force[motion_index]
+                - regression.columns[motion_index][:, parametrisation.columns] @ axis_weights
+                for regression, axis_weights in zip(regressions, regression_weights, strict=True)
             ]
         )
-        for number in range(len(regressions[0].motions))
+        for motion_index in range(len(regressions[0].motions))
     )

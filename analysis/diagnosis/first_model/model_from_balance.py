@@ -3,7 +3,8 @@
 The rows of M, D and K are the weights of the balances without further laws; the matrices are then made symmetric. Their
 tolerance is half the largest change of an entry when the named laws are added to the balances, plus a share
 (`FOUND_NUMBERS_OPEN`) of the largest entry. A mass is at least `MASSLESS_SHARE` of the force's rms over that of the
-acceleration, because every motion of a model needs a mass.
+acceleration, because every motion of a model needs a mass. Called by `fit_without_model` and
+`force_balance_measures`.
 """
 
 from collections.abc import Sequence
@@ -19,33 +20,33 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 
-def first_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
+def build_first_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
     """A linear model with the masses, dampers and springs of force balances, one per command. recording: reduced by
     `reduce_recordings` where the balances hold more than one body per command. None where the commands do not drive one
     measured motion each. Raises MechanicalModelError for matrices that are no valid model."""
     regressions = [balance.search.regression for balance in balances]
-    count = len(balances)
-    if count > len(regressions[0].motions[0].channels) or count != len(recording.response.channels):
+    command_count = len(balances)
+    if command_count > len(regressions[0].motions[0].channels) or command_count != len(recording.response.channels):
         return None
     driven_channels = [regression.base_terms.driven_channel for regression in regressions]
     without_laws, with_laws = (
-        [_matrix_rows(balance, laws, driven_channels) for balance, laws in zip(balances, kinds, strict=True)]
-        for kinds in (
-            [()] * count,
+        [_fit_matrix_rows(balance, laws, driven_channels) for balance, laws in zip(balances, law_choices, strict=True)]
+        for law_choices in (
+            [()] * command_count,
             [tuple(law.place for law in balance.named if law.place >= 0) for balance in balances],
         )
     )
-    matrices = [np.array([row[part] for row in without_laws]) for part in range(3)]
-    matrices_with_laws = [np.array([row[part] for row in with_laws]) for part in range(3)]
+    matrices = [np.array([rows[matrix_index] for rows in without_laws]) for matrix_index in range(3)]
+    matrices_with_laws = [np.array([rows[matrix_index] for rows in with_laws]) for matrix_index in range(3)]
     mass, damping, stiffness = ((matrix + matrix.T) / 2 for matrix in matrices)
-    floor = MASSLESS_SHARE * _rms(np.vstack([motion.force for motion in regressions[0].motions]))
+    least_mass = MASSLESS_SHARE * _compute_rms(np.vstack([motion.force for motion in regressions[0].motions]))
     accelerations = [
         np.gradient(motion.velocity[:, driven_channels], 1 / motion.rate_hz, axis=0)
         for motion in regressions[0].motions
     ]
-    floor = floor / np.maximum(_rms(np.vstack(accelerations)), 1e-300)
-    mass = mass + np.diag(np.maximum(floor - np.diagonal(mass), 0.0))
-    spread = [
+    least_mass = least_mass / np.maximum(_compute_rms(np.vstack(accelerations)), 1e-300)
+    mass = mass + np.diag(np.maximum(least_mass - np.diagonal(mass), 0.0))
+    tolerances = [
         float(np.max(np.abs(base_entry - with_laws)) / 2 + FOUND_NUMBERS_OPEN * np.abs(base_entry).max())
         for base_entry, with_laws in zip((mass, damping, stiffness), matrices_with_laws, strict=True)
     ]
@@ -55,52 +56,52 @@ def first_model(balances: Sequence[Balance], recording: Recording, name: str) ->
         mass,
         damping,
         stiffness,
-        np.eye(count),
-        np.eye(count),
-        tolerance=Tolerance(max(spread[0], 1e-12), max(spread[1], 1e-12), max(spread[2], 1e-12), None),
-        actuator=ActuatorLimits(delay_s=_common_delay_s(balances)),
+        np.eye(command_count),
+        np.eye(command_count),
+        tolerance=Tolerance(max(tolerances[0], 1e-12), max(tolerances[1], 1e-12), max(tolerances[2], 1e-12), None),
+        actuator=ActuatorLimits(delay_s=_find_common_delay_s(balances)),
         rotational=recording.is_rotational,
     )
 
 
-def _common_delay_s(balances: Sequence[Balance]) -> float:
+def _find_common_delay_s(balances: Sequence[Balance]) -> float:
     """The delay (s) that all commands share. 0 where their delays differ, because a model has a single delay, and where
     the recordings are reduced, because the reduction already removes the delay."""
     delays = {balance.search.regression.base_terms.delay_s for balance in balances}
     return delays.pop() if len(delays) == 1 and not is_reduced(balances) else 0.0
 
 
-def plain_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
-    """`first_model` where at least one law is named and there is one body per command: no further fit is needed then.
-    Else None, as where the matrices are no valid model."""
+def build_plain_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
+    """`build_first_model` where at least one law is named and there is one body per command: no further fit is needed
+    then. None otherwise, or where the matrices are no valid model."""
     if not any(balance.named for balance in balances) or is_reduced(balances):
         return None
     try:
-        return first_model(balances, recording, name)
+        return build_first_model(balances, recording, name)
     except (MechanicalModelError, np.linalg.LinAlgError):
         return None
 
 
-def law_power_share_in_band(balances: Sequence[Balance], band_hz: float) -> float:
+def compute_law_power_share(balances: Sequence[Balance], band_hz: float) -> float:
     """Share of the power of a named law's force at frequencies up to `band_hz`; the smallest over the named laws of the
     motion, 1 without any."""
     shares = [1.0]
     for balance in balances:
         regression = balance.search.regression
         laws = [law.place for law in balance.named if law.place >= 0]
-        weights, first = regression.weights(regression.columns_of(laws)), regression.base
+        weights, first_weight = regression.fit_weights(regression.select_columns(laws)), regression.base
         for place in (regression.places[law] for law in laws):
-            law_weights = weights[first : first + place.stop - place.start]
-            first += len(law_weights)
+            law_weights = weights[first_weight : first_weight + place.stop - place.start]
+            first_weight += len(law_weights)
             shares.append(
-                _power_share_in_band(
-                    [rows[:, place] @ law_weights for rows in regression.columns], regression.motions, band_hz
+                _compute_power_share(
+                    [columns[:, place] @ law_weights for columns in regression.columns], regression.motions, band_hz
                 )
             )
     return min(shares)
 
 
-def _power_share_in_band(forces: Sequence[FloatArray], motions: Sequence[Motion], band_hz: float) -> float:
+def _compute_power_share(forces: Sequence[FloatArray], motions: Sequence[Motion], band_hz: float) -> float:
     """Share of the forces' power at frequencies up to `band_hz`. forces: (kept samples,) per motion. The mean over all
     recordings is subtracted, not that of each: where each recording moves in one direction only, the friction differs
     between recordings at frequency zero."""
@@ -115,18 +116,18 @@ def _power_share_in_band(forces: Sequence[FloatArray], motions: Sequence[Motion]
     return power_in_band / total_power
 
 
-def _matrix_rows(
+def _fit_matrix_rows(
     balance: Balance, laws: Sequence[int], driven_channels: Sequence[int]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Rows of the mass, damping and stiffness matrices of one balance, fitted together with these laws. places:
-    channels of the driven motions. A row that the balance does not fit is zero."""
+    """Rows of the mass, damping and stiffness matrices of one balance, fitted together with these laws.
+    laws: indices of the laws. driven_channels: of the driven motions. A row that the balance does not fit is zero."""
     regression = balance.search.regression
-    weights = regression.weights(regression.columns_of(laws))[: regression.matrices]
+    weights = regression.fit_weights(regression.select_columns(laws))[: regression.matrices]
     d = len(regression.motions[0].channels)
     rows = [*weights.reshape(-1, d)[:, list(driven_channels)], np.zeros(len(driven_channels))]
     return rows[0], rows[1], rows[2]
 
 
-def _rms(samples: FloatArray) -> FloatArray:
+def _compute_rms(samples: FloatArray) -> FloatArray:
     """(k,): rms of each column (n, k) about its mean."""
     return np.asarray(np.sqrt(np.mean((samples - samples.mean(axis=0)) ** 2, axis=0)))

@@ -14,17 +14,17 @@ import numpy as np
 from analysis.diagnosis.balance.law import scales_of
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motions
 from analysis.diagnosis.balance.regression import Regression
-from analysis.diagnosis.data.measured_motion import is_read_as_free, time_unit
+from analysis.diagnosis.data.measured_motion import is_read_as_free, select_time_unit
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.first_model.joint_fit import PARTS, JointFit, Part, joint_fit, regressions_of
+from analysis.diagnosis.first_model.joint_fit import PARTS, JointFit, Part, build_regressions, fit_jointly
 from analysis.diagnosis.settings import MASSLESS_SHARE, MODEL_FLOOR, RICHER_STRUCTURE_ERRORS, RICHER_STRUCTURE_GAIN
 from analysis.wording import format_sentence
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused, MechanicalFitSettings
 from equalizer.identification.mechanical.open_tolerance import widen_tolerance
-from equalizer.plant.effect_vocabulary import matrix_unit
-from equalizer.plant.linear_simulation import driven_axes
-from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance, with_units_of
+from equalizer.plant.effect_vocabulary import find_matrix_unit
+from equalizer.plant.linear_simulation import compute_driven_axes
+from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance, adopt_recording_units
 from equalizer.signals.recording import Recording
 from equalizer.signals.unit_system import UnitSystem
 
@@ -112,12 +112,12 @@ def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
         raise NoMotionError("only accelerations were measured")
     if len(motions[0].channels) != count or len(first.response.channels) != count:
         raise NoMotionError("not every command has exactly one measured motion")
-    if not any(motion.valid_samples(motion.fit).any() for motion in motions):
+    if not any(motion.mask_valid_samples(motion.fit).any() for motion in motions):
         raise NoMotionError("too few samples with motion are available for the fit")
     turns = any(scales_of(motions, axis, first.is_rotational).turns for axis in range(count))
     untimed = not np.isfinite(motions[0].band_hz)
     return BalancedRecordings(
-        first, regressions_of(motions, turns), untimed, turns, first.is_rotational, is_read_as_free(first)
+        first, build_regressions(motions, turns), untimed, turns, first.is_rotational, is_read_as_free(first)
     )
 
 
@@ -129,7 +129,7 @@ def fit_structure(balanced: BalancedRecordings, kind: Kind) -> StructureFit:
     if balanced.free:
         parts = tuple(part for part in parts if part != "mass")
     try:
-        fit = joint_fit(balanced.regressions, parts)
+        fit = fit_jointly(balanced.regressions, parts)
         model = _build_model(balanced, fit, kind)
     except np.linalg.LinAlgError as problem:
         raise StructureRefused("the motion does not determine its parameters separately") from problem
@@ -167,7 +167,7 @@ def fit_modal_structure(
     remarks = tuple(format_sentence(remark) for remark in fit.remarks)
     channels = recordings[0].response.channels
     first = recordings[0]
-    model = with_units_of(widen_tolerance(fit.model), first.command.units, first.response.units)
+    model = adopt_recording_units(widen_tolerance(fit.model), first.command.units, first.response.units)
     return StructureFit(
         kind,
         model,
@@ -240,7 +240,7 @@ def _build_model(balanced: BalancedRecordings, fit: JointFit, kind: Kind) -> Mec
     if balanced.untimed:
         tolerance = Tolerance(FIXED_SHARE, FIXED_SHARE, sizes.stiffness_n_per_m, None)
     units = recording.command.units, recording.response.units
-    return with_units_of(replace(widened, tolerance=tolerance), *units, time_unit(recording))
+    return adopt_recording_units(replace(widened, tolerance=tolerance), *units, select_time_unit(recording))
 
 
 def _find_least_mass(motions: Sequence[Motion]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
@@ -257,7 +257,7 @@ def _list_parameters(
     """Diagonal elements of the fitted matrices, with their 95 % intervals."""
     names, (system, parts) = balanced.recording.command.channels, units_and_parts
     return tuple(
-        ParameterEstimate(f"{part} {name}", matrix_unit(part, system), float(fit.matrices[part][k, k]),
+        ParameterEstimate(f"{part} {name}", find_matrix_unit(part, system), float(fit.matrices[part][k, k]),
                float(fit.halves[part][k, k]))
         for part in parts
         for k, name in enumerate(names)
@@ -267,14 +267,14 @@ def _list_parameters(
 def _list_modal_parameters(model: MechanicalModel, recording: Recording) -> tuple[ParameterEstimate, ...]:
     """Mass, damping and stiffness along each driven axis, with 95 % intervals from the model's tolerance (1.96 standard
     deviations); then, for a model with modes, all natural frequencies (Hz)."""
-    axes, estimates = driven_axes(model), []
+    axes, estimates = compute_driven_axes(model), []
     tolerance = model.tolerance or Tolerance()
     spread = (tolerance.mass_kg, tolerance.damping_n_s_per_m, tolerance.stiffness_n_per_m)
     for part, matrix, std in zip(PARTS, (model.mass, model.damping, model.stiffness), spread, strict=True):
         values = np.einsum("ni,nk,ki->i", axes, matrix, axes)
         for name, value in zip(recording.command.channels, values.tolist(), strict=True):
             estimates.append(
-                ParameterEstimate(f"{part} {name}", matrix_unit(part, model.system), value, std and 1.96 * std)
+                ParameterEstimate(f"{part} {name}", find_matrix_unit(part, model.system), value, std and 1.96 * std)
             )
     mode_count = model.coordinates - model.inputs
     if mode_count > 0:

@@ -1,7 +1,8 @@
 """Converts recordings of any form to forces and the motions that they drive, with a sentence on each change.
 
 Used only without a given model, because a model defines its commands and responses itself. The steps are in the order
-of `one_motion_per_force`; each returns the recordings unchanged, with an empty sentence, where it does not apply.
+of `convert_to_driven_motions`; each returns the recordings unchanged, with an empty sentence, where it does not apply.
+Called by `prepare_recordings`.
 """
 
 from collections.abc import Callable, Sequence
@@ -9,12 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.friction_laws import SHARP
+from analysis.diagnosis.balance.friction_laws import LEAST_WIDTH_SHARE
 from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import NoMotionError, compute_motions
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.first_model.free_motion import read_free_motion
-from analysis.diagnosis.first_model.infer_quantity import name_motion
+from analysis.diagnosis.first_model.infer_quantity import infer_quantities
 from analysis.diagnosis.first_model.restore_sign import restore_sign
 from analysis.diagnosis.first_model.reversed_commands import reverse_commands
 from analysis.diagnosis.settings import DEPENDENT_SIGNALS
@@ -37,14 +38,16 @@ Step = Callable[[Recordings], tuple[Recordings, str]]
 """Maps recordings to changed ones and a sentence; the sentence is empty where nothing was changed."""
 
 
-def one_motion_per_force(recordings: Sequence[Recording], turns: bool = True) -> tuple[Recordings, tuple[str, ...]]:
+def convert_to_driven_motions(
+    recordings: Sequence[Recording], turns: bool = True
+) -> tuple[Recordings, tuple[str, ...]]:
     """The converted recordings, and a sentence for each change. recordings: alike in channels, units and rate. turns:
     commands whose positive direction is opposite to that of their motion are reversed; False where a model defines the
     directions."""
     converted, remarks = tuple(recordings), []
     steps: tuple[Step, ...] = (
-        name_motion, read_free_motion, _separate_conditions, _select_imposed_motion, _select_motions, _select_forces,
-        restore_sign, _drop_constant_commands, _merge_commands,
+        infer_quantities, read_free_motion, _separate_conditions, _select_imposed_motion, _select_motions,
+        _select_forces, restore_sign, _drop_constant_commands, _merge_commands,
     )  # fmt: skip
     for step in (*steps, reverse_commands) if turns else steps:
         converted, sentence = step(converted)
@@ -53,7 +56,7 @@ def one_motion_per_force(recordings: Sequence[Recording], turns: bool = True) ->
 
 
 def _separate_conditions(recordings: Recordings) -> tuple[Recordings, str]:
-    """Temperatures and settings among the commands become conditions."""
+    """Move commands that drive no motion, such as temperatures and settings, to the recorded conditions."""
     command = recordings[0].command
     condition_channels = [k for k, quantity in enumerate(command.quantities) if quantity not in DRIVES]
     if not condition_channels or len(condition_channels) == len(command.channels):
@@ -76,7 +79,7 @@ def _select_imposed_motion(recordings: Recordings) -> tuple[Recordings, str]:
     command, response = recordings[0].command, recordings[0].response
     if not (set(command.quantities) <= MOTIONS and set(response.quantities) <= FORCES):
         return recordings, ""
-    kept_channels = _lowest_derivative_channels(command)
+    kept_channels = _find_lowest_derivative_channels(command)
     if len(kept_channels) == len(command.channels):
         return recordings, ""
     return tuple(
@@ -91,11 +94,13 @@ def _select_motions(recordings: Recordings) -> tuple[Recordings, str]:
     quantities = set(signal.quantities)
     if not quantities & MOTIONS or len({DERIVATIVE_OF_QUANTITY.get(quantity, -1) for quantity in quantities}) == 1:
         return recordings, ""
-    used = _lowest_derivative_channels(signal)
-    others = [name for k, name in enumerate(signal.channels) if k not in used]
-    return tuple(replace(recording, response=recording.response.select_channels(used)) for recording in recordings), (
-        f"Forces are balanced along {conjoin([signal.channels[k] for k in used])}; {conjoin(others)}, of another kind, "
-        "was left out."
+    kept_channels = _find_lowest_derivative_channels(signal)
+    dropped_names = [name for k, name in enumerate(signal.channels) if k not in kept_channels]
+    return tuple(
+        replace(recording, response=recording.response.select_channels(kept_channels)) for recording in recordings
+    ), (
+        f"Forces are balanced along {conjoin([signal.channels[k] for k in kept_channels])}; {conjoin(dropped_names)}, "
+        "of another kind, was left out."
     )
 
 
@@ -104,23 +109,25 @@ def _select_forces(recordings: Recordings) -> tuple[Recordings, str]:
     command, response = recordings[0].command, recordings[0].response
     if not (set(command.quantities) <= MOTIONS and set(response.quantities) <= FORCES):
         return recordings, ""
-    count = len(command.channels)
-    if len(response.channels) <= count:
+    motion_count = len(command.channels)
+    if len(response.channels) <= motion_count:
         return recordings, ""
     samples = np.vstack([recording.response.samples for recording in recordings])
-    sizes = np.array(
+    force_stds = np.array(
         [np.std(column[np.isfinite(column)]) if np.isfinite(column).any() else 0.0 for column in samples.T]
     )
-    used = sorted(np.argsort(-sizes, kind="stable")[:count].tolist())
-    dropped = [name for k, name in enumerate(response.channels) if k not in used]
-    return tuple(replace(recording, response=recording.response.select_channels(used)) for recording in recordings), (
-        f"Of the forces along one motion the strongest, {conjoin([response.channels[k] for k in used])}, was balanced; "
-        f"for {conjoin(dropped)}, import the recording with that force as its only response."
+    kept_channels = sorted(np.argsort(-force_stds, kind="stable")[:motion_count].tolist())
+    dropped_names = [name for k, name in enumerate(response.channels) if k not in kept_channels]
+    return tuple(
+        replace(recording, response=recording.response.select_channels(kept_channels)) for recording in recordings
+    ), (
+        f"Of the forces along one motion the strongest, {conjoin([response.channels[k] for k in kept_channels])}, was "
+        f"balanced; for {conjoin(dropped_names)}, import the recording with that force as its only response."
     )
 
 
 def _drop_constant_commands(recordings: Recordings) -> tuple[Recordings, str]:
-    """Leaves out commands that never change, because nothing about their axis can be identified, and with them the
+    """Leave out commands that never change, because nothing about their axis can be identified, and with them the
     motion of their axis, where there is one for each command."""
     command, response = recordings[0].command, recordings[0].response
     samples = np.vstack([recording.command.samples for recording in recordings])
@@ -130,18 +137,19 @@ def _drop_constant_commands(recordings: Recordings) -> tuple[Recordings, str]:
     kept_channels = np.flatnonzero(np.ptp(samples, axis=0) > CONSTANT_RANGE * np.abs(samples).max(axis=0)).tolist()
     if len(kept_channels) in (0, len(command.channels)):
         return recordings, ""
-    paired = len(command.channels) == len(response.channels)
-    idle = [name for k, name in enumerate(command.channels) if k not in kept_channels]
-    dropped_motions = [name for k, name in enumerate(response.channels) if k not in kept_channels] if paired else []
-    text = f" with {conjoin(dropped_motions)}, which no command moves" if dropped_motions else ""
+    is_paired = len(command.channels) == len(response.channels)
+    constant_names = [name for k, name in enumerate(command.channels) if k not in kept_channels]
+    dropped_motions = [name for k, name in enumerate(response.channels) if k not in kept_channels] if is_paired else []
+    motions_text = f" with {conjoin(dropped_motions)}, which no command moves" if dropped_motions else ""
     return (
-        tuple(_with_axes(recording, kept_channels, paired) for recording in recordings),
-        f"{conjoin(idle)} among the commands never {_verb(idle, 'changes')}, and {_verb(idle, 'was')} left out{text}.",
+        tuple(_select_axes(recording, kept_channels, is_paired) for recording in recordings),
+        f"{conjoin(constant_names)} among the commands never {_inflect_verb(constant_names, 'changes')}, and "
+        f"{_inflect_verb(constant_names, 'was')} left out{motions_text}.",
     )
 
 
-def _with_axes(recording: Recording, kept_channels: list[int], paired: bool) -> Recording:
-    """The recording with the kept commands only. paired: also with the responses and positions of the same indices
+def _select_axes(recording: Recording, kept_channels: list[int], is_paired: bool) -> Recording:
+    """The recording with the kept commands only. is_paired: also with the responses and positions of the same indices
     only."""
     command, position, excitation = recording.command, recording.position, recording.excitation
     has_paired_position = position is not None and len(position.channels) == len(recording.response.channels)
@@ -149,73 +157,74 @@ def _with_axes(recording: Recording, kept_channels: list[int], paired: bool) -> 
         recording,
         command=command.select_channels(kept_channels),
         excitation=_select_excitation(excitation, command, kept_channels),
-        response=recording.response.select_channels(kept_channels) if paired else recording.response,
+        response=recording.response.select_channels(kept_channels) if is_paired else recording.response,
         position=position.select_channels(kept_channels)
-        if paired and has_paired_position and position is not None
+        if is_paired and has_paired_position and position is not None
         else position,
     )
 
 
-def _verb(names: Sequence[str], name: str) -> str:
+def _inflect_verb(names: Sequence[str], singular: str) -> str:
     """The verb in the singular for a single name, else in the plural."""
     plural = {"changes": "change", "was": "were", "drives": "drive"}
-    return name if len(names) == 1 else plural[name]
+    return singular if len(names) == 1 else plural[singular]
 
 
 def _merge_commands(recordings: Recordings) -> tuple[Recordings, str]:
-    """Merges commands that drive the same single motion into their sum, each with its fitted gain."""
+    """Merge commands that drive the same single motion into their sum, each with its fitted gain."""
     command, response = recordings[0].command, recordings[0].response
     if len(command.channels) < 2 or len(response.channels) != 1 or set(response.quantities) <= FORCES:
         return recordings, ""
     try:
-        gains, main = _gains(recordings)
+        gains, main_command = _fit_gains(recordings)
     except (NoMotionError, np.linalg.LinAlgError):
         return recordings, ""
-    merged = [name for k, name in enumerate(command.channels) if k != main]
+    merged_names = [name for k, name in enumerate(command.channels) if k != main_command]
     return (
         tuple(
-            replace(recording, command=_sum(recording.command, gains, main),
-                    excitation=None if recording.excitation is None else _sum(recording.excitation, gains, main))
+            replace(recording, command=_sum_channels(recording.command, gains, main_command),
+                    excitation=None if recording.excitation is None
+                    else _sum_channels(recording.excitation, gains, main_command))
             for recording in recordings
         ),
-        f"{conjoin(merged)} {_verb(merged, 'drives')} the same motion as {command.channels[main]}: one command was "
-        "made of them, "
+        f"{conjoin(merged_names)} {_inflect_verb(merged_names, 'drives')} the same motion as "
+        f"{command.channels[main_command]}: one command was made of them, "
         f"{' + '.join(f'{gain:.3g} x {name}' for gain, name in zip(gains, command.channels, strict=True))}.",
     )  # fmt: skip
 
 
-def _sum(signal: Signal, gains: FloatArray, main: int) -> Signal:
+def _sum_channels(signal: Signal, gains: FloatArray, main_command: int) -> Signal:
     """The sum of the channels times their gains, under the name and unit of the main channel."""
-    return replace(signal.select_channels([main]), samples=signal.samples @ gains[:, None])
+    return replace(signal.select_channels([main_command]), samples=signal.samples @ gains[:, None])
 
 
-def _gains(recordings: Recordings) -> tuple[FloatArray, int]:
-    """Gains (m,) of the commands relative to the strongest, and the index of that. They are the weights of the commands
-    in a regression of the acceleration on commands, velocity, position and dry friction; without a time axis, of the
-    position on commands and friction."""
+def _fit_gains(recordings: Recordings) -> tuple[FloatArray, int]:
+    """Fit the gains (m,) of the commands relative to the strongest, and find its index. Gains are the weights of the
+    commands in a regression of the acceleration on commands, velocity, position and dry friction; without a time axis,
+    of the position on commands and friction."""
     motions = compute_motions(observe_parts(recordings, 1))
-    rows, targets = [], []
+    regressor_rows, targets = [], []
     for motion in motions:
-        friction = smooth_sign(motion.velocity, SHARP * max(float(motion.velocity.std()), 1e-300))
+        friction = smooth_sign(motion.velocity, LEAST_WIDTH_SHARE * max(float(motion.velocity.std()), 1e-300))
         columns = [motion.force, motion.velocity, motion.position, friction]
         if not np.isfinite(motion.band_hz):
             columns, target = [motion.force, friction], motion.position
         else:
             target = motion.acceleration
-        valid = motion.valid_samples(motion.fit)
-        rows.append(motion.decimate(np.hstack(columns))[valid])
+        valid = motion.mask_valid_samples(motion.fit)
+        regressor_rows.append(motion.decimate(np.hstack(columns))[valid])
         targets.append(motion.decimate(target)[valid])
     # The means are subtracted, and components of the size of rounding ignored: of two commands with a constant sum, the
     # sum would otherwise appear to drive the motion.
-    x, y = (stacked - stacked.mean(axis=0) for stacked in (np.vstack(rows), np.vstack(targets)[:, 0]))
-    size = np.maximum(x.std(axis=0), 1e-300)
-    scaled_gains = np.linalg.lstsq(x / size, y, rcond=DEPENDENT_SIGNALS)[0][: motions[0].force.shape[1]]
-    main = int(np.argmax(np.abs(scaled_gains)))
-    gains = scaled_gains / size[: len(scaled_gains)]
-    return np.asarray(gains / gains[main]), main
+    x, y = (stacked - stacked.mean(axis=0) for stacked in (np.vstack(regressor_rows), np.vstack(targets)[:, 0]))
+    column_stds = np.maximum(x.std(axis=0), 1e-300)
+    scaled_gains = np.linalg.lstsq(x / column_stds, y, rcond=DEPENDENT_SIGNALS)[0][: motions[0].force.shape[1]]
+    main_command = int(np.argmax(np.abs(scaled_gains)))
+    gains = scaled_gains / column_stds[: len(scaled_gains)]
+    return np.asarray(gains / gains[main_command]), main_command
 
 
-def _lowest_derivative_channels(signal: Signal) -> list[int]:
+def _find_lowest_derivative_channels(signal: Signal) -> list[int]:
     """Indices of the motions with the lowest derivative, such as the positions among positions and velocities."""
     orders = [DERIVATIVE_OF_QUANTITY[quantity] if quantity in MOTIONS else 9 for quantity in signal.quantities]
     return [k for k, order in enumerate(orders) if order == min(orders)]

@@ -12,7 +12,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.motion import Motion, find_motion_signal
-from analysis.diagnosis.data.observed_parts import parts_of
+from analysis.diagnosis.data.observed_parts import find_parts
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.unit_system import system_of
@@ -34,7 +34,7 @@ def reduce_recordings(recordings: Sequence[Recording], balances: Sequence[Balanc
     """The recordings with reduced commands and the driven motions as response. recordings: those of the balances."""
     reduced, first_part = [], 0
     for recording in recordings:
-        parts = parts_of(recording)
+        parts = find_parts(recording)
         reduced.append(_reduce(recording, parts, balances, first_part))
         first_part += len(parts)
     return tuple(reduced)
@@ -52,7 +52,7 @@ def _reduce(
             remaining_force = motion.force[:, axis] - _other_linear_force(balance, motion)
             # Below the band of an integrated motion there is no motion to balance the force.
             command[start:stop, axis] = (
-                motion.band_pass(remaining_force[:, None])[:, 0] if motion.order == 2 else remaining_force
+                motion.filter_to_band(remaining_force[:, None])[:, 0] if motion.order == 2 else remaining_force
             )
     response, integrated = _driven_motions(recording, parts, balances, first_part)
     return replace(
@@ -71,7 +71,9 @@ def _other_linear_force(balance: Balance, motion: Motion) -> FloatArray:
     laws are part of the regression, but not of this force."""
     regression, d = balance.search.regression, len(motion.channels)
     linear = [judged_law.place for judged_law in balance.laws if judged_law.law.linear]
-    weights = regression.weights(regression.columns_of([*linear, *(judged_law.place for judged_law in balance.named)]))
+    weights = regression.fit_weights(
+        regression.select_columns([*linear, *(judged_law.place for judged_law in balance.named)])
+    )
     # The constant force of the base stays in the command, for the later fit.
     weights = np.delete(weights, regression.base - 1)
     motion_columns = [motion.acceleration, motion.velocity, motion.position][: regression.matrices // d]

@@ -2,7 +2,7 @@
 
 Between two minima near zero the sign is constant. It is that of the speed which an FIR filter predicts from the
 command, and the filter is fitted to the signed speed in turn, until the signs no longer change (alternating
-projections, as in phase retrieval; Gerchberg and Saxton, Optik 35:237, 1972).
+projections, as in phase retrieval; Gerchberg and Saxton, Optik 35:237, 1972). A step of `one_motion_per_force`.
 """
 
 import itertools
@@ -21,7 +21,7 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-TAPS, RIDGE, ROUNDS = 40, 1e-3, 20
+FILTER_TAPS, RIDGE_SHARE, MOST_FITS = 40, 1e-3, 20
 """Taps of the filter (samples), ridge parameter over the mean power of a tap, and largest number of fits."""
 
 
@@ -33,9 +33,9 @@ def restore_sign(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ..
         return recordings, ""
     restored = []
     for recording in recordings:
-        amount = recording.response.samples[:, 0]
-        signed, unexplained = _find_signs(recording.command.samples[:, 0], amount)
-        unsigned_unexplained = _compute_unexplained_share(recording.command.samples[:, 0], amount)
+        magnitude = recording.response.samples[:, 0]
+        signed, unexplained = _find_signs(recording.command.samples[:, 0], magnitude)
+        unsigned_unexplained = _compute_unexplained_share(recording.command.samples[:, 0], magnitude)
         if unexplained > 1 - SIGNED_SPEED_FITS or unexplained > SIGNED_SPEED_BETTER * unsigned_unexplained:
             return recordings, ""
         restored.append(replace(recording, response=replace(recording.response, samples=signed[:, None])))
@@ -55,63 +55,69 @@ def _is_unsigned_speed(recording: Recording) -> bool:
     if DERIVATIVE_OF_QUANTITY.get(response.quantities[0]) not in (1, 0) or not np.isfinite(speed).all():
         return False
     rms = float(np.sqrt(np.mean(speed**2)))
-    power = float(np.sum(force**2))
+    command_power = float(np.sum(force**2))
     sign_powers = [float(np.sum(force[force * sign > 0] ** 2)) for sign in (1, -1)]
     reaches_zero = float(np.quantile(speed, 0.05)) < REVERSAL_NEAR_ZERO * rms
     return (
         rms > 0
         and float(speed.min()) > -UNSIGNED_BELOW_ZERO * rms
         and reaches_zero
-        and min(sign_powers) > PUSHED_BOTH_WAYS * power
+        and min(sign_powers) > PUSHED_BOTH_WAYS * command_power
     )
 
 
-def _find_signs(command: FloatArray, amount: FloatArray) -> tuple[FloatArray, float]:
+def _find_signs(command: FloatArray, magnitude: FloatArray) -> tuple[FloatArray, float]:
     """The signed speed (n,), and the share of its power that the filter does not predict."""
-    rows = _rows(command)
-    stretches = _stretches(amount)
+    regressors = _build_regressors(command)
+    stretches = _split_at_minima(magnitude)
     cumulative = np.concatenate([[0.0], np.cumsum(command)])
-    recent = [cumulative[k + 1] - cumulative[max(k + 1 - TAPS // 4, 0)] for k in range(len(command))]
-    best = _with_signs(amount, np.array(recent), stretches)
-    for _ in range(ROUNDS):
-        signed = _with_signs(amount, _predict_speed(rows, best), stretches)
-        if np.array_equal(signed, best):
+    recent_sums = [cumulative[k + 1] - cumulative[max(k + 1 - FILTER_TAPS // 4, 0)] for k in range(len(command))]
+    signed_speed = _assign_signs(magnitude, np.array(recent_sums), stretches)
+    for _ in range(MOST_FITS):
+        next_speed = _assign_signs(magnitude, _predict_speed(regressors, signed_speed), stretches)
+        if np.array_equal(next_speed, signed_speed):
             break
-        best = signed
-    return best, float(np.sum((best - _predict_speed(rows, best)) ** 2) / np.sum(best**2))
+        signed_speed = next_speed
+    return signed_speed, float(
+        np.sum((signed_speed - _predict_speed(regressors, signed_speed)) ** 2) / np.sum(signed_speed**2)
+    )
 
 
-def _compute_unexplained_share(command: FloatArray, amount: FloatArray) -> float:
+def _compute_unexplained_share(command: FloatArray, magnitude: FloatArray) -> float:
     """Error of the filter for the magnitude itself, its mean subtracted, as a share of the magnitude's power."""
-    rows, flat = _rows(command), amount - amount.mean()
-    return float(np.sum((flat - _predict_speed(rows, flat)) ** 2) / np.sum(amount**2))
+    regressors, centred = _build_regressors(command), magnitude - magnitude.mean()
+    return float(np.sum((centred - _predict_speed(regressors, centred)) ** 2) / np.sum(magnitude**2))
 
 
-def _rows(command: FloatArray) -> FloatArray:
+def _build_regressors(command: FloatArray) -> FloatArray:
     """(n, TAPS + 1): the last TAPS samples of the command at each instant, and a constant."""
-    padded = np.concatenate([np.zeros(TAPS), command])
-    return np.column_stack([*(padded[TAPS - k : len(padded) - k] for k in range(TAPS)), np.ones(len(command))])
+    padded = np.concatenate([np.zeros(FILTER_TAPS), command])
+    return np.column_stack(
+        [*(padded[FILTER_TAPS - k : len(padded) - k] for k in range(FILTER_TAPS)), np.ones(len(command))]
+    )
 
 
-def _predict_speed(rows: FloatArray, speed: FloatArray) -> FloatArray:
+def _predict_speed(regressors: FloatArray, speed: FloatArray) -> FloatArray:
     """(n,): prediction of the speed by ridge regression on the rows."""
-    gram = rows.T @ rows
-    weights = np.linalg.solve(gram + RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram)), rows.T @ speed)
-    return np.asarray(rows @ weights)
+    gram = regressors.T @ regressors
+    weights = np.linalg.solve(gram + RIDGE_SHARE * np.trace(gram) / len(gram) * np.eye(len(gram)), regressors.T @ speed)
+    return np.asarray(regressors @ weights)
 
 
-def _stretches(amount: FloatArray) -> list[slice]:
+def _split_at_minima(magnitude: FloatArray) -> list[slice]:
     """Stretches between local minima of the magnitude below `REVERSAL_NEAR_ZERO` of its rms."""
-    low = REVERSAL_NEAR_ZERO * float(np.sqrt(np.mean(amount**2)))
-    is_minimum = (amount[1:-1] <= amount[:-2]) & (amount[1:-1] <= amount[2:]) & (amount[1:-1] < low)
-    ends = [0, *(np.flatnonzero(is_minimum) + 1).tolist(), len(amount)]
+    threshold = REVERSAL_NEAR_ZERO * float(np.sqrt(np.mean(magnitude**2)))
+    is_minimum = (
+        (magnitude[1:-1] <= magnitude[:-2]) & (magnitude[1:-1] <= magnitude[2:]) & (magnitude[1:-1] < threshold)
+    )
+    ends = [0, *(np.flatnonzero(is_minimum) + 1).tolist(), len(magnitude)]
     return [slice(start, end) for start, end in itertools.pairwise(ends) if end > start]
 
 
-def _with_signs(amount: FloatArray, predicted: FloatArray, stretches: list[slice]) -> FloatArray:
+def _assign_signs(magnitude: FloatArray, predicted: FloatArray, stretches: list[slice]) -> FloatArray:
     """(n,): the magnitude, negative in each stretch in which its product with the predicted speed is negative."""
-    signed = amount.copy()
-    for part in stretches:
-        if float(amount[part] @ predicted[part]) < 0:
-            signed[part] = -amount[part]
+    signed = magnitude.copy()
+    for stretch in stretches:
+        if float(magnitude[stretch] @ predicted[stretch]) < 0:
+            signed[stretch] = -magnitude[stretch]
     return signed

@@ -14,11 +14,11 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motions
-from analysis.diagnosis.balance.regression import regression_of
+from analysis.diagnosis.balance.regression import build_regression
 from analysis.diagnosis.balance.structures import Structure, improves_significantly
-from analysis.diagnosis.data.measured_motion import all_as_force_driven, is_read_as_free
+from analysis.diagnosis.data.measured_motion import convert_all_to_force_driven, is_read_as_free
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.data.recorded_conditions import REVERSED
+from analysis.diagnosis.data.recorded_conditions import REVERSED_CHANNELS
 from analysis.diagnosis.settings import REVERSED_SIGN_GAIN
 from analysis.wording import conjoin
 from equalizer.signals.recording import Recording
@@ -31,7 +31,7 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
     instead. recordings: alike in channels, units and rate. A free motion has no command."""
     if is_read_as_free(recordings[0]):
         return recordings, ""
-    driven = all_as_force_driven(recordings)
+    driven = convert_all_to_force_driven(recordings)
     count = len(driven[0].command.channels)
     try:
         motions = compute_motions(observe_parts(driven, len(driven[0].response.channels)))
@@ -47,7 +47,7 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
     sign = np.ones(count)
     sign[reversed_axes] = -1.0
     verb = "is" if len(names) == 1 else "are"
-    note = {REVERSED: names}
+    note = {REVERSED_CHANNELS: names}
     reversed_recordings = tuple(
         _reverse(replace(recording, meta={**recording.meta, **note}), imposed, sign) for recording in recordings
     )
@@ -61,12 +61,11 @@ def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
 def _is_reversed(motions: Sequence[Motion], axis: int) -> bool:
     """Whether the force balance of an axis has a clearly smaller cross-validated error with the force negated."""
     recorded, negated = (
-        regression_of([replace(motion, force=sign * motion.force) for motion in motions], axis, (), turns=False)
+        build_regression([replace(motion, force=sign * motion.force) for motion in motions], axis, (), turns=False)
         for sign in (1.0, -1.0)
     )
     recorded_structure, negated_structure = (
-        Structure((), regression.cross_validated_errors(regression.columns_of(())))
-        for regression in (recorded, negated)
+        Structure((), regression.cross_validate(regression.select_columns(()))) for regression in (recorded, negated)
     )
     return negated_structure.error < (1 - REVERSED_SIGN_GAIN) * recorded_structure.error and improves_significantly(
         recorded_structure, negated_structure

@@ -3,21 +3,22 @@
     M q'' + D q' + K q = B u,    y = C q        below the end of the band, by a zero-phase low pass
 
 Where every coordinate is measured, q follows from y and the derivatives suffice; else the frequency response from y to
-u is used (`inverse_response`). The straight line between the first and the last sample, which a Fourier transform
-cannot represent, is treated by itself in steady state.
+u is used (`compute_inverse_response`). The straight line between the first and the last sample, which a Fourier
+transform cannot represent, is treated by itself in steady state. Used by the error measure by forces (`force_views`,
+`predicted_force`) and by `rigid_model`.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.forces.inverse_response import fast_inverse_response, inverse_response
-from equalizer.plant.linear_simulation import driven_axes
+from analysis.diagnosis.forces.inverse_response import compute_inverse_response, make_fast_inverse_response
+from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.band_limited import end_to_end_line, filter_by_gain, low_pass_gain
+from equalizer.signals.band_limited import compute_end_to_end_line, compute_low_pass_gain, filter_by_gain
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-_NEARLY_STILL_HZ = 1e-6
+_NEAR_STATIC_HZ = 1e-6
 """Frequency (Hz) at which the derivative of the inverse response at 0 Hz is computed."""
 
 
@@ -46,21 +47,22 @@ class BandMotion:
     """(n, m) each: their means over one sample period around each sample."""
 
 
-def band_motion(position: FloatArray, sample_rate_hz: float, band_hz: float) -> BandMotion:
+def compute_band_motion(position: FloatArray, sample_rate_hz: float, band_hz: float) -> BandMotion:
     """Position, velocity and acceleration below `band_hz`, at the samples and as means about them. position: (n, m),
     finite."""
     m = position.shape[1]
 
-    def gain(frequency_hz: FloatArray) -> ComplexArray:
-        wave = 2j * np.pi * frequency_hz
-        mean = np.sinc(frequency_hz / sample_rate_hz)
-        rows = [shape * wave**order for shape in (1.0, mean) for order in range(3)]
-        band_gain = low_pass_gain(frequency_hz, band_hz) * np.array(rows)
+    def compute_gain(frequency_hz: FloatArray) -> ComplexArray:
+        """(lines, 6 m, m): low pass times derivative of order 0 to 2, at the samples, then averaged over a period."""
+        derivative_factor = 2j * np.pi * frequency_hz
+        averaging_gain = np.sinc(frequency_hz / sample_rate_hz)
+        gains = [window_gain * derivative_factor**order for window_gain in (1.0, averaging_gain) for order in range(3)]
+        band_gain = compute_low_pass_gain(frequency_hz, band_hz) * np.array(gains)
         return np.asarray(np.einsum("rl,ij->lrij", band_gain, np.eye(m)).reshape(len(frequency_hz), 6 * m, m))
 
-    filtered = filter_by_gain(position, sample_rate_hz, gain).reshape(len(position), 6, m)
+    filtered = filter_by_gain(position, sample_rate_hz, compute_gain).reshape(len(position), 6, m)
     slope = (position[-1] - position[0]) / max(len(position) - 1, 1) * sample_rate_hz
-    filtered[:, [0, 3]] += end_to_end_line(position)[:, None]
+    filtered[:, [0, 3]] += compute_end_to_end_line(position)[:, None]
     filtered[:, [1, 4]] += slope
     x, v, a, mean_x, mean_v, mean_a = (np.ascontiguousarray(filtered[:, k]) for k in range(6))
     return BandMotion(position, sample_rate_hz, band_hz, (x, v, a), (mean_x, mean_v, mean_a))
@@ -71,23 +73,37 @@ def compute_required_force(model: MechanicalModel, motion: BandMotion) -> Requir
     sensor and effects are not included. Raises numpy.linalg.LinAlgError where the first m outputs do not determine the
     model's motion."""
     if model.coordinates == model.inputs:
-        return _force_of_square_model(model, motion)
+        return _compute_square_model_force(model, motion)
     position, sample_rate_hz = motion.position, motion.sample_rate_hz
-    m, inverse_at = model.inputs, fast_inverse_response(model, len(position), sample_rate_hz / 2)
+    m, compute_inverse = model.inputs, make_fast_inverse_response(model, len(position), sample_rate_hz / 2)
 
-    def gain(frequency_hz: FloatArray) -> ComplexArray:
-        band_gain = low_pass_gain(frequency_hz, motion.band_hz)[:, None, None]
-        inverse = inverse_at(frequency_hz)
+    def compute_gain(frequency_hz: FloatArray) -> ComplexArray:
+        """(lines, 4 m, m): from position to force (mean over a period), and to position and derivatives of the axes."""
+        band_gain = compute_low_pass_gain(frequency_hz, motion.band_hz)[:, None, None]
+        inverse = compute_inverse(frequency_hz)
         inverse[:, :m] *= np.sinc(frequency_hz / sample_rate_hz)[:, None, None]
-        wave = 2j * np.pi * frequency_hz[:, None, None]
-        axes = inverse[:, m:]
-        return np.asarray(band_gain * np.concatenate([inverse[:, :m], axes, wave * axes, wave**2 * axes], axis=1))
+        derivative_factor = 2j * np.pi * frequency_hz[:, None, None]
+        axis_response = inverse[:, m:]
+        return np.asarray(
+            band_gain
+            * np.concatenate(
+                [
+                    inverse[:, :m],
+                    axis_response,
+                    derivative_factor * axis_response,
+                    derivative_factor**2 * axis_response,
+                ],
+                axis=1,
+            )
+        )
 
-    filtered = filter_by_gain(position, sample_rate_hz, gain) + _force_along_line(model, position, sample_rate_hz)
-    return RequiredForce(*(filtered[:, part * m : (part + 1) * m] for part in range(4)))
+    filtered = filter_by_gain(position, sample_rate_hz, compute_gain) + _compute_force_along_line(
+        model, position, sample_rate_hz
+    )
+    return RequiredForce(*(filtered[:, index * m : (index + 1) * m] for index in range(4)))
 
 
-def _force_of_square_model(model: MechanicalModel, motion: BandMotion) -> RequiredForce:
+def _compute_square_model_force(model: MechanicalModel, motion: BandMotion) -> RequiredForce:
     """Required force of a model whose every coordinate is measured: the derivatives suffice, without another Fourier
     transform."""
     to_coordinates = np.linalg.inv(model.output[: model.inputs])
@@ -100,19 +116,19 @@ def _force_of_square_model(model: MechanicalModel, motion: BandMotion) -> Requir
         ),
         np.zeros_like(motion.position),
     )
-    to_axes = (driven_axes(model).T @ to_coordinates).T
+    to_axes = (compute_driven_axes(model).T @ to_coordinates).T
     return RequiredForce(force, *(derivative @ to_axes for derivative in motion.at_samples))
 
 
-def _force_along_line(model: MechanicalModel, position: FloatArray, sample_rate_hz: float) -> FloatArray:
+def _compute_force_along_line(model: MechanicalModel, position: FloatArray, sample_rate_hz: float) -> FloatArray:
     """(n, 4 m): required force, position, velocity and acceleration of the axes for the straight line between first and
     last position, in steady state: y of constant slope needs the force G(0) y + G'(0) y' with the inverse response
     G."""
     m = model.inputs
-    line = end_to_end_line(position)
+    line = compute_end_to_end_line(position)
     slope = (position[-1] - position[0]) / max(len(position) - 1, 1) * sample_rate_hz
-    near_static = inverse_response(model, np.array([0.0, _NEARLY_STILL_HZ]))
-    static, rate = near_static[0].real, near_static[1].imag / (2 * np.pi * _NEARLY_STILL_HZ)
-    force_and_position = line @ static.T + slope @ rate.T
-    velocity = np.broadcast_to(slope @ static[m:].T, (len(line), m))
+    near_static = compute_inverse_response(model, np.array([0.0, _NEAR_STATIC_HZ]))
+    static_gain, gain_slope = near_static[0].real, near_static[1].imag / (2 * np.pi * _NEAR_STATIC_HZ)
+    force_and_position = line @ static_gain.T + slope @ gain_slope.T
+    velocity = np.broadcast_to(slope @ static_gain[m:].T, (len(line), m))
     return np.hstack([force_and_position, velocity, np.zeros((len(line), m))])

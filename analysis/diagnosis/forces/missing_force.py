@@ -6,7 +6,8 @@ and the model's transfer H from the m forces to the c channels, both in units of
     f = (H* H + diag(1 / s²))^-1 H* r        s: expected rms of the force
 
 This f is the posterior mean of a white Gaussian force of variance s² (a latent force in the sense of Rogers and Friis,
-Mech. Syst. Signal Process. 2021).
+Mech. Syst. Signal Process. 2021). Starting values of effects (`evidence_from_residuals`), the screening of laws
+(`matched_filter`) and figures (`signature_curves`) are computed from it.
 """
 
 from dataclasses import dataclass
@@ -35,28 +36,28 @@ class MissingForce:
     """(n, m), m/s (rad/s): contribution of that force to the velocities of the driven axes."""
 
 
-def missing_force(
-    model: MechanicalModel, residuals: FloatArray, unit: FloatArray, sample_rate_hz: float, expected_n: FloatArray
+def estimate_missing_force(
+    model: MechanicalModel, residuals: FloatArray, unit: FloatArray, sample_rate_hz: float, expected_rms_n: FloatArray
 ) -> MissingForce:
     """Estimate the force along each driven axis that explains the residuals (Wiener filter). residuals: (n, c), divided
-    by `unit` (c,), the rms of the noise; channels of the response, then of the position. expected_n: (m,), expected rms
-    s of the force, N; a larger value passes more force and more noise."""
+    by `unit` (c,), the rms of the noise; channels of the response, then of the position. expected_rms_n: (m,), expected
+    rms s of the force, N (N m); a larger value passes more force and more noise."""
     n, c = residuals.shape
-    length = next_fast_len(n + int(_SETTLING_S * sample_rate_hz), real=True)
-    transfer = axis_transfer(model, sample_rate_hz, rfftfreq(length, 1 / sample_rate_hz))
+    padded_length = next_fast_len(n + int(_SETTLING_S * sample_rate_hz), real=True)
+    transfer = compute_axis_transfer(model, sample_rate_hz, rfftfreq(padded_length, 1 / sample_rate_hz))
     channel_transfer = np.concatenate([transfer.response, transfer.position], axis=1)[:, :c] / unit[:c, None]
-    spectrum = rfft(residuals, length, axis=0)
+    spectrum = rfft(residuals, padded_length, axis=0)
     adjoint = np.conj(np.swapaxes(channel_transfer, 1, 2))
-    normal = adjoint @ channel_transfer + np.diag(1 / expected_n**2)
-    force = np.linalg.solve(normal, adjoint @ spectrum[:, :, None])
+    normal_matrix = adjoint @ channel_transfer + np.diag(1 / expected_rms_n**2)
+    force = np.linalg.solve(normal_matrix, adjoint @ spectrum[:, :, None])
     time_series = [
-        irfft(part[:, :, 0], length, axis=0)[:n]
-        for part in (force, transfer.axis_position @ force, transfer.axis_velocity @ force)
+        irfft(force_or_motion[:, :, 0], padded_length, axis=0)[:n]
+        for force_or_motion in (force, transfer.axis_position @ force, transfer.axis_velocity @ force)
     ]
     return MissingForce(*time_series)
 
 
-_WELL_CONDITIONED = 1e8
+_LARGEST_CONDITION = 1e8
 """Largest condition number of the eigenvectors with which the modal form is used; beyond it, rounding errors would
 dominate, and each spectral line is solved for directly."""
 
@@ -75,14 +76,14 @@ class AxisTransfer:
     """To the velocities of the driven axes."""
 
 
-def axis_transfer(model: MechanicalModel, sample_rate_hz: float, frequency_hz: FloatArray) -> AxisTransfer:
+def compute_axis_transfer(model: MechanicalModel, sample_rate_hz: float, frequency_hz: FloatArray) -> AxisTransfer:
     """Transfer functions of the linear mechanism, without effects and actuator; the sensor's low-pass acts on the
     response. frequency_hz: (lines,)."""
     steps = discretise_model(model, 1 / sample_rate_hz)
     m, p = model.inputs, model.outputs
     z = np.exp(2j * np.pi * frequency_hz / sample_rate_hz)
-    rows = np.vstack([steps.motion[: 2 * m], steps.response, steps.position])
-    responses = _frequency_response(steps.advance, steps.by_axis_force, rows, z)
+    output_matrix = np.vstack([steps.motion[: 2 * m], steps.response, steps.position])
+    responses = _compute_frequency_response(steps.transition, steps.by_axis_force, output_matrix, z)
     # A force takes effect from the next sample on; its direct feedthrough is read one sample late.
     response = responses[:, 2 * m : 2 * m + p] + steps.response_by_axis_force * (1 / z)[:, None, None]
     if model.sensor.bandwidth_hz > 0:
@@ -91,10 +92,10 @@ def axis_transfer(model: MechanicalModel, sample_rate_hz: float, frequency_hz: F
     return AxisTransfer(response, responses[:, 2 * m + p :], responses[:, :m], responses[:, m : 2 * m])
 
 
-def _frequency_response(A: FloatArray, B: FloatArray, C: FloatArray, z: ComplexArray) -> ComplexArray:
+def _compute_frequency_response(A: FloatArray, B: FloatArray, C: FloatArray, z: ComplexArray) -> ComplexArray:
     """C (zI - A)^-1 B, (lines, rows, inputs); by the eigenvectors of A where they are well conditioned. z: (lines,)."""
     poles, shapes = np.linalg.eig(A)
-    if np.linalg.cond(shapes) < _WELL_CONDITIONED:
+    if np.linalg.cond(shapes) < _LARGEST_CONDITION:
         output_modes, input_modes = C @ shapes, np.linalg.solve(shapes, B.astype(complex))
         return np.asarray(
             np.einsum("rs,ls,sm->lrm", output_modes, 1 / (z[:, None] - poles), input_modes, optimize=True)

@@ -1,9 +1,10 @@
-"""Error measure by force: the applied force u less the force that the model requires along the measured motion q.
+"""Force error of a model: the applied force u less the force that the model requires along the measured motion q.
 
     e = L (u + h) - L (M q'' + D q' + K q)        L: zero-phase low pass, see `force_views`
 
-with the forces h of the effects along q (inverse dynamics). No simulation is needed, so that the measure suits plants
-in closed loop and plants that drift. All forces are means over one sample period around each sample.
+with the forces h of the effects along q (inverse dynamics). Because no simulation is needed, this error measure suits
+plants in closed loop and plants that drift. All forces are means over one sample period around each sample. Created by
+`force_views`.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,8 +14,13 @@ from typing import Self, TypeVar, cast
 import numpy as np
 
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.data.recorded_conditions import add_carried_weight, effects_under_conditions
-from analysis.diagnosis.forces.inverse_dynamics import BandMotion, RequiredForce, band_motion, compute_required_force
+from analysis.diagnosis.data.recorded_conditions import add_carried_weight, apply_conditions
+from analysis.diagnosis.forces.inverse_dynamics import (
+    BandMotion,
+    RequiredForce,
+    compute_band_motion,
+    compute_required_force,
+)
 from equalizer.effects.effect import AxisForce, Effect, OnCommand, PlacedEffect, Structure
 from equalizer.effects.simulation.bodies import build_bodies
 from equalizer.effects.simulation.forces_along_motion import actuator_force, effect_forces_along_motion
@@ -27,13 +33,13 @@ EDGE_PERIODS = 0.5
 """Length of the distorted edge at either end of a record, in periods of the band's end."""
 _Result = TypeVar("_Result")
 LEAST_ACTUATOR_SHARE = 1e-3
-"""Least ratio of an actuator's rms force to its rms command by which errors are rescaled (see `_balance`)."""
+"""Least ratio of an actuator's rms force to its rms command by which errors are rescaled (`_balance_forces`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PredictedForce:
-    """Error of the force that the model requires for the measured motion; an `ErrorMeasure`. For a plant in closed
-    loop, whose command depends on the response, and for a plant that drifts without a restoring force."""
+    """Error of the force that the model requires for the measured motion; implements `ErrorMeasure`. For a plant in
+    closed loop, whose command depends on the response, and for a plant that drifts without a restoring force."""
 
     records: tuple[Observed, ...]
     """Records whose `measured` is the applied force within the band."""
@@ -44,12 +50,12 @@ class PredictedForce:
     noise: FloatArray
     """(m,): rms noise of the forces, N (N m): see `force_views`."""
     band_hz: float
-    """End of the band in which forces are compared."""
+    """Upper end (Hz) of the band in which forces are compared; it begins at 0."""
     name: str = "predicted force"
     model_effects: tuple[PlacedEffect, ...] = ()
-    """Effects named in the model's own file, which are part of every simulation."""
+    """Effects that the model's file contains: added to the effects of every hypothesis."""
     least: float = 0.0
-    """Least error in units of the noise: smaller errors are set to it; 1 with a floor."""
+    """Least error in units of the noise, to which smaller errors are set: 0, or 1 after `with_floor`."""
     cache: dict[tuple[str, int], tuple[tuple[object, ...], object]] = field(default_factory=dict)
     """Cache of the last inputs and result by kind and record, because many laws are tested on the same model and
     command."""
@@ -71,14 +77,20 @@ class PredictedForce:
         return replace(self, records=records, motions=motions)
 
     def _cut_motion(self, motion: BandMotion, count: int) -> BandMotion:
+        """The motion of the first `count` samples, filtered anew where samples are cut off."""
         position = motion.position
-        return motion if count == len(position) else band_motion(position[:count], motion.sample_rate_hz, self.band_hz)
+        return (
+            motion
+            if count == len(position)
+            else compute_band_motion(position[:count], motion.sample_rate_hz, self.band_hz)
+        )
 
     def _shorten_record(self, record: Observed) -> Observed:
-        """The record cut after the last sample to fit or to choose by, less the edge that the filter distorts."""
-        cut, edge = record.shorten(), count_edge_samples(record.recording.sample_rate_hz, self.band_hz)
-        undistorted = np.arange(len(cut.command)) < len(cut.command) - edge
-        return replace(cut, fit=cut.fit & undistorted, choose=cut.choose & undistorted)
+        """The record cut after the last sample of the roles "fit" and "choose"; the samples that the filter distorts at
+        the cut lose their role."""
+        shortened, edge_samples = record.shorten(), count_edge_samples(record.recording.sample_rate_hz, self.band_hz)
+        undistorted = np.arange(len(shortened.command)) < len(shortened.command) - edge_samples
+        return replace(shortened, fit=shortened.fit & undistorted, choose=shortened.choose & undistorted)
 
     def can_observe(self, effect: Effect) -> bool:
         """Whether the effect changes forces. Effects of sensors do not, because the reading is used as the motion."""
@@ -98,8 +110,8 @@ class PredictedForce:
         )
 
     def _balance_forces(self, model: MechanicalModel, effects: Sequence[PlacedEffect], index: int) -> "_Balance":
-        """The force balance of a record. Its residual is scaled by the actuator's rms command over rms force: a smaller
-        actuator gain would otherwise reduce every error."""
+        """The force balance of a record. Its residual is scaled by the actuator's rms command over its rms force: a
+        smaller actuator gain would otherwise reduce every error."""
         record, motion = self.records[index], self.motions[index]
         rate_hz = record.recording.sample_rate_hz
         model = add_carried_weight(model, record.recording)
@@ -112,31 +124,30 @@ class PredictedForce:
         applied = self._compute_actuator_force(model, effects, index)
         next_force = np.concatenate([required.force[1:], required.force[-1:]])
         axis_motion = required.axis_position, required.axis_velocity, required.axis_acceleration
-        unbalanced = applied.band_force - (required.force + next_force) / 2
-        effects = effects_under_conditions(effects, record.recording)
+        unbalanced_force = applied.band_force - (required.force + next_force) / 2
+        effects = apply_conditions(effects, record.recording)
         effect_force = effect_forces_along_motion(
-            structure, effects, axis_motion, (record.command, unbalanced), rate_hz
+            structure, effects, axis_motion, (record.command, unbalanced_force), rate_hz
         )
         # Both are means over the step that begins at a sample; the required force is the mean around the sample.
-        total = applied.centred_force
+        total_force = applied.centred_force
         if effect_force.any():
-            total = total + filter_low_pass(effect_force, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
-        # Scaled back by the actuator's gain: a weaker actuator must not make every error smaller.
-        strength = _rms(record.command)
-        rescale = strength / np.maximum(_rms(applied.force), LEAST_ACTUATOR_SHARE * strength + np.finfo(float).tiny)
-        return _Balance(required, (total - required.force) * rescale, total)
+            total_force = total_force + filter_low_pass(effect_force, rate_hz, self.band_hz, delay_s=0.5 / rate_hz)
+        command_rms = _rms(record.command)
+        scale = command_rms / np.maximum(_rms(applied.force), LEAST_ACTUATOR_SHARE * command_rms + np.finfo(float).tiny)
+        return _Balance(required, (total_force - required.force) * scale, total_force)
 
     def _compute_actuator_force(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], index: int
     ) -> "_ActuatorForce":
-        """The force of the actuators of a record, cached where no effect changes the command."""
+        """The force of the actuators for a record; cached where no effect changes the command."""
         record = self.records[index]
         rate_hz, hold = record.recording.sample_rate_hz, record.recording.hold
         command_effects = [effect for effect in effects if isinstance(effect.effect.action, OnCommand)]
 
         def compute() -> _ActuatorForce:
             force = actuator_force(model, record.command, rate_hz, command_effects, hold)
-            centred = filter_low_pass(force, rate_hz, self.band_hz, late_s=0.5 / rate_hz)
+            centred = filter_low_pass(force, rate_hz, self.band_hz, delay_s=0.5 / rate_hz)
             return _ActuatorForce(force, filter_low_pass(force, rate_hz, self.band_hz), centred)
 
         return (
@@ -148,7 +159,7 @@ class PredictedForce:
     def _compute_cached(
         self, kind: str, index: int, inputs: tuple[object, ...], compute: Callable[[], _Result]
     ) -> _Result:
-        """The cached result where the inputs are the very same objects, else a new one."""
+        """The cached result where all inputs are identical objects (`is`), else a new result."""
         cached = self.cache.get((kind, index))
         if cached is None or any(
             cached_input is not current_input for cached_input, current_input in zip(cached[0], inputs, strict=True)
@@ -158,6 +169,7 @@ class PredictedForce:
         return cast(_Result, cached[1])
 
     def _gather_evidence(self, model: MechanicalModel, effects: Sequence[PlacedEffect], index: int) -> Evidence:
+        """The evidence from which effects estimate starting values: motion, residual and force of a record."""
         record, balance = self.records[index], self._balance_forces(model, effects, index)
         return Evidence(
             model=add_carried_weight(model, record.recording),
@@ -200,4 +212,5 @@ class _Balance:
 
 
 def _rms(samples: FloatArray) -> FloatArray:
+    """(m,): root mean square of samples (n, m) over time."""
     return np.asarray(np.sqrt(np.mean(samples**2, axis=0)))

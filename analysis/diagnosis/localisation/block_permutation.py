@@ -8,7 +8,7 @@ counted: there the upper tail of a gamma distribution with the mean m and varian
     P(T >= t) = Q(m²/v, t m/v),      Q the regularised upper incomplete gamma function.
 
 References: Winkler, Ridgway, Douaud, Nichols and Smith, NeuroImage 141 (2016) 502 (gamma tail); Bartlett, J. Royal
-Stat. Soc. 98 (1935) 536 (correlation time).
+Stat. Soc. 98 (1935) 536 (correlation time). Called by `state_dependence` and `state_regions`.
 """
 
 from collections.abc import Callable
@@ -21,17 +21,17 @@ from scipy.special import gammaincc
 from equalizer.signals.signal import FloatArray
 
 IntArray = npt.NDArray[np.int64]
-_CORRELATION_TIMES = 3.0
+_CORRELATION_TIMES_PER_BLOCK = 3.0
 """Length of a block, in correlation times. By hand."""
-_LEAST_EXCEEDED = 10
+_LEAST_EXCEEDING = 10
 """Number of permutations with a larger statistic above which the p-value is counted instead of fitted. By hand."""
-SMALLEST = 1e-6
+LEAST_P_VALUE = 1e-6
 """Least p-value: the fitted tail is not trusted below it. By hand."""
 _LEAST_BLOCKS = 8
 """Least number of blocks per stratum; in a short stratum blocks are shorter for it. By hand."""
 
 
-def correlation_time(series: FloatArray) -> float:
+def compute_correlation_time(series: FloatArray) -> float:
     """Correlation time of a series (n,) in samples, at least about 1: 1 + 2 sum over k >= 1 of r_k², r_k the
     autocorrelation at lag k up to n / 4. By this factor the correlation inflates the variance of a product's mean of
     two such series (Bartlett). 1 for a constant series."""
@@ -46,47 +46,52 @@ def correlation_time(series: FloatArray) -> float:
     return float((2 * np.sum((covariance / covariance[0]) ** 2) - 1) / (1 + 2 * lags / n))
 
 
-def shuffle_blocks(strata: IntArray, block: int, random: np.random.Generator) -> IntArray:
+def shuffle_blocks(strata: IntArray, requested_samples: int, random: np.random.Generator) -> IntArray:
     """Indices (n,) of a random exchange of blocks within each stratum. Blocks are cut from a random offset on, the
     stratum taken as a ring; the remainder that fills no block stays at its end. strata: (n,), label of each sample's
-    stratum, contiguous. block: length in samples."""
+    stratum, contiguous. requested_samples: length in samples."""
     indices, order = np.arange(len(strata)), np.empty(len(strata), dtype=np.int64)
     edges = np.concatenate([[0], np.flatnonzero(np.diff(strata)) + 1, [len(strata)]])
     for start, stop in pairwise(edges.tolist()):
-        length = stop - start
-        size = max(1, min(block, length // _LEAST_BLOCKS))
-        offset = stop - int(random.integers(length))
+        stratum_samples = stop - start
+        block_samples = max(1, min(requested_samples, stratum_samples // _LEAST_BLOCKS))
+        offset = stop - int(random.integers(stratum_samples))
         rotated = np.concatenate([indices[offset:stop], indices[start:offset]])
-        blocks = length // size
-        blocks_length = blocks * size
-        order[start : start + blocks_length].reshape(blocks, size)[:] = rotated[:blocks_length].reshape(blocks, size)[
-            random.permutation(blocks)
-        ]
-        order[start + blocks_length : stop] = rotated[blocks_length:]
+        block_count = stratum_samples // block_samples
+        shuffled_samples = block_count * block_samples
+        order[start : start + shuffled_samples].reshape(block_count, block_samples)[:] = rotated[
+            :shuffled_samples
+        ].reshape(block_count, block_samples)[random.permutation(block_count)]
+        order[start + shuffled_samples : stop] = rotated[shuffled_samples:]
     return order
 
 
-def block_length(series: FloatArray) -> int:
+def compute_block_length(series: FloatArray) -> int:
     """Length of a block in samples: three correlation times of the series (n,), at least 1."""
-    return max(1, round(_CORRELATION_TIMES * correlation_time(series)))
+    return max(1, round(_CORRELATION_TIMES_PER_BLOCK * compute_correlation_time(series)))
 
 
-def permutation_p_values(
-    statistics: Callable[[IntArray], FloatArray],
+def compute_permutation_p_values(
+    compute_statistics: Callable[[IntArray], FloatArray],
     strata: IntArray,
-    block: int,
-    permutations: int,
+    block_samples: int,
+    permutation_count: int,
     random: np.random.Generator,
 ) -> FloatArray:
-    """p-values (tests,) of the observed statistics, counted or from the fitted gamma tail (see the module). statistics:
-    from indices (n,) to statistics (tests,), larger where the null hypothesis is less likely, not negative."""
-    observed = statistics(np.arange(len(strata)))
-    permuted = np.array([statistics(shuffle_blocks(strata, block, random)) for _ in range(permutations)])
+    """p-values (tests,) of the observed statistics, counted or from the fitted gamma tail (see the module).
+    compute_statistics: from indices (n,) to statistics (tests,), not negative, larger where the null hypothesis is less
+    likely. strata, block_samples: as of `shuffle_blocks`."""
+    observed = compute_statistics(np.arange(len(strata)))
+    permuted = np.array(
+        [compute_statistics(shuffle_blocks(strata, block_samples, random)) for _ in range(permutation_count)]
+    )
     mean, variance = permuted.mean(axis=0), np.maximum(permuted.var(axis=0, ddof=1), np.finfo(np.float64).tiny)
     tail_p_values = gammaincc(mean**2 / variance, observed * mean / variance)
     # Where enough permutations had a larger statistic, their share is used instead of the fitted tail.
-    counted_p_values = (np.sum(permuted >= observed, axis=0) + 1) / (permutations + 1)
+    counted_p_values = (np.sum(permuted >= observed, axis=0) + 1) / (permutation_count + 1)
     combined_p_values = np.where(
-        counted_p_values > _LEAST_EXCEEDED / (permutations + 1), counted_p_values, np.maximum(tail_p_values, SMALLEST)
+        counted_p_values > _LEAST_EXCEEDING / (permutation_count + 1),
+        counted_p_values,
+        np.maximum(tail_p_values, LEAST_P_VALUE),
     )
     return np.asarray(combined_p_values, dtype=np.float64)

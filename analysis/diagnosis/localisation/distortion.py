@@ -15,7 +15,7 @@ kind and band, with S the set of silent lines of that kind,
 because distortion of driven lines, which the response hides, is taken to be as strong as on the silent lines next to
 them. What differs between periods by more than the noise ("varying") is no function of a periodic motion: drift, a
 moving hand, friction that depends on its history. Its power is the variance between periods beyond that of the noise.
-p-values: the ratio of the power to the power of the noise is F-distributed (`spectral_lines.excess`).
+p-values: the ratio of the power to the power of the noise is F-distributed (`compute_excess_power`).
 
 References: Pintelon and Schoukens, System Identification: A Frequency Domain Approach (2012), chapter 4; Schoukens,
 Vaes and Pintelon, IEEE Control Systems 36 (2016), 38.
@@ -30,15 +30,15 @@ import numpy as np
 from analysis.diagnosis.data.spectral_lines import (
     Band,
     DetectionLines,
-    detection_lines,
-    excess_power,
-    hold_length,
-    lines_in_band,
-    octaves_between,
+    compute_excess_power,
+    compute_hold_samples,
+    find_detection_lines,
+    list_octaves,
+    select_lines_in_band,
 )
-from analysis.diagnosis.localisation.segment_spectra import SegmentSpectrum, segment_spectra
+from analysis.diagnosis.localisation.segment_spectra import SegmentSpectrum, compute_segment_spectra
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from analysis.diagnosis.noise.periods import Periods, find_settled_periods, period_spectra
+from analysis.diagnosis.noise.periods import Periods, compute_period_spectra, find_settled_periods
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.experiments import instrument_signal
 from equalizer.signals.recording import Recording
@@ -106,9 +106,10 @@ def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
         return Distortions((), ("The noise is not known, so distortion cannot be distinguished from it.",))
     settled_periods = find_settled_periods(recording)
     excitation = instrument_signal(recording)
-    hold_samples = hold_length(excitation)
+    hold_samples = compute_hold_samples(excitation)
     lines = [
-        detection_lines(period_spectra(excitation, period).mean(axis=0), hold_samples) for period in settled_periods
+        find_detection_lines(compute_period_spectra(excitation, period).mean(axis=0), hold_samples)
+        for period in settled_periods
     ]
     periods = [
         (period, detection) for period, detection in zip(settled_periods, lines, strict=True) if detection is not None
@@ -120,12 +121,12 @@ def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
         signals.append((recording.position, floor.position))
     cells: list[Distortion] = []
     for signal, noise in signals:
-        for spectrum in segment_spectra(recording, signal, noise, floor.frequency_hz, periods):
-            cells += _cells(spectrum, signal)
-    return Distortions(tuple(cells), tuple(_untestable_remarks(periods)))
+        for spectrum in compute_segment_spectra(recording, signal, noise, floor.frequency_hz, periods):
+            cells += _compute_cells(spectrum, signal)
+    return Distortions(tuple(cells), tuple(_list_untestable_remarks(periods)))
 
 
-def _untestable_remarks(periods: Sequence[tuple[Periods, DetectionLines]]) -> list[str]:
+def _list_untestable_remarks(periods: Sequence[tuple[Periods, DetectionLines]]) -> list[str]:
     """Sentences on the kinds of distortion that this excitation cannot show, and why."""
     remarks = []
     if all(period.count < 2 for period, _ in periods):
@@ -134,7 +135,7 @@ def _untestable_remarks(periods: Sequence[tuple[Periods, DetectionLines]]) -> li
         remarks.append("Some segments have one period only: the transient at its start counts as distortion.")
     if len({period.segment.amplitude for period, _ in periods}) < 2:
         remarks.append("There is one level only: how distortion changes with the level cannot be measured.")
-    if not any(lines.any_silent for _, lines in periods):
+    if not any(lines.has_silent for _, lines in periods):
         remarks.append(
             "There are no silent (undriven) lines: distortion on driven lines cannot be distinguished from the "
             "response."
@@ -146,63 +147,72 @@ def _untestable_remarks(periods: Sequence[tuple[Periods, DetectionLines]]) -> li
     return remarks
 
 
-def _cells(spectrum: SegmentSpectrum, signal: Signal) -> list[Distortion]:
+def _compute_cells(spectrum: SegmentSpectrum, signal: Signal) -> list[Distortion]:
     """The distortions of all channels and bands of one segment."""
     lowest, highest = (float(line) for line in spectrum.frequency_hz[spectrum.lines.driven][[0, -1]])
     cells = []
-    octaves = octaves_between(lowest, highest)
+    octaves = list_octaves(lowest, highest)
     for band in dict.fromkeys(((octaves[0][0], octaves[-1][1]), *octaves)):
-        in_band = lines_in_band(spectrum.frequency_hz, band)
+        in_band = select_lines_in_band(spectrum.frequency_hz, band)
         if (in_band & spectrum.lines.driven).any():
             for index, name in enumerate(signal.channels):
                 cell = _Cell(name, signal.quantities[index], spectrum.input, spectrum.amplitude, band)
-                cells += _kinds(spectrum, index, in_band, cell, band == (octaves[0][0], octaves[-1][1]))
+                cells += _compute_kinds(spectrum, index, in_band, cell, band == (octaves[0][0], octaves[-1][1]))
     return cells
 
 
-def _kinds(spectrum: SegmentSpectrum, channel: int, in_band: Mask, cell: _Cell, whole_band: bool) -> list[Distortion]:
+def _compute_kinds(
+    spectrum: SegmentSpectrum, channel: int, in_band: Mask, cell: _Cell, whole_band: bool
+) -> list[Distortion]:
     """All kinds of distortion in one cell. in_band: (lines,), the lines of its band. whole_band: the whole driven
     band."""
-    power, error = np.abs(spectrum.mean[:, channel]) ** 2, spectrum.error[:, channel]
+    power, noise_power = np.abs(spectrum.mean[:, channel]) ** 2, spectrum.error[:, channel]
     signal_rms = float(np.sqrt(2 * np.sum(power[in_band & spectrum.lines.driven])))
-    results: list[tuple[Kind, tuple[float, float, float], float, int]] = []
-    for kind, is_detection, reached_lines in _detection_masks(spectrum, in_band):
+    excess_by_kind: list[tuple[Kind, tuple[float, float, float], float, int]] = []
+    for kind, is_detection, reached_lines in _list_detection_masks(spectrum, in_band):
         # Each line's noise has a real and an imaginary part in each of count - 1 differences between periods.
-        freedom = float(2 * max(spectrum.count - 1, 1) * is_detection.sum())
-        distortion_power = excess_power(power[is_detection], error[is_detection], freedom)
-        results.append((kind, distortion_power, reached_lines / is_detection.sum(), int(is_detection.sum())))
+        degrees_of_freedom = float(2 * max(spectrum.count - 1, 1) * is_detection.sum())
+        distortion_power = compute_excess_power(power[is_detection], noise_power[is_detection], degrees_of_freedom)
+        excess_by_kind.append((kind, distortion_power, reached_lines / is_detection.sum(), int(is_detection.sum())))
     if spectrum.count > 1:
         # Each line has count - 1 independent differences between periods, whose mean square is `spread`; the sum over
         # them is divided by count - 1 again below.
         spreads = np.repeat(spectrum.spread[in_band, channel], spectrum.count - 1)
-        distortion_power = excess_power(
+        distortion_power = compute_excess_power(
             spreads,
             np.repeat(spectrum.floor[in_band, channel], spectrum.count - 1),
             float(spectrum.floor_freedom[channel]),
         )
-        results.append(("varying", distortion_power, 1 / (spectrum.count - 1), int(in_band.sum())))
+        excess_by_kind.append(("varying", distortion_power, 1 / (spectrum.count - 1), int(in_band.sum())))
     return [
         Distortion(
-            *cell, whole_band, kind, _rms(share * distortion_power), _rms(share * limit), signal_rms, p_value, lines
+            *cell,
+            whole_band,
+            kind,
+            _compute_rms(scale * distortion_power),
+            _compute_rms(scale * power_limit),
+            signal_rms,
+            p_value,
+            lines,
         )
-        for kind, (distortion_power, limit, p_value), share, lines in results
+        for kind, (distortion_power, power_limit, p_value), scale, lines in excess_by_kind
     ]
 
 
-def _detection_masks(spectrum: SegmentSpectrum, in_band: Mask) -> list[tuple[Kind, Mask, int]]:
+def _list_detection_masks(spectrum: SegmentSpectrum, in_band: Mask) -> list[tuple[Kind, Mask, int]]:
     """Kinds of distortion with their lines in the band, and the number of lines of the band that each kind reaches."""
-    numbers = np.arange(1, len(in_band) + 1)
-    multiple = in_band & (numbers % spectrum.lines.step == 0)
-    odd = numbers // spectrum.lines.step % 2 == 1
+    line_numbers = np.arange(1, len(in_band) + 1)
+    is_multiple = in_band & (line_numbers % spectrum.lines.step == 0)
+    is_odd = line_numbers // spectrum.lines.step % 2 == 1
     kinds: list[tuple[Kind, Mask, int]] = [
-        ("odd", np.asarray(in_band & spectrum.lines.odd), int((multiple & odd).sum())),
-        ("even", np.asarray(in_band & spectrum.lines.even), int((multiple & ~odd).sum())),
-        ("either", np.asarray(in_band & spectrum.lines.either), int(multiple.sum())),
+        ("odd", np.asarray(in_band & spectrum.lines.odd), int((is_multiple & is_odd).sum())),
+        ("even", np.asarray(in_band & spectrum.lines.even), int((is_multiple & ~is_odd).sum())),
+        ("either", np.asarray(in_band & spectrum.lines.either), int(is_multiple.sum())),
     ]
     return [kind for kind in kinds if kind[1].any()]
 
 
-def _rms(power: float) -> float:
+def _compute_rms(power: float) -> float:
     """Rms from a sum of squared magnitudes of a one-sided spectrum of complex amplitudes divided by the number of
     samples: a sine of peak A has the magnitude A/2, and A²/2 = 2 (A/2)². Negative sums, which noise alone gives, count
     as 0."""

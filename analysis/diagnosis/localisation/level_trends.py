@@ -2,7 +2,7 @@
 
 Relative to the linear response, distortion by friction and dead zones falls with the level; by nonlinear stiffness and
 drag it rises; by saturation it rises from nothing; by position-dependent forces it stays. Timing errors increase the
-variation between periods; external noise does not depend on the level.
+variation between periods; external noise does not depend on the level. Called by the report (`diagnosis_distortion`).
 """
 
 from collections.abc import Sequence
@@ -53,59 +53,62 @@ class LevelTrend:
         return "rises from nothing" if self.from_nothing else "rises"
 
 
-def level_trends(cells: Sequence[Distortion]) -> tuple[LevelTrend, ...]:
+def compute_level_trends(cells: Sequence[Distortion]) -> tuple[LevelTrend, ...]:
     """Trends of all outputs, inputs, bands and kinds. cells: distortions at all levels."""
     groups: dict[tuple[str, str, str, Band, bool, Kind], list[Distortion]] = {}
     for cell in cells:
         # Realisations differ slightly in the band that they drive.
-        band = _ALL if cell.whole_band else cell.band_hz
+        band = _WHOLE_BAND if cell.whole_band else cell.band_hz
         key = (cell.output, cell.quantity, cell.input, band, cell.whole_band, cell.kind)
         groups.setdefault(key, []).append(cell)
-    return tuple(_trend(key, sorted(group, key=lambda cell: cell.amplitude)) for key, group in groups.items())
+    return tuple(_compute_trend(key, sorted(group, key=lambda cell: cell.amplitude)) for key, group in groups.items())
 
 
-def _trend(key: tuple[str, str, str, Band, bool, Kind], cells: Sequence[Distortion]) -> LevelTrend:
+def _compute_trend(key: tuple[str, str, str, Band, bool, Kind], cells: Sequence[Distortion]) -> LevelTrend:
     """The trend of one group. cells: its distortions, by rising level."""
-    sizes = np.array([max(cell.rms, cell.limit_rms) for cell in cells])
-    signals = np.array([cell.signal_rms for cell in cells])
+    distortion_rms = np.array([max(cell.rms, cell.limit_rms) for cell in cells])
+    signal_rms = np.array([cell.signal_rms for cell in cells])
     levels = np.array([cell.amplitude for cell in cells])
-    relative_db = 20 * np.log10(np.maximum(sizes, _TINY) / np.maximum(signals, _TINY))
+    relative_db = 20 * np.log10(np.maximum(distortion_rms, _LEAST_AMPLITUDE) / np.maximum(signal_rms, _LEAST_AMPLITUDE))
     p_value = min(1.0, min(cell.p_value for cell in cells) * len(cells))
-    significant = np.array([cell.p_value < DISTORTION_P for cell in cells])
-    slope = _slope_with_limits(levels, relative_db, np.array([cell.lines for cell in cells]), significant)
+    is_significant = np.array([cell.p_value < DISTORTION_P for cell in cells])
+    slope = _estimate_slope(levels, relative_db, np.array([cell.lines for cell in cells]), is_significant)
     if key[4]:
         band = min(cell.band_hz[0] for cell in cells), max(cell.band_hz[1] for cell in cells)
         key = (*key[:3], band, *key[4:])
-    return LevelTrend(*key, p_value, slope, bool(significant.any() and not significant[0]))
+    return LevelTrend(*key, p_value, slope, bool(is_significant.any() and not is_significant[0]))
 
 
-def _slope_with_limits(
-    levels: FloatArray, relative_db: FloatArray, lines: FloatArray, significant: Mask
+def _estimate_slope(
+    levels: FloatArray, relative_db: FloatArray, line_counts: FloatArray, is_significant: Mask
 ) -> float | None:
     """Slope in dB per doubling of the level; None where it is not known. Where the distortion is not significant at a
     level, the detection limit takes its place, and bounds the slope: from below at the lowest level, from above at the
     highest. A bound that does not show a trend is not used: the slope is then that of the significant levels."""
-    if not significant.any() or not (levels > 0).all() or len(set(levels)) < 2:
+    if not is_significant.any() or not (levels > 0).all() or len(set(levels)) < 2:
         return None
-    bounded = _slope(np.log2(levels), relative_db, lines)
-    rises, falls = bounded > STEADY_DB and not significant[0], bounded < -STEADY_DB and not significant[-1]
-    if significant.all() or rises or falls:
-        return bounded
+    bounded_slope = _regress_slope(np.log2(levels), relative_db, line_counts)
+    is_rising, is_falling = (
+        bounded_slope > STEADY_DB and not is_significant[0],
+        bounded_slope < -STEADY_DB and not is_significant[-1],
+    )
+    if is_significant.all() or is_rising or is_falling:
+        return bounded_slope
     return (
-        _slope(np.log2(levels[significant]), relative_db[significant], lines[significant])
-        if len(set(levels[significant])) > 1
+        _regress_slope(np.log2(levels[is_significant]), relative_db[is_significant], line_counts[is_significant])
+        if len(set(levels[is_significant])) > 1
         else None
     )
 
 
-def _slope(doublings: FloatArray, relative_db: FloatArray, lines: FloatArray) -> float:
+def _regress_slope(doublings: FloatArray, relative_db: FloatArray, line_counts: FloatArray) -> float:
     """dB per doubling of the level: linear regression, weighted by the number of lines. doublings: log2 of the
     levels."""
-    centred = doublings - np.average(doublings, weights=lines)
-    return float(np.sum(lines * centred * relative_db)) / float(np.sum(lines * centred**2))
+    centred = doublings - np.average(doublings, weights=line_counts)
+    return float(np.sum(line_counts * centred * relative_db)) / float(np.sum(line_counts * centred**2))
 
 
-_TINY = 1e-300
+_LEAST_AMPLITUDE = 1e-300
 """Lower limit of an amplitude, so that its logarithm is finite."""
-_ALL: Band = (0.0, np.inf)
+_WHOLE_BAND: Band = (0.0, np.inf)
 """The whole band (Hz)."""

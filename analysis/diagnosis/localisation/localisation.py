@@ -1,8 +1,8 @@
 """Localises a mismatch: the component through which it enters the model, the states that it depends on, and its kind.
 
 `find_entry_point` compares the residual's spectra with the model's responses to a force at each axis and to an error of
-each sensor (`entry_point`); `find_tied_states` then tests the residual of that component against position, velocity,
-command and time (`state_dependence`).
+each sensor (`entry_point`); `find_state_dependences` then tests the residual of that component against position,
+velocity, command and time (`state_dependence`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,13 +14,13 @@ import numpy as np
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.output_error import Fitted, gather_evidence
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.forces.missing_force import axis_transfer
+from analysis.diagnosis.forces.missing_force import compute_axis_transfer
 from analysis.diagnosis.localisation.distortion import Distortions
 from analysis.diagnosis.localisation.entry_point import Entry, EntryPoint, rank_entries
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell, Prediction
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
-from analysis.diagnosis.localisation.residual_spectra import residual_spectra
-from analysis.diagnosis.localisation.state_dependence import error_states, force_states
+from analysis.diagnosis.localisation.residual_spectra import compute_residual_spectra
+from analysis.diagnosis.localisation.state_dependence import find_error_states, find_force_states
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from equalizer.effects.placing import axis_letter
 from equalizer.effects.starts.evidence import Evidence
@@ -49,24 +49,27 @@ class Localisation:
 def find_entry_point(
     measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, floor: NoiseFloor, cells: Sequence[MismatchCell]
 ) -> EntryPoint | None:
-    """The entry point by the first recording, which represents the device. fitted: the re-tuned model; cells: of it.
-    None where no cell exceeds the noise, or the spectra are not known."""
+    """Entry point of the residual of the first recording, which represents the device. fitted: the re-tuned model;
+    floor: noise of that recording; cells: mismatch map of the re-tuned model. None where no cell exceeds the noise, no
+    free simulation was compared, or the spectra cannot be computed."""
     if measure.name != "free simulation" or not any(cell.beyond_noise for cell in cells):
         return None
     record = measure.records[0]
     recording, p = record.recording, record.recording.response.samples.shape[1]
     predicted = record.measured - fitted.residuals[0] * measure.unit
     position = predicted[:, p:] if predicted.shape[1] > p else None
-    spectra = residual_spectra(recording, Prediction(predicted[:, :p], position), floor, record.fit | record.choose)
+    spectra = compute_residual_spectra(
+        recording, Prediction(predicted[:, :p], position), floor, record.fit | record.choose
+    )
     if spectra is None:
         return None
     model, position_compared = tuning.tune(fitted.deviations), spectra.residual.shape[2] > p
-    entries = possible_entries(model, recording, spectra.frequency_hz, position_compared)
-    kinds = {_DERIVATIVES.get(quantity) for quantity in recording.response.quantities}
-    return rank_entries(spectra, entries, kinds.pop() if len(kinds) == 1 else None)
+    entries = _list_possible_entries(model, recording, spectra.frequency_hz, position_compared)
+    derivative_orders = {_DERIVATIVES.get(quantity) for quantity in recording.response.quantities}
+    return rank_entries(spectra, entries, derivative_orders.pop() if len(derivative_orders) == 1 else None)
 
 
-def find_tied_states(
+def find_state_dependences(
     measure: ErrorMeasure,
     tuning: Tuning,
     fitted: Fitted,
@@ -74,41 +77,42 @@ def find_tied_states(
     entry: EntryPoint | None,
     computed_evidence: Sequence[Evidence] = (),
 ) -> tuple[StateMismatch, ...]:
-    """State dependences of the first recording: of the sensor's error where that is the best entry, else of the missing
-    force. cells: of this fit. computed_evidence: evidence of this fit; empty = to be computed."""
+    """State dependences of the residual of the first recording: of the sensor's error where a sensor is the best entry,
+    else of the missing force. cells: mismatch map of `fitted`. computed_evidence: evidence of `fitted`; computed here
+    if empty."""
     if not any(cell.beyond_noise for cell in cells):
         return ()
     recording, evidence = (
         measure.records[0].recording,
         (computed_evidence or gather_evidence(measure, tuning, fitted))[0],
     )
-    best = entry.ranking[0] if entry is not None and entry.ranking else None
-    if best is not None and best.place == "sensor":
-        channels = recording.response.channels if best.axis is None else (best.axis,)
-        return error_states(evidence, recording, cells, channels)
-    return force_states(evidence, recording, cells, tuning.model.system)
+    best_entry = entry.ranking[0] if entry is not None and entry.ranking else None
+    if best_entry is not None and best_entry.place == "sensor":
+        channels = recording.response.channels if best_entry.axis is None else (best_entry.axis,)
+        return find_error_states(evidence, recording, cells, channels)
+    return find_force_states(evidence, recording, cells, tuning.model.system)
 
 
-def possible_entries(
-    model: MechanicalModel, recording: Recording, frequency_hz: FloatArray, position: bool
+def _list_possible_entries(
+    model: MechanicalModel, recording: Recording, frequency_hz: FloatArray, with_position: bool
 ) -> tuple[Entry, ...]:
     """Entries at which a mismatch may enter the model: a force along an axis, forces along several, or an error of a
-    sensor. frequency_hz: (lines,). position: whether the position is compared in addition to the response."""
-    transfer = axis_transfer(model, recording.sample_rate_hz, frequency_hz)
-    forces = np.concatenate([transfer.response, transfer.position], axis=1) if position else transfer.response
+    sensor. frequency_hz: (lines,). with_position: whether the position is compared in addition to the response."""
+    transfer = compute_axis_transfer(model, recording.sample_rate_hz, frequency_hz)
+    forces = np.concatenate([transfer.response, transfer.position], axis=1) if with_position else transfer.response
     axes = tuple(axis_letter(channel, recording.command.channels) for channel in recording.command.channels)
-    p, channels = model.outputs, forces.shape[1]
-    unit = np.eye(channels, dtype=np.complex128)[None]
+    p, channel_count = model.outputs, forces.shape[1]
+    identity = np.eye(channel_count, dtype=np.complex128)[None]
     entries = [Entry(f"a force along {axis}", "mechanism", axis, forces[:, :, [k]]) for k, axis in enumerate(axes)]
     entries += [Entry("forces along several axes", "mechanism", None, forces)] if len(axes) > 1 else []
     entries += [
-        Entry(f"an error of the {name} channel", "sensor", name, unit[:, :, [k]])
+        Entry(f"an error of the {name} channel", "sensor", name, identity[:, :, [k]])
         for k, name in enumerate(recording.response.channels[:p])
     ]
-    entries += [Entry("errors of several response channels", "sensor", None, unit[:, :, :p])] if p > 1 else []
-    if position and recording.position is not None:
+    entries += [Entry("errors of several response channels", "sensor", None, identity[:, :, :p])] if p > 1 else []
+    if with_position and recording.position is not None:
         entries += [
-            Entry(f"an error of the position channel {name}", "sensor", name, unit[:, :, [p + k]], of_position=True)
+            Entry(f"an error of the position channel {name}", "sensor", name, identity[:, :, [p + k]], of_position=True)
             for k, name in enumerate(recording.position.channels)
         ]
     return tuple(entries)

@@ -1,6 +1,7 @@
 """Sentences for the user about the localisation of a mismatch: where it enters, and the states that it depends on.
 
-Called by the report and by `real_answer`; the numbers come from `entry_point` and `state_regions`.
+Called by the report (`diagnosis_report`) and by `answer_of_findings`; the numbers come from `entry_point` and
+`state_regions`.
 """
 
 from collections.abc import Sequence
@@ -9,75 +10,85 @@ from analysis.diagnosis.localisation.entry_point import EntryPoint, EntryScore
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
 from analysis.diagnosis.settings import ENTRY_AS_GOOD_P, ENTRY_LEAST_LINES
-from analysis.diagnosis.unit_wording import share_text
+from analysis.diagnosis.unit_wording import format_share
 from analysis.wording import conjoin, format_p_text
 
-_FORCE = "the drive, the mechanism and a hand all act there, and these channels do not distinguish them"
-_FORCES = (
+_FORCE_SOURCES = "the drive, the mechanism and a hand all act there, and these channels do not distinguish them"
+_COMMON_FORCE_SOURCES = (
     "drives, the mechanism and a hand act in this way, and so does an error of timing, which shifts all channels "
     "equally"
 )
 
 
-def localisation_sentences(local: Localisation) -> tuple[str, ...]:
+def write_localisation_sentences(localisation: Localisation) -> tuple[str, ...]:
     """Sentences about the residual of the re-tuned model: where it enters, and the states that it depends on."""
-    texts = (entry_sentence(local.entry), states_sentence(local.states.get("retuned", ())))
-    return tuple(sentence for sentence in texts if sentence)
+    sentences = (
+        write_entry_sentence(localisation.entry),
+        write_states_sentence(localisation.states.get("retuned", ())),
+    )
+    return tuple(sentence for sentence in sentences if sentence)
 
 
-def entry_sentence(entry: EntryPoint | None) -> str:
+def write_entry_sentence(entry: EntryPoint | None) -> str:
     """Sentence on the place where the mismatch enters; empty with too few lines of enough power."""
     if entry is None or not entry.ranking or entry.lines < ENTRY_LEAST_LINES:
         return ""
-    best = entry.ranking[0]
-    kind = "" if best.place == "sensor" else f" ({_FORCES if best.axis is None else _FORCE})"
-    explained = f"{_percent(best)} of it, at the median of {entry.lines} frequency lines"
+    best_entry = entry.ranking[0]
+    sources = (
+        ""
+        if best_entry.place == "sensor"
+        else f" ({_COMMON_FORCE_SOURCES if best_entry.axis is None else _FORCE_SOURCES})"
+    )
+    explained_text = f"{_format_share(best_entry)} of it, at the median of {entry.lines} frequency lines"
     return " ".join(
         filter(
             None,
             (
-                f"The mismatch after re-tuning enters as {best.name}{kind}: this explains "
-                f"{explained}{_rival_entry(entry)}.",
-                _sensor_rule_sentence(entry),
+                f"The mismatch after re-tuning enters as {best_entry.name}{sources}: this explains "
+                f"{explained_text}{_describe_rival_entries(entry)}.",
+                _write_sensor_rule_sentence(entry),
             ),
         )
     )
 
 
-def states_sentence(states: Sequence[StateMismatch]) -> str:
+def write_states_sentence(states: Sequence[StateMismatch]) -> str:
     """Sentence on the states that the mismatch depends on; empty where there are none."""
     if not states:
         return ""
-    parts = [
-        f"{state.output}, driven by {state.input}, {state.region.words} ({share_text(state.region.share)} of the "
+    state_phrases = [
+        f"{state.output}, driven by {state.input}, {state.region.words} ({format_share(state.region.share)} of the "
         f"mismatch, {format_p_text(state.region.p_value)})"
         for state in states
     ]
-    return f"The mismatch depends on a state: {'; '.join(parts)}."
+    return f"The mismatch depends on a state: {'; '.join(state_phrases)}."
 
 
-def _rival_entry(entry: EntryPoint) -> str:
+def _describe_rival_entries(entry: EntryPoint) -> str:
     """Clauses on entries that the data cannot distinguish from the best, and on the next best entry; may be empty."""
-    best, distinguishable = (
+    best_entry, distinguishable = (
         entry.ranking[0],
         [score for score in entry.ranking[1:] if score.name not in entry.ranking[0].equivalents],
     )
-    equivalents = f"; {conjoin(best.equivalents)} would have the same effect" if best.equivalents else ""
+    equivalents = f"; {conjoin(best_entry.equivalents)} would have the same effect" if best_entry.equivalents else ""
     # Entries along several axes contain those along each, and errors of several channels contain each channel's.
-    rivals = [rival for rival in distinguishable if not (rival.axis is None and rival.place == best.place)]
+    rivals = [rival for rival in distinguishable if not (rival.axis is None and rival.place == best_entry.place)]
     if not rivals:
         return equivalents
-    second = rivals[0]
-    chance = format_p_text(second.p_value)
-    if second.p_value > ENTRY_AS_GOOD_P:
-        return f"{equivalents}; {second.name} would explain it about equally well ({_percent(second)}, {chance})"
+    next_entry = rivals[0]
+    p_text = format_p_text(next_entry.p_value)
+    if next_entry.p_value > ENTRY_AS_GOOD_P:
+        return (
+            f"{equivalents}; {next_entry.name} would explain it about equally well ({_format_share(next_entry)}, "
+            f"{p_text})"
+        )
     return (
-        f"{equivalents}; the next best entry is {second.name} with {_percent(second)} "
-        f"({chance} for its being equally good)"
+        f"{equivalents}; the next best entry is {next_entry.name} with {_format_share(next_entry)} "
+        f"({p_text} for its being equally good)"
     )
 
 
-def _sensor_rule_sentence(entry: EntryPoint) -> str:
+def _write_sensor_rule_sentence(entry: EntryPoint) -> str:
     """Sentence on the comparison of position and response (`SensorRule`); empty where it is undecided."""
     if entry.rule is None or entry.rule.verdict == "undecided":
         return ""
@@ -92,5 +103,6 @@ def _sensor_rule_sentence(entry: EntryPoint) -> str:
     )
 
 
-def _percent(score: EntryScore) -> str:
-    return share_text(max(score.share, 0.0))
+def _format_share(score: EntryScore) -> str:
+    """Share of the mismatch that the entry explains, as text; a negative share as 0."""
+    return format_share(max(score.share, 0.0))

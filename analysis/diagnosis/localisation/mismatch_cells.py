@@ -1,7 +1,8 @@
-"""Tests a prediction against a recording, per cell: channel x driving input x octave x level.
+"""Tests a prediction against a recording, per cell: channel x driving input x octave x level of the excitation.
 
-The residual is tested against noise and an equivalence margin, which includes the mismatch of clean recordings, if
-there are any; `model_error` tests it against the model's error in other cells.
+The power of the residual is compared with that of the noise plus an equivalence margin (noncentral F test), which
+includes the mismatch of clean recordings, if there are any. p-values are adjusted hierarchically (Benjamini and
+Bogomolov 2014). Called by `mismatch_maps`; `model_error` tests the cells against the model's error in other cells.
 """
 
 from collections.abc import Hashable, Sequence
@@ -9,9 +10,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from analysis.diagnosis.data.spectral_lines import Band, noncentral_f_sf
+from analysis.diagnosis.data.spectral_lines import Band, compute_noncentral_f_sf
 from analysis.diagnosis.localisation.clean_floor import CleanFloor
-from analysis.diagnosis.localisation.residual_lines import Observation, ResidualLines, residual_lines
+from analysis.diagnosis.localisation.residual_lines import Observation, ResidualLines, compute_residual_lines
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, MODEL_FLOOR
 from analysis.diagnosis.types import Mask
@@ -36,8 +37,8 @@ class Margin:
     share: float = MODEL_FLOOR
     learned: CleanFloor = field(default_factory=CleanFloor)
 
-    def of(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
-        """Margin of a cell, as a share of its signal."""
+    def compute_share(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
+        """Return the margin of a cell, as a share of its signal."""
         return float(np.hypot(self.share, self.learned.share(output, quantity, input, band_hz)))
 
 
@@ -88,18 +89,19 @@ class MismatchCell:
         return self.adjusted_p_value <= FALSE_DISCOVERY_RATE
 
 
-def mismatch_cells(
+def compute_mismatch_cells(
     recording: Recording,
     prediction: Prediction,
     floor: NoiseFloor,
     used: Mask | None = None,
     margin: Margin | None = None,
 ) -> tuple[MismatchCell, ...]:
-    """All cells of a recording. used: (n,), the samples that count; None = all. Empty where the noise is not known.
+    """Compute and test all cells of a recording. used: (n,), the samples that count; None = all. Empty where the noise
+    is not known. `beyond_noise` of each cell is set from its adjusted p-value.
 
     Raises ValueError where a prediction has another shape than the recording.
     """
-    observations = _observations(recording, prediction, floor)
+    observations = _make_observations(recording, prediction, floor)
     if not floor.is_known:
         return ()
     used_samples = np.ones(len(recording), dtype=np.bool_) if used is None else used
@@ -109,16 +111,21 @@ def mismatch_cells(
     cells: list[MismatchCell] = []
     for channels, observation in observations:
         groups: dict[tuple[str, Band, float], list[ResidualLines]] = {}
-        for lines in residual_lines(recording, observation, used_samples):
+        for lines in compute_residual_lines(recording, observation, used_samples):
             groups.setdefault((lines.input, lines.band_hz, lines.amplitude), []).append(lines)
         for group in groups.values():
-            cells += [_cell(group, k, name, observation, equivalence_margin) for k, name in enumerate(channels)]
-    return tuple(replace(cell, beyond_noise=cell.significant) for cell in adjust_for_cells(cells))
+            cells += [
+                _compute_cell(group, channel, name, observation, equivalence_margin)
+                for channel, name in enumerate(channels)
+            ]
+    return tuple(replace(cell, beyond_noise=cell.significant) for cell in adjust_cell_p_values(cells))
 
 
-def _observations(
+def _make_observations(
     recording: Recording, prediction: Prediction, floor: NoiseFloor
 ) -> list[tuple[tuple[str, ...], Observation]]:
+    """Pair the names of the channels with measured and predicted samples, for the response and, where recording,
+    prediction and noise have it, the position. Raises ValueError where shapes differ."""
     pairs = [("response", recording.response, prediction.response, floor.response)]
     if recording.position is not None and prediction.position is not None and floor.position is not None:
         pairs.append(("position", recording.position, prediction.position, floor.position))
@@ -131,55 +138,59 @@ def _observations(
     ]
 
 
-def _cell(group: Sequence[ResidualLines], k: int, name: str, observation: Observation, margin: Margin) -> MismatchCell:
-    first = group[0]
-    quantity = observation.quantities[k]
-    margin_share = margin.of(name, quantity, first.input, first.band_hz)
+def _compute_cell(
+    group: Sequence[ResidualLines], channel: int, output: str, observation: Observation, margin: Margin
+) -> MismatchCell:
+    first_lines = group[0]
+    quantity = observation.quantities[channel]
+    margin_share = margin.compute_share(output, quantity, first_lines.input, first_lines.band_hz)
     seconds = np.array([part.seconds for part in group])
     lines = np.array([part.lines for part in group])
     residual, noise, signal = (
-        float(np.average([getattr(part, power_name)[k] for part in group], weights=seconds))
+        float(np.average([getattr(part, power_name)[channel] for part in group], weights=seconds))
         for power_name in ("residual", "noise", "signal")
     )
-    ratio = float(np.average([part.whitened[k] for part in group], weights=lines))
+    noise_power_ratio = float(np.average([part.whitened[channel] for part in group], weights=lines))
     signal_in_noise, freedom = (
-        sum(float(part.signal_to_noise[k]) for part in group),
-        max(float(observation.noise.freedom[k]), 1.0),
+        sum(float(part.signal_to_noise[channel]) for part in group),
+        max(float(observation.noise.freedom[channel]), 1.0),
     )
-    p_value = float(noncentral_f_sf(ratio, lines.sum(), freedom, 2 * margin_share**2 * signal_in_noise))
+    p_value = float(
+        compute_noncentral_f_sf(noise_power_ratio, lines.sum(), freedom, 2 * margin_share**2 * signal_in_noise)
+    )
     return MismatchCell(
-        name, quantity, first.input, first.band_hz, first.amplitude,
-        float(np.sqrt(max(residual - noise, 0.0))), float(np.sqrt(signal)), float(np.sqrt(ratio)),
+        output, quantity, first_lines.input, first_lines.band_hz, first_lines.amplitude,
+        float(np.sqrt(max(residual - noise, 0.0))), float(np.sqrt(signal)), float(np.sqrt(noise_power_ratio)),
         margin_share, p_value, 1.0, float(seconds.sum()), float(lines.sum()), freedom,
         signal_in_noise / float(lines.sum()),
     )  # fmt: skip
 
 
-def adjust_for_cells(cells: Sequence[MismatchCell]) -> tuple[MismatchCell, ...]:
-    """The cells with p-values adjusted for their number."""
+def adjust_cell_p_values(cells: Sequence[MismatchCell]) -> tuple[MismatchCell, ...]:
+    """Return the cells with p-values adjusted for their number, nested by channel and band."""
     paths = [((cell.output, cell.quantity), cell.band_hz) for cell in cells]
     p_values = adjust_nested_p_values(np.array([cell.p_value for cell in cells]), paths, FALSE_DISCOVERY_RATE)
     return tuple(replace(cell, adjusted_p_value=float(p)) for cell, p in zip(cells, p_values, strict=True))
 
 
-def learn_floor(clean: Sequence[Sequence[MismatchCell]]) -> CleanFloor:
-    """The largest share of each cell over clean recordings and levels, raised by a factor that is larger for fewer
-    recordings. clean: the cells of each recording."""
+def learn_floor(clean_cells: Sequence[Sequence[MismatchCell]]) -> CleanFloor:
+    """Return the largest share of each cell over clean recordings and levels, times a factor that is larger for fewer
+    recordings (`CleanFloor.beyond`). clean_cells: the cells of each recording."""
     shares: dict[tuple[str, str, str, Band], float] = {}
-    for cells in clean:
+    for cells in clean_cells:
         for cell in cells:
-            key = (cell.output, cell.quantity, cell.input, cell.band_hz)
-            shares[key] = max(shares.get(key, 0.0), cell.share)
-    factor = CleanFloor(recordings=len(clean)).beyond
-    return CleanFloor({key: factor * share for key, share in shares.items()}, recordings=len(clean))
+            cell_key = (cell.output, cell.quantity, cell.input, cell.band_hz)
+            shares[cell_key] = max(shares.get(cell_key, 0.0), cell.share)
+    factor = CleanFloor(recordings=len(clean_cells)).beyond
+    return CleanFloor({cell_key: factor * share for cell_key, share in shares.items()}, recordings=len(clean_cells))
 
 
 def adjust_nested_p_values(p_values: FloatArray, families: Sequence[tuple[Hashable, ...]], level: float) -> FloatArray:
-    """Adjusted p-values (tests,): found are those up to `level`.
+    """Adjust p-values (tests,) for hierarchical multiple testing; those up to `level` are significant.
 
-    Hierarchical multiple testing: the false discovery rate is controlled family by family. Families nest (channel, then
-    band, then cell). A family's own p-value is Simes' of its members. Members are tested only where their family was
-    found, at a level lowered by the share of families that were found (Benjamini and Bogomolov 2014).
+    The false discovery rate is controlled family by family. Families nest (channel, then band, then cell). The p-value
+    of a family is that of Simes over its members. Members are tested only where their family is significant, at a level
+    lowered by the share of significant families (Benjamini and Bogomolov 2014).
 
     families: one path per test, widest family first; paths of equal length. The test is the last, innermost member.
     """
@@ -194,20 +205,23 @@ def _adjust_families(
     p_values: FloatArray,
     families: Sequence[tuple[Hashable, ...]],
     members: np.ndarray[tuple[int], np.dtype[np.intp]],
-    position: tuple[int, float, float],
+    depth_factor_level: tuple[int, float, float],
     adjusted: FloatArray,
 ) -> None:
-    """position: depth, factor that the level was lowered by, level. Writes the largest p-value along each path."""
-    depth, factor, level = position
+    """Adjust the members of one family, recursively; write to `adjusted` the largest p-value along each path.
+
+    members: indices of the family's tests. depth_factor_level: depth of the family in the paths, factor by which the
+    level was lowered above it, and the level."""
+    depth, factor, level = depth_factor_level
     if depth == len(families[int(members[0])]):
-        adjusted[members] = np.maximum(adjusted[members], factor * _benjamini_hochberg(p_values[members]))
+        adjusted[members] = np.maximum(adjusted[members], factor * _adjust_benjamini_hochberg(p_values[members]))
         return
     groups: dict[Hashable, list[int]] = {}
     for member in members:
         groups.setdefault(families[int(member)][depth], []).append(int(member))
     subfamilies = [np.array(group) for group in groups.values()]
-    simes = np.array([_benjamini_hochberg(p_values[group]).min() for group in subfamilies])
-    family_p_values = factor * _benjamini_hochberg(simes)
+    simes = np.array([_adjust_benjamini_hochberg(p_values[group]).min() for group in subfamilies])
+    family_p_values = factor * _adjust_benjamini_hochberg(simes)
     found_count = int(np.sum(family_p_values <= level))
     for group, p_value in zip(subfamilies, family_p_values, strict=True):
         adjusted[group] = np.maximum(adjusted[group], p_value)
@@ -219,7 +233,8 @@ def _adjust_families(
             adjusted[group] = np.maximum(adjusted[group], p_values[group])
 
 
-def _benjamini_hochberg(p_values: FloatArray) -> FloatArray:
+def _adjust_benjamini_hochberg(p_values: FloatArray) -> FloatArray:
+    """(tests,): p-values adjusted by Benjamini and Hochberg (1995); their minimum is the p-value of Simes (1986)."""
     order = np.argsort(p_values)[::-1]
     adjusted = np.empty(len(p_values))
     scaled = p_values[order] * len(p_values) / np.arange(len(p_values), 0, -1)

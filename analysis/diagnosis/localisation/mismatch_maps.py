@@ -24,8 +24,8 @@ from analysis.diagnosis.localisation.mismatch_cells import (
     Margin,
     MismatchCell,
     Prediction,
-    adjust_for_cells,
-    mismatch_cells,
+    adjust_cell_p_values,
+    compute_mismatch_cells,
 )
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.types import Mapper
@@ -130,7 +130,9 @@ def compute_cells(
         predicted = record.measured - residuals * measure.unit
         position = predicted[:, p:] if predicted.shape[1] > p else None
         used = record.choose | record.test if held_out else None
-        record_cells = mismatch_cells(record.recording, Prediction(predicted[:, :p], position), floor, used, margin)
+        record_cells = compute_mismatch_cells(
+            record.recording, Prediction(predicted[:, :p], position), floor, used, margin
+        )
         cells += [replace(cell, part=part) for cell in record_cells]
     return tuple(cells)
 
@@ -181,7 +183,7 @@ def collect_model_error(held_out: Sequence[MismatchCell]) -> ModelError:
 
 def adjust_for_model_error(cells: Sequence[MismatchCell], error: ModelError) -> tuple[MismatchCell, ...]:
     """The cells with p-values against noise and model error together; `beyond_noise` is kept."""
-    return adjust_for_cells([replace(cell, p_value=_compute_p_value(cell, error)) for cell in cells])
+    return adjust_cell_p_values([replace(cell, p_value=_compute_p_value(cell, error)) for cell in cells])
 
 
 def _compute_p_value(cell: MismatchCell, error: ModelError) -> float:

@@ -1,7 +1,7 @@
 """Converts significant mismatch cells and regions of state to rows of the diagnosis document (`Mismatch`).
 
-Cells are those of `mismatch_cells`, regions those of `state_regions`. The order of the rows puts the largest missing
-power first.
+Cells are those of `mismatch_cells`, regions those of `state_regions`. Rows with the largest missing power come first.
+Called by `assemble_findings`.
 """
 
 from collections.abc import Sequence
@@ -27,44 +27,47 @@ class StateMismatch:
     region: StateRegion
 
 
-def mismatch_rows(
+def list_mismatch_rows(
     cells: Sequence[MismatchCell], states: Sequence[StateMismatch] = (), limit: int = MOST_ROWS
 ) -> tuple[Mismatch, ...]:
-    """Significant rows: states first, in the order of the mismatch power that they contain; then cells, by their
-    missing share of the channel's whole signal. `share` of a cell's row is relative to the signal within the cell (rms,
-    at most 1), which is large in bands without signal and has little meaning by itself."""
+    """List the significant rows, at most `limit`: first regions of state, by the share of the mismatch power that they
+    contain; then cells, by their rms mismatch relative to the channel's rms signal over all bands. `share` of a cell's
+    row is relative to the signal within the cell (rms, at most 1), which is large in bands without signal and has
+    little meaning by itself."""
     significant_states = [state for state in states if state.region.p_value <= FALSE_DISCOVERY_RATE]
     significant_cells = [cell for cell in cells if cell.significant]
-    channel_signals = _channel_signals(cells)
+    channel_signals = _compute_channel_signals(cells)
     significant_states.sort(key=lambda state: (-state.region.share, state.region.p_value))
-    significant_cells.sort(key=lambda cell: (-cell.rms / channel_signals[_channel(cell)], cell.adjusted_p_value))
-    return (*map(_state_row, significant_states), *map(_cell_row, significant_cells))[:limit]
+    significant_cells.sort(
+        key=lambda cell: (-cell.rms / channel_signals[_identify_channel(cell)], cell.adjusted_p_value)
+    )
+    return (*map(_make_state_row, significant_states), *map(_make_cell_row, significant_cells))[:limit]
 
 
-def _channel(cell: MismatchCell) -> tuple[str, str]:
-    """Name and quantity of the cell's channel: response and position may share a name."""
+def _identify_channel(cell: MismatchCell) -> tuple[str, str]:
+    """Return name and quantity of the cell's channel: response and position may share a name."""
     return cell.output, cell.quantity
 
 
-def _channel_signals(cells: Sequence[MismatchCell]) -> dict[tuple[str, str], float]:
-    """Rms of each channel's response over all bands, in the segment that excited it most."""
+def _compute_channel_signals(cells: Sequence[MismatchCell]) -> dict[tuple[str, str], float]:
+    """Compute the rms of each channel's response over all bands, in the segment (input and level) with the largest."""
     powers: dict[tuple[str, str], dict[tuple[str, float], float]] = {}
     for cell in cells:
-        segment_powers = powers.setdefault(_channel(cell), {})
+        segment_powers = powers.setdefault(_identify_channel(cell), {})
         segment_key = (cell.input, cell.amplitude)
         segment_powers[segment_key] = segment_powers.get(segment_key, 0.0) + cell.signal_rms**2
     return {channel: max(max(segment_powers.values()) ** 0.5, 1e-300) for channel, segment_powers in powers.items()}
 
 
-def _cell_row(cell: MismatchCell) -> Mismatch:
-    """The row of a cell; its share is limited to 1, as the document requires."""
+def _make_cell_row(cell: MismatchCell) -> Mismatch:
+    """Convert a cell to a row; its share is limited to 1, as the document requires."""
     return Mismatch(
         cell.output, cell.input, cell.band_hz, cell.amplitude or None, None, min(cell.share, 1.0), cell.adjusted_p_value
     )
 
 
-def _state_row(state: StateMismatch) -> Mismatch:
-    """The row of a region of state, over all levels."""
+def _make_state_row(state: StateMismatch) -> Mismatch:
+    """Convert a region of state to a row without a level, because it covers all levels; its share is limited to 1."""
     region = state.region
     return Mismatch(
         state.output, state.input, state.band_hz, None, region.words, min(region.share, 1.0), region.p_value

@@ -1,8 +1,8 @@
 """Spectra of the residual (recording minus prediction) and of its noise, from which the entry point of a missing effect
-is found.
+is found (`entry_point`).
 
 Channels are those of the response, then of the position. A spectrum is that of the mean period (rfft / n, see
-`line_spectra`), on the lines from the first to the last that the excitation drives.
+`compute_line_spectra`), on the lines from the first to the last that the excitation drives.
 """
 
 from collections.abc import Sequence
@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.data.spectral_lines import detection_lines, hold_length
+from analysis.diagnosis.data.spectral_lines import compute_hold_samples, find_detection_lines
 from analysis.diagnosis.localisation.mismatch_cells import Prediction
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from analysis.diagnosis.noise.periods import Periods, find_settled_periods, period_spectra
+from analysis.diagnosis.noise.periods import Periods, compute_period_spectra, find_settled_periods
 from analysis.diagnosis.types import Mask
 from equalizer.identification.frequency_response.experiments import instrument_signal
 from equalizer.signals.recording import Recording, Segment
@@ -22,7 +22,7 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 _WINDOW_S = 2.0
 """Length (s) of a window of a recording that has no period."""
-_LEAST_AMPLITUDE = 0.1
+_LEAST_AMPLITUDE_SHARE = 0.1
 """Least amplitude of a channel in the model error, relative to the strongest channel of the same signal."""
 
 
@@ -40,47 +40,50 @@ class ResidualSpectra:
     """Number of response channels."""
 
 
-def residual_spectra(
+def compute_residual_spectra(
     recording: Recording,
     prediction: Prediction,
     floor: NoiseFloor,
     used: Mask | None = None,
     model_error: float = 0.01,
 ) -> ResidualSpectra | None:
-    """Spectra of each segment's mean period, or of windows of `_WINDOW_S` where nothing is periodic. None without
-    either, without known noise, or where no line is driven. used: (n,), usable samples. model_error: relative to the
-    response; counts as noise, or residuals of the re-tuned model on other axes would appear as a second force."""
+    """Compute the spectrum of each segment's mean period, or of windows of `_WINDOW_S` where nothing is periodic. None
+    without either, without known noise, or where no line is driven. used: (n,), usable samples. model_error: relative
+    to the response; counts as noise, or residuals of the re-tuned model on other axes would appear as a second
+    force."""
     residuals = [recording.response.samples - prediction.response]
-    noises = [floor.response]
+    channel_noises = [floor.response]
     if recording.position is not None and prediction.position is not None and floor.position is not None:
         residuals.append(recording.position.samples - prediction.position)
-        noises.append(floor.position)
+        channel_noises.append(floor.position)
     residual = np.hstack(residuals)
     is_usable = np.isfinite(residual).all(axis=1) & (np.ones(len(residual), dtype=np.bool_) if used is None else used)
-    segments = [
-        period
-        for period in (_select_usable_periods(periods, is_usable) for periods in find_settled_periods(recording))
-        if period.starts
-    ]
+    usable_periods = (_select_usable_periods(periods, is_usable) for periods in find_settled_periods(recording))
+    segments = [periods for periods in usable_periods if periods.starts]
     if not segments:
-        segments = _windows(recording, is_usable)
+        segments = _cut_windows(recording, is_usable)
     segments = [segment for segment in segments if segment.length == segments[0].length]
     if not segments or not floor.is_known:
         return None
-    lines_hz = segments[0].frequency_hz(recording.sample_rate_hz)
-    excitation = np.stack([period_spectra(instrument_signal(recording), segment).mean(axis=0) for segment in segments])
+    lines_hz = segments[0].compute_line_frequencies(recording.sample_rate_hz)
+    excitation = np.stack(
+        [compute_period_spectra(instrument_signal(recording), segment).mean(axis=0) for segment in segments]
+    )
     total_excitation = np.sqrt(np.sum(np.abs(excitation) ** 2, axis=0)).astype(np.complex128)
-    driven = detection_lines(total_excitation, hold_length(instrument_signal(recording)))
+    driven = find_detection_lines(total_excitation, compute_hold_samples(instrument_signal(recording)))
     if driven is None:
         return None
-    first, last = np.flatnonzero(driven.driven)[[0, -1]]
-    driven_lines = slice(int(first), int(last) + 1)
-    spectra = np.stack([period_spectra(residual, segment).mean(axis=0)[driven_lines] for segment in segments])
-    noise = np.stack([_noise(noises, floor.frequency_hz, lines_hz[driven_lines], segment) for segment in segments])
-    noise += model_error**2 * np.stack(
-        [_response_power(recording, segment, len(noises) > 1)[driven_lines] for segment in segments]
+    first_line, last_line = np.flatnonzero(driven.driven)[[0, -1]]
+    driven_lines = slice(int(first_line), int(last_line) + 1)
+    spectra = np.stack([compute_period_spectra(residual, segment).mean(axis=0)[driven_lines] for segment in segments])
+    driven_hz = lines_hz[driven_lines]
+    noise = np.stack(
+        [_compute_noise_power(channel_noises, floor.frequency_hz, driven_hz, segment) for segment in segments]
     )
-    return ResidualSpectra(lines_hz[driven_lines], spectra, noise, residuals[0].shape[1])
+    noise += model_error**2 * np.stack(
+        [_compute_response_power(recording, segment, len(channel_noises) > 1)[driven_lines] for segment in segments]
+    )
+    return ResidualSpectra(driven_hz, spectra, noise, residuals[0].shape[1])
 
 
 def _select_usable_periods(periods: Periods, usable: Mask) -> Periods:
@@ -89,8 +92,9 @@ def _select_usable_periods(periods: Periods, usable: Mask) -> Periods:
     return Periods(periods.index, periods.segment, starts, periods.settled)
 
 
-def _windows(recording: Recording, usable: Mask) -> list[Periods]:
-    """Windows of a recording without periods, each as a single period; segments of rest are left out."""
+def _cut_windows(recording: Recording, usable: Mask) -> list[Periods]:
+    """Cut windows of `_WINDOW_S` from a recording without periods, each as a single period; segments of rest are left
+    out."""
     length = min(round(_WINDOW_S * recording.sample_rate_hz), len(recording))
     windows = []
     for index, segment in enumerate(recording.segments or (Segment(0, len(recording), "noise", 0.0),)):
@@ -101,22 +105,24 @@ def _windows(recording: Recording, usable: Mask) -> list[Periods]:
     return windows
 
 
-def _response_power(recording: Recording, periods: Periods, with_position: bool) -> FloatArray:
-    """(lines, channels): power of response (and position); a weak channel counts with the amplitude
-    `_LEAST_AMPLITUDE` of the strongest channel of its signal."""
+def _compute_response_power(recording: Recording, periods: Periods, with_position: bool) -> FloatArray:
+    """(lines, channels): squared magnitude of the mean period of response (and position); a weak channel counts with
+    the amplitude `_LEAST_AMPLITUDE_SHARE` of the strongest channel of its signal."""
     signals = [recording.response, *([recording.position] if with_position and recording.position is not None else [])]
-    parts = []
+    channel_powers = []
     for signal in signals:
-        power = np.abs(period_spectra(signal.samples, periods).mean(axis=0)) ** 2
-        parts.append(np.maximum(power, _LEAST_AMPLITUDE**2 * power.max(axis=1, keepdims=True)))
-    return np.hstack(parts)
+        power = np.abs(compute_period_spectra(signal.samples, periods).mean(axis=0)) ** 2
+        channel_powers.append(np.maximum(power, _LEAST_AMPLITUDE_SHARE**2 * power.max(axis=1, keepdims=True)))
+    return np.hstack(channel_powers)
 
 
-def _noise(noises: Sequence[ChannelNoise], floor_hz: FloatArray, lines_hz: FloatArray, periods: Periods) -> FloatArray:
+def _compute_noise_power(
+    channel_noises: Sequence[ChannelNoise], floor_hz: FloatArray, lines_hz: FloatArray, periods: Periods
+) -> FloatArray:
     """(lines, channels): expected power of the noise in the mean period. Averaging over `periods.count` periods does
     not lower the rounding errors, which repeat with the motion."""
-    parts = []
-    for noise in noises:
+    noise_powers = []
+    for noise in channel_noises:
         density = np.stack([np.interp(lines_hz, floor_hz, channel) for channel in noise.density.T], axis=1)
-        parts.append(((density - noise.rounding) / periods.count + noise.rounding) / periods.length)
-    return np.hstack(parts)
+        noise_powers.append(((density - noise.rounding) / periods.count + noise.rounding) / periods.length)
+    return np.hstack(noise_powers)

@@ -3,7 +3,7 @@
 A state is a variable of the motion or of the signals: position, velocity, command, response, time. Each test asks
 whether the mismatch is larger in a region of it, or follows its sign (`state_regions`); its p-value is multiplied by
 the number of all tests (Bonferroni), and a dependence is stated where it is below `FALSE_DISCOVERY_RATE` and says more
-than where the device was most of the time.
+than where the device was most of the time. Called by `localisation`.
 """
 
 from collections.abc import Sequence
@@ -32,72 +32,84 @@ from equalizer.signals.unit_system import UnitSystem
 
 _SEED = 20
 """Seed of the permutations: the same recording gives the same result."""
-FORCE_TESTS = 6
+TESTS_PER_AXIS = 6
 """Tests along one axis: position and velocity by size and by sign, command and time by size."""
-ERROR_TESTS = 2
+TESTS_PER_CHANNEL = 2
 """Tests of one response channel: response and time, by size."""
-_DRIVEN = 0.02
+_DRIVEN_SHARE = 0.02
 """Least rms of an axis's command, relative to the strongest segment, for the axis to count as driven."""
 
 
-def force_states(
+def find_force_states(
     evidence: Evidence, recording: Recording, cells: Sequence[MismatchCell], system: UnitSystem
 ) -> tuple[StateMismatch, ...]:
-    """State dependences of the missing force along each driven axis with a cell beyond noise. p-values are corrected
-    for all regions tested."""
+    """Find regions of state in which the missing force is larger, along each driven axis with a cell beyond noise.
+    p-values are corrected for all regions tested."""
     axis_states = []
-    for k, channel in enumerate(recording.command.channels):
+    for axis_index, channel in enumerate(recording.command.channels):
         channel_cells = [cell for cell in cells if cell.beyond_noise and channel in cell.input.split("+")]
         if not channel_cells:
             continue
-        letter = axis_letter(channel, recording.command.channels)
-        length = system.length
-        speed = "ω" if length == "rad" else "v"
-        command = evidence.command[:, k]
+        axis_symbol = axis_letter(channel, recording.command.channels)
+        length_unit = system.length
+        velocity_symbol = "ω" if length_unit == "rad" else "v"
+        command = evidence.command[:, axis_index]
         states = [
-            State("position", letter if len(letter) == 1 else "x", length, evidence.axis_position[:, k]),
-            State("velocity", speed, f"{length}/s", evidence.axis_velocity[:, k]),
+            State(
+                "position",
+                axis_symbol if len(axis_symbol) == 1 else "x",
+                length_unit,
+                evidence.axis_position[:, axis_index],
+            ),
+            State("velocity", velocity_symbol, f"{length_unit}/s", evidence.axis_velocity[:, axis_index]),
             State("command", channel, "", command),
             State("time", "t", "s", np.arange(len(command)) / evidence.sample_rate_hz),
         ]
-        strata = _strata(recording, evidence.used > 0, command)
-        worst = max(channel_cells, key=lambda cell: cell.in_noise)
-        regions = find_state_regions(Disturbance(evidence.axis_force[:, k], strata, command), states, _SEED)
-        axis_states.append([StateMismatch(worst.output, channel, _band(channel_cells), region) for region in regions])
-    return _correct_p_values(axis_states, FORCE_TESTS)
+        strata = _assign_strata(recording, evidence.used > 0, command)
+        worst_cell = max(channel_cells, key=lambda cell: cell.in_noise)
+        regions = find_state_regions(Disturbance(evidence.axis_force[:, axis_index], strata, command), states, _SEED)
+        axis_states.append(
+            [StateMismatch(worst_cell.output, channel, _enclose_bands(channel_cells), region) for region in regions]
+        )
+    return _correct_p_values(axis_states, TESTS_PER_AXIS)
 
 
-def error_states(
+def find_error_states(
     evidence: Evidence, recording: Recording, cells: Sequence[MismatchCell], channels: Sequence[str]
 ) -> tuple[StateMismatch, ...]:
-    """State dependences of the error of each response channel among `channels` with a cell beyond noise."""
+    """Find regions of response or time in which the error is larger, for each response channel among `channels` with a
+    cell beyond noise. p-values are corrected for all regions tested."""
     channel_states = []
-    for k, channel in enumerate(recording.response.channels):
-        quantity = recording.response.quantities[k]
+    for channel_index, channel in enumerate(recording.response.channels):
+        quantity = recording.response.quantities[channel_index]
         channel_cells = [
             cell for cell in cells if cell.beyond_noise and (cell.output, cell.quantity) == (channel, quantity)
         ]
         if not channel_cells or channel not in channels:
             continue
-        reading = evidence.response[:, k]
+        reading = evidence.response[:, channel_index]
         states = [
             State("response", channel, "", reading),
             State("time", "t", "s", np.arange(len(reading)) / evidence.sample_rate_hz),
         ]
-        strata = _strata(recording, evidence.used > 0, reading)
+        strata = _assign_strata(recording, evidence.used > 0, reading)
         inputs = "+".join(
             channel
             for channel in recording.command.channels
             if any(channel in m.input.split("+") for m in channel_cells)
         )
-        regions = find_state_regions(Disturbance(reading - evidence.predicted[:, k], strata, reading), states, _SEED)
-        channel_states.append([StateMismatch(channel, inputs, _band(channel_cells), region) for region in regions])
-    return _correct_p_values(channel_states, ERROR_TESTS)
+        regions = find_state_regions(
+            Disturbance(reading - evidence.predicted[:, channel_index], strata, reading), states, _SEED
+        )
+        channel_states.append(
+            [StateMismatch(channel, inputs, _enclose_bands(channel_cells), region) for region in regions]
+        )
+    return _correct_p_values(channel_states, TESTS_PER_CHANNEL)
 
 
 def _correct_p_values(groups: Sequence[Sequence[StateMismatch]], tests_per_group: int) -> tuple[StateMismatch, ...]:
-    """Bonferroni correction over all axes or channels, with tests_per_group tests each; only significant ones are kept,
-    of each axis or channel those with the largest share."""
+    """Correct p-values by Bonferroni over all axes or channels, with tests_per_group tests each. Only significant and
+    informative ones are kept, of each axis or channel the `STATES_NAMED` with the largest share."""
     tests = tests_per_group * len(groups)
     significant_states = []
     for group in groups:
@@ -121,18 +133,24 @@ def _is_informative(region: StateRegion) -> bool:
     return region.criterion == "sign" or region.share > STATE_CROWDED * region.occupied
 
 
-def _strata(recording: Recording, used: Mask, driven: FloatArray) -> IntArray:
-    """(n,): number of the segment; -1 where samples do not count, or hardly any command drives them."""
-    n = len(driven)
-    strata = np.full(n, -1, dtype=np.int64)
-    spans = [(s.start, min(s.stop, n)) for s in recording.segments if s.kind != "rest" and s.start < n] or [(0, n)]
-    driven_rms = [float(np.sqrt(np.nanmean(driven[start:stop] ** 2))) for start, stop in spans]
-    for number, ((start, stop), rms) in enumerate(zip(spans, driven_rms, strict=True)):
-        if rms > _DRIVEN * max(driven_rms):
-            strata[start:stop] = number
+def _assign_strata(recording: Recording, used: Mask, driving_signal: FloatArray) -> IntArray:
+    """(n,): index of the segment, rests not counted; -1 where samples do not count, or are hardly driven
+    (`_DRIVEN_SHARE`). The permutation test permutes within segments. driving_signal: (n,), command or reading."""
+    sample_count = len(driving_signal)
+    strata = np.full(sample_count, -1, dtype=np.int64)
+    spans = [
+        (segment.start, min(segment.stop, sample_count))
+        for segment in recording.segments
+        if segment.kind != "rest" and segment.start < sample_count
+    ] or [(0, sample_count)]
+    driven_rms = [float(np.sqrt(np.nanmean(driving_signal[start:stop] ** 2))) for start, stop in spans]
+    for segment_number, ((start, stop), rms) in enumerate(zip(spans, driven_rms, strict=True)):
+        if rms > _DRIVEN_SHARE * max(driven_rms):
+            strata[start:stop] = segment_number
     strata[~used] = -1
     return strata
 
 
-def _band(cells: Sequence[MismatchCell]) -> Band:
+def _enclose_bands(cells: Sequence[MismatchCell]) -> Band:
+    """Return the band (Hz) from the lowest to the highest frequency of the cells."""
     return min(cell.band_hz[0] for cell in cells), max(cell.band_hz[1] for cell in cells)

@@ -11,7 +11,11 @@ from typing import Literal
 
 import numpy as np
 
-from analysis.diagnosis.localisation.block_permutation import IntArray, block_length, permutation_p_values
+from analysis.diagnosis.localisation.block_permutation import (
+    IntArray,
+    compute_block_length,
+    compute_permutation_p_values,
+)
 from analysis.wording import typeset
 from equalizer.signals.signal import FloatArray
 
@@ -96,7 +100,7 @@ def find_state_regions(
     used = np.flatnonzero(is_used)[np.argsort(disturbance.strata[is_used], kind="stable")]
     values, strata = disturbance.values[used], disturbance.strata[used]
     random = np.random.default_rng(seed)
-    block = block_length(values)
+    block = compute_block_length(values)
     regions: list[StateRegion] = []
     motion_states = [(state, state.values[used]) for state in states if state.kind != "time"]
     if motion_states:
@@ -152,7 +156,7 @@ def _test_states(
         ]
         return np.array(sizes + signs)
 
-    p_values = permutation_p_values(statistics, sample.strata, sample.block, permutations, random)
+    p_values = compute_permutation_p_values(statistics, sample.strata, sample.block, permutations, random)
     regions = []
     for (state, values), bins, p_value in zip(states, by_size, p_values, strict=False):
         region = _find_region(state, values, bins, sample)

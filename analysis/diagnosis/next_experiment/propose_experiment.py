@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.document import NextExperiment
-from analysis.diagnosis.errors.output_error import Fitted, hypothesis_sensitivity, residuals_to_fit
+from analysis.diagnosis.errors.output_error import Fitted, compute_effect_columns, stack_fit_residuals
 from analysis.diagnosis.next_experiment.choose_experiment import (
     Bench,
     ExperimentSet,
@@ -13,7 +13,7 @@ from analysis.diagnosis.next_experiment.choose_experiment import (
     make_document_entry,
     predict_gains,
 )
-from analysis.diagnosis.next_experiment.experiment_menu import experiment_menu
+from analysis.diagnosis.next_experiment.experiment_menu import list_experiments
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import is_equal_rival
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext, compute_sensitivity
@@ -60,7 +60,7 @@ def propose_experiment(context: SearchContext, explanation: Explanation) -> Prop
             continue
         rate_hz = record.recording.sample_rate_hz
         bench = Bench(context.tuning, rate_hz, record.recording.hold, context.measure.noise)
-        menu = experiment_menu(context.tuning.model, rate_hz, axis, level)
+        menu = list_experiments(context.tuning.model, rate_hz, axis, level)
         predicted = [
             predict_gains(bench, named_fit, rival.fitted, _compute_recorded_information(context, rival), menu)
             for rival in rivals
@@ -93,8 +93,8 @@ def _has_conditions(fitted: Fitted) -> bool:
 def _compute_recorded_information(context: SearchContext, candidate: FittedCandidate) -> FloatArray:
     """Information matrix of a candidate's parameters from the existing recordings, calibration included."""
     fitted = candidate.fitted
-    effect_columns = hypothesis_sensitivity(
-        context.measure, context.tuning, fitted, residuals_to_fit(context.measure, fitted.residuals)
+    effect_columns = compute_effect_columns(
+        context.measure, context.tuning, fitted, stack_fit_residuals(context.measure, fitted.residuals)
     )
     columns = np.vstack([compute_sensitivity(context, fitted.deviations, fitted.hypothesis).columns, effect_columns])
     information = columns @ columns.T

@@ -101,7 +101,7 @@ def _build_floor(
 
 
 def _estimate_from_repeats(recording: Recording, periods: Sequence[Periods]) -> NoiseFloor:
-    lines_hz = max(periods, key=lambda period: period.length).frequency_hz(recording.sample_rate_hz)
+    lines_hz = max(periods, key=lambda period: period.length).compute_line_frequencies(recording.sample_rate_hz)
     response = estimate_repeat_noise(recording, recording.response.samples, periods, lines_hz)
     remarks = _describe_variation(recording.response, response)
     position = None

@@ -1,4 +1,7 @@
-"""Whole settled periods of a recording's periodic segments, and their spectra."""
+"""Complete, settled periods of a recording's periodic segments, and their spectra.
+
+Used for the noise estimate from repeated periods (`repeat_noise`) and for spectra of the residual (`localisation`).
+"""
 
 from dataclasses import dataclass
 
@@ -6,12 +9,12 @@ import numpy as np
 
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import ComplexArray, FloatArray
-from equalizer.signals.spectral_density import line_spectra
+from equalizer.signals.spectral_density import compute_line_spectra
 
 _TRANSIENT_RATIO = 2.0
 """Largest energy ratio, first third over last third, of a period's difference from the segment's last period; above it
 the difference still decays, so that the period contains the transient."""
-_SHORTEST = 8
+_SHORTEST_PERIOD = 8
 """Shortest period that is used, in samples: a shorter one has too few spectral lines."""
 
 
@@ -20,7 +23,7 @@ class Periods:
     """The usable periods of one periodic segment."""
 
     index: int
-    """Number of the segment in the recording."""
+    """Index of the segment in the recording."""
     segment: Segment
     starts: tuple[int, ...]
     """First samples of the complete, settled periods; at least one."""
@@ -29,7 +32,7 @@ class Periods:
 
     @property
     def length(self) -> int:
-        """Samples of one period."""
+        """Number of samples of one period."""
         return self.segment.period
 
     @property
@@ -37,21 +40,21 @@ class Periods:
         """Number of usable periods."""
         return len(self.starts)
 
-    def frequency_hz(self, sample_rate_hz: float) -> FloatArray:
-        """(lines,): frequencies of the lines of `period_spectra`, without zero and half the rate."""
+    def compute_line_frequencies(self, sample_rate_hz: float) -> FloatArray:
+        """(lines,): frequencies of the lines of `compute_period_spectra`, without zero and half the rate."""
         lines: FloatArray = np.arange(1.0, (self.length + 1) // 2) * (sample_rate_hz / self.length)
         return lines
 
 
 def find_settled_periods(recording: Recording) -> tuple[Periods, ...]:
-    """The usable periods of every periodic segment. The first period is left out, and further ones until the transient
-    has decayed; so are periods with missing samples. Segments without a usable period are left out."""
+    """Find the usable periods of every periodic segment. The first period is left out, and further ones until the
+    transient has decayed; so are periods with missing samples. Segments without a usable period are left out."""
     usable_periods = []
     for index, segment in enumerate(recording.segments):
-        if segment.period < _SHORTEST:
+        if segment.period < _SHORTEST_PERIOD:
             continue
-        starts = range(segment.start, segment.stop - segment.period + 1, segment.period)
-        complete_starts = [start for start in starts if _is_complete(recording, start, segment.period)]
+        period_starts = range(segment.start, segment.stop - segment.period + 1, segment.period)
+        complete_starts = [start for start in period_starts if _is_complete(recording, start, segment.period)]
         settled_starts = _drop_transients(
             recording, [start for start in complete_starts if start != segment.start], segment.period
         )
@@ -62,20 +65,20 @@ def find_settled_periods(recording: Recording) -> tuple[Periods, ...]:
     return tuple(usable_periods)
 
 
-def period_samples(samples: FloatArray, periods: Periods) -> FloatArray:
-    """Samples of the usable periods, (periods, length, channels). samples: (n, channels)."""
+def stack_periods(samples: FloatArray, periods: Periods) -> FloatArray:
+    """Stack the samples of the usable periods: (periods, length, channels). samples: (n, channels)."""
     return np.stack([samples[start : start + periods.length] for start in periods.starts])
 
 
-def period_spectra(samples: FloatArray, periods: Periods) -> ComplexArray:
-    """Spectrum (rfft / length) of each usable period, (periods, lines, channels), on the lines of
-    `Periods.frequency_hz`."""
-    return line_spectra(period_samples(samples, periods))
+def compute_period_spectra(samples: FloatArray, periods: Periods) -> ComplexArray:
+    """Compute the spectrum (rfft / length) of each usable period: (periods, lines, channels), on the lines of
+    `Periods.compute_line_frequencies`."""
+    return compute_line_spectra(stack_periods(samples, periods))
 
 
-def mean_spectrum(samples: FloatArray, periods: Periods) -> ComplexArray:
+def compute_mean_spectrum(samples: FloatArray, periods: Periods) -> ComplexArray:
     """(lines, channels): spectrum of the mean period."""
-    return np.asarray(line_spectra(period_samples(samples, periods).mean(axis=0, keepdims=True))[0])
+    return np.asarray(compute_line_spectra(stack_periods(samples, periods).mean(axis=0, keepdims=True))[0])
 
 
 def _is_complete(recording: Recording, start: int, length: int) -> bool:
@@ -86,8 +89,8 @@ def _is_complete(recording: Recording, start: int, length: int) -> bool:
 
 
 def _drop_transients(recording: Recording, starts: list[int], length: int) -> list[int]:
-    """The periods after the transient: leading periods are dropped, except for the last two, while their difference
-    from the last period decays within a period (`_TRANSIENT_RATIO`)."""
+    """Return the starts of the periods after the transient: leading periods are dropped, except for the last two, while
+    their difference from the last period decays within a period (`_TRANSIENT_RATIO`)."""
     samples, third = recording.response.samples, length // 3
     while len(starts) > 2:
         difference = samples[starts[0] : starts[0] + length] - samples[starts[-1] : starts[-1] + length]

@@ -17,7 +17,7 @@ from equalizer.identification.frequency_response.noise_floor import (
     smooth_over_lines,
 )
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray, runs_of
+from equalizer.signals.signal import FloatArray, find_runs
 from equalizer.signals.spectral_density import hann
 
 _LEAST_SAMPLES = 8
@@ -111,4 +111,4 @@ def quiet_band_noise(
 
 def _find_longest_run(samples: FloatArray) -> tuple[int, int]:
     """Start and stop of the longest stretch without a gap: edges of a filled gap would add power at all frequencies."""
-    return max(runs_of(np.asarray(np.isfinite(samples).all(axis=1))), key=lambda run: run[1] - run[0], default=(0, 0))
+    return max(find_runs(np.asarray(np.isfinite(samples).all(axis=1))), key=lambda run: run[1] - run[0], default=(0, 0))

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import fdtri
 
 from analysis.diagnosis.noise.channel_noise import ChannelNoise, SegmentNoise
-from analysis.diagnosis.noise.periods import Periods, period_samples, period_spectra
+from analysis.diagnosis.noise.periods import Periods, compute_period_spectra, stack_periods
 from analysis.diagnosis.noise.quiet_noise import fast_noise_at_rest
 from analysis.diagnosis.noise.rounding import rounding_step, undo_rounding
 from analysis.diagnosis.types import Mask
@@ -98,9 +98,9 @@ def count_equal_lines(density: FloatArray) -> FloatArray:
 def _estimate_spread(
     recording: Recording, samples: FloatArray, periods: Periods, lines_hz: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    density = period_variance(period_spectra(samples, periods)) * periods.length
+    density = period_variance(compute_period_spectra(samples, periods)) * periods.length
     freedom = 2 * (periods.count - 1) * count_equal_lines(smooth_over_lines(density, _SMOOTHED_LINES))
-    period_lines_hz = periods.frequency_hz(recording.sample_rate_hz)
+    period_lines_hz = periods.compute_line_frequencies(recording.sample_rate_hz)
     if len(period_lines_hz) != len(lines_hz):
         density = np.stack([np.interp(lines_hz, period_lines_hz, channel) for channel in density.T], axis=1)
     return density, freedom
@@ -110,7 +110,7 @@ def _find_moving_channels(samples: FloatArray, periods: Sequence[Periods]) -> Ma
     """(segments, channels): whether a channel moves over its rounding steps; True for all where it never does."""
     steps = np.array([rounding_step(channel) for channel in samples.T])
     is_moving = np.array(
-        [period_samples(samples, period).std(axis=(0, 1)) >= _LEAST_STEPS * steps for period in periods]
+        [stack_periods(samples, period).std(axis=(0, 1)) >= _LEAST_STEPS * steps for period in periods]
     )
     return np.asarray(is_moving | ~is_moving.any(axis=0), dtype=np.bool_)
 

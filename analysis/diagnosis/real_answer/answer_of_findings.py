@@ -1,14 +1,14 @@
-"""The findings on one real recording as plain values."""
+"""Converts the findings on one real recording to the document `RealAnswer`; called by `diagnose_real`."""
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from analysis.diagnosis.effect_words import parameters_text
+from analysis.diagnosis.effect_words import format_parameters
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.localisation.localisation_words import localisation_sentences
+from analysis.diagnosis.localisation.localisation_words import write_localisation_sentences
 from analysis.diagnosis.real_answer.real_answer import DrawnExcerpt, HeldOutStretch, OwnParameter, RealAnswer
-from analysis.diagnosis.result.candidate_wording import candidate_sentences
+from analysis.diagnosis.result.candidate_wording import describe_candidates
 from analysis.diagnosis.result.findings import Findings, TimeSeries
 from analysis.diagnosis.result.wording import (
     describe_equivalents,
@@ -26,14 +26,15 @@ _HALF_WIDTH_95 = 1.96
 """Standard errors of half a 95 % interval (normal distribution)."""
 
 
-def answer_of_findings(
+def make_real_answer(
     findings: Findings,
     recording: Recording,
     names: tuple[str, str, str],
     nominal: Mapping[str, float],
 ) -> RealAnswer:
-    """The answer to a real recording from the findings of its diagnosis. names: of folder, recording and what it is.
-    What only the caller knows (further tests, a pair, objections, the time it took) is left empty."""
+    """Make the document of a real recording from the findings of its diagnosis. names: folder, recording, title.
+    nominal: parameters known by other means, in SI (see `list_own_parameters`). What only the caller knows (further
+    tests, a pair, objections, the time it took) is left empty."""
     diagnosis, box = findings.diagnosis, findings.black_box
     folder, recording_name, title = names
     return RealAnswer(
@@ -43,38 +44,38 @@ def answer_of_findings(
         device=recording.device,
         verdict=diagnosis.verdict,
         answer=write_answer(findings),
-        model=model_sentence(findings),
+        model=describe_model(findings),
         error=diagnosis.error,
         fitted=diagnosis.fit.fit,
         held_out=diagnosis.fit.test,
         black_box=None if box is None or not np.isfinite(box.test_error) else box.test_error,
-        where=localisation_sentences(findings.localisation) if findings.maps else (),
-        named=describe_named(findings),
+        where=write_localisation_sentences(findings.localisation) if findings.maps else (),
+        named=describe_named_effects(findings),
         effects=tuple(effect.effect for effect in diagnosis.effects),
         left=describe_remainder(diagnosis, extract_device(findings)),
         remarks=findings.remarks,
-        numbers=own_parameters(findings, nominal),
-        stretches=held_out_stretches(findings.time_series),
-        excerpt=drawn_excerpt(findings.time_series),
+        numbers=list_own_parameters(findings, nominal),
+        stretches=list_held_out_stretches(findings.time_series),
+        excerpt=select_excerpt(findings.time_series),
         further=(),
         pair=None,
         objections=(),
         seconds=0.0,
         candidates=diagnosis.candidates,
-        not_confirmed=candidate_sentences(diagnosis, extract_device(findings)),
+        not_confirmed=describe_candidates(diagnosis, extract_device(findings)),
     )
 
 
-def describe_named(findings: Findings) -> tuple[str, ...]:
-    """Each effect with its parameters, and what these data cannot tell from it."""
-    single = findings.given.inputs == 1
+def describe_named_effects(findings: Findings) -> tuple[str, ...]:
+    """Describe each named effect: its parameters, and the effects that these data cannot distinguish from it."""
+    is_single_axis = findings.given.inputs == 1
     return tuple(
         " ".join(
             filter(
                 None,
                 (
-                    f"{capitalise(format_effect_title(effect, single))}, "
-                    f"{parameters_text(effect.effect, effect.parameters)}.",
+                    f"{capitalise(format_effect_title(effect, is_single_axis))}, "
+                    f"{format_parameters(effect.effect, effect.parameters)}.",
                     describe_equivalents(effect),
                 ),
             )
@@ -83,8 +84,9 @@ def describe_named(findings: Findings) -> tuple[str, ...]:
     )
 
 
-def model_sentence(findings: Findings) -> str:
-    """Sentence on the given model: its name, numbers of coordinates, commands and responses, and quantity."""
+def describe_model(findings: Findings) -> str:
+    """Describe the given model in a sentence: its name, numbers of coordinates, commands and responses, and
+    quantity."""
     model = findings.given
     bodies = "one body" if model.coordinates == 1 else f"{model.coordinates} bodies or modes"
     commands = "one command" if model.inputs == 1 else f"{model.inputs} commands"
@@ -92,29 +94,31 @@ def model_sentence(findings: Findings) -> str:
     return f"{capitalise(model.name)}: linear, {bodies}, {commands}, {responses} ({model.quantity})."
 
 
-def held_out_stretches(time_series: Sequence[TimeSeries]) -> tuple[HeldOutStretch, ...]:
-    """Each held-out stretch by channel, with its times in s and three rms values: of the signal about its mean, and of
-    the errors of the re-tuned and the completed model. Stretches without finite values are left out."""
+def list_held_out_stretches(time_series: Sequence[TimeSeries]) -> tuple[HeldOutStretch, ...]:
+    """List the held-out stretches by channel, with its times in s and three rms values: of the signal about its mean,
+    and of the errors of the re-tuned and the completed model. Stretches without finite values are left out."""
     stretches = []
     for series in time_series:
         for start, stop in series.tested:
             samples = slice(start, stop)
-            for c, channel in enumerate(series.channels):
-                measured = series.measured[samples, c]
+            for channel_index, channel in enumerate(series.channels):
+                measured = series.measured[samples, channel_index]
                 is_measured = np.isfinite(measured)
                 if not is_measured.any():
                     continue
-                sizes = [
+                rms_values = [
                     float(np.sqrt(np.mean((measured - reference)[is_measured] ** 2)))
                     for reference in (
                         measured[is_measured].mean(),
-                        series.retuned[samples, c],
-                        series.after[samples, c],
+                        series.retuned[samples, channel_index],
+                        series.after[samples, channel_index],
                     )
                 ]
-                times = start / series.sample_rate_hz, stop / series.sample_rate_hz
-                if np.isfinite(sizes).all():
-                    stretches.append(HeldOutStretch(series.name, channel, series.units[c], *times, *sizes))
+                times_s = start / series.sample_rate_hz, stop / series.sample_rate_hz
+                if np.isfinite(rms_values).all():
+                    stretches.append(
+                        HeldOutStretch(series.name, channel, series.units[channel_index], *times_s, *rms_values)
+                    )
     return tuple(stretches)
 
 
@@ -122,36 +126,47 @@ EXCERPT_SAMPLES = 900
 """Samples of an excerpt, around where re-tuned and final prediction differ most."""
 
 
-def drawn_excerpt(time_series: Sequence[TimeSeries]) -> DrawnExcerpt | None:
-    """At most `EXCERPT_SAMPLES` held-out samples of a channel, about where the completed model departs most from the
-    re-tuned model; None without held-out data."""
-    stretches = [(series, *ends) for series in time_series for ends in series.tested]
+def select_excerpt(time_series: Sequence[TimeSeries]) -> DrawnExcerpt | None:
+    """Select at most `EXCERPT_SAMPLES` held-out samples of a channel, about where the completed model departs most from
+    the re-tuned model; None without held-out data."""
+    stretches = [(series, *bounds) for series in time_series for bounds in series.tested]
     if not stretches:
         return None
-    series, first, last = max(stretches, key=lambda stretch: float(_change(*stretch).max(initial=0.0)))
-    change = _change(series, first, last)
-    peak_index, c = divmod(int(np.argmax(change)), change.shape[1])
-    start = max(min(first + peak_index - EXCERPT_SAMPLES // 2, last - EXCERPT_SAMPLES), first)
-    samples = slice(start, min(start + EXCERPT_SAMPLES, last))
-    measured, retuned, after = (
-        tuple(np.nan_to_num(values_of[samples, c]).tolist())
-        for values_of in (series.measured, series.retuned, series.after)
+    series, first_sample, end_sample = max(
+        stretches, key=lambda stretch: float(_compute_relative_change(*stretch).max(initial=0.0))
+    )
+    relative_change = _compute_relative_change(series, first_sample, end_sample)
+    peak_index, channel_index = divmod(int(np.argmax(relative_change)), relative_change.shape[1])
+    start = max(min(first_sample + peak_index - EXCERPT_SAMPLES // 2, end_sample - EXCERPT_SAMPLES), first_sample)
+    samples = slice(start, min(start + EXCERPT_SAMPLES, end_sample))
+    measured, retuned, completed = (
+        tuple(np.nan_to_num(signal[samples, channel_index]).tolist())
+        for signal in (series.measured, series.retuned, series.after)
     )
     step_s = 1 / series.sample_rate_hz
     return DrawnExcerpt(
-        series.name, series.channels[c], series.units[c], start * step_s, step_s, measured, retuned, after
+        series.name,
+        series.channels[channel_index],
+        series.units[channel_index],
+        start * step_s,
+        step_s,
+        measured,
+        retuned,
+        completed,
     )
 
 
-def _change(series: TimeSeries, start: int, stop: int) -> FloatArray:
-    """(samples, c): how far the found effects move the prediction, as a share of the channel's rms."""
-    size = np.maximum(np.nanstd(series.measured, axis=0), np.finfo(float).tiny)
-    return np.asarray(np.nan_to_num(np.abs(series.retuned - series.after)[start:stop] / size))
+def _compute_relative_change(series: TimeSeries, start: int, stop: int) -> FloatArray:
+    """(samples, c): change of the prediction by the named effects, relative to the channel's standard deviation; 0
+    where not finite. start, stop: samples."""
+    channel_rms = np.maximum(np.nanstd(series.measured, axis=0), np.finfo(float).tiny)
+    return np.asarray(np.nan_to_num(np.abs(series.retuned - series.after)[start:stop] / channel_rms))
 
 
-def own_parameters(findings: Findings, nominal: Mapping[str, float]) -> tuple[OwnParameter, ...]:
-    """Mass, damping and stiffness of the re-tuned model with their 95 % intervals, where it has one body; else empty.
-    nominal: values known by other means, by these words, in SI.
+def list_own_parameters(findings: Findings, nominal: Mapping[str, float]) -> tuple[OwnParameter, ...]:
+    """List mass, damping and stiffness of the re-tuned model with 95 % intervals, where it has one coordinate; else
+    empty, as where band powers were compared or errors are not known. nominal: values known by other means, in SI, by
+    "mass", "damping" and "stiffness".
 
     The intervals are those at the end of the search, on the samples that were fitted. Where the residual exceeds the
     noise they are widened by the ratio of both in the worst channel: a slightly wrong law shifts the other parameters.
@@ -164,26 +179,29 @@ def own_parameters(findings: Findings, nominal: Mapping[str, float]) -> tuple[Ow
         or findings.own_errors is None
     ):
         return ()
-    after = findings.explanation.after
-    error_ratio = max(after.score.worst_channel, 1.0)
-    return _parameters(
-        tuning, model, tuning.values(after.fitted.deviations), findings.own_errors * error_ratio, nominal
+    final_candidate = findings.explanation.after
+    error_ratio = max(final_candidate.score.worst_channel, 1.0)
+    return _compare_parameters(
+        tuning, model, tuning.to_changes(final_candidate.fitted.deviations), findings.own_errors * error_ratio, nominal
     )
 
 
-def _parameters(
+def _compare_parameters(
     tuning: Tuning, model: MechanicalModel, changes: FloatArray, errors: FloatArray, nominal: Mapping[str, float]
 ) -> tuple[OwnParameter, ...]:
+    """Compare mass, damping and stiffness with their nominal values. changes: added to the model's values by re-tuning;
+    errors: standard errors; each (parameters,), in `tuning.units`."""
     nominal_values = (model.mass[0, 0], model.damping[0, 0], model.stiffness[0, 0])
     names = ("mass", "damping", "stiffness")
     rows = zip(names, nominal_values, tuning.units, changes, errors, strict=False)
     return tuple(
-        _compare_parameter(name, unit, float(start + change), float(error), nominal)
-        for name, start, unit, change, error in rows
+        _compare_parameter(name, unit, float(initial_value + change), float(error), nominal)
+        for name, initial_value, unit, change, error in rows
     )
 
 
 def _compare_parameter(name: str, unit: str, value: float, error: float, nominal: Mapping[str, float]) -> OwnParameter:
+    """Return a parameter with its 95 % interval, None where the standard error is not finite, and its nominal value."""
     half_width = _HALF_WIDTH_95 * error
     has_interval = bool(np.isfinite(half_width))
     return OwnParameter(

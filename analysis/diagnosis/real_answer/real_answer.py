@@ -1,6 +1,6 @@
 """Document of the diagnosis of one real recording, format `hapteq-real-answer`, version 1: the values of a row of the
-table of real recordings, and of its section in the report. Made by `answer_of_findings`; field names are those of the
-file."""
+table of real recordings, and of its section in the report. Made by `answer_of_findings`, read by `real_report` and
+`real_summary`; field names are those of the file."""
 
 import json
 from dataclasses import asdict
@@ -32,8 +32,11 @@ class HeldOutStretch:
     start_s: float
     stop_s: float
     signal: float
+    """Rms of the signal about its mean."""
     retuned: float
+    """Rms error of the re-tuned model."""
     after: float
+    """Rms error of the model with the named effects."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -44,7 +47,9 @@ class OwnParameter:
     unit: str
     value: float
     low: float | None
+    """Lower end of the 95 % interval; None = not known."""
     high: float | None
+    """Upper end of the 95 % interval."""
     nominal: float | None
     """The value known by other means; None = not known."""
 
@@ -63,11 +68,15 @@ class FurtherTest:
     recording: str
     title: str
     error: str
+    """Name of the error measure."""
     retuned: float | None
+    """Error of the re-tuned model; None = not computed."""
     after: float | None
+    """Error of the model with the named effects; None = not computed."""
     stretches: tuple[HeldOutStretch, ...] = ()
     """The whole recording of each channel, where responses were compared."""
     problem: str = ""
+    """Why the recording could not be predicted; else empty."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -85,18 +94,18 @@ class PairOutcome:
     as_before: float | None
     """Error of the model fitted to the recording from before, unchanged."""
     gain: float | None
-    """Error of that model with one gain factor re-tuned."""
+    """Error of the model from before with one gain factor re-tuned."""
     retuned: float | None
-    """Error of that model re-tuned within its tolerances."""
+    """Error of the model from before, re-tuned within its tolerances."""
     with_effects: float | None
     """Error of the re-tuned model with the named effects."""
     expected_left: float | None
-    """Error of that model on the recording from before: expected as the remaining error."""
+    """Error of the model from before on the recording from before: the error expected to remain."""
 
 
 @dataclass(frozen=True, config=STRICT)
 class DrawnExcerpt:
-    """A held-out stretch that shows the effects found."""
+    """A held-out stretch in which the named effects change the prediction most; samples in `unit`."""
 
     record: str
     channel: str
@@ -126,21 +135,25 @@ class RealAnswer:
     fitted: Errors | None
     held_out: Errors | None
     black_box: float | None
+    """Held-out error of the black box; None = not computed."""
     where: tuple[str, ...]
     """Sentences on where the mismatch occurs."""
     named: tuple[str, ...]
+    """Sentences on the named effects, with their parameters."""
     effects: tuple[str, ...]
-    """Names of the vocabulary."""
+    """Names of these effects in the vocabulary."""
     left: str
     """Sentence on the unexplained remainder."""
     remarks: tuple[str, ...]
     numbers: tuple[OwnParameter, ...]
+    """Mass, damping and stiffness of the simple model."""
     stretches: tuple[HeldOutStretch, ...]
     excerpt: DrawnExcerpt | None
     further: tuple[FurtherTest, ...]
     pair: PairOutcome | None
     objections: tuple[str, ...]
     seconds: float
+    """Duration of the diagnosis."""
     candidates: tuple[Candidate, ...] = ()
     """Best candidates that were not confirmed, in descending order."""
     not_confirmed: tuple[str, ...] = ()
@@ -148,12 +161,13 @@ class RealAnswer:
 
 
 def real_answer_to_json(answer: RealAnswer) -> dict[str, Any]:
-    """Plain values, without format and version."""
+    """Convert the document to plain values for JSON, without format and version."""
     return asdict(answer)
 
 
 def real_answer_from_json(document: dict[str, Any]) -> RealAnswer:
-    """Parse the document of an answer. document: without format and version. Raises RealAnswerError."""
+    """Parse the document of an answer. document: plain values without format and version. Raises RealAnswerError
+    with a sentence per problem that begins with its place in the document."""
     try:
         return _ADAPTER.validate_json(json.dumps(document), strict=True)
     except ValidationError as error:
@@ -161,8 +175,8 @@ def real_answer_from_json(document: dict[str, Any]) -> RealAnswer:
         raise RealAnswerError(problems) from error
 
 
-def real_answer_schema() -> dict[str, Any]:
-    """JSON Schema of what `real_answer_to_json` gives."""
+def make_real_answer_schema() -> dict[str, Any]:
+    """Return the JSON Schema of the values that `real_answer_to_json` returns."""
     return _ADAPTER.json_schema(mode="serialization")
 
 

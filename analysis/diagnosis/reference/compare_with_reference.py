@@ -18,7 +18,7 @@ from analysis.diagnosis.contrast.rank_faults import rank_faults
 from analysis.diagnosis.contrast.signal_faults import SignalFault, find_hum, find_quantization, find_sensor_noise
 from analysis.diagnosis.errors.choose_measure import MeasureChoice
 from analysis.diagnosis.errors.hypothesis import Hypothesis
-from analysis.diagnosis.errors.prediction_error import prediction_error
+from analysis.diagnosis.errors.prediction_error import compute_prediction_error
 from analysis.diagnosis.reference.model_free_faults import find_sensor_faults
 from analysis.diagnosis.search.search import HUM
 from analysis.diagnosis.types import TimeBudget
@@ -125,7 +125,7 @@ def find_contrast(
 def predicts_clean(model: MechanicalModel, clean: Sequence[Recording]) -> bool:
     """Whether the model, without re-tuning, predicts every clean recording with a relative error of at most
     `LARGEST_CLEAN_ERROR`."""
-    errors = [prediction_error(recording, model, "all").without_gain for recording in clean]
+    errors = [compute_prediction_error(recording, model, "all").without_gain for recording in clean]
     return all(error is not None and error <= LARGEST_CLEAN_ERROR for error in errors)
 
 

@@ -1,9 +1,10 @@
 """Model error learned from clean recordings: the residual of the re-tuned model, which then counts as noise.
 
-A linear model is never exact. What it leaves on recordings of the intact device is no evidence for a missing effect. It
-is learned in two forms: its share of the signal by channel, input and octave (the floor of the mismatch map), and its
-spectrum, as the filter that whitens it (an AR(p) model, `fit_whitening_filter`). In the diagnosed recordings residuals
-pass through this filter, and their noise is the whitened residual's rms, scaled with the signal.
+A linear model is never exact: its residual on recordings of the intact device is no evidence for a missing effect.
+Called by `search_by_simulation` and `diagnose` where clean recordings are given. The residual is learned in two forms:
+its share of the signal by channel, input and octave (the floor of the mismatch map), and its spectrum, as the filter
+that whitens it (an AR(p) model, `fit_whitening_filter`). In the diagnosed recordings residuals pass through this
+filter, and their noise level is the whitened residual's rms, scaled with the signal.
 """
 
 from collections.abc import Sequence
@@ -11,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.errors.choose_measure import MeasureChoice, measure_of
+from analysis.diagnosis.errors.choose_measure import MeasureChoice, make_measure
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.tuning import Tuning, tuning_of
+from analysis.diagnosis.errors.tuning import Tuning, make_tuning
 from analysis.diagnosis.errors.whitened_measure import (
     WhitenedMeasure,
     WhiteningFilter,
@@ -31,7 +32,7 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-LEARNING = "learning from the clean recordings"
+LEARNING_STEP = "learning from the clean recordings"
 LEARNED_AT = 0.02
 """Progress (share of the whole diagnosis) at the end of learning."""
 
@@ -57,7 +58,8 @@ class _RetunedFit:
 
     @property
     def signal(self) -> FloatArray:
-        return _signal(self.measure, self.retuned.fitted.residuals)
+        """(c,): signal level, see `_compute_signal_level`."""
+        return _compute_signal_level(self.measure, self.retuned.fitted.residuals)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,111 +69,119 @@ class LearnedError:
     floor: CleanFloor
     whitening: WhiteningFilter
     share: FloatArray
-    """(c,): rms of the whitened residual over the signal's; see `_signal`."""
+    """(c,): rms of the whitened residual over the signal's; see `_compute_signal_level`."""
     references: ReferenceRecordings
 
-    def noise_measure(self, measure: ErrorMeasure, model: MechanicalModel) -> WhitenedMeasure:
-        """The error measure of the recordings to diagnose, with this residual as coloured noise."""
-        return whiten_measure(measure, self.whitening, self.share * _signal(measure, measure.residuals(model, ())))
+    def make_noise_measure(self, measure: ErrorMeasure, model: MechanicalModel) -> WhitenedMeasure:
+        """Return the error measure of the recordings to diagnose, with this residual as coloured noise."""
+        return whiten_measure(
+            measure, self.whitening, self.share * _compute_signal_level(measure, measure.residuals(model, ()))
+        )
 
 
 def learn_model_error(
     clean: Sequence[Recording], model: MechanicalModel, diagnosed: Sequence[Recording], map_: Mapper, progress: Progress
 ) -> LearnedError:
-    """The residual spectrum of the re-tuned model on clean recordings, as noise for the search. clean: of the same
-    device, alike in channels and units; the model is re-tuned to each separately, because recordings of different days
-    differ. diagnosed: the recordings to diagnose, with the same measure. Raises NothingLearned where that cannot be."""
-    error = measure_of(diagnosed, model, clean).measure.name
+    """Learn the residual spectrum of the re-tuned model on clean recordings, as noise for the search. clean: of the
+    same device, alike in channels and units; the model is re-tuned to each separately, because recordings of different
+    days differ. diagnosed: the recordings to diagnose, with the same measure. Raises NothingLearned where the measures
+    differ."""
+    measure_name = make_measure(diagnosed, model, clean).measure.name
     fits: list[_RetunedFit] = []
     for number, recording in enumerate(clean):
-        progress(LEARNING, LEARNED_AT * number / len(clean))
-        chosen = measure_of((recording,), model, (*diagnosed, *clean))
-        require_same_measure(chosen.measure.name, error)
+        progress(LEARNING_STEP, LEARNED_AT * number / len(clean))
+        chosen = make_measure((recording,), model, (*diagnosed, *clean))
+        require_same_measure(chosen.measure.name, measure_name)
         fits.append(_learn_from_recording(chosen, model, recording, map_))
     floor = learn_floor([fit.cells for fit in fits])
-    largest = np.max([fit.channels for fit in fits], axis=0)
-    floor = replace(floor, error=error, recordings=len(clean), channels=tuple(largest.tolist()))
+    largest_shares = np.max([fit.channels for fit in fits], axis=0)
+    floor = replace(floor, error=measure_name, recordings=len(clean), channels=tuple(largest_shares.tolist()))
     return _learn_spectrum(floor, fits, map_)
 
 
 def learn_model_floor(
     clean: Sequence[Recording], model: MechanicalModel, diagnosed: Sequence[Recording], map_: Mapper, progress: Progress
 ) -> CleanFloor:
-    """The floor of `learn_model_error`; an empty one where the clean recordings cannot be compared."""
+    """Return only the floor of `learn_model_error`; an empty one where the clean recordings cannot be compared."""
     try:
         return learn_model_error(clean, model, diagnosed, map_, progress).floor
     except (NothingLearned, np.linalg.LinAlgError):
         return CleanFloor()
 
 
-def require_same_measure(learned_by: str, error: str) -> None:
-    """Require that clean and diagnosed recordings have the same error measure. Raises NothingLearned."""
-    if learned_by != error:
+def require_same_measure(clean_measure: str, diagnosed_measure: str) -> None:
+    """Require that clean and diagnosed recordings have the same error measure, each given by its name. Raises
+    NothingLearned where they differ."""
+    if clean_measure != diagnosed_measure:
         raise NothingLearned(
-            f"the clean recordings can only be compared by {learned_by}, those to diagnose by {error}, so their "
-            "errors are not comparable; give clean recordings that were made in the same way"
+            f"the clean recordings can only be compared by {clean_measure}, those to diagnose by {diagnosed_measure}, "
+            "so their errors are not comparable; give clean recordings that were made in the same way"
         )
 
 
 def _learn_spectrum(floor: CleanFloor, fits: Sequence[_RetunedFit], map_: Mapper) -> LearnedError:
-    """The whitening filter of all residuals, the whitened residual's share of the signal (the largest of all
-    recordings), and the clean recordings as references."""
+    """Fit the whitening filter of all residuals, and compute the whitened residual's share of the signal (the largest
+    of all recordings) and the clean recordings as references."""
     residuals = [record_residual for fit in fits for record_residual in fit.residuals]
     whitening = fit_whitening_filter(residuals, np.min([fit.measure.noise for fit in fits], axis=0))
     shares = [
-        _rms([whitening.apply(residual) for residual in fit.residuals])
-        / _signal(fit.measure, fit.retuned.fitted.residuals)
+        _compute_rms([whitening.apply(residual) for residual in fit.residuals])
+        / _compute_signal_level(fit.measure, fit.retuned.fitted.residuals)
         for fit in fits
     ]
     share = np.max(shares, axis=0)
-    learned = [
+    references = [
         prepare_reference_recording(
-            whiten_measure(count_as_noise(fit.measure, floor), whitening, share * fit.signal),
+            whiten_measure(add_learned_noise(fit.measure, floor), whitening, share * fit.signal),
             fit.tuning,
             fit.retuned.fitted.deviations,
             map_,
         )
         for fit in fits
     ]
-    return LearnedError(floor, whitening, share, ReferenceRecordings(tuple(learned), floor.beyond))
+    return LearnedError(floor, whitening, share, ReferenceRecordings(tuple(references), floor.beyond))
 
 
-def _signal(measure: ErrorMeasure, residuals: Sequence[FloatArray]) -> FloatArray:
+def _compute_signal_level(measure: ErrorMeasure, residuals: Sequence[FloatArray]) -> FloatArray:
     """(c,): standard deviation of the measured or the predicted signal, the smaller of both, so that neither hum and
     drift nor a bad model increases it."""
     measured = [record.measured for record in measure.records]
-    predicted = [channels - residual * measure.unit for channels, residual in zip(measured, residuals, strict=True)]
-    sizes = [np.nanstd(np.vstack(series), axis=0) for series in (measured, predicted)]
-    return np.asarray(np.maximum(np.fmin(*sizes), np.finfo(float).tiny))
+    predicted = [samples - residual * measure.unit for samples, residual in zip(measured, residuals, strict=True)]
+    channel_levels = [np.nanstd(np.vstack(signals), axis=0) for signals in (measured, predicted)]
+    return np.asarray(np.maximum(np.fmin(*channel_levels), np.finfo(float).tiny))
 
 
-def _rms(residuals: Sequence[FloatArray]) -> FloatArray:
+def _compute_rms(residuals: Sequence[FloatArray]) -> FloatArray:
+    """(c,): rms over the samples of all records; NaN is left out. residuals: (n, c) each."""
     return np.asarray(np.sqrt(np.nanmean(np.vstack(residuals) ** 2, axis=0)))
 
 
 def _learn_from_recording(
     chosen: MeasureChoice, model: MechanicalModel, recording: Recording, map_: Mapper
 ) -> _RetunedFit:
-    full_measure, tuning = chosen.measure, tuning_of(model, recording.command.channels)
+    """Re-tune the model to one clean recording, and compute its mismatch cells and residual shares."""
+    full_measure, tuning = chosen.measure, make_tuning(model, recording.command.channels)
     context = SearchContext(full_measure.shorten(), full_measure, tuning, map_)
-    retuned = context.with_test_score(context.candidate(retune_alone(context)))
+    retuned = context.with_test_score(context.score_fit(retune_alone(context)))
     cells = compute_cells(full_measure, retuned.fitted, chosen.floors)
-    return _RetunedFit(full_measure, tuning, retuned, cells, _channel_shares(full_measure, retuned))
+    return _RetunedFit(full_measure, tuning, retuned, cells, _compute_channel_shares(full_measure, retuned))
 
 
-def _channel_shares(measure: ErrorMeasure, retuned: FittedCandidate) -> FloatArray:
+def _compute_channel_shares(measure: ErrorMeasure, retuned: FittedCandidate) -> FloatArray:
     """(c,): rms of the residual above the noise over the rms of the signal, the largest over the samples to fit, to
     choose and to test by: sqrt(score² - 1) noise / signal, where the score is rms residual over rms noise."""
     score = retuned.score
-    worst = np.nanmax(np.maximum([score.fit, score.choose, score.test], 1.0), axis=0)
-    return np.asarray(np.sqrt(worst**2 - 1) * measure.noise / np.maximum(_size(measure), np.finfo(float).tiny))
+    worst_score = np.nanmax(np.maximum([score.fit, score.choose, score.test], 1.0), axis=0)
+    return np.asarray(
+        np.sqrt(worst_score**2 - 1) * measure.noise / np.maximum(_compute_signal_rms(measure), np.finfo(float).tiny)
+    )
 
 
-def count_as_noise(measure: ErrorMeasure, floor: CleanFloor) -> ErrorMeasure:
-    """The measure with the learned residual counted as noise."""
-    return measure.with_floor(np.array(floor.channels) * _size(measure)) if floor.channels else measure
+def add_learned_noise(measure: ErrorMeasure, floor: CleanFloor) -> ErrorMeasure:
+    """Return the measure with the learned residual counted as noise; unchanged without a learned share per channel."""
+    return measure.with_floor(np.array(floor.channels) * _compute_signal_rms(measure)) if floor.channels else measure
 
 
-def _size(measure: ErrorMeasure) -> FloatArray:
-    """(c,): rms of the signal."""
+def _compute_signal_rms(measure: ErrorMeasure) -> FloatArray:
+    """(c,): standard deviation of the measured signal, in the channel's unit."""
     return np.asarray(np.nanstd(np.vstack([record.measured for record in measure.records]), axis=0))

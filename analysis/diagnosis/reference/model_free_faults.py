@@ -1,14 +1,15 @@
 """Detection of sensor faults without a model: quantization, clipping (saturation), lost samples (repeated readings).
 
 A healthy device also repeats readings and has a largest one. Reference recordings of the device without the fault
-therefore give the usual count of such readings, which a fault must exceed significantly (`_is_unusual`).
+therefore give the usual count of such readings, which a fault must exceed significantly (`_is_unusual`). Called by
+`search_by_simulation` and `compare_with_reference`, where reference recordings are given.
 """
 
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, Spread, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, Spread, make_claim_hypothesis
 from analysis.diagnosis.settings import READINGS_DEVIATIONS, READINGS_FACTOR, READINGS_LEAST, STEP_FACTOR
 from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import Effect, Values
@@ -16,39 +17,39 @@ from equalizer.effects.starts.lattice import confirm_lattice_step, lattice_step
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-EQUAL_STEPS = 1e-3
+STEP_TOLERANCE = 1e-3
 """Relative difference of the quantization steps of two channels up to which they count as equal."""
-LONG_RUNS = 2.0
+LONGEST_MEAN_RUN = 2.0
 """Largest mean length in samples of runs of repeats that are taken for lost samples, as with half of all samples lost
 at random: longer runs are backlash, or a sensor at rest."""
 FULL_STEP_SHARE = 0.75
 """Least median step after a repeat, relative to the median of the other steps: after backlash it is half of that or
 less."""
-STRETCHES = 3
+STRETCH_COUNT = 3
 """Number of stretches into which each reference recording is divided: the largest share of any stretch is usual."""
-EQUAL_READINGS = 1e-9
+READING_TOLERANCE = 1e-9
 """Relative difference up to which readings count as equal to a limit."""
 
 
 def find_sensor_faults(
     recordings: Sequence[Recording], clean: Sequence[Recording], effects: Sequence[Effect]
 ) -> tuple[Hypothesis, ...]:
-    """The first fault of quantization, clipping and lost samples that is found: at most one hypothesis, because
+    """Find the first fault of quantization, clipping and lost samples, in this order: at most one hypothesis, because
     quantized readings also repeat and accumulate at the largest value. clean: reference recordings, at least one;
-    effects: those that may be named."""
+    effects: those that may be named. Empty where the fault found first is not among them."""
     effects_by_name = {effect.name: effect for effect in effects}
-    readings = _readings(recordings)
+    readings = _stack_readings(recordings)
     references = [
-        part for recording in clean for part in np.array_split(_readings([recording]), STRETCHES) if len(part)
+        part for recording in clean for part in np.array_split(_stack_readings([recording]), STRETCH_COUNT) if len(part)
     ]
     for name, detect in (
-        ("quantization", _quantization),
+        ("quantization", _find_quantization),
         ("sensor_clipping", _find_clipping),
-        ("lost_samples", _lost_samples),
+        ("lost_samples", _find_lost_samples),
     ):
         fault = detect(readings, references)
         if fault is not None:
-            return (_hypothesis_of(effects_by_name[name], *fault),) if name in effects_by_name else ()
+            return (_make_hypothesis(effects_by_name[name], *fault),) if name in effects_by_name else ()
     return ()
 
 
@@ -56,127 +57,133 @@ ChannelFault = tuple[tuple[int, ...], Values]
 """Channels, and the parameters of their fault."""
 
 
-def _hypothesis_of(effect: Effect, channels: tuple[int, ...], values: Values) -> Hypothesis:
-    """The hypothesis that these channels have the fault, with the same values."""
+def _make_hypothesis(effect: Effect, channels: tuple[int, ...], values: Values) -> Hypothesis:
+    """Make the hypothesis that these channels have the fault, with the same values."""
     spread: Spread = "all" if len(channels) > 1 else "one"
-    return hypothesis_of_claim(Claim(effect, spread, channels), [values])
+    return make_claim_hypothesis(Claim(effect, spread, channels), [values])
 
 
-def _readings(recordings: Sequence[Recording]) -> FloatArray:
+def _stack_readings(recordings: Sequence[Recording]) -> FloatArray:
     """(n, p): responses of all recordings, one after another, without samples in which a channel is missing."""
     samples = np.vstack([recording.response.samples for recording in recordings])
     return np.asarray(samples[np.isfinite(samples).all(axis=1)])
 
 
-def _quantization(readings: FloatArray, references: Sequence[FloatArray]) -> ChannelFault | None:
-    """Quantization: readings lie on a lattice whose step is more than `STEP_FACTOR` times that of every reference."""
+def _find_quantization(readings: FloatArray, references: Sequence[FloatArray]) -> ChannelFault | None:
+    """Find quantization: readings lie on a lattice whose step is more than `STEP_FACTOR` times that of every
+    reference."""
     steps = {}
-    for c in range(readings.shape[1]):
-        step = lattice_step(readings[:, c])
+    for channel in range(readings.shape[1]):
+        step = lattice_step(readings[:, channel])
         if step is not None and all(
-            step > STEP_FACTOR * confirm_lattice_step(reference[:, c], step) for reference in references
+            step > STEP_FACTOR * confirm_lattice_step(reference[:, channel], step) for reference in references
         ):
-            steps[c] = step
-    equal_steps = bool(steps) and min(steps.values()) > (1 - EQUAL_STEPS) * max(steps.values())
+            steps[channel] = step
+    equal_steps = bool(steps) and min(steps.values()) > (1 - STEP_TOLERANCE) * max(steps.values())
     return _choose_channels(steps, equal_steps and len(steps) == readings.shape[1], readings.shape[1], "step")
 
 
 def _find_clipping(readings: FloatArray, references: Sequence[FloatArray]) -> ChannelFault | None:
-    """Clipping: significantly more readings at the largest magnitude than in the references, which exceed that
+    """Find clipping: significantly more readings at the largest magnitude than in the references, which exceed that
     magnitude, and no more repeats below it than usual."""
     limits = {}
-    for c in range(readings.shape[1]):
-        limit, count = _top_readings(readings[:, c])
-        usual_count = max(_top_readings(reference[:, c])[1] / len(reference) for reference in references) * len(
-            readings
-        )
-        largest_reference = max(float(np.abs(reference[:, c]).max()) for reference in references)
-        usual_repeats = max(_repeats_below_top(reference[:, c]) / len(reference) for reference in references) * len(
-            readings
-        )
+    for channel in range(readings.shape[1]):
+        limit, count = _count_top_readings(readings[:, channel])
+        usual_count = max(
+            _count_top_readings(reference[:, channel])[1] / len(reference) for reference in references
+        ) * len(readings)
+        largest_reference = max(float(np.abs(reference[:, channel]).max()) for reference in references)
+        usual_repeats = max(
+            _count_repeats_below_top(reference[:, channel]) / len(reference) for reference in references
+        ) * len(readings)
         if (
             limit < largest_reference
             and _is_unusual(count, usual_count)
-            and not _is_unusual(_repeats_below_top(readings[:, c]), usual_repeats)
+            and not _is_unusual(_count_repeats_below_top(readings[:, channel]), usual_repeats)
         ):
-            limits[c] = limit
-    all_clipped = bool(limits) and bool(np.all(np.abs(readings) <= max(limits.values()) * (1 + EQUAL_READINGS)))
+            limits[channel] = limit
+    all_clipped = bool(limits) and bool(np.all(np.abs(readings) <= max(limits.values()) * (1 + READING_TOLERANCE)))
     return _choose_channels(limits, all_clipped, readings.shape[1], "limit")
 
 
-def _repeats_below_top(values: FloatArray) -> int:
-    """Number of repeated readings below the largest magnitude of one channel: backlash holds readings at any level,
+def _count_repeats_below_top(values: FloatArray) -> int:
+    """Count the repeated readings below the largest magnitude of one channel: backlash holds readings at any level,
     clipping at the limit only."""
-    sizes = np.abs(values[1:])
-    return int(np.count_nonzero((np.diff(values) == 0) & (sizes < sizes.max() * (1 - EQUAL_READINGS))))
+    magnitudes = np.abs(values[1:])
+    return int(np.count_nonzero((np.diff(values) == 0) & (magnitudes < magnitudes.max() * (1 - READING_TOLERANCE))))
 
 
-def _top_readings(values: FloatArray) -> tuple[float, int]:
-    """The largest magnitude of one channel, and the number of readings there less the number at the next smaller
+def _count_top_readings(values: FloatArray) -> tuple[float, int]:
+    """Return the largest magnitude of one channel, and the number of readings there less the number at the next smaller
     magnitude."""
-    sizes = np.abs(values)
-    limit = float(sizes.max())
-    at_limit = sizes >= limit * (1 - EQUAL_READINGS)
-    smaller = sizes[~at_limit]
-    next_count = int(np.count_nonzero(smaller >= smaller.max() * (1 - EQUAL_READINGS))) if len(smaller) else 0
+    magnitudes = np.abs(values)
+    limit = float(magnitudes.max())
+    at_limit = magnitudes >= limit * (1 - READING_TOLERANCE)
+    smaller = magnitudes[~at_limit]
+    next_count = int(np.count_nonzero(smaller >= smaller.max() * (1 - READING_TOLERANCE))) if len(smaller) else 0
     return limit, int(np.count_nonzero(at_limit)) - next_count
 
 
-def _lost_samples(readings: FloatArray, references: Sequence[FloatArray]) -> ChannelFault | None:
-    """Lost samples: significantly more runs of repeats than in the references, short and followed by a full step. The
-    parameter is the share of lost samples. A sensor that rests for a while has not lost samples."""
-    repeated = _repeats(readings)
-    usual_count = max(float(_run_starts(_repeats(reference)).mean()) for reference in references) * len(repeated)
-    run_count = int(_run_starts(repeated).sum())
+def _find_lost_samples(readings: FloatArray, references: Sequence[FloatArray]) -> ChannelFault | None:
+    """Find lost samples: significantly more runs of repeats than in the references, short and followed by a full step.
+    The parameter is the share of lost samples. A sensor that rests for a while has not lost samples."""
+    repeated = _mark_repeats(readings)
+    usual_count = max(float(_mark_run_starts(_mark_repeats(reference)).mean()) for reference in references) * len(
+        repeated
+    )
+    run_count = int(_mark_run_starts(repeated).sum())
     if (
         not _is_unusual(run_count, usual_count)
-        or repeated.sum() > LONG_RUNS * run_count
-        or not _makes_full_steps(readings, repeated)
+        or repeated.sum() > LONGEST_MEAN_RUN * run_count
+        or not _has_full_steps(readings, repeated)
     ):
         return None
     fraction = (float(repeated.sum()) - usual_count) / len(repeated)
     return tuple(range(readings.shape[1])), {"fraction": fraction}
 
 
-def _makes_full_steps(values: FloatArray, repeated: Mask) -> bool:
-    """Whether the median step after a repeat is about as large as the other steps, as after lost samples; after
-    backlash it is smaller."""
-    sizes = np.abs(np.diff(values, axis=0)).sum(axis=1)[1:]
+def _has_full_steps(values: FloatArray, repeated: Mask) -> bool:
+    """Whether the median step after a repeat exceeds `FULL_STEP_SHARE` of the median of the other steps, as after lost
+    samples; after backlash it is smaller. True where either kind of step does not occur."""
+    step_sizes = np.abs(np.diff(values, axis=0)).sum(axis=1)[1:]
     follows_repeat = repeated[:-1] & ~repeated[1:]
     is_regular = ~repeated[:-1] & ~repeated[1:]
     return (
-        bool(np.median(sizes[follows_repeat]) > FULL_STEP_SHARE * np.median(sizes[is_regular]))
+        bool(np.median(step_sizes[follows_repeat]) > FULL_STEP_SHARE * np.median(step_sizes[is_regular]))
         if follows_repeat.any() and is_regular.any()
         else True
     )
 
 
-def _repeats(values: FloatArray) -> Mask:
-    """(n - 1,): whether all channels repeat the reading before."""
+def _mark_repeats(values: FloatArray) -> Mask:
+    """(n - 1,): whether all channels repeat the previous reading."""
     return np.asarray((np.diff(values, axis=0) == 0).all(axis=1), dtype=np.bool_)
 
 
-def _run_starts(repeated: Mask) -> Mask:
+def _mark_run_starts(repeated: Mask) -> Mask:
     """(n - 1,): mask of the first repeat of each run."""
     return np.asarray(repeated & ~np.concatenate([[False], repeated[:-1]]), dtype=np.bool_)
 
 
-def _is_unusual(count: int, usual: float) -> bool:
+def _is_unusual(count: int, usual_count: float) -> bool:
     """Whether a count exceeds the usual one by a factor and by several standard deviations of a Poisson count,
     sqrt(usual)."""
     return (
         count >= READINGS_LEAST
-        and count > READINGS_FACTOR * usual
-        and count > usual + READINGS_DEVIATIONS * np.sqrt(usual)
+        and count > READINGS_FACTOR * usual_count
+        and count > usual_count + READINGS_DEVIATIONS * np.sqrt(usual_count)
     )
 
 
 def _choose_channels(
-    parameters: Mapping[int, float], in_all_channels: bool, width: int, name: str
+    parameters: Mapping[int, float], in_all_channels: bool, channel_count: int, parameter_name: str
 ) -> ChannelFault | None:
-    """The channels with the fault: all, or only the one with the largest parameter. parameters: by channel;
-    in_all_channels: whether all channels have the fault; name: name of the parameter."""
+    """Choose the channels with the fault: all, or only the one with the largest parameter. parameters: by channel;
+    in_all_channels: whether all channels have the fault; parameter_name: for the returned values. None without
+    parameters."""
     if not parameters:
         return None
     worst_channel = max(parameters, key=lambda channel: parameters[channel])
-    return tuple(range(width)) if in_all_channels else (worst_channel,), {name: parameters[worst_channel]}
+    return tuple(range(channel_count)) if in_all_channels else (worst_channel,), {
+        parameter_name: parameters[worst_channel]
+    }

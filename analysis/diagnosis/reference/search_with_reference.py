@@ -10,13 +10,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.fit_score import fit_score
+from analysis.diagnosis.errors.fit_score import compute_fit_score
 from analysis.diagnosis.errors.output_error import evaluate_fit
-from analysis.diagnosis.reference.learn_model_error import LearnedError, count_as_noise
+from analysis.diagnosis.reference.learn_model_error import LearnedError, add_learned_noise
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.no_prediction import is_without_prediction
-from analysis.diagnosis.search.revise_selection import without_effect
+from analysis.diagnosis.search.revise_selection import remove_effect
 from analysis.diagnosis.search.search import search_effects
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.verdict import Judgement, SearchResult, Unconfirmed
@@ -68,10 +68,12 @@ def _withdraw_shared_effects(result: SearchResult, learned: LearnedError) -> Sea
         if not learned.references.is_present_on_clean(hypothesis, index):
             continue
         unconfirmed.append(Unconfirmed(hypothesis, 0.0, IMPROVES_CLEAN_REASON, index))
-        explanation = without_effect(result.context, explanation, index)
+        explanation = remove_effect(result.context, explanation, index)
     if not unconfirmed:
         return result
-    judgement = _judge_with_floor(result.context.whole, explanation, bool(explanation.steps), learned.floor.beyond)
+    judgement = _judge_with_floor(
+        result.context.full_measure, explanation, bool(explanation.steps), learned.floor.beyond
+    )
     return replace(result, found=explanation, judgement=judgement, unconfirmed=(*result.unconfirmed, *unconfirmed))
 
 
@@ -79,7 +81,7 @@ def _compute_mean_log_error(context: SearchContext, result: SearchResult) -> flo
     """Mean log error power with the named effects, on the samples to fit and to choose by."""
     candidate = result.found.after if result.judgement.named else result.found.retuned
     fitted = evaluate_fit(context.measure, context.tuning, candidate.fitted.deviations, candidate.fitted.hypothesis)
-    return FittedCandidate(fitted, fit_score(context.measure, fitted.residuals)).score.mean_log_error
+    return FittedCandidate(fitted, compute_fit_score(context.measure, fitted.residuals)).score.mean_log_error
 
 
 def _search_plain_residual(
@@ -93,13 +95,15 @@ def _search_plain_residual(
     raised_floor = replace(
         learned.floor, channels=tuple(learned.floor.beyond * channel for channel in learned.floor.channels)
     )
-    noise_measure = count_as_noise(context.whole, raised_floor)
+    noise_measure = add_learned_noise(context.full_measure, raised_floor)
     search_context = replace(
-        context, measure=noise_measure.shorten(), whole=noise_measure, least_remaining_error=EXPLAINED_ERROR
+        context, measure=noise_measure.shorten(), full_measure=noise_measure, least_remaining_error=EXPLAINED_ERROR
     )
     result = search_effects(search_context, catalogue, progress, time_left)
-    full_measure = count_as_noise(context.whole, learned.floor).with_records(result.context.whole.records)
-    final_context = replace(context, measure=full_measure.shorten(), whole=full_measure)
+    full_measure = add_learned_noise(context.full_measure, learned.floor).with_records(
+        result.context.full_measure.records
+    )
+    final_context = replace(context, measure=full_measure.shorten(), full_measure=full_measure)
     return replace(result, context=final_context, found=_refit_with(final_context, result.found))
 
 
@@ -111,20 +115,20 @@ def _search_whitened_residual(
     time_left: TimeBudget,
 ) -> SearchResult:
     """Search on the whitened residual; the result is refitted and judged on the plain one."""
-    plain_measure = count_as_noise(context.whole, learned.floor)
-    whitened_measure = learned.noise_measure(plain_measure, context.tuning.model)
+    plain_measure = add_learned_noise(context.full_measure, learned.floor)
+    whitened_measure = learned.make_noise_measure(plain_measure, context.tuning.model)
     # Model error is not random noise: even the right law leaves more than its learned size.
     least_error = EXPLAINED_ERROR * learned.references.gain_factor
     search_context = replace(
         context,
         measure=whitened_measure.shorten(),
-        whole=whitened_measure,
+        full_measure=whitened_measure,
         references=learned.references,
         least_remaining_error=least_error,
     )
     result = search_effects(search_context, catalogue, progress, time_left)
-    plain_measure = plain_measure.with_records(result.context.whole.records)
-    final_context = replace(context, measure=plain_measure.shorten(), whole=plain_measure)
+    plain_measure = plain_measure.with_records(result.context.full_measure.records)
+    final_context = replace(context, measure=plain_measure.shorten(), full_measure=plain_measure)
     explanation = _refit_with(final_context, result.found)
     if context.certain:
         return replace(
@@ -151,7 +155,7 @@ def _judge_with_floor(measure: ErrorMeasure, explanation: Explanation, is_named:
             "explained" if explanation.after.score.worst_channel <= factor * EXPLAINED_ERROR else "partly_explained",
             True,
         )
-    plain_error = fit_score(measure, explanation.before.fitted.residuals).worst_channel
+    plain_error = compute_fit_score(measure, explanation.before.fitted.residuals).worst_channel
     if max(plain_error, explanation.before.score.worst_channel) <= factor * NOISE_ALONE:
         return Judgement("no_mismatch", False)
     return Judgement(
@@ -169,9 +173,9 @@ def _refit_with(context: SearchContext, explanation: Explanation) -> Explanation
     steps = [*explanation.steps[:-1], *(replace(step, fitted=final_fit) for step in explanation.steps[-1:])]
     return replace(
         explanation,
-        before=_evaluate_with(context.whole, context, explanation.before),
-        retuned=_evaluate_with(context.whole, context, explanation.retuned),
-        after=_evaluate_with(context.whole, context, replace(explanation.after, fitted=final_fit)),
+        before=_evaluate_with(context.full_measure, context, explanation.before),
+        retuned=_evaluate_with(context.full_measure, context, explanation.retuned),
+        after=_evaluate_with(context.full_measure, context, replace(explanation.after, fitted=final_fit)),
         steps=tuple(_evaluate_with(context.measure, context, step) for step in steps),
     )
 

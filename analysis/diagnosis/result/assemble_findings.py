@@ -20,14 +20,14 @@ from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.localisation.clean_floor import CleanFloor, clean_floor_sentence
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_maps import Maps, build_mismatch_maps, summarise_worst_channel
-from analysis.diagnosis.localisation.mismatch_rows import mismatch_rows
+from analysis.diagnosis.localisation.mismatch_rows import list_mismatch_rows
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.error_table import collect_channel_errors, compute_fit_errors, is_held_out_still
 from analysis.diagnosis.result.findings import Findings, TimeSeries
 from analysis.diagnosis.result.named_effects import Labels, make_labels, make_named_effects
 from analysis.diagnosis.result.post_search import examine_fits
-from analysis.diagnosis.result.unconfirmed import add_held_out_gains
-from analysis.diagnosis.result.unit_doubt import constant_sentence, unit_sentences
+from analysis.diagnosis.result.unconfirmed_candidates import add_held_out_gains
+from analysis.diagnosis.result.unit_doubt import describe_unit_doubts, describe_unknown_units
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import compute_final_errors, compute_interval_errors
 from analysis.diagnosis.search.search_context import SearchContext
@@ -36,7 +36,7 @@ from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE, INTERVAL_FACTOR
 from equalizer.effects.placing import axis_letter, model_effects
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import FloatArray, runs_of
+from equalizer.signals.signal import FloatArray, find_runs
 
 if TYPE_CHECKING:
     from analysis.diagnosis.next_experiment.propose_experiment import Proposal
@@ -48,7 +48,7 @@ def assemble_findings(
     """The findings of a search. result.found.after: the model with the named effects, or the re-tuned model without
     any. names: of the recordings. learned: the residual of clean recordings, counted as noise."""
     context, fits, verdict = result.context, result.found, result.judgement
-    measure, tuning = context.whole, context.tuning
+    measure, tuning = context.full_measure, context.tuning
     recording, placed_effects = measure.records[0].recording, fits.after.fitted.hypothesis.list_placed_effects()
     labels, (improved, retuned) = make_labels(recording, tuning.model), _build_models(result, recording)
     channels, errors = list_channel_names(recording, len(measure.noise)), _compute_standard_errors(result)
@@ -113,7 +113,7 @@ def _collect_remarks(
 ) -> tuple[str, ...]:
     """Remarks without repetition: `leading`, then on doubtful units, a constant force of the model, and the noise."""
     of_noise = (remark for floor in floors for remark in floor.remarks)
-    texts = (*leading, *unit_sentences(time_series), constant_sentence(tuning.model), *of_noise)
+    texts = (*leading, *describe_unit_doubts(time_series), describe_unknown_units(tuning.model), *of_noise)
     return tuple(dict.fromkeys(filter(None, texts)))
 
 
@@ -145,23 +145,23 @@ def _build_document(
 ) -> Diagnosis:
     """The document. errors: standard errors of all parameters. examined: mismatch maps and localisation."""
     explanation, judgement = result.found, result.judgement
-    measure, tuning, fitted = result.context.whole, result.context.tuning, explanation.after.fitted
+    measure, tuning, fitted = result.context.full_measure, result.context.tuning, explanation.after.fitted
     maps, local = examined
     labels = make_labels(measure.records[0].recording, tuning.model)
     return Diagnosis(
         verdict=judgement.verdict,
-        mismatch=mismatch_rows(maps.cells["before"], local.states["before"])
+        mismatch=list_mismatch_rows(maps.cells["before"], local.states["before"])
         or (
             ()
             if judgement.verdict == "no_mismatch"
             else summarise_worst_channel(measure, explanation.before.score, explanation.before.fitted)
         ),
         effects=_list_effects_with_gains(result, errors, labels) if judgement.named else (),
-        retuned=dict(zip(tuning.names, tuning.values(fitted.deviations).tolist(), strict=True)),
+        retuned=dict(zip(tuning.names, tuning.to_changes(fitted.deviations).tolist(), strict=True)),
         remainder=()
         if judgement.verdict not in ("partly_explained", "unexplained")
         else list_impact_remainder(measure, explanation)
-        or mismatch_rows(maps.cells["after"], local.states["after"])
+        or list_mismatch_rows(maps.cells["after"], local.states["after"])
         or summarise_worst_channel(measure, explanation.after.score, fitted),
         fit=compute_fit_errors(measure, explanation),
         error=measure.name,
@@ -184,13 +184,13 @@ def _list_effects_with_gains(result: SearchResult, errors: FloatArray, labels: L
     if explanation.statistic is not None or len(explanation.steps) != len(effects):
         return effects
     intermediate_fits = [context.with_test_score(step) for step in explanation.steps[:-1]]
-    return add_held_out_gains(effects, context.whole, (explanation.plain, *intermediate_fits, explanation.after))
+    return add_held_out_gains(effects, context.full_measure, (explanation.plain, *intermediate_fits, explanation.after))
 
 
 def _propose(context: SearchContext, explanation: Explanation, judgement: Judgement) -> "Proposal | None":
     """Proposal of the next recording; None where no effect is named, or where recordings cannot be predicted by
     simulation."""
-    if not judgement.named or context.whole.name != "free simulation" or explanation.statistic is not None:
+    if not judgement.named or context.full_measure.name != "free simulation" or explanation.statistic is not None:
         return None
     # Imported here: only named effects have rivals that a further recording could separate.
     from analysis.diagnosis.next_experiment.propose_experiment import propose_experiment
@@ -223,7 +223,7 @@ def _build_time_series(measure: ErrorMeasure, explanation: Explanation, names: S
                 before=given_predicted,
                 retuned=retuned_predicted,
                 after=completed_predicted,
-                tested=tuple(runs_of(record.test)),
+                tested=tuple(find_runs(record.test)),
             )
         )
     return tuple(time_series)

@@ -1,8 +1,8 @@
-"""A black-box correction as a reference for the named effects: where it predicts better, physics is still missing.
+"""A black-box correction as a reference for the named effects: where it predicts better, an effect is still missing.
 
 A polynomial of the re-tuned model's own signals is added to each channel of its prediction, term by term, each time the
 one that explains most of the residual (orthogonal least squares; Chen, Billings and Luo 1989), as many terms per
-channel as the physics has parameters.
+channel as the named effects have parameters. Called by `post_search`.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.fit_score import signal_rms
+from analysis.diagnosis.errors.fit_score import compute_signal_rms
 from analysis.diagnosis.result.findings import BlackBox
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.types import Mask
@@ -24,95 +24,107 @@ _LEAST_RMS = 1e-6
 _TINY = np.finfo(np.float64).tiny
 
 
-def black_box(measure: ErrorMeasure, retuned: FittedCandidate, terms: int, physics: float | None) -> BlackBox | None:
-    """The black box with that number of terms per channel and its error on the test samples. physics: the named
-    effects' error there, as in `document.Errors`. None where nothing is held out."""
-    if physics is None or not any(record.test.any() for record in measure.records):
+def fit_black_box(
+    measure: ErrorMeasure, retuned: FittedCandidate, term_count: int, physics_error: float | None
+) -> BlackBox | None:
+    """Fit the black box with `term_count` terms per channel, and compute its error on the test samples. physics_error:
+    that of the named effects there, as in `document.Errors`. None where that is None or nothing is held out."""
+    if physics_error is None or not any(record.test.any() for record in measure.records):
         return None
-    fitted = [record.fit for record in measure.records]
-    signals = [
+    fit_masks = [record.fit for record in measure.records]
+    regressors = [
         # Missing samples are neither fitted nor tested, so their value does not matter.
-        _signals_and_changes(record.command, np.nan_to_num(record.measured - residuals * measure.unit))
+        _make_regressors(record.command, np.nan_to_num(record.measured - residuals * measure.unit))
         for record, residuals in zip(measure.records, retuned.fitted.residuals, strict=True)
     ]
-    signals = _clip_to_fitted_range(signals, fitted)
-    rows = np.vstack([signal[mask] for signal, mask in zip(signals, fitted, strict=True)])
-    residuals = np.vstack([residual[mask] for residual, mask in zip(retuned.fitted.residuals, fitted, strict=True)])
-    stride = max(len(rows) // SELECTION_SAMPLES, 1)
-    selection_terms = _terms(rows[::stride], range(_term_count(rows)))
-    scale = _scale(selection_terms)
-    selected = [_select_terms(selection_terms / scale, target, terms) for target in residuals[::stride].T]
-    used_terms = sorted({number for numbers in selected for number in numbers})
-    terms_matrix, weights = (
-        _terms(rows, used_terms) / scale[used_terms],
-        np.zeros((len(used_terms), residuals.shape[1])),
+    regressors = _clip_to_fitted_range(regressors, fit_masks)
+    fit_regressors = np.vstack(
+        [record_regressors[mask] for record_regressors, mask in zip(regressors, fit_masks, strict=True)]
     )
-    for channel, numbers in enumerate(selected):
-        columns = [used_terms.index(number) for number in numbers]
+    residuals = np.vstack([residual[mask] for residual, mask in zip(retuned.fitted.residuals, fit_masks, strict=True)])
+    stride = max(len(fit_regressors) // SELECTION_SAMPLES, 1)
+    selection_terms = _compute_terms(fit_regressors[::stride], range(_count_terms(fit_regressors)))
+    term_rms = _compute_term_rms(selection_terms)
+    selected = [_select_terms(selection_terms / term_rms, target, term_count) for target in residuals[::stride].T]
+    used_terms = sorted({term_number for term_numbers in selected for term_number in term_numbers})
+    terms_matrix = _compute_terms(fit_regressors, used_terms) / term_rms[used_terms]
+    weights = np.zeros((len(used_terms), residuals.shape[1]))
+    for channel, term_numbers in enumerate(selected):
+        columns = [used_terms.index(term_number) for term_number in term_numbers]
         weights[columns, channel] = np.linalg.lstsq(terms_matrix[:, columns], residuals[:, channel], rcond=None)[0]
-    corrected = [
-        residual[record.test] - _terms(signal[record.test], used_terms) / scale[used_terms] @ weights
-        for record, residual, signal in zip(measure.records, retuned.fitted.residuals, signals, strict=True)
+    test_errors = [
+        residual[record.test]
+        - _compute_terms(record_regressors[record.test], used_terms) / term_rms[used_terms] @ weights
+        for record, residual, record_regressors in zip(
+            measure.records, retuned.fitted.residuals, regressors, strict=True
+        )
     ]
     return BlackBox(
         "polynomial of the model's signals",
-        terms * residuals.shape[1],
-        _normalise_error(measure, np.vstack(corrected)),
-        physics,
+        term_count * residuals.shape[1],
+        _normalise_error(measure, np.vstack(test_errors)),
+        physics_error,
     )
 
 
-def _scale(rows: FloatArray) -> FloatArray:
+def _compute_term_rms(term_values: FloatArray) -> FloatArray:
     """(terms,): rms; infinite for terms that vanish where they are fitted, such as products of commands that are never
     played together, so that they are not used elsewhere."""
-    rms = np.sqrt(np.mean(rows**2, axis=0))
+    rms = np.sqrt(np.mean(term_values**2, axis=0))
     return np.where(rms > _LEAST_RMS, rms, np.inf)
 
 
-def _clip_to_fitted_range(signals: list[FloatArray], fitted: list[Mask]) -> list[FloatArray]:
-    """The signals clipped to the range that was fitted to: beyond it, a polynomial extrapolates badly."""
-    fitted_signals = np.vstack([signal[mask] for signal, mask in zip(signals, fitted, strict=True)])
-    return [np.clip(signal, fitted_signals.min(axis=0), fitted_signals.max(axis=0)) for signal in signals]
+def _clip_to_fitted_range(regressors: list[FloatArray], fit_masks: list[Mask]) -> list[FloatArray]:
+    """Clip the regressors to their range on the fit samples: beyond it, a polynomial extrapolates badly."""
+    fitted_regressors = np.vstack(
+        [record_regressors[mask] for record_regressors, mask in zip(regressors, fit_masks, strict=True)]
+    )
+    return [
+        np.clip(record_regressors, fitted_regressors.min(axis=0), fitted_regressors.max(axis=0))
+        for record_regressors in regressors
+    ]
 
 
-def _signals_and_changes(command: FloatArray, predicted: FloatArray) -> FloatArray:
-    """(n, 2 signals): commands and predictions, one sample before, and their changes; each with an rms of 1."""
+def _make_regressors(command: FloatArray, predicted: FloatArray) -> FloatArray:
+    """(n, 2 signals): commands and predictions of the previous sample, and their changes since; each with an rms of
+    1."""
     signals = np.hstack([command, predicted])
     signals = signals / np.maximum(np.sqrt(np.mean(signals**2, axis=0)), _TINY)
-    previous = np.vstack([signals[:1], signals[:-1]])
-    base = np.hstack([previous, signals - previous])
-    return np.asarray(base / np.maximum(np.sqrt(np.mean(base**2, axis=0)), _TINY))
+    previous_signals = np.vstack([signals[:1], signals[:-1]])
+    regressors = np.hstack([previous_signals, signals - previous_signals])
+    return np.asarray(regressors / np.maximum(np.sqrt(np.mean(regressors**2, axis=0)), _TINY))
 
 
-def _term_count(base: FloatArray) -> int:
-    """Number of terms: powers, and products of two signals."""
-    width: int = base.shape[1]
+def _count_terms(regressors: FloatArray) -> int:
+    """Count the terms of `_compute_terms`: four powers of each regressor, and products of two signals."""
+    width: int = regressors.shape[1]
     return 4 * width + len(list(combinations(range(width // 2), 2)))
 
 
-def _terms(base: FloatArray, numbers: Sequence[int]) -> FloatArray:
-    """(n, terms): the terms of these numbers. base: (n, 2 signals). With s a signal, number = power (2 signals) +
-    index: s, s², s |s| and s³ for powers 0 to 3; then the products of two signals."""
-    width = base.shape[1]
+def _compute_terms(regressors: FloatArray, term_numbers: Sequence[int]) -> FloatArray:
+    """(n, terms): the terms of these numbers. regressors: (n, 2 signals). With s a regressor, number = power (2
+    signals) + index: s, s², s |s| and s³ for powers 0 to 3; then the products of two signals."""
+    width = regressors.shape[1]
     products = list(combinations(range(width // 2), 2))
-    values = np.empty((len(base), len(numbers)))
-    for column, number in enumerate(numbers):
-        power, index = divmod(number, width)
+    values = np.empty((len(regressors), len(term_numbers)))
+    for column, term_number in enumerate(term_numbers):
+        power, index = divmod(term_number, width)
         if power < 4:
-            signal = base[:, index]
+            signal = regressors[:, index]
             values[:, column] = signal * (1.0, signal, np.abs(signal), signal**2)[power]
         else:
-            first_signal, second_signal = products[number - 4 * width]
-            values[:, column] = base[:, first_signal] * base[:, second_signal]
+            first_signal, second_signal = products[term_number - 4 * width]
+            values[:, column] = regressors[:, first_signal] * regressors[:, second_signal]
     return values
 
 
-def _select_terms(candidate_terms: FloatArray, target: FloatArray, count: int) -> list[int]:
-    """Indices of the terms selected by orthogonal least squares, one after the other."""
+def _select_terms(candidate_terms: FloatArray, target: FloatArray, term_count: int) -> list[int]:
+    """Select terms by forward selection: each time the one most correlated with the residual of the least-squares fit.
+    candidate_terms: (n, terms); target: (n,). Returns indices, in the order of selection."""
     selected: list[int] = []
     residual = target
     power = np.sum(candidate_terms**2, axis=0)
-    for _ in range(count):
+    for _ in range(term_count):
         gain = (candidate_terms.T @ residual) ** 2 / np.maximum(power, _TINY)
         gain[selected] = -1.0
         selected.append(int(np.argmax(gain)))
@@ -123,8 +135,8 @@ def _select_terms(candidate_terms: FloatArray, target: FloatArray, count: int) -
 
 
 def _normalise_error(measure: ErrorMeasure, errors: FloatArray) -> float:
-    """Rms error over the rms signal, root mean square over channels. errors: (test samples, c), in units of the
+    """Compute rms error over rms signal, root mean square over channels. errors: (test samples, c), in units of the
     measure."""
-    size = np.maximum(signal_rms(measure.records, [record.test for record in measure.records]), _TINY)
-    rms = np.sqrt(np.mean(errors**2, axis=0)) * measure.unit / size
+    signal_level = np.maximum(compute_signal_rms(measure.records, [record.test for record in measure.records]), _TINY)
+    rms = np.sqrt(np.mean(errors**2, axis=0)) * measure.unit / signal_level
     return float(np.sqrt(np.mean(rms**2)))

@@ -1,7 +1,9 @@
-"""Adds the results of force balances to the findings: classes of effects, shares, candidates, and balance errors.
+"""Adds the results of force balances to a diagnosis: classes of effects, shares, candidates, and balance errors.
 
 A class holds effects that the data cannot distinguish; a candidate is a law that was found but is not confirmed. Gains
-are shares of the squared force error on held-out data (`judged_law`).
+are fractions of the squared force error on held-out data (`judged_law`). `diagnose` calls the two entry points:
+`add_balances_with_given_model` where the user gave a model, `add_balances_with_fitted_model` where the model was fitted
+to the same recordings. channels: names of the commands, in the order of the balances.
 """
 
 import re
@@ -11,8 +13,8 @@ from typing import TYPE_CHECKING
 
 from analysis.diagnosis.confirm.require_gain import CONSTANTS
 from analysis.diagnosis.document import Candidate, Diagnosis, NamedEffect, Rival
-from analysis.diagnosis.effect_words import noun_of, place_of
-from analysis.diagnosis.result.candidate_wording import REFINED
+from analysis.diagnosis.effect_words import get_noun, get_place
+from analysis.diagnosis.result.candidate_wording import REFINEMENT_REASON
 from analysis.diagnosis.result.findings import BalanceErrors
 from analysis.diagnosis.settings import FURTHER_LAW_GAIN, LAW_OF_CEILING
 from analysis.wording import conjoin
@@ -25,17 +27,17 @@ if TYPE_CHECKING:
 
 
 _NAME, _FREE_PARAMETER, _AXIS_SIGNAL = re.compile(r"[A-Za-z_]\w*"), re.compile(r"^p\d+$"), re.compile(r"^([vf]?)[xyz]$")
-"""Names in a formula; names of its free parameters; names of the position, velocity or command of an axis."""
+"""Regular expressions: names in a formula; its free parameters; position, velocity (v) or command (f) of an axis."""
 _NUMBER = re.compile(r"(?<![A-Za-z_\d])\d[\d.]*(?:[eE][+-]?\d+)?")
-MOST_LISTED = 6
-"""Most candidates that a diagnosis lists. By hand."""
+MOST_CANDIDATES = 6
+"""Largest number of candidates that a diagnosis lists. Chosen by hand."""
 SPECIAL_CASES = {
     "drifting_friction": ("coulomb_friction",),
     "condition_dependent_friction": ("coulomb_friction",),
     "drifting_force": ("constant_force",),
 }
 """Laws without a simulation, and the special cases that each contains."""
-# SPECIAL_CASE, EQUALLY_GOOD and LINEAR_DYNAMICS: reasons in the document for which an effect is not named.
+# SPECIAL_CASE, EQUALLY_GOOD and LINEAR_DYNAMICS: reasons in `diagnosis.json` for which an effect is not named.
 SPECIAL_CASE = (
     "its special case, which is named, has hardly a larger error in a simulation, which does not determine the "
     "further parameters"
@@ -48,11 +50,11 @@ DELAY_EFFECTS = ("transport_delay", "amplifier_lag", "sensor_lag", "logger_offse
 LINEAR_DYNAMICS = "a mode, lag or relaxation that the model lacks: linear dynamics, which simulations did not confirm"
 
 
-def add_balances_to_search(
+def add_balances_with_given_model(
     diagnosis: Diagnosis, balances: "Sequence[Balance]", unconfirmed: Sequence[Candidate], channels: tuple[str, ...]
 ) -> Diagnosis:
-    """The diagnosis with classes and candidates, where a model was given. unconfirmed: effects that the search by
-    simulation found and did not name. channels: of the commands."""
+    """Add classes and candidates to the diagnosis of a search, for a model that the user gave. unconfirmed: effects
+    that the search by simulation found and did not name."""
     equivalents = {
         (law.law.effect, axis_letter(channels[axis], channels)): law.equivalents
         for axis, balance in enumerate(balances)
@@ -62,7 +64,7 @@ def add_balances_to_search(
         replace(effect, class_=_find_class(effect, equivalents.get((effect.effect, effect.axis or ""), ())))
         for effect in diagnosis.effects
     )
-    named = {(name, effect.axis) for effect in effects for name in (effect.effect, *effect.class_)}
+    named_keys = {(name, effect.axis) for effect in effects for name in (effect.effect, *effect.class_)}
     judged_laws = [
         (axis_letter(channels[axis], channels), law)
         for axis, balance in enumerate(balances)
@@ -74,28 +76,29 @@ def add_balances_to_search(
         if law.share >= LAW_OF_CEILING and law.gain >= FURTHER_LAW_GAIN
     ]
     ranked = sorted((*unconfirmed, *balance_candidates), key=lambda candidate: -candidate.held_out_gain)
-    listed = [candidate for candidate in ranked if (candidate.effect, candidate.axis) not in named]
-    return replace(diagnosis, effects=effects, candidates=_deduplicate(listed)[:MOST_LISTED])
+    listed = [candidate for candidate in ranked if (candidate.effect, candidate.axis) not in named_keys]
+    return replace(diagnosis, effects=effects, candidates=_deduplicate(listed)[:MOST_CANDIDATES])
 
 
 def _find_class(effect: NamedEffect, equivalents: tuple[str, ...]) -> tuple[str, ...]:
-    """The effect with its rivals that neither simulation nor balance can distinguish from it; empty without any.
-    equivalents: rivals by the balance."""
+    """Class of an effect: its name and its rivals that neither simulation nor balance can distinguish from it; empty
+    without such rivals. equivalents: rivals by the balance."""
     distinguished = {rival.effect for rival in effect.rivals if not rival.inseparable}
     names = [rival.effect for rival in effect.rivals if rival.inseparable]
     names += [name for name in equivalents if name not in distinguished]
     return tuple(dict.fromkeys((effect.effect, *names))) if names else ()
 
 
-def add_balance_classes(
+def add_balances_with_fitted_model(
     diagnosis: Diagnosis,
     balances: "Sequence[Balance]",
     channels: tuple[str, ...],
     unconfirmed: Sequence[Candidate] = (),
 ) -> Diagnosis:
-    """The diagnosis with classes, shares and candidates of the balances, where no model was given. channels: of the
-    commands; unconfirmed: effects of actuator and sensor that a search found, listed after the laws of the motion. A
-    constant force that no balance names is a parameter of the model, not an effect."""
+    """Add classes, shares and candidates to the diagnosis, for a model that was fitted to the same recordings.
+    unconfirmed: effects of actuator and sensor that a search found, listed after the significant laws of the motion. A
+    constant force or sensor offset that no balance names becomes a re-tuned parameter; where no effect remains, the
+    verdict "explained" becomes "parameters", and any other "unexplained"."""
     if not balances:
         return diagnosis
     judged_laws = [
@@ -103,39 +106,39 @@ def add_balance_classes(
         for axis, balance in enumerate(balances)
         for law in balance.laws
     ]
-    constants = {
+    unnamed_constants = {
         f"{effect.effect.replace('_', ' ')} {effect.axis}": effect.parameters[CONSTANTS[effect.effect]].value
         for effect in diagnosis.effects
         if effect.effect in CONSTANTS and _find_matching_law(effect, judged_laws) is None
     }
     effects = tuple(
-        _add_class(effect, _find_matching_law(effect, judged_laws))
+        _add_balance_results(effect, _find_matching_law(effect, judged_laws))
         for effect in diagnosis.effects
-        if f"{effect.effect.replace('_', ' ')} {effect.axis}" not in constants
+        if f"{effect.effect.replace('_', ' ')} {effect.axis}" not in unnamed_constants
     )
-    named = {(name, effect.axis) for effect in effects for name in _list_covered_names(effect)}
+    named_keys = {(name, effect.axis) for effect in effects for name in _list_covered_names(effect)}
     ranked = [
         (_rank_law(law), _make_candidate(law, axis_letter(channels[axis], channels), effects))
         for axis, balance in enumerate(balances)
         for law in (*balance.laws, *balance.further_laws)
-        if law.formula is None or (law.simulated_as, axis_letter(channels[axis], channels)) not in named
+        if law.formula is None or (law.simulated_as, axis_letter(channels[axis], channels)) not in named_keys
     ]
-    ranked += [(1, entry) for entry in unconfirmed]
-    listed = [entry for _, entry in sorted(ranked, key=lambda pair: pair[0]) if (entry.effect, entry.axis) not in named]
-    retuned = {**diagnosis.retuned, **constants}
+    ranked += [(1, candidate) for candidate in unconfirmed]
+    listed = [c for _, c in sorted(ranked, key=lambda entry: entry[0]) if (c.effect, c.axis) not in named_keys]
+    retuned = {**diagnosis.retuned, **unnamed_constants}
     verdict = diagnosis.verdict
     if not effects and diagnosis.effects:
         verdict = "parameters" if verdict == "explained" else "unexplained"
     return replace(
-        diagnosis, verdict=verdict, effects=effects, retuned=retuned, candidates=_deduplicate(listed)[:MOST_LISTED]
+        diagnosis, verdict=verdict, effects=effects, retuned=retuned, candidates=_deduplicate(listed)[:MOST_CANDIDATES]
     )
 
 
 def _find_matching_law(
     effect: NamedEffect, judged_laws: "Sequence[tuple[JudgedLaw, str, float]]"
 ) -> "tuple[JudgedLaw, float] | None":
-    """The law of a balance that the named effect represents, and its share of the mismatch; None where no balance has
-    it. judged_laws: laws with their axis and share."""
+    """Find the law of a balance that the named effect represents, with its share of the mismatch; None where no balance
+    has it. judged_laws: laws with their axis and share."""
     for law, axis, share in judged_laws:
         is_match = (law.simulated_as, axis) == (effect.effect, effect.axis or "")
         if is_match and law.formula is not None and effect.law is not None:
@@ -146,21 +149,21 @@ def _find_matching_law(
 
 
 def _extract_form(formula: str) -> list[str]:
-    """Signals and functions of a formula in their order, to compare formulas; the axis's own signals have the names of
-    a balance (x, vx and fx become q, v and f)."""
+    """Signals and functions of a formula in their order, without numbers and free parameters, to compare formulas. The
+    axis's own signals get the names of a balance (x, vx and fx become q, v and f)."""
     names = (_FREE_PARAMETER.sub("", name) for name in _NAME.findall(_NUMBER.sub("", formula)))
     return [_AXIS_SIGNAL.sub(lambda match: match[1] or "q", name) for name in names if name]
 
 
 def _list_covered_names(effect: NamedEffect) -> tuple[str, ...]:
-    """Names that are not listed as candidates once the effect is named: its own, its class, and its refinements."""
-    refined = (rival.effect for rival in effect.rivals if rival.why_not == REFINED)
+    """Names that are not candidates once the effect is named: its own, those of its class, and its refinements."""
+    refined = (rival.effect for rival in effect.rivals if rival.why_not == REFINEMENT_REASON)
     return (effect.effect, *effect.class_, *refined)
 
 
 def _rank_law(judged_law: "JudgedLaw") -> int:
-    """Order of candidates: physics with a significant gain and possible parameters first; then a linear model of a
-    higher order; and last laws that explain almost nothing."""
+    """Rank of a candidate, 0 first. 0: physically possible parameters and a significant gain; 1: other laws; 2: linear
+    dynamics of a higher order; 3: laws that explain almost nothing (`LAW_OF_CEILING`)."""
     if judged_law.law.linear:
         return 2
     if judged_law.share < LAW_OF_CEILING:
@@ -171,47 +174,47 @@ def _rank_law(judged_law: "JudgedLaw") -> int:
 def describe_linear_terms(
     balances: "Sequence[Balance]", channels: tuple[str, ...], in_samples: bool = False
 ) -> tuple[str, ...]:
-    """Remarks on the linear terms of the first model other than mass, damping and stiffness. channels: of the commands.
-    in_samples: times are in samples."""
-    texts = []
+    """Remarks on the linear terms of the fitted model other than mass, damping and stiffness. in_samples: whether times
+    are in samples, for recordings without a time axis."""
+    remarks = []
     for channel, balance in zip(channels, balances, strict=False):
         linear_part, motion = balance.search.regression.base_terms, balance.search.regression.motions[0]
-        laws = [law.effect for law in balance.linear_laws]
+        law_names = [law.effect for law in balance.linear_laws]
         delay_text = f"{linear_part.delay_s:.3g} samples" if in_samples else f"{1e3 * linear_part.delay_s:.3g} ms"
-        parts = [f"a delay of the command of {delay_text} (or a lag)"] if linear_part.delay_s else []
-        parts += [noun_of(name) for name in dict.fromkeys(laws)]
+        term_texts = [f"a delay of the command of {delay_text} (or a lag)"] if linear_part.delay_s else []
+        term_texts += [get_noun(name) for name in dict.fromkeys(law_names)]
         if len(motion.channels) > len(balances):
             further_motions = [name for k, name in enumerate(motion.channels) if k != linear_part.driven_channel]
-            parts.append(f"the motion of {conjoin(further_motions)}")
-        if parts:
+            term_texts.append(f"the motion of {conjoin(further_motions)}")
+        if term_texts:
             place = f" along {channel}" if len(channels) > 1 else ""
-            texts.append(
-                f"In addition to mass, damping and stiffness, the first model contains{place} {conjoin(parts)}; "
+            remarks.append(
+                f"In addition to mass, damping and stiffness, the first model contains{place} {conjoin(term_texts)}; "
                 "linear terms are not counted as missing physics."
             )
-    return tuple(texts)
+    return tuple(remarks)
 
 
 def collect_balance_errors(
     diagnosis: Diagnosis, balances: "Sequence[Balance]", channels: tuple[str, ...]
 ) -> tuple[BalanceErrors, ...]:
-    """Errors of each axis's balance with the laws that the document names; see `add_balance_classes`."""
+    """Errors of each axis's balance on held-out data, with the laws that the diagnosis names."""
     errors = []
     for axis, balance in enumerate(balances):
         letter = axis_letter(channels[axis], channels)
         names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
         laws = [law.place for law in balance.laws if law.simulated_as in names]
-        rms = balance.error_of(laws) if laws else balance.linear
+        named_error = balance.error_of(laws) if laws else balance.linear
         has_prior = balance.search.regression.prior is not None
         errors.append(
-            BalanceErrors(letter, balance.linear, rms, balance.ceiling, bool(laws), balance.tested, has_prior)
+            BalanceErrors(letter, balance.linear, named_error, balance.ceiling, bool(laws), balance.tested, has_prior)
         )
     return tuple(errors)
 
 
 def _deduplicate(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
-    """The candidates with each effect only once, at its highest rank; laws without a name are the same only if their
-    formulas and axes are. candidates: the best first."""
+    """The candidates with each effect only once, at its highest rank; laws outside the catalogue are the same only if
+    their formulas and axes are. candidates: the best first."""
     unique: dict[object, Candidate] = {}
     for candidate in candidates:
         law = candidate.law
@@ -220,23 +223,26 @@ def _deduplicate(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
 
 
 def _compute_explained_share(balance: "Balance", law: "JudgedLaw") -> float:
-    """Share of the linear model's held-out error power that a law removes. `JudgedLaw.share` is relative to the
-    decrease by all laws together, and for a law of the command to the linear error already."""
+    """Share of the linear model's held-out error power that a law removes, 0 to 1. `JudgedLaw.share` is relative to the
+    decrease by all laws together, and is converted; only for a law of the command it is relative to the linear model's
+    error, as required."""
     total_share = 1 - (balance.ceiling / max(balance.linear, 1e-300)) ** 2 if law.has_column else 1.0
     return min(max(total_share * law.share, 0.0), 1.0)
 
 
-def _add_class(effect: NamedEffect, law_and_share: "tuple[JudgedLaw, float] | None") -> NamedEffect:
-    """The effect with its class, share and probability by the balance. law_and_share: the law of the balance, and its
-    share of the mismatch; None where no balance has it."""
+def _add_balance_results(effect: NamedEffect, law_and_share: "tuple[JudgedLaw, float] | None") -> NamedEffect:
+    """Add class, share, probability and rivals by the balance to an effect. law_and_share: the law of the balance, and
+    its share of the mismatch; None where no balance has it: then only a delay gets a class (`DELAY_EFFECTS`)."""
     if law_and_share is None:
         is_delay = effect.effect in DELAY_EFFECTS
         return replace(effect, class_=tuple(dict.fromkeys((effect.effect, *DELAY_EFFECTS)))) if is_delay else effect
     law, share = law_and_share
     known_rivals = {rival.effect for rival in effect.rivals}
-    equivalents = tuple(name for name in law.equivalents if name == law.stands_for or not refines(name, effect.effect))
+    equivalents = tuple(
+        name for name in law.equivalents if name == law.stands_for or not is_refinement_of(name, effect.effect)
+    )
     rivals = tuple(
-        Rival(name, 0.0, name in equivalents, EQUALLY_GOOD if name in equivalents else REFINED)
+        Rival(name, 0.0, name in equivalents, EQUALLY_GOOD if name in equivalents else REFINEMENT_REASON)
         for name in law.equivalents
         if name not in known_rivals
     )
@@ -247,19 +253,21 @@ def _add_class(effect: NamedEffect, law_and_share: "tuple[JudgedLaw, float] | No
     )
 
 
-def refines(effect: str, special_case: str) -> bool:
-    """Whether an effect contains another as a special case."""
+def is_refinement_of(effect: str, special_case: str) -> bool:
+    """Whether an effect contains the effect `special_case` as a special case."""
     special_cases = EFFECTS[effect].simpler if effect in EFFECTS else SPECIAL_CASES.get(effect, ())
     return special_case in special_cases
 
 
 def _make_candidate(judged_law: "JudgedLaw", axis: str, effects: Sequence[NamedEffect] = ()) -> Candidate:
     """A law of a balance as a candidate of the document. effects: the named effects."""
-    is_refinement = any(refines(judged_law.law.effect, effect.effect) and effect.axis == axis for effect in effects)
-    default_reason = SPECIAL_CASE if is_refinement else "simulations of the whole recording do not confirm it"
+    has_named_special_case = any(
+        is_refinement_of(judged_law.law.effect, effect.effect) and effect.axis == axis for effect in effects
+    )
+    default_reason = SPECIAL_CASE if has_named_special_case else "simulations of the whole recording do not confirm it"
     return Candidate(
         effect=judged_law.law.effect,
-        place=place_of(judged_law.law.effect),
+        place=get_place(judged_law.law.effect),
         axis=axis or None,
         parameters=judged_law.values,
         held_out_gain=min(max(judged_law.gain, 0.0), 1.0),

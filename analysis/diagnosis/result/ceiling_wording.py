@@ -1,7 +1,8 @@
 """Sentences for the user about held-out errors: compared with the noise, with all laws together, and with a black box.
 
 The ceiling is the fit of all laws together in a force balance (`BalanceErrors.ceiling`): the error that no sum of a few
-laws should be expected to beat. Errors are rms errors over the rms of the signal, unless a text says otherwise.
+laws should be expected to beat. Errors are rms errors over the rms of the signal, unless a text says otherwise. Called
+by `wording` and `diagnosis_report`.
 """
 
 from collections.abc import Sequence
@@ -9,68 +10,76 @@ from collections.abc import Sequence
 from analysis.diagnosis.document import Errors
 from analysis.diagnosis.result.findings import BalanceErrors, BlackBox
 from analysis.diagnosis.settings import FIT_CONFIRMED, SAME_TO_READERS
-from analysis.diagnosis.unit_wording import error_of_signal, error_text, share_text
+from analysis.diagnosis.unit_wording import format_error, format_error_of_signal, format_share
 from analysis.wording import capitalise
 
-ROUNDING = 1e-9
+ROUNDING_TOLERANCE = 1e-9
 """Relative difference of two errors of the same data that is due to rounding."""
 
 
-def black_box_sentence(box: BlackBox | None, named: bool) -> str:
-    """Sentence that compares held-out errors of a black box and of the physics; empty without a black box. named:
+def describe_black_box(box: BlackBox | None, named: bool) -> str:
+    """Compare the held-out errors of a black box and of the physics in a sentence; empty without a black box. named:
     whether effects were named; else the physics is the re-tuned model."""
     if box is None:
         return ""
-    physics = "the physics" if named else "the re-tuned model"
-    fitted = (
+    physics_name = "the physics" if named else "the re-tuned model"
+    fit_text = (
         f"A black box ({box.kind}, {box.coefficient_count} parameters), fitted to the same samples, has an error of"
     )
-    errors = f"{error_of_signal(box.test_error)} on the held-out data; {physics} has {error_text(box.physics_error)}"
-    if black_box_beats(box):
+    errors_text = (
+        f"{format_error_of_signal(box.test_error)} on the held-out data; {physics_name} has "
+        f"{format_error(box.physics_error)}"
+    )
+    if is_black_box_better(box):
         return (
-            f"{fitted} {errors}. The black box predicts better: the data contain structure that no named effect "
+            f"{fit_text} {errors_text}. The black box predicts better: the data contain structure that no named effect "
             "explains."
         )
     if box.physics_error * SAME_TO_READERS < box.test_error:
-        return f"{fitted} {errors}. {capitalise(physics)} predicts better."
-    return f"{fitted} {errors}: the black box does not predict better."
+        return f"{fit_text} {errors_text}. {capitalise(physics_name)} predicts better."
+    return f"{fit_text} {errors_text}: the black box does not predict better."
 
 
-def black_box_beats(box: BlackBox) -> bool:
+def is_black_box_better(box: BlackBox) -> bool:
     """Whether the held-out error of the black box is smaller by more than the factor `SAME_TO_READERS`."""
     return box.test_error * SAME_TO_READERS < box.physics_error
 
 
 def describe_ceiling(axis_errors: Sequence[BalanceErrors]) -> tuple[str, ...]:
-    """One sentence per axis whose force balance was tested."""
+    """Describe the held-out errors of each axis's force balance in a sentence, also where no law could be tested."""
     return tuple(_describe_ceiling_of_axis(errors, len(axis_errors) == 1) for errors in axis_errors)
 
 
-def _describe_ceiling_of_axis(errors: BalanceErrors, single: bool) -> str:
-    """The sentence of one axis. single: whether the device has no other, so that it needs no name."""
-    axis = "" if single else f" along {errors.axis}"
+def _describe_ceiling_of_axis(errors: BalanceErrors, is_single_axis: bool) -> str:
+    """Describe the held-out errors of one axis. is_single_axis: whether the device has no other, so that it needs no
+    name."""
+    axis_text = "" if is_single_axis else f" along {errors.axis}"
     if not errors.tested:
         return (
-            f"In the force balance{axis}, no law could be tested: the device moves only once, and the held-out data "
-            "contain almost no motion. Record several motions, or give one of them the role of a test."
+            f"In the force balance{axis_text}, no law could be tested: the device moves only once, and the held-out "
+            "data contain almost no motion. Record several motions, or give one of them the role of a test."
         )
-    model = (
+    model_text = (
         "the error of the re-tuned model is"
         if errors.is_model_given
         else "the error of mass, damping and stiffness alone is"
     )
-    linear = f"In the force balance{axis}, on held-out data, {model} {error_text(errors.linear)} of the force"
-    named = f"with the named laws it is {error_text(errors.named_error)}" if errors.has_named_law else "no law is named"
-    if errors.has_named_law and errors.named_error <= errors.ceiling * (1 + ROUNDING):
-        return f"{linear}, {named}, and all laws together reach no smaller error."
-    share = (
-        f", and that is {share_text(errors.share)} of the reduction of the error power that all laws together reach"
+    linear_text = (
+        f"In the force balance{axis_text}, on held-out data, {model_text} {format_error(errors.linear)} of the force"
+    )
+    named_text = (
+        f"with the named laws it is {format_error(errors.named_error)}" if errors.has_named_law else "no law is named"
+    )
+    if errors.has_named_law and errors.named_error <= errors.ceiling * (1 + ROUNDING_TOLERANCE):
+        return f"{linear_text}, {named_text}, and all laws together reach no smaller error."
+    share_text = (
+        f", and that is {format_share(errors.share)} of the reduction of the error power that all laws together reach"
         if errors.named_error < errors.linear
         else ""
     )
     return (
-        f"{linear}; with all laws together it is {error_text(errors.ceiling)}, a bound that a sum of a few laws can "
-        f"hardly reach; {named}{share}."
+        f"{linear_text}; with all laws together it is {format_error(errors.ceiling)}, a bound that a sum of a few laws "
+        f"can hardly reach; {named_text}{share_text}."
     )
 
 
@@ -79,55 +88,61 @@ _NOISE_SOURCES = {"rest": "at the level measured at rest", "quiet band": "at the
 unknown, so that errors are not stated in units of it."""
 
 
-def times_text(ratio: float) -> str:
-    """A ratio in words, such as "1.04 times"."""
+def format_ratio(ratio: float) -> str:
+    """Format a ratio in words, such as "1.04 times"."""
     return f"{ratio:.2f} times" if ratio < 10 else f"{ratio:.3g} times"
 
 
-def fall_text(errors: Errors, first_stage: tuple[str, str], last_stage: tuple[str, str], noise_method: str = "") -> str:
-    """Clause on the change of the held-out error between two stages. first_stage, last_stage: a field of `Errors`, and
-    its name in words. noise_method: `NoiseFloor.how`; empty where it is not known."""
+def describe_error_change(
+    errors: Errors, first_stage: tuple[str, str], last_stage: tuple[str, str], noise_method: str = ""
+) -> str:
+    """Describe, in a clause, the change of the held-out error between two stages. first_stage, last_stage: a field of
+    `Errors`, and its name in words. noise_method: `NoiseFloor.how`; empty where it is not known."""
     first_error, last_error = getattr(errors, first_stage[0]), getattr(errors, last_stage[0])
     if first_error is None or last_error is None:
         return "how much better it predicts held-out data is not known"
     verb = "falls" if last_error * SAME_TO_READERS < first_error else "goes"
     return (
-        f"the error on held-out data {verb} from {error_of_signal(first_error)} ({first_stage[1]}) to "
-        f"{error_text(last_error)} ({last_stage[1]}){_noise(errors, last_error, noise_method)}"
+        f"the error on held-out data {verb} from {format_error_of_signal(first_error)} ({first_stage[1]}) to "
+        f"{format_error(last_error)} ({last_stage[1]}){_describe_noise(errors, last_error, noise_method)}"
     )
 
 
 def describe_error(beginning: str, error: float | None, errors: Errors, noise_method: str = "") -> str:
-    """Clause on a single held-out error and on the noise, or that the error is not known. beginning: of the clause."""
+    """Describe, in a clause, one held-out error and the noise, or state that the error is not known. beginning: of the
+    clause."""
     if error is None:
         return "its error on held-out data is not known"
-    return f"{beginning}, its error on held-out data is {error_of_signal(error)}{_noise(errors, error, noise_method)}"
+    return (
+        f"{beginning}, its error on held-out data is {format_error_of_signal(error)}"
+        f"{_describe_noise(errors, error, noise_method)}"
+    )
 
 
-def _noise(errors: Errors, error: float, noise_method: str) -> str:
-    """End of a clause: an error compared with that of noise alone."""
+def _describe_noise(errors: Errors, error: float, noise_method: str) -> str:
+    """Compare an error with that of noise alone, as the end of a clause."""
     if not errors.noise or noise_method == "unknown":
         return "; what noise alone would leave is not known"
     if noise_method in _NOISE_SOURCES:
-        return f"; noise {_NOISE_SOURCES[noise_method]} would leave {error_text(errors.noise)}"
-    return f", {times_text(error / errors.noise)} what noise alone would leave ({error_text(errors.noise)})"
+        return f"; noise {_NOISE_SOURCES[noise_method]} would leave {format_error(errors.noise)}"
+    return f", {format_ratio(error / errors.noise)} what noise alone would leave ({format_error(errors.noise)})"
 
 
-def confirmation_sentence(fit: Errors, test: Errors) -> str:
-    """A sentence where held-out data do not confirm the fit; else empty. The errors of both sets are compared in units
-    of their noise, so that different signals do not matter."""
+def describe_confirmation(fit: Errors, test: Errors) -> str:
+    """State that held-out data do not, or only in part, confirm the fit; else empty, as where an error is not known.
+    The errors of both sets are compared in units of their noise, so that different signals do not matter."""
     if None in (test.after, test.retuned, test.noise, fit.after, fit.noise):
         return ""
     assert test.after is not None and test.retuned is not None and test.noise and fit.after is not None and fit.noise
     if test.after > test.retuned:
         return (
             "The held-out data do not confirm this: there the re-tuned model alone has a smaller error "
-            f"({error_of_signal(test.retuned)} compared with {error_text(test.after)})."
+            f"({format_error_of_signal(test.retuned)} compared with {format_error(test.after)})."
         )
     test_ratio, fit_ratio = test.after / test.noise, fit.after / fit.noise
     if test_ratio > FIT_CONFIRMED * max(fit_ratio, 1.0):
         return (
-            f"The held-out data confirm this only in part: the error is {times_text(test_ratio)} the noise there and "
-            f"{times_text(fit_ratio)} the noise on the fitted data."
+            f"The held-out data confirm this only in part: the error is {format_ratio(test_ratio)} the noise there and "
+            f"{format_ratio(fit_ratio)} the noise on the fitted data."
         )
     return ""

@@ -13,7 +13,7 @@ from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
 from analysis.diagnosis.contrast.decide import T_BOUND, Decision
 from analysis.diagnosis.contrast.fault import Fault
 from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, NamedEffect, Rival, Verdict
-from analysis.diagnosis.effect_words import unit_of
+from analysis.diagnosis.effect_words import get_parameter_unit
 from analysis.diagnosis.reference.compare_with_reference import Contrast
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
@@ -159,12 +159,12 @@ def _find_units(fault: Fault, recording: Recording, system: UnitSystem) -> Mappi
     if fault.effect in EFFECTS_BY_NAME:
         reading_unit = recording.response.units[max(fault.site, 0)] if fault.place == "sensor" else "1"
         return {
-            parameter.name: parameter.unit_in(system, reading_unit)
+            parameter.name: parameter.find_unit(system, reading_unit)
             for parameter in EFFECTS_BY_NAME[fault.effect].parameters
         }
     signal = recording.response if fault.place == "sensor" else recording.command
     unit = signal.units[max(fault.site, 0)]
-    stiffness = unit_of(fault.effect, "stiffness", system)
+    stiffness = get_parameter_unit(fault.effect, "stiffness", system)
     return {"stiffness": stiffness, "offset": unit, "cubic": f"1/({unit})^2", "square": f"1/({unit})"}
 
 
@@ -207,7 +207,7 @@ def _find_directly_shown_fault(contrast: Contrast, recording: Recording) -> Name
     units = (
         dict.fromkeys(values, unit)
         if effect is None
-        else {parameter.name: parameter.unit_in(LINEAR, unit) for parameter in effect.parameters}
+        else {parameter.name: parameter.find_unit(LINEAR, unit) for parameter in effect.parameters}
     )
     estimates = {key: Estimate(value, units[key]) for key, value in values.items() if key in units}
     axis = axis_letter(channels[sites[0]], channels) if len(sites) < len(channels) or len(channels) == 1 else None

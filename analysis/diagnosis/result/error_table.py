@@ -1,7 +1,7 @@
 """Table of errors of the given, the re-tuned and the completed model, on fitted and on held-out samples.
 
-Errors are rms residuals over the rms of the measured signal (`signal_rms`), root mean square over the channels, and are
-listed with the error that noise alone would leave. For impacts they are errors of the logarithm of band
+Errors are rms residuals over the rms of the measured signal (`compute_signal_rms`), root mean square over the channels,
+and are listed with the error that noise alone would leave. For impacts they are errors of the logarithm of band
 amplitudes instead.
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.document import Errors, Fit
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.fit_score import rms_over, signal_rms
+from analysis.diagnosis.errors.fit_score import compute_residual_rms, compute_signal_rms
 from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.settings import HELD_OUT_SURPRISE, SAME_TO_READERS, STILL_SHARE
@@ -64,10 +64,10 @@ def _compute_errors(measure: ErrorMeasure, explanation: Explanation, parts: tupl
     masks = [np.logical_or.reduce([getattr(record, part) for part in parts]) for record in measure.records]
     if not any(mask.any() for mask in masks):
         return Errors(None, None, None, None)
-    signal_size = np.maximum(signal_rms(measure.records, masks), np.finfo(float).tiny)
+    signal_size = np.maximum(compute_signal_rms(measure.records, masks), np.finfo(float).tiny)
 
     def compute_error(candidate: FittedCandidate) -> float | None:
-        rms = rms_over(measure.records, candidate.fitted.residuals, masks) * measure.unit / signal_size
+        rms = compute_residual_rms(measure.records, candidate.fitted.residuals, masks) * measure.unit / signal_size
         mean_error = float(np.sqrt(np.mean(rms**2)))
         return mean_error if np.isfinite(mean_error) else None
 

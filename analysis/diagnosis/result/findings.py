@@ -15,12 +15,12 @@ from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.curves.state_maps import StateMaps
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.unit_wording import error_text
+from analysis.diagnosis.unit_wording import format_error
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
-from equalizer.signals.summary import Summarised, Summary
+from equalizer.signals.summary import Summary, SummaryDisplay
 
 if TYPE_CHECKING:
     from analysis.diagnosis.next_experiment.propose_experiment import Proposal
@@ -76,7 +76,7 @@ class Signature:
 @dataclass(frozen=True, slots=True, eq=False)
 class BlackBox:
     """A model without physics, with as many terms per channel as the named effects have parameters (at least 1), fitted
-    to the same samples (`black_box`)."""
+    to the same samples (`fit_black_box`)."""
 
     kind: str
     """What it is, in words."""
@@ -119,7 +119,7 @@ class BalanceErrors:
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
-class Findings(Summarised):
+class Findings(SummaryDisplay):
     """Findings of a diagnosis: the document (`diagnosis`), the improved model, and the data of figures and page."""
 
     diagnosis: Diagnosis
@@ -184,8 +184,8 @@ class Findings(Summarised):
                     ("candidate", f"{candidate.effect} {candidate.axis or ''}".strip())
                     for candidate in self.diagnosis.candidates[:3]
                 ),
-                *((f"held-out error {stage}", error_text(value)) for stage, value in held_out_errors.items()),
-                ("noise alone", error_text(errors.noise)),
+                *((f"held-out error {stage}", format_error(value)) for stage, value in held_out_errors.items()),
+                ("noise alone", format_error(errors.noise)),
             ),
         )
 

@@ -196,7 +196,7 @@ def _find_units(effect: Effect, values: Values, labels: Labels) -> dict[str, str
         law = law_with_values(effect.law, values)
         units = law_units(law, Channels(labels.inputs, labels.outputs, labels.quantity), labels.system)
         return dict(zip(values, units, strict=True))
-    return {p.name: p.unit_in(labels.system, labels.response_unit) for p in EFFECTS_BY_NAME[effect.name].parameters}
+    return {p.name: p.find_unit(labels.system, labels.response_unit) for p in EFFECTS_BY_NAME[effect.name].parameters}
 
 
 def extract_law(hypothesis: Hypothesis, number: int, axis: str | None) -> FoundLaw | None:

@@ -2,7 +2,7 @@
 
 Doubts are: a parameter at the bound of its fit, static friction below Coulomb friction, a confidence interval that
 contains the value without the effect, and negative damping or stiffness of the improved model (not passive, or
-unstable).
+unstable). Called by `wording` and `diagnosis_report`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,9 +10,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from analysis.diagnosis.document import NamedEffect
-from analysis.diagnosis.effect_words import noun_of
+from analysis.diagnosis.effect_words import get_noun
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.unit_wording import value_text
+from analysis.diagnosis.unit_wording import format_value
 from equalizer.effects.effect import Parameter, PlacedEffect
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, RESPONSE
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -24,58 +24,62 @@ _EIGENVALUE_ROUNDING = 1e-6
 """Magnitude of a negative eigenvalue that rounding may cause, relative to the largest eigenvalue."""
 
 
-def implausible_sentences(findings: Findings) -> tuple[str, ...]:
-    """Sentences on implausible parameters of the named effects, on their intervals, and on the improved model."""
+def describe_doubts(findings: Findings) -> tuple[str, ...]:
+    """Describe, in sentences, implausible parameters of the named effects, their intervals, and the improved model."""
     return (
-        *(sentence for placed in findings.named for sentence in _effect_doubts(placed, findings)),
-        *(sentence for effect in findings.diagnosis.effects for sentence in _interval_doubts(effect, findings.named)),
-        *_model_doubts(findings.improved),
+        *(sentence for placed_effect in findings.named for sentence in _check_effect(placed_effect, findings)),
+        *(sentence for effect in findings.diagnosis.effects for sentence in _check_interval(effect, findings.named)),
+        *_check_model(findings.improved),
     )
 
 
-def _effect_doubts(placed: PlacedEffect, findings: Findings) -> Iterator[str]:
-    """Sentences on fitted parameters at a bound, and on friction that is smaller at rest than in motion."""
-    noun, values = noun_of(placed.effect.name), placed.values
-    for parameter in placed.effect.parameters:
+def _check_effect(placed_effect: PlacedEffect, findings: Findings) -> Iterator[str]:
+    """Check for fitted parameters at a bound, and for friction that is smaller at rest than in motion; one sentence
+    each."""
+    noun, values = get_noun(placed_effect.effect.name), placed_effect.values
+    for parameter in placed_effect.effect.parameters:
         value = values[parameter.name]
         if not parameter.fixed and _is_at_bound(value, parameter):
-            text = value_text(value, _unit(placed.effect.name, parameter.name, findings))
+            text = format_value(value, _find_unit(placed_effect.effect.name, parameter.name, findings))
             yield (
                 f"The {parameter.name.replace('_', ' ')} of {noun} reached the limit of its allowed range ({text}): "
                 "the fit has not found a best value."
             )
-    if placed.effect.name == "stribeck_friction" and values["static"] < values["coulomb"]:
+    if placed_effect.effect.name == "stribeck_friction" and values["static"] < values["coulomb"]:
         yield "The fitted friction is smaller at rest than in motion, which is rare for real surfaces."
 
 
 def _is_at_bound(value: float, parameter: Parameter) -> bool:
     """Whether a parameter is at a bound of its fit. A bound of 0 is not checked, nor one at which the effect
     vanishes."""
-    edges = [edge for edge in (parameter.lower, parameter.upper) if edge != parameter.none]
-    return any(np.isclose(value, edge, rtol=_BOUND_TOLERANCE, atol=0.0) for edge in edges if edge)
+    bounds = [bound for bound in (parameter.lower, parameter.upper) if bound != parameter.none]
+    return any(np.isclose(value, bound, rtol=_BOUND_TOLERANCE, atol=0.0) for bound in bounds if bound)
 
 
-def _interval_doubts(effect: NamedEffect, placed_effects: Sequence[PlacedEffect]) -> Iterator[str]:
-    """A sentence where the 95 % interval of an effect's main parameter contains the value without the effect."""
-    placed = next((placed for placed in placed_effects if placed.effect.name == effect.effect), None)
-    for parameter in placed.effect.parameters[:1] if placed is not None else ():
+def _check_interval(effect: NamedEffect, placed_effects: Sequence[PlacedEffect]) -> Iterator[str]:
+    """Check whether the 95 % interval of an effect's main parameter contains the value without the effect; a sentence
+    if so. placed_effects: the named effects, for their parameters."""
+    placed_effect = next(
+        (placed_effect for placed_effect in placed_effects if placed_effect.effect.name == effect.effect), None
+    )
+    for parameter in placed_effect.effect.parameters[:1] if placed_effect is not None else ():
         estimate = effect.parameters.get(parameter.name)
         if estimate is None or estimate.ci95 is None or parameter.none is None:
             continue
         low, high = estimate.ci95
         if low <= parameter.none <= high:
-            text = value_text(estimate.value, estimate.unit, estimate.ci95)
+            text = format_value(estimate.value, estimate.unit, estimate.ci95)
             yield (
-                f"The interval of {noun_of(effect.effect)}, {text}, includes the value without the effect: the data "
+                f"The interval of {get_noun(effect.effect)}, {text}, includes the value without the effect: the data "
                 "hardly support it."
             )
 
 
-def _model_doubts(improved: MechanicalModel) -> Iterator[str]:
-    """Sentences on a damping or stiffness matrix with a negative eigenvalue beyond rounding."""
+def _check_model(improved: MechanicalModel) -> Iterator[str]:
+    """Check damping and stiffness matrix for a negative eigenvalue beyond rounding; a sentence each."""
     for name, matrix in (("damping", improved.damping), ("stiffness", improved.stiffness)):
-        lowest, largest = _ends(matrix)
-        if lowest < -_EIGENVALUE_ROUNDING * max(largest, 1e-300):
+        lowest_eigenvalue, largest_magnitude = _compute_extreme_eigenvalues(matrix)
+        if lowest_eigenvalue < -_EIGENVALUE_ROUNDING * max(largest_magnitude, 1e-300):
             consequence = (
                 "would generate energy"
                 if name == "damping"
@@ -84,17 +88,18 @@ def _model_doubts(improved: MechanicalModel) -> Iterator[str]:
             yield f"The improved model's {name} is negative in one direction: in it, the device {consequence}."
 
 
-def _ends(matrix: FloatArray) -> tuple[float, float]:
-    """Lowest eigenvalue, and largest magnitude of an eigenvalue, of the symmetric part of a matrix."""
-    values = np.linalg.eigvalsh((matrix + matrix.T) / 2)
-    return float(values[0]), float(np.abs(values).max())
+def _compute_extreme_eigenvalues(matrix: FloatArray) -> tuple[float, float]:
+    """Compute the lowest eigenvalue, and the largest magnitude of an eigenvalue, of the symmetric part of a matrix."""
+    eigenvalues = np.linalg.eigvalsh((matrix + matrix.T) / 2)
+    return float(eigenvalues[0]), float(np.abs(eigenvalues).max())
 
 
-def _unit(effect: str, parameter: str, findings: Findings) -> str:
-    """Unit of an effect's parameter in the given model's unit system; "1" where it is not in the vocabulary."""
+def _find_unit(effect: str, parameter: str, findings: Findings) -> str:
+    """Find the unit of an effect's parameter in the given model's unit system; "1" where it is not in the
+    vocabulary."""
     entry = EFFECTS_BY_NAME.get(effect)
     for known_parameter in entry.parameters if entry else ():
         if known_parameter.name == parameter:
             response = findings.time_series[0].units[0] if findings.time_series else RESPONSE
-            return known_parameter.unit_in(findings.given.system, response)
+            return known_parameter.find_unit(findings.given.system, response)
     return "1"

@@ -1,7 +1,7 @@
 """Amplitude densities of the residuals on held-out data, with those of the signal and the noise.
 
-Welch's spectra (`spectral_density`) of all held-out stretches, averaged in power with the lengths as weights, then over
-sixths of an octave.
+Welch's spectra (`estimate_spectral_density`) of all held-out stretches, averaged in power with the lengths as
+weights, then over sixths of an octave.
 """
 
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ import numpy as np
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.findings import TimeSeries
 from equalizer.signals.signal import FloatArray
-from equalizer.signals.spectral_density import spectral_density
+from equalizer.signals.spectral_density import estimate_spectral_density
 
 _MAX_WINDOW_SAMPLES = 2048
 """Most samples of a Welch window; the shortest stretch limits it further."""
@@ -86,7 +86,7 @@ def _compute_power(part: tuple[TimeSeries, int, int], name: str, length: int) ->
     measured = series.measured[start:stop]
     values = measured if name == "measured" else measured - getattr(series, name)[start:stop]
     finite_values = np.nan_to_num(values)
-    return spectral_density(finite_values, series.sample_rate_hz, length)[1]
+    return estimate_spectral_density(finite_values, series.sample_rate_hz, length)[1]
 
 
 def _compute_noise_power(floor: NoiseFloor | None, lines_hz: FloatArray, rate_hz: float, channels: int) -> FloatArray:

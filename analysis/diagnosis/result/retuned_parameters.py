@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from analysis.diagnosis.document import Errors
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.settings import RETUNING_DOUBTED, RETUNING_NAMED, SAME_TO_READERS
-from analysis.diagnosis.unit_wording import error_text, value_text
+from analysis.diagnosis.unit_wording import format_error, format_value
 from analysis.wording import conjoin, typeset
 from equalizer.signals.signal import FloatArray
 
@@ -38,7 +38,7 @@ class MovedParameter:
         """The change with its sign and unit; a relative change in per cent."""
         sign = "+" if self.change >= 0 else ""
         change_size = (
-            f"{typeset(f'{100 * self.change:.2g}')} %" if self.unit == "1" else value_text(self.change, self.unit)
+            f"{typeset(f'{100 * self.change:.2g}')} %" if self.unit == "1" else format_value(self.change, self.unit)
         )
         return f"{sign}{change_size}"
 
@@ -49,7 +49,7 @@ def list_parameters(tuning: Tuning, deviations: FloatArray) -> tuple[MovedParame
     return tuple(
         MovedParameter(name, float(change), unit, float(deviation), bool(abs(deviation) >= tuning.bound - 1e-6))
         for name, change, unit, deviation in zip(
-            tuning.names, tuning.values(deviations), tuning.units, deviations, strict=True
+            tuning.names, tuning.to_changes(deviations), tuning.units, deviations, strict=True
         )
     )
 
@@ -133,7 +133,7 @@ def describe_raised_error(errors: Errors) -> str:
     if not _is_error_raised(errors) or errors.before is None or errors.retuned is None:
         return ""
     return (
-        f"Re-tuning raises the error on held-out data from {error_text(errors.before)} to "
-        f"{error_text(errors.retuned)} of the signal: the fitted data differ from the held-out data, and the re-tuned "
-        "parameters are doubtful."
+        f"Re-tuning raises the error on held-out data from {format_error(errors.before)} to "
+        f"{format_error(errors.retuned)} of the signal: the fitted data differ from the held-out data, and the "
+        "re-tuned parameters are doubtful."
     )

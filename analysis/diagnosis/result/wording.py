@@ -6,26 +6,26 @@ data."""
 from collections.abc import Mapping, Sequence
 
 from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect, format_law
-from analysis.diagnosis.effect_words import OF_THE_WHOLE, noun_of, parameters_text, place_words
+from analysis.diagnosis.effect_words import WHOLE_DEVICE_FAULTS, format_parameters, format_place, get_noun
 from analysis.diagnosis.result.candidate_wording import (
-    REFINED,
+    REFINEMENT_REASON,
     Device,
-    best_candidate_sentence,
-    candidate_sentences,
-    class_noun,
-    class_sentence,
-    refinement_sentence,
+    describe_best_candidate,
+    describe_candidates,
+    describe_class,
+    describe_refinements,
+    format_class_noun,
 )
 from analysis.diagnosis.result.ceiling_wording import (
-    black_box_sentence,
-    confirmation_sentence,
+    describe_black_box,
     describe_ceiling,
+    describe_confirmation,
     describe_error,
-    fall_text,
+    describe_error_change,
 )
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.impact_wording import impact_sentence
-from analysis.diagnosis.result.plausibility import implausible_sentences
+from analysis.diagnosis.result.plausibility import describe_doubts
 from analysis.diagnosis.result.retuned_parameters import (
     MovedParameter,
     choose_better_error,
@@ -36,7 +36,7 @@ from analysis.diagnosis.result.retuned_parameters import (
     find_moved_parameters,
 )
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE
-from analysis.diagnosis.unit_wording import probability_text, share_text
+from analysis.diagnosis.unit_wording import format_probability, format_share
 from analysis.wording import capitalise, conjoin, end_sentence, format_p_text
 
 _PLACES_NAMED = 3
@@ -49,9 +49,9 @@ _AT_NOISE_LEVEL = (
 
 def format_effect_title(effect: NamedEffect, single: bool = False) -> str:
     """Noun and place of an effect: "dry friction on the x drive". single: the device has one axis."""
-    if effect.effect in OF_THE_WHOLE and effect.axis is None:
-        return noun_of(effect.effect)
-    return f"{class_noun(effect)} {place_words(effect.place, effect.axis, single)}"
+    if effect.effect in WHOLE_DEVICE_FAULTS and effect.axis is None:
+        return get_noun(effect.effect)
+    return f"{format_class_noun(effect)} {format_place(effect.place, effect.axis, single)}"
 
 
 def describe_effect(effect: NamedEffect, signature: str = "", single: bool = False) -> str:
@@ -59,7 +59,7 @@ def describe_effect(effect: NamedEffect, signature: str = "", single: bool = Fal
     if effect.law is not None:
         signature = "; ".join(filter(None, (format_law(effect.law), signature)))
     text = ", ".join(
-        filter(None, (format_effect_title(effect, single), parameters_text(effect.effect, effect.parameters)))
+        filter(None, (format_effect_title(effect, single), format_parameters(effect.effect, effect.parameters)))
     )
     return f"{capitalise(text)}: {signature}." if signature else f"{capitalise(text)}."
 
@@ -81,10 +81,12 @@ def describe_verdict(
             if moved_parameters
             else ", each within its calibration's standard deviation"
         )
-        error_text_ = fall_text(errors, ("before", "as given"), ("retuned", "re-tuned"), noise_method)
+        error_text_ = describe_error_change(errors, ("before", "as given"), ("retuned", "re-tuned"), noise_method)
         return f"No physics is missing; parameters of the model are wrong{change_text}. {capitalise(error_text_)}."
     if diagnosis.effects:
-        error_text_ = capitalise(fall_text(errors, choose_better_model(errors), ("after", "with it"), noise_method))
+        error_text_ = capitalise(
+            describe_error_change(errors, choose_better_model(errors), ("after", "with it"), noise_method)
+        )
         if not select_significant(diagnosis.remainder):
             remark = "" if diagnosis.verdict == "explained" else f" {_AT_NOISE_LEVEL}"
             return f"Missing in the model: {effect_titles}. {error_text_}.{remark}"
@@ -93,7 +95,7 @@ def describe_verdict(
         "Model and device disagree, and no effect of the catalogue explains it. "
         f"{capitalise(describe_error(*choose_better_error(errors), errors, noise_method))}."
     )
-    return " ".join(filter(None, (sentence, best_candidate_sentence(diagnosis, device))))
+    return " ".join(filter(None, (sentence, describe_best_candidate(diagnosis, device))))
 
 
 def write_answer(findings: Findings) -> str:
@@ -117,35 +119,35 @@ def describe_rivals(effect: NamedEffect) -> tuple[str, ...]:
     """A sentence per rival of the effect: its probability and why it was not chosen. Rivals that the data cannot
     distinguish from the effect are in `describe_equivalents`."""
     return tuple(
-        f"{capitalise(noun_of(rival.effect))} (probability {probability_text(rival.probability)}): "
+        f"{capitalise(get_noun(rival.effect))} (probability {format_probability(rival.probability)}): "
         f"{end_sentence(rival.why_not)}"
         for rival in effect.rivals
-        if not rival.inseparable and rival.why_not != REFINED
+        if not rival.inseparable and rival.why_not != REFINEMENT_REASON
     )
 
 
 def describe_equivalents(effect: NamedEffect) -> str:
     """Sentences on rivals that the data cannot distinguish from the effect, and on laws that only refine it; empty
     where there are none."""
-    return " ".join(filter(None, (_describe_inseparable(effect), refinement_sentence(effect))))
+    return " ".join(filter(None, (_describe_inseparable(effect), describe_refinements(effect))))
 
 
 def _describe_inseparable(effect: NamedEffect) -> str:
     if effect.class_:
-        return class_sentence(effect)
+        return describe_class(effect)
     equivalents = [rival for rival in effect.rivals if rival.inseparable]
     if not equivalents:
         return ""
     subject = "both are" if len(equivalents) == 1 else "all of them are"
     probability_texts = ", ".join(
-        f"{noun_of(name)} {probability_text(probability)}"
+        f"{get_noun(name)} {format_probability(probability)}"
         for name, probability in (
             (effect.effect, effect.probability), *((other.effect, other.probability) for other in equivalents)
         )
     )  # fmt: skip
     return (
-        f"These data do not distinguish {noun_of(effect.effect)} from "
-        f"{conjoin([noun_of(other.effect) for other in equivalents])}: {subject} "
+        f"These data do not distinguish {get_noun(effect.effect)} from "
+        f"{conjoin([get_noun(other.effect) for other in equivalents])}: {subject} "
         f"named (probabilities: {probability_texts})."
     )
 
@@ -177,7 +179,7 @@ def describe_place(mismatch: Mismatch, device: Device | None = None) -> str:
     level = "" if mismatch.amplitude is None else f" at {mismatch.amplitude:g}"
     state = f", {mismatch.state}" if mismatch.state else ""
     driven = f", driven by {mismatch.input}{level}" if mismatch.input else ""
-    share = f"{share_text(mismatch.share)} of {'the mismatch' if mismatch.state else 'the signal'}"
+    share = f"{format_share(mismatch.share)} of {'the mismatch' if mismatch.state else 'the signal'}"
     return f"{mismatch.output}{band}{driven}{state}: {share} ({format_p_text(mismatch.p_value)})"
 
 
@@ -190,7 +192,7 @@ def describe_next_experiment(diagnosis: Diagnosis) -> str:
         return (
             "No further recording was found that would distinguish what these data do not." if has_equivalents else ""
         )
-    named_noun, *rivals = (noun_of(name) for name in experiment.splits) if experiment.splits else ("",)
+    named_noun, *rivals = (get_noun(name) for name in experiment.splits) if experiment.splits else ("",)
     benefit = f"would distinguish {named_noun} from {conjoin(rivals)}" if rivals else "would help"
     subject = "The recordings" if "; then " in experiment.command else "The recording"
     return f"{subject} that {benefit}: {experiment.command}. {capitalise(end_sentence(experiment.why))}"
@@ -200,7 +202,7 @@ def describe_share(effect: NamedEffect) -> str:
     """Sentences on an effect's share of the mismatch after re-tuning, its probability, and its held-out gain."""
     return (
         f"It accounts for {100 * effect.share:.3g} % of the mismatch after re-tuning; the probability that this "
-        f"effect is the cause is {probability_text(effect.probability)}.{describe_gain(effect)}"
+        f"effect is the cause is {format_probability(effect.probability)}.{describe_gain(effect)}"
     )
 
 
@@ -209,8 +211,8 @@ def describe_gain(effect: NamedEffect) -> str:
     gain = effect.held_out_gain
     if gain is None or gain.ci95 is None:
         return ""
-    low, high = (share_text(max(end, 0.0)) for end in gain.ci95)
-    return f" On held-out data it explains {share_text(max(gain.value, 0.0))} of the error's power ({low} to {high})."
+    low, high = (format_share(max(end, 0.0)) for end in gain.ci95)
+    return f" On held-out data it explains {format_share(max(gain.value, 0.0))} of the error's power ({low} to {high})."
 
 
 def write_summary_lines(findings: Findings) -> tuple[str, ...]:
@@ -222,20 +224,20 @@ def write_summary_lines(findings: Findings) -> tuple[str, ...]:
     for effect in diagnosis.effects:
         lines += [describe_effect(effect, signatures.get(effect.effect, ""), single), describe_equivalents(effect)]
     if diagnosis.verdict in ("explained", "partly_explained"):
-        lines.append(confirmation_sentence(diagnosis.fit.fit, diagnosis.fit.test))
+        lines.append(describe_confirmation(diagnosis.fit.fit, diagnosis.fit.test))
     if diagnosis.verdict not in ("no_mismatch", "parameters"):
         lines += [
             describe_raised_error(diagnosis.fit.test),
             describe_retuning(moved_parameters, findings.fitted),
             describe_remainder(diagnosis, extract_device(findings)),
             *describe_ceiling(findings.balance_errors),
-            black_box_sentence(findings.black_box, bool(diagnosis.effects)),
-            *candidate_sentences(diagnosis, extract_device(findings)),
+            describe_black_box(findings.black_box, bool(diagnosis.effects)),
+            *describe_candidates(diagnosis, extract_device(findings)),
         ]
     lines += [
         describe_next_experiment(diagnosis),
         *describe_doubtful_parameters(moved_parameters, findings.fitted),
-        *implausible_sentences(findings),
+        *describe_doubts(findings),
     ]
     lines += findings.remarks
     return tuple(line for line in lines if line)

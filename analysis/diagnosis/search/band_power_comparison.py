@@ -3,6 +3,7 @@
 A misfit is the rms logarithm of the ratio of measured and simulated amplitudes, divided by its chance variation: the
 same quantity between two simulations of one hypothesis, whose coordinates differ by 1e-9 (`perturb`). Impacts make
 these simulations diverge, and no hypothesis can be expected to match the recording better than it matches itself.
+Called by `impacts`.
 """
 
 from dataclasses import dataclass
@@ -31,29 +32,33 @@ class BandPowerComparison:
     the amplitude; at least `IMPACTS_LEAST_SPREAD`."""
 
     def score_candidate(self, deviations: FloatArray, hypothesis: Hypothesis) -> FittedCandidate:
-        """The candidate with its misfits over the chance variation, those on held-out samples included."""
-        fitted = evaluate_fit(self.context.whole, self.context.tuning, deviations, hypothesis)
-        misfits = self.power.misfits(self.power.measured - self.power.predict(fitted.residuals))
+        """Simulate the hypothesis and return the candidate with its misfits over the chance variation, those on
+        held-out samples included."""
+        fitted = evaluate_fit(self.context.full_measure, self.context.tuning, deviations, hypothesis)
+        misfits = self.power.compute_misfits(self.power.measured - self.power.predict(fitted.residuals))
         return FittedCandidate(
-            fitted, FitScore(*(self._times(misfit) for misfit in (misfits.fit, misfits.choose, misfits.test)))
+            fitted,
+            FitScore(*(self._divide_by_chance(misfit) for misfit in (misfits.fit, misfits.choose, misfits.test))),
         )
 
-    def _times(self, misfit: FloatArray) -> FloatArray:
+    def _divide_by_chance(self, misfit: FloatArray) -> FloatArray:
         """(c,): misfit over the chance variation; 1 for a channel whose bands are all below the noise, NaN where no
         channel has a band above it."""
         return misfit if np.isnan(misfit).all() else np.where(np.isnan(misfit), 1.0, misfit / self.chance)
 
 
-def comparison_of(context: SearchContext, best: BandPowerFit) -> BandPowerComparison:
-    """The comparison with the chance variation of the given fit: per channel the largest of its values on the samples
-    to fit, to choose by and to test."""
-    power, model = BandPower(context.whole), context.tuning.tune(best.deviations)
+def make_comparison(context: SearchContext, best: BandPowerFit) -> BandPowerComparison:
+    """Make the comparison with the chance variation of the given fit: per channel the largest of its values on the
+    samples to fit, to choose by and to test."""
+    power, model = BandPower(context.full_measure), context.tuning.tune(best.deviations)
 
     def predict(number: int) -> FloatArray:
-        return power.predict(context.whole.residuals(model, perturb(best.hypothesis, number).list_placed_effects()))
+        return power.predict(
+            context.full_measure.residuals(model, perturb(best.hypothesis, number).list_placed_effects())
+        )
 
     first_powers, second_powers = (np.asarray(powers) for powers in context.map_(predict, range(2)))
-    differences = power.misfits(first_powers - second_powers)
+    differences = power.compute_misfits(first_powers - second_powers)
     chance = np.fmax(np.fmax(differences.fit, differences.choose), differences.test)
     return BandPowerComparison(context, power, np.fmax(chance, IMPACTS_LEAST_SPREAD))
 
@@ -61,36 +66,36 @@ def comparison_of(context: SearchContext, best: BandPowerFit) -> BandPowerCompar
 def is_convincing(named: FittedCandidate, retuned: FittedCandidate) -> bool:
     """Whether an explanation removes at least `IMPACTS_SHARE` of the re-tuned model's misfit and leaves at most
     `IMPACTS_ERROR` times the chance variation, on the samples to choose by and on those to test."""
-    pairs = [
+    misfit_pairs = [
         (getattr(retuned.score, part), getattr(named.score, part))
         for part in ("choose", "test")
         if np.isfinite(getattr(named.score, part)).any()
     ]
-    return bool(pairs) and all(
-        _rms_over_channels(named_misfit) <= (1 - IMPACTS_SHARE) * _rms_over_channels(retuned_misfit)
-        and _rms_over_channels(named_misfit) <= IMPACTS_ERROR
-        for retuned_misfit, named_misfit in pairs
+    return bool(misfit_pairs) and all(
+        _compute_rms_over_channels(named_misfit) <= (1 - IMPACTS_SHARE) * _compute_rms_over_channels(retuned_misfit)
+        and _compute_rms_over_channels(named_misfit) <= IMPACTS_ERROR
+        for retuned_misfit, named_misfit in misfit_pairs
     )
 
 
 def is_as_good(rival: FittedCandidate, named: FittedCandidate) -> bool:
     """Whether a rival's misfit is at most `IMPACTS_AS_GOOD` times that of the named hypothesis, on the samples to
     choose by and on those to test."""
-    pairs = [(getattr(candidate.score, part) for candidate in (rival, named)) for part in ("choose", "test")]
+    misfit_pairs = [(getattr(candidate.score, part) for candidate in (rival, named)) for part in ("choose", "test")]
     return all(
-        _rms_over_channels(rival_misfit) <= IMPACTS_AS_GOOD * _rms_over_channels(named_misfit)
-        for rival_misfit, named_misfit in pairs
+        _compute_rms_over_channels(rival_misfit) <= IMPACTS_AS_GOOD * _compute_rms_over_channels(named_misfit)
+        for rival_misfit, named_misfit in misfit_pairs
         if np.isfinite(rival_misfit).any()
     )
 
 
-def _rms_over_channels(misfit: FloatArray) -> float:
-    """Root mean square over the channels; NaN is left out."""
+def _compute_rms_over_channels(misfit: FloatArray) -> float:
+    """Compute the root mean square over the channels; NaN is left out. misfit: (c,)."""
     return float(np.sqrt(np.nanmean(misfit**2)))
 
 
-def worst_part(candidate: FittedCandidate) -> float:
-    """The larger of the misfits on the samples to choose by and on the held-out samples, each the root mean square over
-    channels, in units of the chance variation; 0 where there is none."""
+def compute_worst_misfit(candidate: FittedCandidate) -> float:
+    """Compute the larger of the misfits on the samples to choose by and on the held-out samples, each the root mean
+    square over channels, in units of the chance variation; 0 where there is none."""
     parts = (candidate.score.choose, candidate.score.test)
-    return max((_rms_over_channels(part) for part in parts if np.isfinite(part).any()), default=0.0)
+    return max((_compute_rms_over_channels(part) for part in parts if np.isfinite(part).any()), default=0.0)

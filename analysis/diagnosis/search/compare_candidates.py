@@ -1,7 +1,7 @@
 """Compares candidates: the best first fits are continued until they converge, then all are ordered by their errors.
 
 A Gauss-Newton fit converges about geometrically: after relative reductions g1 and g2 of the cost by two fits, the next
-is expected to reduce it by g2 min(g2 / g1, 1) (`output_error.expect_gain`); fits end when that is below a tolerance.
+is expected to reduce it by g2 min(g2 / g1, 1) (`predict_decrease`); fits end when that is below a tolerance.
 The sensitivity to the model's own parameters costs one simulation for each of them. It is therefore kept from fit to
 fit, and recomputed only where a parameter has moved far. So all candidates are compared at a small part of the cost of
 full fits, and only those near the best are refined. With forces that depend on the motion, a sensitivity that was
@@ -19,11 +19,11 @@ from analysis.diagnosis.errors.hypothesis import generate_near_equivalents, has_
 from analysis.diagnosis.errors.output_error import (
     Fitted,
     Sensitivity,
+    build_jacobian,
     evaluate_fit,
-    expect_gain,
     fit,
-    residuals_to_fit,
-    sensitivity,
+    predict_decrease,
+    stack_fit_residuals,
 )
 from analysis.diagnosis.search.search_context import FITTING, FittedCandidate, SearchContext, compute_sensitivity
 from analysis.diagnosis.search.short_recordings import coarsen, shorten_recordings
@@ -74,9 +74,9 @@ def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitt
         for number, trial in enumerate(promising[1:MOST_REFINED], 1)
         if not any(_is_same_start(context, trial, compared) for compared in promising[:number])
     ]
-    if refined and context.candidate(refined[0]).score.worst_channel <= NO_SECOND_START:
+    if refined and context.score_fit(refined[0]).score.worst_channel <= NO_SECOND_START:
         further_fits = [
-            trial for trial in further_fits if context.candidate(trial).score.worst_channel <= REACHES_NOISE
+            trial for trial in further_fits if context.score_fit(trial).score.worst_channel <= REACHES_NOISE
         ]
     remaining = [
         trial for trial in fits[1 if promising else 0 :] if not any(trial is compared for compared in further_fits)
@@ -85,9 +85,9 @@ def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitt
         :1
     ]
     refined += context.guard.wrap(context.map_, FITTING)(refit, [*further_fits, *special_cases])  # type: ignore[arg-type]
-    refined = _polish(context, sorted(refined, key=lambda trial: context.candidate(trial).score.mean_log_error))
+    refined = _polish(context, sorted(refined, key=lambda trial: context.score_fit(trial).score.mean_log_error))
     fitted_candidates = [
-        context.candidate(trial) for trial in [*refined, *(trial for trial in remaining if trial not in special_cases)]
+        context.score_fit(trial) for trial in [*refined, *(trial for trial in remaining if trial not in special_cases)]
     ]
     return tuple(sorted(fitted_candidates, key=lambda candidate: candidate.score.mean_log_error))
 
@@ -109,7 +109,7 @@ def _polish(context: SearchContext, fits: list[Fitted]) -> list[Fitted]:
         )
     for _ in range(POLISHING_ROUNDS):
         try:
-            jacobian = sensitivity(measure, tuning, fits[0].deviations, fits[0].hypothesis, context.map_)
+            jacobian = build_jacobian(measure, tuning, fits[0].deviations, fits[0].hypothesis, context.map_)
 
             def continue_fit(trial: Fitted, jacobian: Sensitivity = jacobian) -> Fitted:
                 continue_candidate = partial(fit, measure, tuning, trial, jacobian, FULL_FIT_ROUNDS, context.map_)
@@ -125,7 +125,7 @@ def _polish(context: SearchContext, fits: list[Fitted]) -> list[Fitted]:
 
 def _compute_worst_error(context: SearchContext, fitted: Fitted) -> float:
     """Error of the worst channel, in units of the noise."""
-    return context.candidate(fitted).score.worst_channel
+    return context.score_fit(fitted).score.worst_channel
 
 
 def _is_time_invariant(fitted: Fitted) -> bool:
@@ -143,7 +143,7 @@ def _is_same_start(context: SearchContext, fitted: Fitted, other_fit: Fitted) ->
 
 def _compute_prediction_difference(context: SearchContext, fitted: Fitted, other_fit: Fitted) -> float:
     """Mean square difference of two fits' predictions on the samples to fit, in units of the noise's variance."""
-    difference = residuals_to_fit(context.measure, fitted.residuals) - residuals_to_fit(
+    difference = stack_fit_residuals(context.measure, fitted.residuals) - stack_fit_residuals(
         context.measure, other_fit.residuals
     )
     with np.errstate(over="ignore", invalid="ignore"):
@@ -217,7 +217,7 @@ def _refine_from_both_starts(
     # With 1 as the reduction before, `_refine_from` may renew a shared sensitivity instead of ending after one fit.
     first_fit, jacobian = _refine_from(context, fitted, jacobian, 1.0)
     first_fit, jacobian = _refine_similar(context, first_fit, jacobian)
-    if is_jacobian_shared or context.candidate(first_fit).score.worst_channel <= NO_SECOND_START:
+    if is_jacobian_shared or context.score_fit(first_fit).score.worst_channel <= NO_SECOND_START:
         return first_fit, jacobian
     calibrated = evaluate_fit(
         context.measure, context.tuning, np.zeros_like(first_fit.deviations), first_fit.hypothesis
@@ -244,7 +244,7 @@ def choose_plainest(context: SearchContext, fitted: Fitted) -> Fitted:
     best = fitted
     for variant in generate_near_equivalents(fitted.hypothesis):
         variant_fit = evaluate_fit(context.measure, context.tuning, best.deviations, variant)
-        samples = len(residuals_to_fit(context.measure, variant_fit.residuals))
+        samples = len(stack_fit_residuals(context.measure, variant_fit.residuals))
         best = variant_fit if variant_fit.cost < best.cost + RICHER_LAW_SQUARES / samples else best
     return best
 
@@ -263,10 +263,10 @@ def _refine_from(
     for _ in range(MOST_RENEWALS):
         next_fit = fit(context.measure, context.tuning, best, current_jacobian, REFINING_ROUNDS, context.map_)
         gain = 1 - next_fit.cost / best.cost if best.cost > 0 else 0.0
-        best, expected_gain, previous_gain = next_fit, expect_gain(gain, previous_gain), gain
+        best, expected_gain, previous_gain = next_fit, predict_decrease(gain, previous_gain), gain
         has_converged = (expected_gain if is_complete else gain) < _compute_gain_limit(best)
         if (is_complete and has_converged) or (
-            context.candidate(best).score.worst_channel <= NO_SECOND_START and has_converged
+            context.score_fit(best).score.worst_channel <= NO_SECOND_START and has_converged
         ):
             break
         if (

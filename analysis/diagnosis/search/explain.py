@@ -27,7 +27,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Hypothesis, combine
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Hypothesis, combine_hypotheses
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.next_effect import Step, find_next_effect
@@ -92,8 +92,8 @@ class Explanation:
     errors: tuple[Fitted, FloatArray] | None = None
     """A fit and the standard errors of all its parameters (`compute_final_errors`), where already computed."""
     jackknife_errors: tuple[Fitted, FloatArray | None] | None = None
-    """A fit at its minimum, and the jackknife standard errors of its parameters over segments (`segment_errors`); None
-    in place of the errors for a single segment."""
+    """A fit at its minimum, and the jackknife standard errors of its parameters over segments
+    (`compute_segment_errors`); None in place of the errors for a single segment."""
 
     @property
     def plain(self) -> FittedCandidate:
@@ -133,10 +133,10 @@ def start_explanation(
     """The model as given and re-tuned, with the effects that need no search (`_known_rounds`)."""
     given_fit = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NO_EFFECTS)
     progress("re-tuning the model within its tolerances", 0.02)
-    base = context.candidate(refine(context, given_fit))
+    base = context.score_fit(refine(context, given_fit))
     rounds = _known_rounds(context, base, previous_steps)
     steps = tuple(round_candidates[0] for round_candidates in rounds)
-    ends = (context.with_test_score(context.candidate(given_fit)), context.with_test_score(base))
+    ends = (context.with_test_score(context.score_fit(given_fit)), context.with_test_score(base))
     return Explanation(*ends, context.with_test_score(steps[-1]) if steps else ends[1], tuple(rounds), steps)
 
 
@@ -151,7 +151,7 @@ def add_effects(
     """The explanation with further effects, up to `max_effects` in total. A last round of `selected` in which no
     effect was added is not computed again: a second effect is looked for together with its best candidate."""
     rounds, steps = list(selected.rounds), list(selected.steps)
-    base = steps[-1] if steps else context.candidate(_reevaluate(context, selected.retuned))
+    base = steps[-1] if steps else context.score_fit(_reevaluate(context, selected.retuned))
     limited, excluded, ended_early = replace(context, map_=limit_map(context.map_, time_left)), "", selected.ended_early
     may_extend = not context.certain and not selected.barred and not ended_early
     while may_extend and len(steps) < max_effects and is_worth_searching(context, selected, base):
@@ -194,7 +194,7 @@ def is_worth_searching(context: SearchContext, explanation: Explanation, base: F
     is looked for where two fit as well as right laws fit a real device, because it would only absorb their small
     errors; except with opened held-out samples, which are few and may show an effect that the others do not."""
     if base.fitted.hypothesis.claims:
-        has_noise_limit = context.references is None and not context.opened
+        has_noise_limit = context.references is None and not context.has_opened_samples
         if has_noise_limit and len(base.fitted.hypothesis.claims) > 1 and leaves_little(explanation.retuned, base):
             return False
         return base.score.worst_channel > context.least_remaining_error
@@ -245,15 +245,15 @@ def _known_rounds(
 
 def _refit(context: SearchContext, candidate: FittedCandidate) -> FittedCandidate:
     """The candidate fitted again to the context's samples, from its own parameters."""
-    return context.candidate(refine(context, _reevaluate(context, candidate)))
+    return context.score_fit(refine(context, _reevaluate(context, candidate)))
 
 
 def _add_certain(context: SearchContext, base: FittedCandidate, hypothesis: Hypothesis) -> FittedCandidate:
     """The fit with a certain hypothesis added, even where that does not lower the error."""
     start = evaluate_fit(
-        context.measure, context.tuning, base.fitted.deviations, combine(base.fitted.hypothesis, hypothesis)
+        context.measure, context.tuning, base.fitted.deviations, combine_hypotheses(base.fitted.hypothesis, hypothesis)
     )
-    return context.candidate(refine(context, start))
+    return context.score_fit(refine(context, start))
 
 
 def retune_alone(context: SearchContext) -> Fitted:

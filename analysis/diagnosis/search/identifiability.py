@@ -16,16 +16,16 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import FreeParameter
 from analysis.diagnosis.errors.intervals import (
     STRETCH_S,
+    compute_full_sensitivity,
+    compute_segment_errors,
+    compute_standard_errors,
     finish_fit,
-    segment_errors,
-    sensitivity_to_all,
-    standard_errors,
 )
 from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit
 from analysis.diagnosis.search.compare_candidates import choose_plainest
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import is_equal_rival
-from analysis.diagnosis.search.revise_selection import without_effect
+from analysis.diagnosis.search.revise_selection import remove_effect
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.short_recordings import shorten_recordings
 from analysis.diagnosis.search.time_budget import unlimited_time
@@ -54,7 +54,7 @@ def compute_final_errors(context: SearchContext, explanation: Explanation) -> Fl
     last_candidate = explanation.steps[-1] if explanation.steps else explanation.retuned
     if explanation.errors is not None and explanation.errors[0] is last_candidate.fitted:
         return explanation.errors[1]
-    return standard_errors(context.measure, *_evaluate_with_sensitivity(context, last_candidate.fitted))
+    return compute_standard_errors(context.measure, *_evaluate_with_sensitivity(context, last_candidate.fitted))
 
 
 def compute_interval_errors(context: SearchContext, explanation: Explanation, noise_errors: FloatArray) -> FloatArray:
@@ -65,7 +65,7 @@ def compute_interval_errors(context: SearchContext, explanation: Explanation, no
     if explanation.jackknife_errors is not None and explanation.jackknife_errors[0] is last_fit:
         jackknife_errors = explanation.jackknife_errors[1]
     else:
-        jackknife_errors = segment_errors(context.measure, *_evaluate_with_sensitivity(context, last_fit))
+        jackknife_errors = compute_segment_errors(context.measure, *_evaluate_with_sensitivity(context, last_fit))
     if jackknife_errors is None:
         return INTERVAL_FACTOR * noise_errors
     return np.asarray(np.hypot(noise_errors, np.minimum(jackknife_errors, MOST_BETWEEN_SEGMENTS * noise_errors)))
@@ -81,15 +81,15 @@ def finish_explanation(context: SearchContext, explanation: Explanation, time_le
         context.measure, context.tuning, last_candidate.fitted.deviations, last_candidate.fitted.hypothesis
     )
     fitted, jacobian = _finish_fit(context, start, time_left)
-    errors = standard_errors(context.measure, fitted, jacobian)
-    jackknife_errors = segment_errors(context.measure, fitted, jacobian)
+    errors = compute_standard_errors(context.measure, fitted, jacobian)
+    jackknife_errors = compute_segment_errors(context.measure, fitted, jacobian)
     if fitted is start:
         return replace(
             explanation,
             errors=(last_candidate.fitted, errors),
             jackknife_errors=(last_candidate.fitted, jackknife_errors),
         )
-    candidate = context.candidate(fitted)
+    candidate = context.score_fit(fitted)
     scored_candidate = context.with_test_score(candidate)
     final_candidate = scored_candidate if last_candidate is explanation.after else candidate
     rounds = tuple(
@@ -130,7 +130,7 @@ def _compute_sensitivity(context: SearchContext, fitted: Fitted) -> Sensitivity:
     """Sensitivity to all parameters of a fit, on one period of each segment where the drive repeats."""
     short_form = shorten_recordings(context, fitted)
     fit_context = context if short_form is None else short_form.context
-    jacobian = sensitivity_to_all(
+    jacobian = compute_full_sensitivity(
         fit_context.measure, fit_context.tuning, fitted.deviations, fitted.hypothesis, fit_context.map_
     )
     return jacobian if short_form is None else short_form.repeat_sensitivity(jacobian)
@@ -155,7 +155,7 @@ def keep_identifiable(context: SearchContext, explanation: Explanation, time_lef
             _find_replacement(context, explanation, time_left) if len(explanation.steps) == 1 else None
         ) or _remove_effects(explanation)
         return replace(explanation, undetermined=undetermined)
-    reduced = without_effect(context, explanation, removed_index)
+    reduced = remove_effect(context, explanation, removed_index)
     rounds = tuple(
         tuple(
             candidate
@@ -248,14 +248,14 @@ def _is_undetermined(free: FreeParameter, coordinate: float, error: float) -> bo
     """Whether the parameter's interval contains the value that means no effect. error: standard error of its
     coordinate."""
     half_width, distance = _compute_interval_and_distance(free, coordinate, error)
-    value, null_value = free.value(coordinate), free.parameter.none or 0.0
+    value, null_value = free.to_value(coordinate), free.parameter.none or 0.0
     return distance <= _ZERO_TOLERANCE * max(abs(value), abs(null_value)) or not half_width <= distance
 
 
 def _compute_interval_and_distance(free: FreeParameter, coordinate: float, error: float) -> tuple[float, float]:
     """Half width of the parameter's interval, and the distance of its value from no effect."""
-    value, null_value = free.value(coordinate), free.parameter.none or 0.0
-    return 1.96 * INTERVAL_FACTOR * abs(free.value(coordinate + error) - value), abs(value - null_value)
+    value, null_value = free.to_value(coordinate), free.parameter.none or 0.0
+    return 1.96 * INTERVAL_FACTOR * abs(free.to_value(coordinate + error) - value), abs(value - null_value)
 
 
 def compute_null_distance(
@@ -265,7 +265,7 @@ def compute_null_distance(
     interval excludes no effect. effect: its index."""
     last_fit = explanation.steps[-1].fitted
     reduced = (
-        explanation.retuned if len(explanation.steps) == 1 else without_effect(context, explanation, effect).steps[-1]
+        explanation.retuned if len(explanation.steps) == 1 else remove_effect(context, explanation, effect).steps[-1]
     )
     # The re-tuned model, and at times the last step, is kept as it is on all samples. Both fits end at their minimum:
     # else the difference is not all the effect's.

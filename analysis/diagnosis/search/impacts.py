@@ -1,10 +1,16 @@
-"""Rattling play (backlash): its waveform is chaotic and cannot be predicted, so hypotheses are compared by band powers.
+"""Explanation of an irregular response by play (backlash) with impacts, compared by the power in frequency bands.
 
 Two simulations of a drive with play diverge within a few impacts, however small their initial difference (Ott, Chaos in
-Dynamical Systems, chapter 4). The difference between two simulations of one hypothesis, its chance variation, is
-therefore used in place of the noise.
+Dynamical Systems, chapter 4). Waveforms can therefore not be compared. Band powers are compared instead (`band_power`),
+and the difference between two simulations of one hypothesis, its chance variation, takes the place of the noise.
 
-Where play alone leaves clearly more than chance, a second effect is searched for (`second_effect_with_play`).
+Steps of `explain_impacts`, which `search_by_simulation` calls:
+
+1. nothing is fitted unless the response is irregular (`is_irregular`);
+2. play is fitted on each driven axis, and the best of these fits refined together with the model's parameters;
+3. where play leaves more than the chance variation, a second effect is added (`second_effect_with_play`);
+4. the result counts if no simpler or rival hypothesis is about as good (`_judge_play`), the data determine all
+   parameters, and a gap of zero fits clearly worse (`_needs_gap`).
 """
 
 from collections.abc import Sequence
@@ -20,8 +26,8 @@ from analysis.diagnosis.errors.hypothesis import (
     NO_EFFECTS,
     Claim,
     Hypothesis,
-    combine,
-    hypothesis_of_claim,
+    combine_hypotheses,
+    make_claim_hypothesis,
     remove_claim,
 )
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
@@ -30,10 +36,10 @@ from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.search.band_power_comparison import (
     BandPowerComparison,
-    comparison_of,
+    compute_worst_misfit,
     is_as_good,
     is_convincing,
-    worst_part,
+    make_comparison,
 )
 from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.identifiability import find_undetermined
@@ -52,7 +58,7 @@ from equalizer.effects.effect import Effect, Values
 from equalizer.effects.starts.evidence import Evidence
 
 GAP_FACTORS = np.geomspace(0.02, 5.0, 13)
-"""Starting values of the gap, relative to the estimated gap. By hand."""
+"""Starting values of the gap, relative to the estimated gap. Chosen by hand."""
 FIRST_FIT_ROUNDS = 5
 """Gauss-Newton steps of the first fit, in which the model's parameters are fixed."""
 
@@ -64,11 +70,14 @@ def explain_impacts(
     catalogue: Sequence[Effect],
     time_left: TimeBudget = unlimited_time,
 ) -> Explanation | None:
-    """The explanation by play, compared by band power; None where the response is regular, where play does not explain
-    it, where the time ends before that is known, or where responses are not simulated freely. floors: noise per
-    recording. time_left: called before each refinement, and between its linearisations."""
+    """The explanation by play, alone or with a second effect. None where the response is regular, where play does not
+    explain it, where the time ends before that is known, or where the error measure is no free simulation.
+
+    explanation: result of the search by waveforms. floors: noise of each recording. time_left: called before each
+    refinement, and between its linearisations.
+    """
     effects = {effect.name: effect for effect in catalogue}
-    if PLAY not in effects or not isinstance(context.whole, FreeSimulation):
+    if PLAY not in effects or not isinstance(context.full_measure, FreeSimulation):
         return None
     if not is_irregular(context, explanation, floors):
         return None
@@ -76,32 +85,32 @@ def explain_impacts(
     evidence = gather_evidence(context.measure, context.tuning, given_fit)[0]
     problem = BandPowerProblem(BandPower(context.measure), context.tuning, context.map_)
     play_claims = [Claim(effects[PLAY], "one", (axis,)) for axis in range(context.tuning.model.inputs)]
-    placed_fits = sorted((_fit_claim(problem, evidence, claim) for claim in play_claims), key=lambda claim: claim.cost)
-    if placed_fits[0].cost >= evaluate_hypothesis(problem, given_fit.deviations, NO_EFFECTS).cost:
+    axis_fits = sorted((_fit_claim(problem, evidence, claim) for claim in play_claims), key=lambda fit: fit.cost)
+    if axis_fits[0].cost >= evaluate_hypothesis(problem, given_fit.deviations, NO_EFFECTS).cost:
         return None
-    chance_weighted = weight_by_chance_variation(problem, placed_fits[0])
+    chance_weighted = weight_by_chance_variation(problem, axis_fits[0])
     retuned_deviations = explanation.retuned.fitted.deviations
     if evaluate_hypothesis(chance_weighted, retuned_deviations, NO_EFFECTS).cost <= NEAR_CHANCE:
         return None  # the band powers of the model without play differ from the recorded ones by chance alone
     if not time_left():
         return None
-    play_fit = refine_band_power(chance_weighted, placed_fits[0], time_left)
-    rivals = list(placed_fits[1:])
+    play_fit = refine_band_power(chance_weighted, axis_fits[0], time_left)
+    rivals = list(axis_fits[1:])
     if RIVAL in effects:
         rivals.append(_fit_claim(problem, evidence, Claim(effects[RIVAL], "one", play_fit.hypothesis.claims[0].sites)))
     rival_hypotheses = [rival.hypothesis for rival in rivals if rival.hypothesis.claims and np.isfinite(rival.cost)]
-    play_comparison = comparison_of(context, play_fit)
+    play_comparison = make_comparison(context, play_fit)
     play_candidate = play_comparison.score_candidate(play_fit.deviations, play_fit.hypothesis)
-    is_explained = worst_part(play_candidate) <= EXPLAINED_BY_CHANCE
+    is_explained = compute_worst_misfit(play_candidate) <= EXPLAINED_BY_CHANCE
     second_effects = SecondEffects((), complete=True)
     if not is_explained:
         second_effects = search_second_effects(context, explanation, problem, play_fit, catalogue, time_left)
     fits = (play_fit, second_effects.fits)
-    named = _name_confirmed(context, explanation, problem, fits, rival_hypotheses, play_comparison)
-    return named and replace(named, ended_early=named.ended_early or not second_effects.complete)
+    result = _find_confirmed_explanation(context, explanation, problem, fits, rival_hypotheses, play_comparison)
+    return result and replace(result, ended_early=result.ended_early or not second_effects.complete)
 
 
-def _name_confirmed(
+def _find_confirmed_explanation(
     context: SearchContext,
     explanation: Explanation,
     problem: BandPowerProblem,
@@ -109,33 +118,34 @@ def _name_confirmed(
     rival_hypotheses: Sequence[Hypothesis],
     play_comparison: BandPowerComparison,
 ) -> Explanation | None:
-    """The first explanation that the recordings confirm: by the best pair, else the next one, at last by play alone. No
-    parameter is open, and the gap is needed: play of no gap is no cause of an irregular response. fits, rivals: as for
-    `_judge_play`. play_comparison: with the chance variation of play alone."""
+    """The first explanation that the recordings confirm: by play with a second effect, the best fit first, last by play
+    alone. Confirmed: `_judge_play` accepts it, all its parameters are determined, and `_needs_gap` holds, because play
+    without a gap causes no irregular response. fits, rival_hypotheses: as for `_judge_play`. play_comparison: with the
+    chance variation of play alone."""
     play_fit, pairs = fits
     for pair_index in range(len(pairs) + 1):
         pair_fits = pairs[pair_index:]
         best_fit = (*pair_fits, play_fit)[0]
-        comparison = comparison_of(context, best_fit) if pair_fits else play_comparison
-        named = _judge_play(comparison, explanation, problem, (play_fit, pair_fits), rival_hypotheses)
-        if named is None or any(find_undetermined(context, named)):
+        comparison = make_comparison(context, best_fit) if pair_fits else play_comparison
+        play_explanation = _judge_play(comparison, explanation, problem, (play_fit, pair_fits), rival_hypotheses)
+        if play_explanation is None or any(find_undetermined(context, play_explanation)):
             continue
         if _needs_gap(comparison, problem, best_fit):
-            return named
+            return play_explanation
     return None
 
 
 def _needs_gap(comparison: BandPowerComparison, problem: BandPowerProblem, best_fit: BandPowerFit) -> bool:
-    """Whether the gap is needed: with the gap fixed at its least value and all else refitted, the misfit is far larger
-    (profile of the likelihood at a gap of zero)."""
+    """Whether a gap of zero is ruled out: with the gap fixed at its least value and all other parameters fitted again,
+    the misfit is much larger (profile likelihood; `is_convincing`)."""
     claim, placed_effect = best_fit.hypothesis.claims[0], best_fit.hypothesis.list_placed_effects()[0]
     parameters = claim.effect.parameters
     gapless_effect = replace(
         claim.effect, parameters=tuple(replace(p, fixed=p.fixed or p.name == "gap") for p in parameters)
     )
     smallest_gap = next(p.lower for p in parameters if p.name == "gap")
-    hypothesis = combine(
-        hypothesis_of_claim(replace(claim, effect=gapless_effect), [{**placed_effect.values, "gap": smallest_gap}]),
+    hypothesis = combine_hypotheses(
+        make_claim_hypothesis(replace(claim, effect=gapless_effect), [{**placed_effect.values, "gap": smallest_gap}]),
         remove_claim(best_fit.hypothesis, 0),
     )
     gapless_start = evaluate_hypothesis(problem, best_fit.deviations, hypothesis)
@@ -144,13 +154,16 @@ def _needs_gap(comparison: BandPowerComparison, problem: BandPowerProblem, best_
     )
     if not np.isfinite(gapless_fit.cost):
         return False
-    scored = [comparison.score_candidate(fitted.deviations, fitted.hypothesis) for fitted in (best_fit, gapless_fit)]
-    return is_convincing(*scored)
+    candidates = [
+        comparison.score_candidate(fitted.deviations, fitted.hypothesis) for fitted in (best_fit, gapless_fit)
+    ]
+    return is_convincing(*candidates)
 
 
 def _fit_claim(problem: BandPowerProblem, evidence: Evidence, claim: Claim) -> BandPowerFit:
-    """The best fit of a claim on the segments that excite its axis, over a grid of starting gaps, with the model's
-    parameters fixed; the model without effects where the claim has no starting values."""
+    """The best fit of a claim, with the model's parameters fixed, evaluated on all segments. It is fitted on the
+    segments that excite its axis, from the best of several starting gaps (`GAP_FACTORS`). Without starting values: the
+    model without effects."""
     measure = problem.power.measure
     assert isinstance(measure, FreeSimulation)
     segment_problem = BandPowerProblem(
@@ -161,7 +174,7 @@ def _fit_claim(problem: BandPowerProblem, evidence: Evidence, claim: Claim) -> B
     start_values = [{**values, "gap": float(factor * values["gap"])} for values in starts for factor in GAP_FACTORS]
 
     def evaluate(values: Values) -> BandPowerFit:
-        return evaluate_hypothesis(segment_problem, no_deviations, hypothesis_of_claim(claim, [values]))
+        return evaluate_hypothesis(segment_problem, no_deviations, make_claim_hypothesis(claim, [values]))
 
     trial_fits: list[BandPowerFit] = list(segment_problem.map_(evaluate, start_values))  # type: ignore[arg-type]
     best_fit = (
@@ -179,17 +192,18 @@ def _judge_play(
     fits: tuple[BandPowerFit, Sequence[BandPowerFit]],
     rival_hypotheses: Sequence[Hypothesis],
 ) -> Explanation | None:
-    """The explanation by play, and by a second effect if there is one; None where the re-tuned model, another effect or
-    a rival of play is about as good. comparison: with the chance variation of the best fit. fits: of play alone, and
-    with a second effect, the best first. rival_hypotheses: of play. A second effect must improve on play alone."""
+    """The explanation by play, and by a second effect if there is one. None where the re-tuned model, another effect or
+    a rival of play is about as good, or a second effect does not improve on play alone. comparison: with the chance
+    variation of the best fit. fits: of play alone, and with a second effect, the best first. rival_hypotheses: play on
+    other axes, and the effect `RIVAL`."""
     play_fit, pair_fits = fits
     best_fit = (*pair_fits, play_fit)[0]
     play_candidate = comparison.score_candidate(play_fit.deviations, play_fit.hypothesis)
-    pair_candidates = tuple(comparison.score_candidate(scored.deviations, scored.hypothesis) for scored in pair_fits)
+    pair_candidates = tuple(comparison.score_candidate(pair.deviations, pair.hypothesis) for pair in pair_fits)
     best_candidate = (*pair_candidates, play_candidate)[0]
     no_deviations = np.zeros_like(best_fit.deviations)
-    tunings = (no_deviations, explanation.retuned.fitted.deviations, best_fit.deviations)
-    linear_candidates = [comparison.score_candidate(deviations, NO_EFFECTS) for deviations in tunings]
+    deviation_sets = (no_deviations, explanation.retuned.fitted.deviations, best_fit.deviations)
+    linear_candidates = [comparison.score_candidate(deviations, NO_EFFECTS) for deviations in deviation_sets]
     given_candidate = linear_candidates[0]
     retuned_candidate = min(linear_candidates, key=lambda candidate: candidate.score.mean_log_error)
     rivals = [comparison.score_candidate(no_deviations, rival) for rival in rival_hypotheses]
@@ -198,15 +212,15 @@ def _judge_play(
         for candidate in (*(explanation.rounds[0] if explanation.rounds else ()), *explanation.steps[1:])
         if candidate.fitted.hypothesis.key[-1] != play_fit.hypothesis.key[-1]
     ]
-    simpler = (*waveform_candidates, play_candidate) if pair_candidates else waveform_candidates
-    is_simpler_as_good = any(is_as_good(candidate, best_candidate) for candidate in simpler)
+    simpler_candidates = (*waveform_candidates, play_candidate) if pair_candidates else waveform_candidates
+    is_simpler_as_good = any(is_as_good(candidate, best_candidate) for candidate in simpler_candidates)
     if is_simpler_as_good or not is_convincing(best_candidate, retuned_candidate):
         return None
     for rival in (scored for scored in rivals if is_as_good(scored, play_candidate)):
         if not pair_fits:
             return None
         second_effect = remove_claim(best_fit.hypothesis, 0)
-        start = evaluate_hypothesis(problem, no_deviations, combine(rival.fitted.hypothesis, second_effect))
+        start = evaluate_hypothesis(problem, no_deviations, combine_hypotheses(rival.fitted.hypothesis, second_effect))
         rival_pair = fit_band_power(problem, start, FIRST_FIT_ROUNDS)
         if is_as_good(comparison.score_candidate(rival_pair.deviations, rival_pair.hypothesis), best_candidate):
             return None
@@ -218,13 +232,13 @@ def _judge_play(
 
 
 def is_irregular(context: SearchContext, explanation: Explanation, floors: Sequence[NoiseFloor]) -> bool:
-    """Whether a response is irregular, like that of rattling play: periods of a segment vary by more than
+    """Whether a response is irregular, as with play that rattles: the periods of a segment vary by more than
     `VARIES_ERROR` times the noise or, without repeats, a channel's residual has a kurtosis above `PEAKED_KURTOSIS`."""
     if any(floor.method == "repeats" for floor in floors):
         return any(
             _is_variation_large(channel) for floor in floors for channel in (floor.response, floor.position) if channel
         )
-    masks = [record.fit | record.choose for record in context.whole.records]
+    masks = [record.fit | record.choose for record in context.full_measure.records]
     residuals = np.vstack([row[mask] for row, mask in zip(explanation.retuned.fitted.residuals, masks, strict=True)])
     if not len(residuals):
         return False

@@ -1,13 +1,14 @@
 """Detects explanations without predictive power: the prediction is no better than a constant.
 
 An effect that stops the simulated device, or a low-pass filter that passes nothing, leaves the whole signal as
-residual. That can be a smaller error than that of a wrong prediction, although it explains nothing.
+residual. That can be a smaller error than that of a wrong prediction, although it explains nothing. Called by `search`,
+`next_effect` and `search_with_reference`.
 """
 
 import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.fit_score import rms_over, signal_rms
+from analysis.diagnosis.errors.fit_score import compute_residual_rms, compute_signal_rms
 from analysis.diagnosis.errors.output_error import Fitted
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.settings import NO_PREDICTION_ERROR, NO_PREDICTION_SHARE
@@ -15,42 +16,46 @@ from analysis.diagnosis.types import Mask
 from equalizer.effects.placing import place_of_effect
 from equalizer.signals.signal import FloatArray
 
-_TINY = 1e-300
+_LEAST_RMS = 1e-300
 """Lower limit of an rms, so that its logarithm is finite."""
 
 
 def is_without_prediction(measure: ErrorMeasure, candidate: FittedCandidate) -> bool:
     """Whether in every channel the residual is at least `NO_PREDICTION_SHARE` of the signal (rms), on the samples to
     fit and to choose by."""
-    return bool((_residual_rms(measure, candidate.fitted) >= NO_PREDICTION_SHARE * _signal_rms(measure)).all())
+    return bool(
+        (_compute_residual_rms(measure, candidate.fitted) >= NO_PREDICTION_SHARE * _compute_signal_rms(measure)).all()
+    )
 
 
-def predicts_nothing(measure: ErrorMeasure, base: Fitted, fitted: Fitted) -> bool:
+def is_newest_without_prediction(measure: ErrorMeasure, base: Fitted, fitted: Fitted) -> bool:
     """Whether the newest effect leaves no predictive power in the channel where it reduces the error most, or in a
     channel whose sensor it acts on: a residual of at least `NO_PREDICTION_SHARE` of the signal and of
     `NO_PREDICTION_ERROR` times the noise. Such an effect only frees the model to fit the other channels."""
-    base_rms, fitted_rms = _residual_rms(measure, base), _residual_rms(measure, fitted)
-    main_channel = int(np.argmax(np.log(np.maximum(base_rms, _TINY)) - np.log(np.maximum(fitted_rms, _TINY))))
+    base_rms, fitted_rms = _compute_residual_rms(measure, base), _compute_residual_rms(measure, fitted)
+    main_channel = int(np.argmax(np.log(np.maximum(base_rms, _LEAST_RMS)) - np.log(np.maximum(fitted_rms, _LEAST_RMS))))
     claim = fitted.hypothesis.claims[-1]
     sensor_sites = claim.sites if place_of_effect(claim.effect) == "sensor" else ()
     is_unpredicted = fitted_rms >= np.maximum(
-        NO_PREDICTION_SHARE * _signal_rms(measure), NO_PREDICTION_ERROR * measure.noise
+        NO_PREDICTION_SHARE * _compute_signal_rms(measure), NO_PREDICTION_ERROR * measure.noise
     )
     return bool(
         is_unpredicted[main_channel] or any(is_unpredicted[site] for site in sensor_sites if site < len(is_unpredicted))
     )
 
 
-def _residual_rms(measure: ErrorMeasure, fitted: Fitted) -> FloatArray:
+def _compute_residual_rms(measure: ErrorMeasure, fitted: Fitted) -> FloatArray:
     """(c,): rms residual, in each channel's own unit."""
-    return np.asarray(rms_over(measure.records, fitted.residuals, _decision_samples(measure)) * measure.unit)
+    return np.asarray(
+        compute_residual_rms(measure.records, fitted.residuals, _select_decision_samples(measure)) * measure.unit
+    )
 
 
-def _signal_rms(measure: ErrorMeasure) -> FloatArray:
+def _compute_signal_rms(measure: ErrorMeasure) -> FloatArray:
     """(c,): rms of the measured signal without its mean, in each channel's own unit."""
-    return signal_rms(measure.records, _decision_samples(measure))
+    return compute_signal_rms(measure.records, _select_decision_samples(measure))
 
 
-def _decision_samples(measure: ErrorMeasure) -> list[Mask]:
+def _select_decision_samples(measure: ErrorMeasure) -> list[Mask]:
     """Per record, the mask of the samples to fit and to choose by."""
     return [record.fit | record.choose for record in measure.records]

@@ -9,9 +9,22 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from analysis.diagnosis.errors.fit_score import rms_over
-from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Hypothesis, combine, hypothesis_of_claim, remove_claim
-from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit, fit, gather_evidence, sensitivity
+from analysis.diagnosis.errors.fit_score import compute_residual_rms
+from analysis.diagnosis.errors.hypothesis import (
+    NO_EFFECTS,
+    Hypothesis,
+    combine_hypotheses,
+    make_claim_hypothesis,
+    remove_claim,
+)
+from analysis.diagnosis.errors.output_error import (
+    Fitted,
+    Sensitivity,
+    build_jacobian,
+    evaluate_fit,
+    fit,
+    gather_evidence,
+)
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.errors.whitened_measure import WhitenedMeasure
 from analysis.diagnosis.search.starting_hypotheses import list_candidates
@@ -69,12 +82,12 @@ class ReferenceRecording:
             hypothesis for hypothesis in list_candidates([last.effect], self.evidence) if hypothesis.claims == (last,)
         ]
         other_claims = remove_claim(tested, len(tested.claims) - 1)
-        return [tested, *(combine(other_claims, hypothesis) for hypothesis in suggested)]
+        return [tested, *(combine_hypotheses(other_claims, hypothesis) for hypothesis in suggested)]
 
     def _compute_channel_rms(self, fitted: Fitted) -> FloatArray:
         """(c,): rms residual on the samples to fit and to choose by, in units of `measure.unit`."""
         masks = [record.fit | record.choose for record in self.measure.records]
-        return rms_over(self.measure.records, fitted.residuals, masks)
+        return compute_residual_rms(self.measure.records, fitted.residuals, masks)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,7 +117,7 @@ class ReferenceRecordings:
         effect = hypothesis.claims[claim_index].effect
         fixed_parameters = tuple(replace(parameter, fixed=True) for parameter in effect.parameters)
         fixed_claim = replace(hypothesis.claims[claim_index], effect=replace(effect, parameters=fixed_parameters))
-        fixed = hypothesis_of_claim(
+        fixed = make_claim_hypothesis(
             fixed_claim, [placed_effect.values for placed_effect in hypothesis.list_effects_of(claim_index)]
         )
         cost_without, cost_with = np.sum([reference.compute_costs(fixed) for reference in self.recordings], axis=0)
@@ -116,6 +129,6 @@ def prepare_reference_recording(
 ) -> ReferenceRecording:
     """A clean recording prepared for comparison. deviations: of the model re-tuned to this recording, in standard
     deviations of the calibration; the fit is continued from there."""
-    jacobian = sensitivity(measure, tuning, deviations, NO_EFFECTS, map_)
+    jacobian = build_jacobian(measure, tuning, deviations, NO_EFFECTS, map_)
     base = fit(measure, tuning, evaluate_fit(measure, tuning, deviations, NO_EFFECTS), jacobian, ROUNDS)
     return ReferenceRecording(measure, tuning, base, jacobian, gather_evidence(measure, tuning, base)[0])

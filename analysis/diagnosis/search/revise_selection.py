@@ -3,7 +3,7 @@
 Forward selection chooses the first effect while that effect alone must explain the whole error, so that the choice may
 be a compromise. The first effect is therefore searched for again with the later effects kept; where another effect fits
 better, it replaces the first and becomes the last in the order. This is repeated until no replacement fits better, or
-every effect has been tried once (Miller, Subset Selection in Regression, 2002, ch. 3).
+every effect has been tried once (Miller, Subset Selection in Regression, 2002, ch. 3). Called by `search`.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from analysis.diagnosis.errors.hypothesis import Hypothesis, combine, remove_claim
+from analysis.diagnosis.errors.hypothesis import Hypothesis, combine_hypotheses, remove_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
@@ -31,75 +31,89 @@ from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 
 
-def without_effect(context: SearchContext, explanation: Explanation, number: int) -> Explanation:
-    """The explanation without one effect; the effects found after it are refitted. number: index of the effect, in the
-    order in which they were found. Without the only effect, the explanation is the re-tuned model."""
+def remove_effect(context: SearchContext, explanation: Explanation, effect_index: int) -> Explanation:
+    """Remove one effect from the explanation and refit the effects found after it. effect_index: in the order in which
+    they were found. Without its only effect, the explanation is the re-tuned model."""
     if len(explanation.steps) == 1:
         return replace(explanation, after=explanation.retuned, steps=())
-    earlier, later = explanation.steps[:number], list(explanation.steps[number + 1 :])
-    if not later:
+    earlier_steps, later_steps = explanation.steps[:effect_index], list(explanation.steps[effect_index + 1 :])
+    if not later_steps:
         return replace(
-            explanation, after=context.with_test_score(earlier[-1]), rounds=explanation.rounds[:number], steps=earlier
+            explanation,
+            after=context.with_test_score(earlier_steps[-1]),
+            rounds=explanation.rounds[:effect_index],
+            steps=earlier_steps,
         )
-    refitted = [_omit_effect(context, candidate, number) for candidate in later]
-    refitted[-1] = context.candidate(refine(context, refitted[-1].fitted))
+    refitted = [_omit_effect(context, candidate, effect_index) for candidate in later_steps]
+    refitted[-1] = context.score_fit(refine(context, refitted[-1].fitted))
     # Rivals of this stage were fitted without later effects, so they can be compared with a single later one only.
-    rivals = explanation.rounds[number] if len(refitted) == 1 else ()
+    rivals = explanation.rounds[effect_index] if len(refitted) == 1 else ()
     remaining_rivals = [candidate for candidate in rivals if candidate.newest != refitted[0].newest]
-    rounds = (*explanation.rounds[:number], (refitted[0], *remaining_rivals), *explanation.rounds[number + 2 :])
-    return replace(explanation, after=context.with_test_score(refitted[-1]), rounds=rounds, steps=(*earlier, *refitted))
+    rounds = (
+        *explanation.rounds[:effect_index],
+        (refitted[0], *remaining_rivals),
+        *explanation.rounds[effect_index + 2 :],
+    )
+    return replace(
+        explanation, after=context.with_test_score(refitted[-1]), rounds=rounds, steps=(*earlier_steps, *refitted)
+    )
 
 
-def without_last_refitted(context: SearchContext, explanation: Explanation) -> Explanation:
-    """The explanation without the last of several effects. The others are refitted from the values that they had with
-    it, which may lead to a better minimum than the one before it was added; the better of both minima is used."""
-    last, without_last = len(explanation.steps) - 1, without_effect(context, explanation, len(explanation.steps) - 1)
-    refitted = context.candidate(refine(context, _omit_effect(context, explanation.steps[-1], last).fitted))
+def remove_last_refitted(context: SearchContext, explanation: Explanation) -> Explanation:
+    """Remove the last of several effects. The others are refitted from the values that they had with it, which may lead
+    to a smaller minimum of the cost than the one before it was added; the smaller of both is used."""
+    last_index, without_last = (
+        len(explanation.steps) - 1,
+        remove_effect(context, explanation, len(explanation.steps) - 1),
+    )
+    refitted = context.score_fit(refine(context, _omit_effect(context, explanation.steps[-1], last_index).fitted))
     if not refitted.fitted.cost < without_last.steps[-1].fitted.cost:
         return without_last
     # Rivals of the remaining last effect were compared at a worse minimum, so they are left out.
-    rounds = (*without_last.rounds[: last - 1], (refitted,))
+    rounds = (*without_last.rounds[: last_index - 1], (refitted,))
     return replace(
         without_last, after=context.with_test_score(refitted), rounds=rounds, steps=(*without_last.steps[:-1], refitted)
     )
 
 
-def _omit_effect(context: SearchContext, candidate: FittedCandidate, number: int) -> FittedCandidate:
-    """The candidate without its effect of this index, its other values unchanged."""
-    reduced: Hypothesis = remove_claim(candidate.fitted.hypothesis, number)
-    return context.candidate(evaluate_fit(context.measure, context.tuning, candidate.fitted.deviations, reduced))
+def _omit_effect(context: SearchContext, candidate: FittedCandidate, effect_index: int) -> FittedCandidate:
+    """Return the candidate without its effect of this index, its other values unchanged and not refitted."""
+    reduced: Hypothesis = remove_claim(candidate.fitted.hypothesis, effect_index)
+    return context.score_fit(evaluate_fit(context.measure, context.tuning, candidate.fitted.deviations, reduced))
 
 
 def drop_needless(context: SearchContext, explanation: Explanation, time_left: TimeBudget) -> Explanation:
     """Drop the first effect without which the others fit as well: a later effect may have made it superfluous, and the
     last may only have led the others out of a local minimum. Of three effects, also drop the one without which the
-    other two leave the smallest error, if that is as small as right laws leave on a real device: no law is exact, and a
-    third effect may only fit the remaining error."""
-    sufficient, last = [], len(explanation.steps) - 1
-    for number in range(len(explanation.steps) if time_left() else 0):
+    other two leave the smallest error, if that is as small as the noise (`as_good_as_noise`): no law is exact, and a
+    third effect may only fit the remaining error. Unchanged where every effect is needed, or no time is left."""
+    sufficient_explanations, last_index = [], len(explanation.steps) - 1
+    for effect_index in range(len(explanation.steps) if time_left() else 0):
         reduced = (
-            without_effect(context, explanation, number)
-            if number < last
-            else without_last_refitted(context, explanation)
+            remove_effect(context, explanation, effect_index)
+            if effect_index < last_index
+            else remove_last_refitted(context, explanation)
         )
         if np.isfinite(reduced.steps[-1].fitted.cost):
             if not is_worthwhile(reduced.steps[-1], explanation.steps[-1]):
-                return reduced if last < 2 else drop_needless(context, reduced, time_left)
-            sufficient += [reduced] if last > 1 and context.references is None and as_good_as_noise(reduced) else []
+                return reduced if last_index < 2 else drop_needless(context, reduced, time_left)
+            sufficient_explanations += (
+                [reduced] if last_index > 1 and context.references is None and as_good_as_noise(reduced) else []
+            )
         if not time_left():
             break
-    return min(sufficient, key=lambda reduced: reduced.after.score.mean_log_error, default=explanation)
+    return min(sufficient_explanations, key=lambda reduced: reduced.after.score.mean_log_error, default=explanation)
 
 
 def drop_unconfirmed(context: SearchContext, explanation: Explanation) -> Explanation:
-    """Drop a last effect that was added to an explanation whose error was at most `EXPLAINED_ERROR` already, as right
-    laws leave on a real device, if the held-out error is not smaller with it."""
+    """Drop a last effect that was added to an explanation whose error was at most `EXPLAINED_ERROR` already, the error
+    of correct laws on a real device, if the held-out error is not smaller with it; repeat."""
     while len(explanation.steps) > 1 and explanation.steps[-2].score.worst_channel <= EXPLAINED_ERROR:
         if explanation.after.held_out_error < context.with_test_score(explanation.steps[-2]).held_out_error or np.isinf(
             explanation.after.held_out_error
         ):
             break
-        explanation = without_effect(context, explanation, len(explanation.steps) - 1)
+        explanation = remove_effect(context, explanation, len(explanation.steps) - 1)
     return explanation
 
 
@@ -109,7 +123,7 @@ def drop_negligible(context: SearchContext, explanation: Explanation) -> Explana
     while len(explanation.steps) > 1 and not as_good_as_noise(explanation):
         if compute_step_shares(explanation.retuned, explanation.steps)[-1] >= LAST_EFFECT_SHARE:
             break
-        reduced = without_effect(context, explanation, len(explanation.steps) - 1)
+        reduced = remove_effect(context, explanation, len(explanation.steps) - 1)
         if not is_worth_naming(reduced):
             break
         explanation = reduced
@@ -123,8 +137,9 @@ def exchange_effects(
     progress: Progress,
     time_left: TimeBudget,
 ) -> Explanation:
-    """The explanation with effects exchanged; unchanged where its error is as small as right laws leave on a real
-    device, where it has a single effect, where no other effect fits better, or where an exchange crashes."""
+    """Exchange the first effect for one that fits better, at most once per effect. Unchanged where the error is at most
+    `EXPLAINED_ERROR`, where there is a single effect, where no other effect fits better, or where an exchange
+    crashes."""
     limited = replace(context, map_=limit_map(context.map_, time_left))
     for _ in explanation.steps:
         if not _may_exchange(context, explanation, time_left) or leaves_little(explanation.retuned, explanation.after):
@@ -141,8 +156,8 @@ def exchange_effects(
 def _search_first_effect(
     context: SearchContext, explanation: Explanation, catalogue: Sequence[Effect], progress: Progress
 ) -> tuple[Explanation, tuple[FittedCandidate, ...]]:
-    """The explanation without its first effect, and the candidates of the whole catalogue in its place."""
-    remaining = without_effect(context, explanation, 0)
+    """Return the explanation without its first effect, and the candidates of the whole catalogue in its place."""
+    remaining = remove_effect(context, explanation, 0)
     return remaining, find_next_effect(context, catalogue, remaining.steps[-1].fitted, _make_exchange_step(progress))
 
 
@@ -153,8 +168,8 @@ def exchange_for_relatives(
     progress: Progress,
     time_left: TimeBudget,
 ) -> Explanation:
-    """The explanation with its first effect exchanged for another of its family, or a refinement, at the same site:
-    which of them fits best may show only when the second effect is known.
+    """Exchange the first effect for another of its family, or a refinement, at the same site: which of them fits best
+    may show only when the second effect is known.
 
     The candidates start from the whole explanation without the first effect, whose other values are not refitted; only
     a candidate with a smaller error than the first effect is fitted further. The first effect is among the candidates,
@@ -163,41 +178,41 @@ def exchange_for_relatives(
     family = list_relatives(explanation.steps[0].newest, catalogue) if explanation.steps else ()
     if len(family) < 2 or not _may_exchange(context, explanation, time_left):
         return explanation
-    limited, last = replace(context, map_=limit_map(context.map_, time_left)), explanation.steps[-1]
+    limited, last_step = replace(context, map_=limit_map(context.map_, time_left)), explanation.steps[-1]
     sites = explanation.steps[0].fitted.hypothesis.claims[-1].sites
 
     def compare() -> tuple[Explanation, tuple[FittedCandidate, ...]]:
-        base = _omit_effect(limited, last, 0).fitted
+        base = _omit_effect(limited, last_step, 0).fitted
         evidence = gather_evidence(limited.measure, limited.tuning, base)[0]
         fits = find_first_fits(limited, family, base, evidence, _make_exchange_step(progress), sites)
-        improved = [law for law in fits if law.cost < last.fitted.cost]
-        current_fit = _with_first_at_end(limited, last)
+        improved = [law for law in fits if law.cost < last_step.fitted.cost]
+        current_fit = _move_first_to_end(limited, last_step)
         compared = move_plainest_first([*compare_plausible_fits(limited, base, improved, evidence), current_fit])
         # The other effects are refitted only where the first effect is replaced.
-        return explanation if compared[0] is current_fit else without_effect(limited, explanation, 0), compared
+        return explanation if compared[0] is current_fit else remove_effect(limited, explanation, 0), compared
 
     return _exchange_first(context, explanation, compare) or explanation
 
 
-def _with_first_at_end(context: SearchContext, candidate: FittedCandidate) -> FittedCandidate:
-    """The same fit with its first effect last in the order, so that candidates in its place can be compared with it."""
-    hypothesis = first = candidate.fitted.hypothesis
-    for number in reversed(range(1, len(hypothesis.claims))):
-        first = remove_claim(first, number)
-    reordered = combine(remove_claim(hypothesis, 0), first)
-    return context.candidate(evaluate_fit(context.measure, context.tuning, candidate.fitted.deviations, reordered))
+def _move_first_to_end(context: SearchContext, candidate: FittedCandidate) -> FittedCandidate:
+    """Return the same fit with its first effect last in the order, to compare it with candidates in its place."""
+    hypothesis = first_alone = candidate.fitted.hypothesis
+    for effect_index in reversed(range(1, len(hypothesis.claims))):
+        first_alone = remove_claim(first_alone, effect_index)
+    reordered = combine_hypotheses(remove_claim(hypothesis, 0), first_alone)
+    return context.score_fit(evaluate_fit(context.measure, context.tuning, candidate.fitted.deviations, reordered))
 
 
 def _may_exchange(context: SearchContext, explanation: Explanation, time_left: TimeBudget) -> bool:
     """Whether there are two or more effects that may be changed, the error is above `EXPLAINED_ERROR`, and time is
     left."""
-    fixed = context.certain or context.references is not None or explanation.ended_early or explanation.barred
+    is_fixed = context.certain or context.references is not None or explanation.ended_early or explanation.barred
     is_improvable = len(explanation.steps) > 1 and explanation.after.score.worst_channel > EXPLAINED_ERROR
-    return not fixed and is_improvable and time_left()
+    return not is_fixed and is_improvable and time_left()
 
 
 def _make_exchange_step(progress: Progress) -> Step:
-    """The step of the work that the progress display shows for an exchange."""
+    """Return the step of the work that the progress display shows for an exchange."""
     return Step("looking again for the first effect", 0.8, progress)
 
 
@@ -206,17 +221,17 @@ def _exchange_first(
     explanation: Explanation,
     compare: Callable[[], tuple[Explanation, tuple[FittedCandidate, ...]]],
 ) -> Explanation | None:
-    """The explanation with its first effect replaced by a candidate that fits better with the other effects, which is
-    then last in the order; None where there is none. compare: returns the explanation without the first effect, and the
-    candidates in its place, the preferred one first."""
+    """Replace the first effect by a candidate that fits better with the other effects, which is then last in the order;
+    None where there is none, where time is out, or where the comparison crashes. compare: returns the explanation
+    without the first effect, and the candidates in its place, the preferred one first."""
 
-    def find() -> tuple[Explanation, tuple[FittedCandidate, ...]] | None:
+    def find_exchange() -> tuple[Explanation, tuple[FittedCandidate, ...]] | None:
         try:
             return compare()
         except OutOfTimeError:
             return None
 
-    comparison = context.guard.run(explanation.steps[-1].newest, "its exchange", find, None)
+    comparison = context.guard.run(explanation.steps[-1].newest, "its exchange", find_exchange, None)
     if comparison is None:
         return None
     remaining, compared = comparison

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.hypothesis import Hypothesis, combine
-from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, residuals_to_fit, solve_bounded_step
+from analysis.diagnosis.errors.hypothesis import Hypothesis, combine_hypotheses
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, solve_bounded_step, stack_fit_residuals
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.settings import STRONGEST_START, WEAKEST_START
 from analysis.diagnosis.types import Mapper
@@ -44,12 +44,12 @@ def screen(
     """The hypotheses, each combined with that of `base`, with their predicted costs, the lowest first. jacobian:
     sensitivity to the model's own parameters at `base`."""
     model = tuning.tune(base.deviations)
-    errors = residuals_to_fit(measure, base.residuals)
+    errors = stack_fit_residuals(measure, base.residuals)
 
     def predict(hypothesis: Hypothesis) -> ScreenedHypothesis:
-        combined = combine(base.hypothesis, hypothesis)
+        combined = combine_hypotheses(base.hypothesis, hypothesis)
         with np.errstate(over="ignore", invalid="ignore"):
-            changed_errors = residuals_to_fit(measure, measure.residuals(model, combined.list_placed_effects()))
+            changed_errors = stack_fit_residuals(measure, measure.residuals(model, combined.list_placed_effects()))
         return ScreenedHypothesis(
             combined, _predict_cost(base, jacobian, errors, errors - changed_errors, tuning.bound)
         )

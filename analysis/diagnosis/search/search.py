@@ -272,7 +272,7 @@ def _adds_confirmed(first: SearchResult, opened: SearchResult, parts: int) -> bo
     # The first effects are refitted to the opened samples, so that this gain is not credited to the new effect.
     context, fitted = opened.context, reference.fitted
     start = evaluate_fit(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
-    refitted = context.with_test_score(context.candidate(refine(context, start)))
+    refitted = context.with_test_score(context.score_fit(refine(context, start)))
     return confirms_addition(refitted, explanation.after)
 
 
@@ -294,6 +294,6 @@ def _exchange_and_prune(
 def _judge_with_prediction(context: SearchContext, explanation: Explanation) -> Judgement:
     """The judgement; "unexplained" where the explanation predicts nothing (`no_prediction`)."""
     judgement = judge(explanation)
-    if judgement.named and is_without_prediction(context.whole, explanation.after):
+    if judgement.named and is_without_prediction(context.full_measure, explanation.after):
         return Judgement("unexplained", False)
     return judgement

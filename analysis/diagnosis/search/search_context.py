@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
-from analysis.diagnosis.errors.fit_score import FitScore, fit_score, rms_over
+from analysis.diagnosis.errors.fit_score import FitScore, compute_fit_score, compute_residual_rms
 from analysis.diagnosis.errors.hypothesis import Hypothesis, remove_claim
-from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit, fit, sensitivity
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, build_jacobian, evaluate_fit, fit
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.reference_recordings import ReferenceRecordings
@@ -33,7 +33,7 @@ FIRST_FIT_ROUNDS = 3
 """Gauss-Newton steps of a first fit."""
 STARTING, SCREENING, FITTING = "its starting values", "its screening", "its fit"
 """Steps of the work on each effect, in words."""
-SENSED_SHARE = 0.06
+LEAST_SENSITIVITY_SHARE = 0.06
 """Least sensitivity of an axis's channel to a parameter that counts, relative to the largest of any parameter there."""
 
 
@@ -44,7 +44,7 @@ class FittedCandidate:
     fitted: Fitted
     score: FitScore
     clean_gain: float = 0.0
-    """Reduction of the mean log error power on clean recordings, which is subtracted from the gain here."""
+    """Reduction of the mean log error power on clean recordings, which is subtracted from the gain on these."""
 
     @property
     def newest(self) -> str:
@@ -53,7 +53,8 @@ class FittedCandidate:
 
     @property
     def held_out_error(self) -> float:
-        """Mean logarithm of the channels' held-out errors; infinite where there is none, or where it runs away."""
+        """Mean logarithm of the channels' held-out errors, in units of the noise; infinite without held-out samples, or
+        where the simulation diverges."""
         mean_log = float(np.mean(np.log(self.score.test)))
         return np.inf if np.isnan(mean_log) else mean_log
 
@@ -69,89 +70,93 @@ class SearchContext:
 
     measure: ErrorMeasure
     """On the samples to fit and to choose by."""
-    whole: ErrorMeasure
-    """With the held-out samples, too."""
+    full_measure: ErrorMeasure
+    """The measure on all samples, held-out ones included."""
     tuning: Tuning
     map_: Mapper
     excluded: frozenset[str] = frozenset()
-    """Effects that are not to be named. Those that others refine are simulated all the same: a refined law is named
-    only where its refinement shows, and without it that law is the excluded one."""
+    """Effects that are not to be named. Those that others refine are simulated nevertheless, as rivals of their
+    refinements."""
     references: ReferenceRecordings | None = None
     """Clean recordings: what a candidate gains on them is counted against it."""
     certain: tuple[Hypothesis, ...] = ()
-    """Faults that a recording shows by itself (`model_free_faults`): added without a search."""
+    """Sensor faults that are detected without a model (`model_free_faults`): added without a search."""
     guard: Guard = field(default_factory=Guard)
     """Isolates crashes of single effects."""
-    opened: bool = False
-    """A part of the held-out samples is used to fit and to choose by."""
+    has_opened_samples: bool = False
+    """Whether a part of the held-out samples is used to fit and to choose by."""
     least_remaining_error: float = NOISE_ALONE
     """Error of the worst channel, in units of the noise, above which a further effect is searched for."""
 
-    def open_alternate(self, mismatch_fit: FittedCandidate, coarsest: int = HALVES) -> "tuple[SearchContext, int]":
-        """Copy of the context in which a part of every held-out stretch is used to fit and to choose by, and into how
-        many parts stretches were cut: the first of two; where only one half shows the mismatch (such as in a sweep),
-        every other of more. mismatch_fit: see `open_milder`. coarsest: least number of parts that is tried."""
-        longest_samples = max(record.longest_held_out() for record in self.whole.records)
-        part_counts = [parts for parts in (HALVES, *FINER_PARTS) if parts >= coarsest]
+    def open_alternate(self, mismatch_fit: FittedCandidate, least_parts: int = HALVES) -> "tuple[SearchContext, int]":
+        """Return a copy of the context in which a part of every held-out stretch is used to fit and to choose by, and
+        the number of parts per stretch: the first of two; where only one half shows the mismatch (such as in a sweep),
+        every other of more. mismatch_fit: see `open_milder`. least_parts: least number of parts that is tried."""
+        longest_samples = max(record.compute_longest_test_stretch() for record in self.full_measure.records)
+        part_counts = [parts for parts in (HALVES, *FINER_PARTS) if parts >= least_parts]
         for parts in (parts for parts in part_counts if longest_samples >= parts * LEAST_PART):
-            opened_masks = [record.every_other_part(parts) for record in self.whole.records]
-            if self._both_show(opened_masks, mismatch_fit):
-                return self._open(opened_masks), parts
-        return self._open([record.every_other_part(coarsest) for record in self.whole.records]), coarsest
+            opened_masks = [record.mask_alternate_parts(parts) for record in self.full_measure.records]
+            if self._is_shown_by_both(opened_masks, mismatch_fit):
+                return self._open_samples(opened_masks), parts
+        return self._open_samples(
+            [record.mask_alternate_parts(least_parts) for record in self.full_measure.records]
+        ), least_parts
 
     def open_milder(self, mismatch_fit: FittedCandidate) -> "SearchContext | None":
-        """Copy of the context in which all held-out segments but the loudest are used to fit and to choose by, where
-        both show, in the channel where the held-out samples show most, a mismatch that the other samples do not: the
-        loudest still tests by another kind of command. None where they do not. mismatch_fit: a fit with its residuals
+        """Return a copy of the context in which all held-out segments but the loudest are used to fit and to choose by;
+        the loudest remains as test. None unless both, in the channel with the largest held-out error, show a mismatch
+        that the other samples do not. mismatch_fit: a fit with its residuals
         in all samples, and its held-out errors."""
-        records = self.whole.records
-        levels = [level for record in records for _, level in record.held_out_levels()]
-        opened_masks = [record.held_out_below(max(levels, default=0.0) / LOUDER_RATIO) for record in records]
+        records = self.full_measure.records
+        levels = [level for record in records for _, level in record.list_test_levels()]
+        opened_masks = [record.mask_test_below(max(levels, default=0.0) / LOUDER_RATIO) for record in records]
         if not any(mask.any() for mask in opened_masks):
             return None
-        return self._open(opened_masks) if self._both_show(opened_masks, mismatch_fit) else None
+        return self._open_samples(opened_masks) if self._is_shown_by_both(opened_masks, mismatch_fit) else None
 
-    def _both_show(self, opened_masks: list[Mask], mismatch_fit: FittedCandidate) -> bool:
-        """Whether opened samples and those that stay held out show what the other samples do not."""
-        # Another channel may show a little of something else, such as friction that is not fitted to the last.
-        records, worst_channel = self.whole.records, int(np.argmax(np.nan_to_num(mismatch_fit.score.test)))
+    def _is_shown_by_both(self, opened_masks: list[Mask], mismatch_fit: FittedCandidate) -> bool:
+        """Whether opened samples and those that stay held out both show a mismatch that the other samples do not."""
+        # Only the worst channel counts: others may show a small remaining error of a fitted effect, such as friction.
+        records, worst_channel = self.full_measure.records, int(np.argmax(np.nan_to_num(mismatch_fit.score.test)))
         sealed_masks = [record.test & ~mask for record, mask in zip(records, opened_masks, strict=True)]
-        scale = self.whole.unit / self.whole.noise
+        scale = self.full_measure.unit / self.full_measure.noise
         errors = [
-            (rms_over(records, mismatch_fit.fitted.residuals, part) * scale)[[worst_channel]]
+            (compute_residual_rms(records, mismatch_fit.fitted.residuals, part) * scale)[[worst_channel]]
             for part in (opened_masks, sealed_masks)
         ]
         return all(shows_only_held_out(channel_errors, mismatch_fit) for channel_errors in errors)
 
-    def _open(self, opened_masks: Sequence[Mask]) -> "SearchContext":
-        records = (record.unseal(mask) for record, mask in zip(self.whole.records, opened_masks, strict=True))
-        full_measure = self.whole.with_records(tuple(records))
-        return replace(self, measure=full_measure.shorten(), whole=full_measure, opened=True)
+    def _open_samples(self, opened_masks: Sequence[Mask]) -> "SearchContext":
+        """Return a copy of the context in which the masked held-out samples are used to fit and to choose by."""
+        records = (record.unseal(mask) for record, mask in zip(self.full_measure.records, opened_masks, strict=True))
+        full_measure = self.full_measure.with_records(tuple(records))
+        return replace(self, measure=full_measure.shorten(), full_measure=full_measure, has_opened_samples=True)
 
     def fit_to_all(self) -> "SearchContext":
-        """Copy of the context that also fits to the samples to choose by: what a force balance has chosen needs no
-        choice."""
+        """Return a copy of the context that also fits to the samples to choose by: laws that a force balance has chosen
+        need no further selection."""
         measure, full_measure = (
             source.with_records(tuple(record.fit_to_all() for record in source.records))
-            for source in (self.measure, self.whole)
+            for source in (self.measure, self.full_measure)
         )
-        return replace(self, measure=measure, whole=full_measure)
+        return replace(self, measure=measure, full_measure=full_measure)
 
-    def candidate(self, fitted: Fitted) -> FittedCandidate:
-        """The fit scored on the samples to fit and to choose by; its `test` is NaN."""
+    def score_fit(self, fitted: Fitted) -> FittedCandidate:
+        """Score the fit on the samples to fit and to choose by; its `test` is NaN."""
         return self._score(fitted, self.measure)
 
     def with_test_score(self, candidate: FittedCandidate) -> FittedCandidate:
-        """The candidate scored on all samples, held-out ones included."""
-        fitted = evaluate_fit(self.whole, self.tuning, candidate.fitted.deviations, candidate.fitted.hypothesis)
-        return self._score(fitted, self.whole)
+        """Return the candidate scored on all samples, held-out ones included."""
+        fitted = evaluate_fit(self.full_measure, self.tuning, candidate.fitted.deviations, candidate.fitted.hypothesis)
+        return self._score(fitted, self.full_measure)
 
     def _score(self, fitted: Fitted, measure: ErrorMeasure) -> FittedCandidate:
-        score = fit_score(measure, fitted.residuals)
+        """Score the residuals; errors are raised by the gain on clean recordings where these are given."""
+        score = compute_fit_score(measure, fitted.residuals)
         if self.references is None:
             return FittedCandidate(fitted, score)
         clean_gain = self.references.compute_clean_gain(fitted.hypothesis)
-        return FittedCandidate(fitted, score.larger(np.exp(clean_gain)), 2 * float(clean_gain.mean()))
+        return FittedCandidate(fitted, score.scale_errors(np.exp(clean_gain)), 2 * float(clean_gain.mean()))
 
 
 def shows_only_held_out(errors: FloatArray, candidate: FittedCandidate) -> bool:
@@ -164,7 +169,8 @@ def shows_only_held_out(errors: FloatArray, candidate: FittedCandidate) -> bool:
 def fit_first(
     context: SearchContext, base: Fitted, jacobian: Sensitivity, screened: Sequence[ScreenedHypothesis]
 ) -> list[Fitted]:
-    """Fits of the hypotheses with the largest predicted gains, the best first."""
+    """Fit the hypotheses with the largest predicted gains, `FIRST_FIT_ROUNDS` steps each; the smallest cost first.
+    Hypotheses whose fit crashes are left out."""
     measure, tuning = context.measure, context.tuning
 
     def make_first_fit(entry: ScreenedHypothesis) -> Fitted:
@@ -184,22 +190,25 @@ def fit_first(
 def compute_sensitivity(
     context: SearchContext, deviations: np.ndarray, hypothesis: Hypothesis, with_forces: bool = False
 ) -> Sensitivity:
-    """Sensitivity of the prediction to the model's own parameters. Motion-dependent forces are left out first:
-    simulations are quick without them, and small forces hardly change the sensitivity."""
+    """Compute the sensitivity of the prediction to the model's own parameters. Motion-dependent forces are left out,
+    because simulations are fast without them and small forces hardly change it; with_forces recomputes it with them
+    for the parameters of `find_sensitive_parameters`."""
     reduced = hypothesis
     for number in reversed(range(len(hypothesis.claims))):
         if isinstance(hypothesis.claims[number].effect.action, (AxisForce, JointForce)):
             reduced = remove_claim(reduced, number)
-    base_jacobian = sensitivity(context.measure, context.tuning, deviations, reduced, context.map_)
+    base_jacobian = build_jacobian(context.measure, context.tuning, deviations, reduced, context.map_)
     if not with_forces or reduced is hypothesis:
         return base_jacobian
     parameters = find_sensitive_parameters(context.measure, context.tuning, base_jacobian, hypothesis)
-    return sensitivity(
+    return build_jacobian(
         context.measure, context.tuning, deviations, hypothesis, context.map_, (base_jacobian.columns, parameters)
     )
 
 
 def _select_worth_fitting(base: Fitted, screened: Sequence[ScreenedHypothesis]) -> list[ScreenedHypothesis]:
+    """Select the hypotheses with at least `WORTH_FITTING` of the largest predicted gain; from `LEAST_FITTED` to
+    `MOST_FITTED` of them."""
     interleaved = _interleave_starts(screened)
     best_gain = max((base.cost - entry.cost for entry in interleaved), default=0.0)
     selected = [entry for entry in interleaved if base.cost - entry.cost >= WORTH_FITTING * best_gain]
@@ -207,7 +216,7 @@ def _select_worth_fitting(base: Fitted, screened: Sequence[ScreenedHypothesis]) 
 
 
 def _interleave_starts(screened: Sequence[ScreenedHypothesis]) -> list[ScreenedHypothesis]:
-    """The hypotheses in a new order: the best start of each before the second start of any."""
+    """Reorder the hypotheses: the best start of each before the second start of any."""
     start_counts: dict[object, int] = {}
     ranked = []
     for entry in screened:
@@ -220,7 +229,8 @@ def _interleave_starts(screened: Sequence[ScreenedHypothesis]) -> list[ScreenedH
 def find_sensitive_parameters(
     measure: ErrorMeasure, tuning: Tuning, base_jacobian: Sensitivity, hypothesis: Hypothesis
 ) -> list[int]:
-    """Parameters whose sensitivity changes with the hypothesis's forces: those that move the axes at which these act.
+    """Find the parameters whose sensitivity changes with the hypothesis's forces: those that move the axes at which
+    these act; all of them for a force in a joint.
     base_jacobian: sensitivity without motion-dependent forces."""
     forces = [
         effect
@@ -236,16 +246,18 @@ def find_sensitive_parameters(
     is_sensitive = np.zeros(len(tuning.names), dtype=bool)
     for site in sites:
         parameter_rms = channel_rms[:, int(np.argmax(mobility[:, site]))]
-        is_sensitive |= parameter_rms > SENSED_SHARE * parameter_rms.max(initial=0.0)
+        is_sensitive |= parameter_rms > LEAST_SENSITIVITY_SHARE * parameter_rms.max(initial=0.0)
     return np.flatnonzero(is_sensitive).tolist()
 
 
 def _compute_channel_rms(measure: ErrorMeasure, columns: FloatArray, outputs: int) -> FloatArray:
     """(t, p): rms of each parameter's sensitivity per response channel. columns: (t, samples), over all records."""
-    squares, first = np.zeros((len(columns), outputs)), 0
+    squares, first_column = np.zeros((len(columns), outputs)), 0
     for record in measure.records:
         count, channels = int(record.fit.sum()), record.measured.shape[1]
-        part = columns[:, first : first + count * channels].reshape(len(columns), count, channels)[:, :, :outputs]
+        part = columns[:, first_column : first_column + count * channels].reshape(len(columns), count, channels)[
+            :, :, :outputs
+        ]
         squares += np.einsum("tnc,tnc->tc", part, part)
-        first += count * channels
+        first_column += count * channels
     return np.sqrt(squares)

@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 
 from analysis.diagnosis.errors.band_power_fit import BandPowerFit, BandPowerProblem, evaluate_hypothesis, fit_band_power
-from analysis.diagnosis.errors.hypothesis import Hypothesis, combine, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import Hypothesis, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.errors.refine_band_power import refine_band_power, weight_by_chance_variation
 from analysis.diagnosis.search.explain import Explanation
@@ -173,7 +173,7 @@ def _search_strength(problem: BandPowerProblem, play_fit: BandPowerFit, second_e
     step), or with one that is not zero where the effect is absent (such as a gain, or a limit)."""
 
     def evaluate(hypothesis: Hypothesis) -> BandPowerFit:
-        return evaluate_hypothesis(problem, play_fit.deviations, combine(play_fit.hypothesis, hypothesis))
+        return evaluate_hypothesis(problem, play_fit.deviations, combine_hypotheses(play_fit.hypothesis, hypothesis))
 
     best = evaluate(second_effect)
     main = next(iter(second_effect.claims[-1].effect.parameters), None)
@@ -195,7 +195,7 @@ def _scale_strength(hypothesis: Hypothesis, factor: float) -> Hypothesis:
     (claim,) = hypothesis.claims
     main_name = claim.effect.parameters[0].name
     values = [placed_effect.values for placed_effect in hypothesis.list_placed_effects()]
-    return hypothesis_of_claim(claim, [{**group, main_name: factor * group[main_name]} for group in values])
+    return make_claim_hypothesis(claim, [{**group, main_name: factor * group[main_name]} for group in values])
 
 
 def _select_best_per_effect(starts: Sequence[BandPowerFit]) -> list[BandPowerFit]:

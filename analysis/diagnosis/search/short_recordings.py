@@ -15,9 +15,16 @@ from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import Hypothesis, has_motion_forces
-from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit, fit, residuals_to_fit, sensitivity
-from analysis.diagnosis.forces.inverse_dynamics import band_motion
-from analysis.diagnosis.forces.inverse_response import transmission_zeros
+from analysis.diagnosis.errors.output_error import (
+    Fitted,
+    Sensitivity,
+    build_jacobian,
+    evaluate_fit,
+    fit,
+    stack_fit_residuals,
+)
+from analysis.diagnosis.forces.inverse_dynamics import compute_band_motion
+from analysis.diagnosis.forces.inverse_response import compute_transmission_zeros
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.noise.periods import find_settled_periods
 from analysis.diagnosis.search.screening import ScreenedHypothesis, screen
@@ -27,15 +34,14 @@ from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import AxisForce, JointForce
 from equalizer.effects.simulation.bodies import Restarts
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.plant.linear_simulation import growth_rate
+from equalizer.plant.linear_simulation import compute_growth_rate
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 Indices = npt.NDArray[np.int64]
 
 COARSER = 2
-"""Factor on the simulation step where hypotheses are only ranked and their fits begun: the integration error stays far
-below the error of the linearised prediction of gains."""
+"""Factor on the simulation step for ranking: its integration error is far below that of the linearised gains."""
 
 
 def coarsen(measure: ErrorMeasure) -> ErrorMeasure:
@@ -75,9 +81,9 @@ class ShortRecordings:
         all samples by at most `RUN_IN_ERROR` times the cost, in mean square. base_fit: on all samples."""
         measure, tuning = self.context.measure, self.context.tuning
         short_fit = evaluate_fit(measure, tuning, base_fit.deviations, base_fit.hypothesis)
-        errors = residuals_to_fit(self.full, base_fit.residuals).reshape(len(self.fitted_sample), -1)[self.fit_index]
+        errors = stack_fit_residuals(self.full, base_fit.residuals).reshape(len(self.fitted_sample), -1)[self.fit_index]
         with np.errstate(over="ignore", invalid="ignore"):  # a diverged simulation overflows
-            difference = residuals_to_fit(measure, short_fit.residuals) - errors.ravel()
+            difference = stack_fit_residuals(measure, short_fit.residuals) - errors.ravel()
             return float(np.mean(difference**2)) <= RUN_IN_ERROR * base_fit.cost
 
     def repeat_sensitivity(self, jacobian: Sensitivity) -> Sensitivity:
@@ -189,8 +195,8 @@ def _run_in_s(measure: FreeSimulation | PredictedForce, model: MechanicalModel) 
     a simulation; for a predicted force, which depends on earlier and later motion, of the model's inverse (its zeros)
     and of the band limit."""
     if isinstance(measure, FreeSimulation):
-        return RUN_IN_CONSTANTS / max(-growth_rate(model), np.finfo(float).tiny), 0.0
-    rates = np.abs(transmission_zeros(model, 2 * np.pi * measure.band_hz).real)
+        return RUN_IN_CONSTANTS / max(-compute_growth_rate(model), np.finfo(float).tiny), 0.0
+    rates = np.abs(compute_transmission_zeros(model, 2 * np.pi * measure.band_hz).real)
     settling_s = RUN_IN_CONSTANTS / max(float(rates.min(initial=np.inf)), np.finfo(float).tiny)
     return (settling_s + RUN_IN_CONSTANTS / measure.band_hz,) * 2
 
@@ -237,7 +243,7 @@ def _split_pieces(measure: PredictedForce, cut: Sequence[_KeptSamples]) -> Predi
             if not len(kept) or (driven & (np.abs(piece.command).max(axis=0) == 0)).any():
                 return None
             records.append(piece)
-            motions.append(band_motion(motion.position[kept], motion.sample_rate_hz, measure.band_hz))
+            motions.append(compute_band_motion(motion.position[kept], motion.sample_rate_hz, measure.band_hz))
     return replace(measure, records=tuple(records), motions=tuple(motions))
 
 
@@ -263,7 +269,7 @@ def fit_on_short_recordings(
     screened = screen(short.measure, short.tuning, short_base, jacobian, invariant, guard.wrap(short.map_, SCREENING))
     full_jacobian, has_forces = short_form.repeat_sensitivity(jacobian), has_motion_forces(base.hypothesis)
     if has_forces:
-        full_jacobian = sensitivity(context.measure, context.tuning, base.deviations, base.hypothesis, context.map_)
+        full_jacobian = build_jacobian(context.measure, context.tuning, base.deviations, base.hypothesis, context.map_)
 
     def fit_to_all(fitted: Fitted) -> Fitted:
         full_fit = evaluate_fit(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, make_claim_hypothesis
 from analysis.diagnosis.settings import CLOCK_LEAST_SHARE, CLOCK_TRIALS_PER_PERIOD, MOST_CLOCK_TRIALS, STARTS_PER_CLAIM
 from analysis.diagnosis.types import Mapper
 from equalizer.effects.clock_drift import LARGEST_PPM
@@ -40,7 +40,7 @@ def list_candidates(catalogue: Sequence[Effect], evidence: Evidence, map_: Mappe
         hypotheses: list[Hypothesis] = []
         if "one" in effect.sites or len(sites) == 1:
             hypotheses += [
-                hypothesis_of_claim(Claim(effect, "one", (site,)), [values])
+                make_claim_hypothesis(Claim(effect, "one", (site,)), [values])
                 for site in sites
                 for values in starts[site]
             ]
@@ -82,7 +82,7 @@ def is_within_data(hypothesis: Hypothesis, claim_index: int, evidence: Evidence,
 def _make_common_hypotheses(effect: Effect, sites: tuple[int, ...], evidence: Evidence) -> list[Hypothesis]:
     """Hypotheses of the effect at all sites with the same parameters; empty where the effect does not allow that."""
     starts = effect.starts(evidence, ALL_SITES)[:STARTS_PER_CLAIM] if "all" in effect.sites else ()
-    return [hypothesis_of_claim(Claim(effect, "all", sites), [values]) for values in starts]
+    return [make_claim_hypothesis(Claim(effect, "all", sites), [values]) for values in starts]
 
 
 def _make_separate_hypotheses(
@@ -94,7 +94,7 @@ def _make_separate_hypotheses(
     if "each" not in effect.sites or not known_starts:
         return []
     all_starts = [values[0] if values else _weaken_start(effect, known_starts[0]) for values in starts]
-    return [hypothesis_of_claim(Claim(effect, "each", sites), all_starts)]
+    return [make_claim_hypothesis(Claim(effect, "each", sites), all_starts)]
 
 
 def _weaken_start(effect: Effect, values: Values) -> Values:
@@ -115,7 +115,7 @@ def search_clock_drift(catalogue: Sequence[Effect], evidence: Evidence) -> tuple
     p = evidence.response.shape[1]
     claim = Claim(effect, "all" if p > 1 else "one", tuple(range(p)))
     return tuple(
-        hypothesis_of_claim(claim, [{"ppm": ppm, "interpolated": interpolated, "with_position": 1.0}])
+        make_claim_hypothesis(claim, [{"ppm": ppm, "interpolated": interpolated, "with_position": 1.0}])
         for interpolated in (0.0, 1.0)
         if ppm != 0
     )

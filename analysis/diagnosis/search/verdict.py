@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from analysis.diagnosis.document import Verdict
-from analysis.diagnosis.effect_words import noun_of
+from analysis.diagnosis.effect_words import get_noun
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import compute_mismatch_share, leaves_little
@@ -118,7 +118,7 @@ def list_remarks(explanation: Explanation) -> tuple[str, ...]:
     time_remark = (OUT_OF_TIME,) if explanation.ended_early else ()
     excluded_remark = (ONLY_REFINES,) if explanation.barred else ()
     undetermined = (
-        f"An explanation by {noun_of(name)} is not named: these recordings hardly determine its parameters."
+        f"An explanation by {get_noun(name)} is not named: these recordings hardly determine its parameters."
         for name in dict.fromkeys(explanation.undetermined)
     )
     return (*time_remark, *excluded_remark, *undetermined)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.evaluation.blind_test.confidence_intervals import RESAMPLED, wilson
+from analysis.evaluation.blind_test.confidence_intervals import RESAMPLE_COUNT, compute_wilson_interval
 from analysis.evaluation.blind_test.outcome import Outcome
 from equalizer.signals.signal import FloatArray
 
@@ -59,7 +59,7 @@ def compute_calibration(outcomes: Sequence[Outcome], kinds: Sequence[str] = ANSW
         return Calibration(None, None, None, ())
     probabilities = np.array([effect.probability for _, effect in names])
     is_right = np.array([float(effect.effect in case.names) for case, effect in names])
-    resamples = np.random.default_rng(21).integers(len(names), size=(RESAMPLED, len(names)))
+    resamples = np.random.default_rng(21).integers(len(names), size=(RESAMPLE_COUNT, len(names)))
     low, high = np.quantile(
         [_compute_calibration_error(probabilities[k], is_right[k]) for k in resamples], (0.025, 0.975)
     )
@@ -97,5 +97,5 @@ def _make_bins(probabilities: FloatArray, is_right: FloatArray) -> list[Bin]:
     bins, tied_shares = [], _average_ties(probabilities, is_right)
     for part in _split_bins(probabilities):
         hits, count = float(tied_shares[part].sum()), len(part)
-        bins.append(Bin(float(probabilities[part].mean()), hits / count, *wilson(hits, count), count))
+        bins.append(Bin(float(probabilities[part].mean()), hits / count, *compute_wilson_interval(hits, count), count))
     return bins

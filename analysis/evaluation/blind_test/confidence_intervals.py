@@ -5,7 +5,7 @@ of cases that come in dependent groups, and a median or mean, have a percentile 
 
 References: Wilson, Journal of the American Statistical Association 22 (1927), 209; Efron and Tibshirani, An
 Introduction to the Bootstrap (1993), chapter 13; Davison and Hinkley, Bootstrap Methods and their Application (1997),
-section 3.8 (groups resampled as a whole).
+section 3.8 (groups resampled as a whole). Used by `score`, `detection`, `calibration` and `lab_kit`.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -18,7 +18,7 @@ from statsmodels.stats.proportion import proportion_confint
 from equalizer.signals.signal import FloatArray
 
 Item = TypeVar("Item")
-RESAMPLED = 2000
+RESAMPLE_COUNT = 2000
 """Resamples of a bootstrap interval."""
 _QUANTILES = (0.025, 0.975)
 _GROUP_SEED, _VALUE_SEED = 21, 20
@@ -42,37 +42,44 @@ class Figure:
     """Number of cases that count towards a share; None for a statistic."""
 
 
-def share(name: str, items: Sequence[Item], is_hit: Callable[[Item], bool]) -> Figure:
-    """Share of the items among `items` for which `is_hit` is true, with Wilson's interval; without a value where there
-    are no items."""
+def compute_share(name: str, items: Sequence[Item], is_hit: Callable[[Item], bool]) -> Figure:
+    """Compute the share of the items among `items` for which `is_hit` is true, with Wilson's interval; without a value
+    where there are no items."""
     hits, count = sum(is_hit(item) for item in items), len(items)
     if not count:
         return Figure(name, None, None, None, 0, 0)
-    low, high = wilson(hits, count)
+    low, high = compute_wilson_interval(hits, count)
     return Figure(name, hits / count, low, high, count, hits)
 
 
-def wilson(hits: float, trials: int) -> tuple[float, float]:
-    """Lower and upper end of Wilson's 95 % score interval of a proportion. hits: successes, 0 to `trials`. trials:
-    trials, at least 1."""
+def compute_wilson_interval(hits: float, trials: int) -> tuple[float, float]:
+    """Compute lower and upper end of Wilson's 95 % score interval of a proportion. hits: number of successes, 0 to
+    `trials`. trials: at least 1."""
     low, high = proportion_confint(hits, trials, method="wilson")
     return float(low), float(high)
 
 
 def pool_share(name: str, groups: Sequence[Sequence[bool]]) -> Figure:
-    """Share of true items in all groups together, whose items depend on each other: the interval resamples groups as a
-    whole (cluster bootstrap). Empty groups are left out; without a value where all are empty."""
-    hits = np.array([sum(group) for group in groups if group], dtype=np.float64)
-    sizes = np.array([len(group) for group in groups if group], dtype=np.float64)
-    if not len(sizes):
+    """Compute the share of true items in all groups together, whose items depend on each other: the interval resamples
+    groups as a whole (cluster bootstrap). Empty groups are left out; without a value where all are empty."""
+    group_hits = np.array([sum(group) for group in groups if group], dtype=np.float64)
+    group_sizes = np.array([len(group) for group in groups if group], dtype=np.float64)
+    if not len(group_sizes):
         return Figure(name, None, None, None, 0, 0)
-    resamples = np.random.default_rng(_GROUP_SEED).integers(len(sizes), size=(RESAMPLED, len(sizes)))
-    low, high = np.quantile(hits[resamples].sum(axis=1) / sizes[resamples].sum(axis=1), _QUANTILES)
-    return Figure(name, float(hits.sum() / sizes.sum()), float(low), float(high), int(sizes.sum()), int(hits.sum()))
+    resamples = np.random.default_rng(_GROUP_SEED).integers(len(group_sizes), size=(RESAMPLE_COUNT, len(group_sizes)))
+    low, high = np.quantile(group_hits[resamples].sum(axis=1) / group_sizes[resamples].sum(axis=1), _QUANTILES)
+    return Figure(
+        name,
+        float(group_hits.sum() / group_sizes.sum()),
+        float(low),
+        float(high),
+        int(group_sizes.sum()),
+        int(group_hits.sum()),
+    )
 
 
-def statistic(name: str, values: Iterable[float], reduce: Callable[..., FloatArray]) -> Figure:
-    """A statistic of the finite values, with its bootstrap interval; without a value where none is finite.
+def compute_statistic(name: str, values: Iterable[float], reduce: Callable[..., FloatArray]) -> Figure:
+    """Compute a statistic of the finite values, with its bootstrap interval; without a value where none is finite.
 
     reduce: function of an array (resamples, values) and `axis=1`, such as np.median or np.mean.
     """
@@ -80,6 +87,6 @@ def statistic(name: str, values: Iterable[float], reduce: Callable[..., FloatArr
     if not len(finite):
         return Figure(name, None, None, None, 0)
     value = float(reduce(finite[None, :], axis=1)[0])
-    resamples = np.random.default_rng(_VALUE_SEED).integers(len(finite), size=(RESAMPLED, len(finite)))
+    resamples = np.random.default_rng(_VALUE_SEED).integers(len(finite), size=(RESAMPLE_COUNT, len(finite)))
     low, high = np.quantile(reduce(finite[resamples], axis=1), _QUANTILES)
     return Figure(name, value, float(low), float(high), len(finite))

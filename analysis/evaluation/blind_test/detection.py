@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.evaluation.blind_test.confidence_intervals import wilson
+from analysis.evaluation.blind_test.confidence_intervals import compute_wilson_interval
 from analysis.evaluation.blind_test.outcome import DETECTABLE, Outcome
 
 SIZE_GROUPS = 10
@@ -81,5 +81,7 @@ def compute_rates_by_size(singles: Sequence[Outcome]) -> tuple[SizeGroup, ...]:
         group = [ordered[k] for k in indices]
         hits = sum(case.right for case in group)
         median_change = float(np.median([max(case.adds, 1e-3) for case in group]))
-        groups.append(SizeGroup(median_change, hits / len(group), *wilson(hits, len(group)), len(group)))
+        groups.append(
+            SizeGroup(median_change, hits / len(group), *compute_wilson_interval(hits, len(group)), len(group))
+        )
     return tuple(groups)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
-from analysis.evaluation.blind_test.confidence_intervals import Figure, share
+from analysis.evaluation.blind_test.confidence_intervals import Figure, compute_share
 
 DETECTABLE = 1.25
 """Factor by which a fault must change the held-out error of the device's base model, up or down, to count as
@@ -99,14 +99,14 @@ def score_injections(outcomes: Sequence[InjectedOutcome]) -> tuple[Figure, ...]:
     undetectable = [outcome for outcome in outcomes if outcome.effects and not outcome.detectable]
     faultless = [outcome for outcome in outcomes if not outcome.effects]
     return (
-        share("nothing injected, nothing named", faultless, lambda case: case.right),
-        share("detectable faults named, or in the class", faults, lambda case: case.right),
-        share(
+        compute_share("nothing injected, nothing named", faultless, lambda case: case.right),
+        compute_share("detectable faults named, or in the class", faults, lambda case: case.right),
+        compute_share(
             "detectable faults, another name at the right place", faults, _make_class_test("other name, right place")
         ),
-        share("detectable faults, a wrong fault named", faults, _make_class_test("wrong")),
-        share("too weak to ask for, named all the same", undetectable, lambda case: case.right),
-        share("too weak to ask for, a wrong fault named", undetectable, _make_class_test("wrong")),
+        compute_share("detectable faults, a wrong fault named", faults, _make_class_test("wrong")),
+        compute_share("too weak to ask for, named all the same", undetectable, lambda case: case.right),
+        compute_share("too weak to ask for, a wrong fault named", undetectable, _make_class_test("wrong")),
     )
 
 
@@ -147,6 +147,6 @@ def _make_tally(name: str, outcomes: Sequence[InjectedOutcome]) -> Tally:
         name,
         len(faults),
         counts,
-        share(name, detectable, lambda case: case.right),
-        share(name, faultless, lambda case: case.right),
+        compute_share(name, detectable, lambda case: case.right),
+        compute_share(name, faultless, lambda case: case.right),
     )

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from analysis.diagnosis.document import Diagnosis
-from analysis.evaluation.blind_test.confidence_intervals import Figure, share
+from analysis.evaluation.blind_test.confidence_intervals import Figure, compute_share
 
 CONTROL_CHANGE, MISSING = "nothing", "missing"
 """Name of the change that changes nothing (control); verdict of a recording without a diagnosis."""
@@ -141,10 +141,14 @@ def compute_kit_figures(rows: Sequence[Scored]) -> tuple[Figure, ...]:
     changed_rows = [row for row in rows if row.change != CONTROL_CHANGE]
     kinds = [change.name for change in CHANGES if any(row.change == change.name for row in changed_rows)]
     return (
-        share("changes named", changed_rows, lambda scored: scored.right),
-        share("nothing changed, nothing named", _select_change(rows, CONTROL_CHANGE), lambda scored: scored.right),
-        share("written numbers inside their interval", _select_with_interval(rows), lambda scored: bool(scored.inside)),
-        *(share(kind, _select_change(rows, kind), lambda scored: scored.right) for kind in kinds),
+        compute_share("changes named", changed_rows, lambda scored: scored.right),
+        compute_share(
+            "nothing changed, nothing named", _select_change(rows, CONTROL_CHANGE), lambda scored: scored.right
+        ),
+        compute_share(
+            "written numbers inside their interval", _select_with_interval(rows), lambda scored: bool(scored.inside)
+        ),
+        *(compute_share(kind, _select_change(rows, kind), lambda scored: scored.right) for kind in kinds),
     )
 
 

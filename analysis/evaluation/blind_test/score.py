@@ -14,7 +14,7 @@ import numpy as np
 
 from analysis.diagnosis.document import NamedEffect
 from analysis.evaluation.blind_test.calibration import Calibration, compute_calibration
-from analysis.evaluation.blind_test.confidence_intervals import Figure, pool_share, share, statistic
+from analysis.evaluation.blind_test.confidence_intervals import Figure, compute_share, compute_statistic, pool_share
 from analysis.evaluation.blind_test.follow_up import FollowUp, compute_follow_up_figures
 from analysis.evaluation.blind_test.outcome import Concealed, Outcome
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
@@ -110,32 +110,34 @@ def _compute_single_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     bank_words = {"main": "", "dirty": ", dirty bank", "engine": ", second engine"}
     for bank in BANKS:
         detectable = _select_detectable(_select_kind(outcomes, "single", bank))
-        yield share(f"named right{bank_words[bank]}", detectable, lambda case: case.right)
+        yield compute_share(f"named right{bank_words[bank]}", detectable, lambda case: case.right)
     singles_detected = _select_detectable(_select_kind(outcomes, "single"))
-    yield share("named first, all banks", singles_detected, lambda case: case.named_names[:1] == case.names)
-    yield share("in the returned set", singles_detected, lambda case: case.names[0] in case.returned)
+    yield compute_share("named first, all banks", singles_detected, lambda case: case.named_names[:1] == case.names)
+    yield compute_share("in the returned set", singles_detected, lambda case: case.names[0] in case.returned)
     named_cases = [case for case in singles_detected if case.named]
-    yield statistic("names in the returned set, mean", [float(len(case.returned)) for case in named_cases], np.mean)
+    yield compute_statistic(
+        "names in the returned set, mean", [float(len(case.returned)) for case in named_cases], np.mean
+    )
     unambiguous = [case for case in singles_detected if len(case.returned) == 1]
-    yield share("right where one name is returned", unambiguous, lambda case: case.right)
-    yield share("place", named_cases, lambda case: case.named[0].place == case.concealed[0].place)
+    yield compute_share("right where one name is returned", unambiguous, lambda case: case.right)
+    yield compute_share("place", named_cases, lambda case: case.named[0].place == case.concealed[0].place)
     on_one_axis = [
         case for case in named_cases if case.right and case.concealed[0].axis is not None and len(case.axes) > 1
     ]
-    yield share("axis, of two or three", on_one_axis, lambda case: not is_on_other_axis(case))
+    yield compute_share("axis, of two or three", on_one_axis, lambda case: not is_on_other_axis(case))
     singles = _select_kind(outcomes, "single")
     detectable = [single for single in singles if single.seen_by_ideal_observer]
-    yield share("single effects that count as detectable", singles, lambda case: case.detectable)
-    yield share("named right, of those that an oracle sees", detectable, lambda case: case.right)
+    yield compute_share("single effects that count as detectable", singles, lambda case: case.detectable)
+    yield compute_share("named right, of those that an oracle sees", detectable, lambda case: case.right)
     undetectable = [outcome for outcome in outcomes if outcome.kind != "nothing" and not outcome.detectable]
-    yield share("not detectable, yet a wrong name", undetectable, has_wrong_name)
+    yield compute_share("not detectable, yet a wrong name", undetectable, has_wrong_name)
 
 
 def _compute_null_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     """False alarms on cases without a concealed effect."""
-    yield share("nothing missing, yet named", _select_kind(outcomes, "nothing"), lambda case: bool(case.named))
+    yield compute_share("nothing missing, yet named", _select_kind(outcomes, "nothing"), lambda case: bool(case.named))
     nothing_missing = _select_kind(outcomes, "nothing")
-    yield share(
+    yield compute_share(
         "nothing missing, and said so", nothing_missing, lambda case: case.verdict in ("no_mismatch", "parameters")
     )
 
@@ -143,25 +145,27 @@ def _compute_null_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
 def _compute_open_set_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     """Figures on cases whose true effect is outside the catalogue, or was excluded from it."""
     outside = _select_detectable(_select_kind(outcomes, "outside"))
-    yield share("outside the catalogue, not explained", outside, lambda case: case.verdict in ADMITS_MISMATCH)
-    yield share("outside the catalogue, no name at all", outside, lambda case: not case.named)
+    yield compute_share("outside the catalogue, not explained", outside, lambda case: case.verdict in ADMITS_MISMATCH)
+    yield compute_share("outside the catalogue, no name at all", outside, lambda case: not case.named)
     excluded = _select_detectable(_select_kind(outcomes, "without"))
-    yield share("without the true effect, any name", excluded, lambda case: bool(case.named))
-    yield share("without the true effect, yet explained", excluded, lambda case: case.verdict == "explained")
+    yield compute_share("without the true effect, any name", excluded, lambda case: bool(case.named))
+    yield compute_share("without the true effect, yet explained", excluded, lambda case: case.verdict == "explained")
 
 
 def _compute_pair_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     """Figures on cases with two concealed effects."""
     pairs = _select_detectable(_select_kind(outcomes, "pair"))
-    yield share("pairs, both and no other", pairs, lambda case: case.right)
-    yield share("pairs, at least one", pairs, lambda case: bool(set(case.names) & set(case.named_names)))
+    yield compute_share("pairs, both and no other", pairs, lambda case: case.right)
+    yield compute_share("pairs, at least one", pairs, lambda case: bool(set(case.names) & set(case.named_names)))
 
 
 def _compute_number_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     """Parameter errors and interval coverage of single effects named right, the remaining error, and run times."""
     right_cases = [case for case in _select_detectable(_select_kind(outcomes, "single")) if case.right]
     errors = [compute_main_error(case.concealed[0], case.named[0]) for case in right_cases]
-    yield statistic("main parameter's error, median", [error for error in errors if error is not None], np.median)
+    yield compute_statistic(
+        "main parameter's error, median", [error for error in errors if error is not None], np.median
+    )
     covered = [list(compute_interval_coverage(case.concealed[0], case.named[0]).values()) for case in right_cases]
     yield pool_share("true value in the 95 % interval", covered)
     mains = [
@@ -169,10 +173,12 @@ def _compute_number_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
         for case in right_cases
         if EFFECTS_BY_NAME[case.names[0]].main.name in compute_interval_coverage(case.concealed[0], case.named[0])
     ]
-    yield share("the same, main parameters", mains, lambda case: is_main_covered(case.concealed[0], case.named[0]))
+    yield compute_share(
+        "the same, main parameters", mains, lambda case: is_main_covered(case.concealed[0], case.named[0])
+    )
     final_errors = [case.worst_error("after") for case in right_cases]
-    yield statistic("held-out error over noise, worst channel, median", final_errors, np.median)
-    yield statistic("seconds per diagnosis, median", [outcome.seconds for outcome in outcomes], np.median)
+    yield compute_statistic("held-out error over noise, worst channel, median", final_errors, np.median)
+    yield compute_statistic("seconds per diagnosis, median", [outcome.seconds for outcome in outcomes], np.median)
 
 
 def compute_main_error(concealed: Concealed, named_effect: NamedEffect) -> float | None:

@@ -3,7 +3,8 @@
     error = |P (f_true - f_found)| / |P f_true|        on each axis with a true law; the worst axis counts
 
 f: contribution of the laws over the samples; P: projection onto the complement of the columns that the model itself
-fits: acceleration, velocity, position and a constant for forces; acceleration and a constant for readings.
+fits: acceleration, velocity, position and a constant for forces; acceleration and a constant for readings. Called by
+`prove_laws` of the blind test of laws.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,46 +28,52 @@ class FreshMotion:
     response: bool
     """Whether `added` belongs to the reading, not to the force."""
     rate_hz: float
+    """Sample rate."""
 
 
-def law_error(laws: Sequence[Law], motion: FreshMotion) -> float:
-    """The relative error of the module's equation, on the worst axis that has a true law; inf where a found law gives
-    a number that is not finite. laws: the found laws."""
-    return max(_axis_error(laws, motion, axis) for axis in motion.added)
+def compute_law_error(laws: Sequence[Law], motion: FreshMotion) -> float:
+    """Compute the relative error of the module's equation, on the worst axis that has a true law; inf where a found law
+    gives a number that is not finite. laws: the found laws."""
+    return max(_compute_axis_error(laws, motion, axis) for axis in motion.added)
 
 
-def _axis_error(laws: Sequence[Law], motion: FreshMotion, axis: str) -> float:
-    """The relative error on one axis. A law that replaces a command or a response contributes its difference from
-    it."""
+def _compute_axis_error(laws: Sequence[Law], motion: FreshMotion, axis: str) -> float:
+    """Compute the relative error on one axis. A law that replaces a command or a response contributes its difference
+    from it."""
     true_contribution, found_contribution = motion.added[axis], np.zeros(len(motion.added[axis]))
     for law in laws:
         if law.axis[-1] != axis or (law.acts_on == "response") != motion.response:
             continue
-        replaced = {"force": None, "command": f"f{axis}", "response": f"a{axis}"}[law.acts_on]
+        replaced_signal = {"force": None, "command": f"f{axis}", "response": f"a{axis}"}[law.acts_on]
         predicted = evaluate(law, _begin_at_rest(motion), motion.rate_hz)[1:]
-        found_contribution = found_contribution + predicted - (0.0 if replaced is None else motion.columns[replaced])
+        found_contribution = (
+            found_contribution + predicted - (0.0 if replaced_signal is None else motion.columns[replaced_signal])
+        )
     if not np.isfinite(found_contribution).all():
         return float("inf")
     fitted_by_model = [
         motion.columns[name] for name in ((f"a{axis}",) if motion.response else (f"a{axis}", f"v{axis}", axis))
     ]
-    base = np.linalg.qr(
+    fitted_basis = np.linalg.qr(
         np.column_stack([*(_normalise(column) for column in fitted_by_model), np.ones(len(true_contribution))])
     )[0]
 
-    def norm_beyond_model(force: FloatArray) -> float:
-        return float(np.linalg.norm(force - base @ (base.T @ force)))
+    def compute_projected_norm(force: FloatArray) -> float:
+        """Norm of P force, with P as in the module's equation."""
+        return float(np.linalg.norm(force - fitted_basis @ (fitted_basis.T @ force)))
 
-    return norm_beyond_model(true_contribution - found_contribution) / max(norm_beyond_model(true_contribution), 1e-300)
+    return compute_projected_norm(true_contribution - found_contribution) / max(
+        compute_projected_norm(true_contribution), 1e-300
+    )
 
 
 def _begin_at_rest(motion: FreshMotion) -> Mapping[str, FloatArray]:
-    """The signals preceded by a sample of zeros, because the states of laws with memory start at rest, as the simulated
+    """Prepend to the signals a sample of zeros, because the states of laws with memory start at rest, as the simulated
     device did."""
     columns = {name: np.concatenate([[0.0], column]) for name, column in motion.columns.items()}
     return columns | {"t": np.concatenate([[motion.columns["t"][0] - 1 / motion.rate_hz], motion.columns["t"]])}
 
 
 def _normalise(column: FloatArray) -> FloatArray:
-    """The column with a Euclidean norm of 1, so that units do not affect the QR decomposition."""
+    """Scale the column to a Euclidean norm of 1, so that units do not affect the QR decomposition."""
     return np.asarray(column / max(float(np.linalg.norm(column)), 1e-300))

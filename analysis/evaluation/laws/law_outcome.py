@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from analysis.diagnosis.document import Candidate, NamedEffect
 from analysis.evaluation.blind_test.outcome import AnsweredCase
 from equalizer.effects.discovered_law import has_memory
-from equalizer.laws.law import Law, law_of
+from equalizer.laws.law import Law, parse_law
 
 MAX_LAW_ERROR = 0.05
-"""Relative error (`law_error`) up to which a law counts as the concealed function."""
+"""Relative error (`compute_law_error`) up to which a law counts as the concealed function."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,8 @@ class LawOutcome(AnsweredCase):
     truth: TrueLaw | None
     """The concealed law; None where no law was concealed."""
     errors: tuple[float, ...] = ()
-    """Errors of `laws` (`law_error`): first in the visited range, then at a higher level; empty where not computed."""
+    """Errors of `laws` (`compute_law_error`): first in the visited range, then at a higher level; empty where not
+    computed."""
 
     @property
     def named(self) -> tuple[Law, ...]:
@@ -106,7 +107,7 @@ class LawOutcome(AnsweredCase):
 def _collect_laws(entries: Sequence[NamedEffect] | Sequence[Candidate]) -> tuple[Law, ...]:
     """The laws among effects or candidates of the document."""
     return tuple(
-        law_of(entry.law.expression, entry.law.acts_on, entry.law.axis) for entry in entries if entry.law is not None
+        parse_law(entry.law.expression, entry.law.acts_on, entry.law.axis) for entry in entries if entry.law is not None
     )
 
 

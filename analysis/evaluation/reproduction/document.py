@@ -1,7 +1,8 @@
 """Document of a reproduction: the content of `reproduction.json`, format `hapteq-reproduction`, version 1.
 
 Each published figure comes with its findings: what the paper reports, the reproduced value, and the rule by which it
-counts as reproduced. Units are part of the names, or of the descriptions, which also appear in the JSON Schema.
+counts as reproduced. Units are part of the names, or of the descriptions, which also appear in the JSON Schema. Written
+by `write_reproduction`, read by `reproduction_report`.
 """
 
 import json
@@ -105,7 +106,7 @@ class UsedModel:
 
 @dataclass(frozen=True, config=STRICT)
 class Reproduction:
-    """The whole document."""
+    """The complete document: the findings on the published figures, and how the device was driven."""
 
     device: str
     subjects: int
@@ -123,7 +124,7 @@ class Reproduction:
 
 
 def reproduction_to_json(reproduction: Reproduction) -> dict[str, Any]:
-    """The document as plain values for JSON, without format and version."""
+    """Convert the document to plain values for JSON, without format and version."""
     values: dict[str, Any] = _ADAPTER.dump_python(reproduction, mode="json")
     return values
 
@@ -139,8 +140,8 @@ def reproduction_from_json(document: dict[str, Any]) -> Reproduction:
         ) from error
 
 
-def reproduction_schema() -> dict[str, Any]:
-    """JSON Schema of the values that `reproduction_to_json` returns."""
+def make_reproduction_schema() -> dict[str, Any]:
+    """Make the JSON Schema of the values that `reproduction_to_json` returns."""
     return _ADAPTER.json_schema(mode="serialization")
 
 

@@ -160,8 +160,8 @@ def _find_onset(onset: CouplingOnset) -> Finding:
 
 def _find_slope(response: FrequencyResponse) -> Finding | None:
     """Slope in dB per octave of the mean gain along the axes, by a line fit; None with fewer than 3 reliable lines."""
-    lines = response.within(*SLOPE_HZ)
-    lines = lines.of_lines(lines.reliable)
+    lines = response.select_band(*SLOPE_HZ)
+    lines = lines.select_lines(lines.reliable)
     if len(lines) < 3:
         return None
     diagonal_gain = np.abs(np.einsum("lii->li", lines.response)).mean(axis=1)

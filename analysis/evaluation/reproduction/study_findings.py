@@ -1,7 +1,8 @@
 """Findings on the published figure 2: thresholds of direction discrimination by frequency, from simulated participants.
 
 Group means are compared pairwise with simultaneous p-values (Tukey-Kramer, `PairDifference`). Thresholds are force
-amplitudes in N, and those at the cap are censored. The limit of direction perception follows `LIMIT_RULE`.
+amplitudes in N, and those at the cap are censored. The limit of direction perception follows `LIMIT_RULE`. Called by
+`write_reproduction`.
 """
 
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from statistics import mean
 from analysis.evaluation.reproduction.document import FigureFindings, Finding
 from analysis.psychophysics.comparisons import PairDifference
 from analysis.psychophysics.study_analysis import StudyAnalysis
-from analysis.psychophysics.threshold_table import frequency_name
+from analysis.psychophysics.threshold_table import format_frequency
 from analysis.wording import format_signed
 
 SIGNIFICANT_P = 0.05
@@ -23,7 +24,7 @@ LIMIT_RULE = (
     "least one threshold is cut by the cap"
 )
 
-_DIFFERS = (
+_DIFFERENCES = (
     "No person took part: the participants are simulated, and how their thresholds rise with frequency was set "
     "beforehand so that a study of ten resembles the published one in its main lines. That it does is no evidence "
     "about people; this is a test of the procedure, the analysis and the figure.",
@@ -40,18 +41,21 @@ class _Means:
 
     analysis: StudyAnalysis
 
-    def mean_at(self, frequency_hz: float) -> float | None:
-        """Group mean of the thresholds in N; None where no run was completed."""
-        values = [value for value in self.analysis.table.groups().get(frequency_name(frequency_hz), ()) if value]
+    def compute_mean(self, frequency_hz: float) -> float | None:
+        """Compute the group mean of the thresholds in N; None where no run was completed."""
+        values = [
+            value for value in self.analysis.table.group_by_frequency().get(format_frequency(frequency_hz), ()) if value
+        ]
         return mean(values) if values else None
 
-    def pair(self, first_hz: float, second_hz: float) -> PairDifference | None:
-        """Difference of the means at two frequencies, second minus first; None where they were not compared."""
-        names = (frequency_name(first_hz), frequency_name(second_hz))
+    def find_pair(self, first_hz: float, second_hz: float) -> PairDifference | None:
+        """Find the difference of the means at two frequencies, second minus first; None where they were not
+        compared."""
+        names = (format_frequency(first_hz), format_frequency(second_hz))
         return next((p for p in self.analysis.comparisons.pairs if (p.first, p.second) == names), None)
 
     def count_censored(self, frequency_hz: float) -> int:
-        """Number of thresholds that the cap censored at this frequency."""
+        """Count the thresholds that the cap censored at this frequency."""
         table = self.analysis.table
         if frequency_hz not in table.frequencies_hz:
             return 0
@@ -59,19 +63,20 @@ class _Means:
         return sum(row[column] for row in table.censored)
 
 
-def direction_limit_hz(analysis: StudyAnalysis) -> float | None:
-    """Limit of direction perception in Hz by `LIMIT_RULE`; None where no tested frequency fulfils it."""
+def find_direction_limit(analysis: StudyAnalysis) -> float | None:
+    """Find the limit of direction perception (Hz) by `LIMIT_RULE`; None where no tested frequency fulfils it."""
     means = _Means(analysis)
     lowest, *higher_hz = analysis.table.frequencies_hz
     for frequency_hz in higher_hz:
-        pair = means.pair(lowest, frequency_hz)
+        pair = means.find_pair(lowest, frequency_hz)
         if pair is not None and pair.difference > 0 and pair.p < SIGNIFICANT_P and means.count_censored(frequency_hz):
             return frequency_hz
     return None
 
 
-def study_findings(analysis: StudyAnalysis) -> FigureFindings:
-    """Findings on the published figure 2: means, differences and censoring of the thresholds over frequency."""
+def make_study_findings(analysis: StudyAnalysis) -> FigureFindings:
+    """Make the findings on the published figure 2: means, differences and censoring of the thresholds over
+    frequency."""
     means = _Means(analysis)
     tested = analysis.table.frequencies_hz
     findings = [
@@ -91,14 +96,14 @@ def study_findings(analysis: StudyAnalysis) -> FigureFindings:
         "some participants end at the cap of 3 N, and much the same at 45 Hz. It takes 35 Hz as a cautious limit of "
         "direction.",
         findings=tuple(finding for finding in findings if finding is not None),
-        differs=_DIFFERS,
+        differs=_DIFFERENCES,
         remarks=analysis.warnings,
     )
 
 
 def _find_mean_threshold(means: _Means, frequency_hz: float) -> Finding:
-    """The mean threshold at one frequency, without a judgement: the paper prints no number."""
-    value, censored = means.mean_at(frequency_hz), means.count_censored(frequency_hz)
+    """Find the mean threshold (N) at one frequency, compared with nothing, because the paper prints no number."""
+    value, censored = means.compute_mean(frequency_hz), means.count_censored(frequency_hz)
     censored_text = (
         f", {censored} of {len(means.analysis.table.subjects)} thresholds cut by the cap" if censored else ""
     )
@@ -113,9 +118,14 @@ def _find_mean_threshold(means: _Means, frequency_hz: float) -> Finding:
 
 
 def _find_rise(means: _Means, low_hz: float, high_hz: float, published: str, significant: bool) -> Finding | None:
-    """Whether the mean rises between two frequencies, with the published significance at `SIGNIFICANT_P`."""
-    pair, low, high = means.pair(low_hz, high_hz), means.mean_at(low_hz), means.mean_at(high_hz)
-    if pair is None or low is None or high is None:
+    """Find whether the mean rises between two frequencies, with the published significance at
+    `SIGNIFICANT_P`; None where means or comparison are missing."""
+    pair, low_mean_n, high_mean_n = (
+        means.find_pair(low_hz, high_hz),
+        means.compute_mean(low_hz),
+        means.compute_mean(high_hz),
+    )
+    if pair is None or low_mean_n is None or high_mean_n is None:
         return None
     rises = pair.difference > 0
     rule = f"up, and {'significant' if significant else 'not significant'} at 5 %, in all pairs at once"
@@ -131,7 +141,7 @@ def _find_rise(means: _Means, low_hz: float, high_hz: float, published: str, sig
 
 
 def _find_censoring(means: _Means, analysis: StudyAnalysis) -> Finding | None:
-    """Whether the cap censors some thresholds at 35 Hz, but not all."""
+    """Find whether the cap censors some thresholds at 35 Hz, but not all; None where 35 Hz was not tested."""
     if 35.0 not in analysis.table.frequencies_hz:
         return None
     censored, participants = means.count_censored(35.0), len(analysis.table.subjects)
@@ -147,11 +157,11 @@ def _find_censoring(means: _Means, analysis: StudyAnalysis) -> Finding | None:
 
 
 def _find_similarity(means: _Means) -> Finding | None:
-    """Whether the means at 35 and 45 Hz are fairly similar (`MAX_MEAN_DIFFERENCE`)."""
-    first, second = means.mean_at(35.0), means.mean_at(45.0)
-    if first is None or second is None:
+    """Find whether the means at 35 and 45 Hz are fairly similar (`MAX_MEAN_DIFFERENCE`); None where one is missing."""
+    mean_35_hz_n, mean_45_hz_n = means.compute_mean(35.0), means.compute_mean(45.0)
+    if mean_35_hz_n is None or mean_45_hz_n is None:
         return None
-    difference = abs(first - second) / max(first, second)
+    difference = abs(mean_35_hz_n - mean_45_hz_n) / max(mean_35_hz_n, mean_45_hz_n)
     return Finding(
         what="35 and 45 Hz",
         published="fairly similar",
@@ -164,4 +174,5 @@ def _find_similarity(means: _Means) -> Finding | None:
 
 
 def _format_p(p: float) -> str:
+    """Format a p-value with three decimals, or "< 0.001"."""
     return "< 0.001" if p < 0.001 else f"= {p:.3f}"

@@ -1,6 +1,6 @@
-"""All figures of one diagnosis, in the order of the report.
+"""All figures of one diagnosis, in the order of the report; called by `write_diagnosis`.
 
-Each figure is an independent piece of work, so that a figure whose drawing crashes can be left out (`Guard`).
+Each figure is drawn as an independent unit of work, so that one whose drawing crashes can be left out (`Guard`).
 """
 
 from collections.abc import Callable, Sequence
@@ -8,25 +8,25 @@ from functools import partial
 
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.residual_spectrum import compute_remainder_spectra
-from analysis.diagnosis.search.guard import Guard, Part
+from analysis.diagnosis.search.guard import Guard, WorkPart
 from analysis.figures.diagnosis.held_out import held_out_picture
 from analysis.figures.diagnosis.mismatch_map import make_mismatch_map_picture, rank_driving_inputs
 from analysis.figures.diagnosis.remainder import remainder_picture
-from analysis.figures.diagnosis.rivals import rivals_pictures
-from analysis.figures.diagnosis.signature import signature_pictures
-from analysis.figures.diagnosis.state_maps import state_map_pictures
+from analysis.figures.diagnosis.rivals import make_rivals_pictures
+from analysis.figures.diagnosis.signature import make_signature_pictures
+from analysis.figures.diagnosis.state_maps import make_state_map_pictures
 from analysis.figures.picture import Picture, count_in_samples
 
 
 def diagnosis_pictures(findings: Findings, guard: Guard | None = None) -> tuple[Picture, ...]:
     """Draw the figures for which there are data. guard: notes crashes and leaves the figure out; without it, or while
     it is off, exceptions propagate."""
-    picture_lists = (guard or Guard()).run_parts(map, diagnosis_drawings(findings))
+    picture_lists = (guard or Guard()).run_parts(map, list_drawings(findings))
     return tuple(picture for pictures in picture_lists for picture in pictures)
 
 
-def diagnosis_drawings(findings: Findings) -> list[Part]:
-    """The drawings as independent pieces of work; each returns its pictures, none where there are no data."""
+def list_drawings(findings: Findings) -> list[WorkPart]:
+    """List the drawings as independent units of work; each returns its pictures, none where there are no data."""
     # Where a motion is imposed and the force is measured, levels are those of the motion, and have no force unit.
     imposed = any(unit.startswith("N") for series in findings.time_series for unit in series.units)
     unit = "" if imposed else findings.given.system.force
@@ -37,26 +37,27 @@ def diagnosis_drawings(findings: Findings) -> list[Part]:
 
     drawings: list[tuple[str, Callable[[], Sequence[Picture]]]] = [
         *(("the mismatch map", partial(draw_map, number)) for number in range(len(rank_driving_inputs(findings.maps)))),
-        ("the map of states", lambda: state_map_pictures(findings.state_maps)),
-        ("the figure of signatures", lambda: signature_pictures(findings.signatures)),
-        ("the figure of rivals", lambda: rivals_pictures(findings.explanation, findings.axes or ("x", "y", "z"))),
+        ("the map of states", lambda: make_state_map_pictures(findings.state_maps)),
+        ("the figure of signatures", lambda: make_signature_pictures(findings.signatures)),
+        ("the figure of rivals", lambda: make_rivals_pictures(findings.explanation, findings.axes or ("x", "y", "z"))),
         (
             "the figure of held-out errors",
             lambda: [held_out_picture(*held_out_data)] if held_out_data[0] or held_out_data[2] else [],
         ),
-        ("the spectrum of the residual", lambda: _remainder_pictures(findings)),
+        ("the spectrum of the residual", lambda: _make_remainder_pictures(findings)),
     ]
     return [
-        Part(name, "its drawing", partial(_with_time_labels, draw, findings.is_timed), ()) for name, draw in drawings
+        WorkPart(name, "its drawing", partial(_draw_with_time_labels, draw, findings.is_timed), ())
+        for name, draw in drawings
     ]
 
 
-def _with_time_labels(draw: Callable[[], Sequence[Picture]], is_timed: bool) -> Sequence[Picture]:
-    """The pictures; with labels in samples instead of seconds where the time axis is unknown."""
+def _draw_with_time_labels(draw: Callable[[], Sequence[Picture]], is_timed: bool) -> Sequence[Picture]:
+    """Draw the pictures; with labels in samples instead of seconds where the time axis is unknown."""
     return draw() if is_timed else [count_in_samples(picture) for picture in draw()]
 
 
-def _remainder_pictures(findings: Findings) -> list[Picture]:
-    """The picture of the residual spectra; none where no samples were held out."""
+def _make_remainder_pictures(findings: Findings) -> list[Picture]:
+    """Make the picture of the residual spectra; none where no samples were held out."""
     spectra = compute_remainder_spectra(findings.time_series, findings.floor)
     return [remainder_picture(spectra)] if spectra else []

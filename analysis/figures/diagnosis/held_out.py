@@ -1,8 +1,8 @@
 """Figure of the prediction of held-out data by three models: as given, re-tuned, and with the effects found.
 
-Left: an excerpt of a channel, measured and predicted, with the residuals. It is chosen automatically, where the effects
-change the prediction most in units of the noise. Right: rms errors of all channels over all held-out samples, over the
-noise.
+Left: an excerpt of a channel, measured and predicted, with the residuals; it is the excerpt in which the effects change
+the prediction most, in units of the noise. Right: rms error of each channel over all held-out samples, divided by the
+rms of its noise. `diagnosis_pictures` calls `held_out_picture`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,25 +13,33 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.diagnosis.result.findings import TimeSeries
-from analysis.diagnosis.unit_wording import scale_of
-from analysis.figures.diagnosis.stage_style import COMPLETED_STAGE, GIVEN_STAGE, MEASURED, RETUNED_STAGE, STAGES, Stage
+from analysis.diagnosis.unit_wording import choose_scale
+from analysis.figures.diagnosis.stage_style import (
+    COMPLETED_STAGE,
+    GIVEN_STAGE,
+    MEASURED_HANDLE,
+    RETUNED_STAGE,
+    STAGES,
+    StageStyle,
+)
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, GREY, draw_no_data_note, new_figure, plain_axes, ratio_ticks
+from analysis.figures.style import BLACK, GREY, create_figure, draw_no_data_note, set_ratio_ticks, style_axes
 from equalizer.signals.signal import FloatArray
 
-_CYCLES = 5.0
-"""Length of the excerpt in cycles of the change that the effects make to the prediction."""
+_EXCERPT_CYCLES = 5.0
+"""Length of the excerpt, in cycles of the change that the effects make to the prediction."""
 _SHORTEST_S, _LONGEST_S = 0.1, 3.0
 """Bounds of the excerpt's length (s)."""
 _MARKERS = {"before": "s", "retuned": "D", "after": "o"}
-"""Marker of each stage."""
+"""Matplotlib marker, by stage."""
 _CANDIDATES_PER_STRETCH = 60
 """Number of candidate excerpts per held-out stretch, evenly spaced."""
 _OFFSET_WEIGHT = 0.01
-"""Weight of the mean square of a change against its variance in the choice of the excerpt (`_visibility`)."""
+"""Weight of the squared mean of a change, relative to its variance, in the choice of the excerpt
+(`_compute_visibility`)."""
 
 ChannelErrors = Mapping[str, Mapping[str, float]]
-"""Rms error over the noise's rms, by stage ("before", "retuned", "after"), then by channel."""
+"""Rms error divided by the rms of the noise, by stage ("before", "retuned", "after"), then by channel."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,112 +72,115 @@ def held_out_picture(
         "units of its noise; the line marks noise alone. These data were used neither for fitting nor for model "
         "selection.",
         figure=draw_held_out(excerpt, noise_rms, errors),
-        alternative=_alternative_text(errors),
+        alternative=_describe_errors(errors),
     )
 
 
 def find_excerpt(time_series: Sequence[TimeSeries], noise_rms: Mapping[str, float]) -> Excerpt | None:
-    """The held-out excerpt and channel where the re-tuned and the final prediction differ most, in units of the noise;
-    where these do not differ visibly, where the given and the final do. None where neither pair differs."""
+    """The held-out excerpt and channel in which the re-tuned and the completed model's predictions differ most, in
+    units of the noise; if these do not differ visibly, those of the given and the completed model. None if neither
+    pair differs visibly. noise_rms: by channel, in the channel's SI unit."""
     for stage_name in ("retuned", "before"):
         best: tuple[float, Excerpt] | None = None
         for series in time_series:
-            noise = np.array([noise_rms.get(name, np.nan) for name in series.channels])
-            change = np.nan_to_num((getattr(series, stage_name) - series.after) / noise)
+            channel_noise = np.array([noise_rms.get(channel_name, np.nan) for channel_name in series.channels])
+            change = np.nan_to_num((getattr(series, stage_name) - series.after) / channel_noise)
             for start, stop in series.tested:
-                candidate = _strongest_excerpt(series, change[start:stop], start)
+                candidate = _find_strongest_excerpt(series, change[start:stop], start)
                 if candidate is not None and (best is None or candidate[0] > best[0]):
                     best = candidate
-        # A change counts as visible where `_visibility` is above a tenth of the noise's variance.
+        # A change counts as visible if `_compute_visibility` is above a tenth of the noise's variance.
         if best is not None and best[0] > 0.1:
             return best[1]
     return None
 
 
-def _strongest_excerpt(series: TimeSeries, change: FloatArray, start: int) -> tuple[float, Excerpt] | None:
-    """Visibility and excerpt of the part of a held-out stretch in which the change is most visible; None without a
-    change. change: (n, channels), in units of the noise; start: index of its first sample."""
+def _find_strongest_excerpt(series: TimeSeries, change: FloatArray, start: int) -> tuple[float, Excerpt] | None:
+    """Visibility (`_compute_visibility`) and excerpt of the part of a held-out stretch in which the change is most
+    visible; None if the change is zero. change: (n, channels), difference of two predictions in units of the noise.
+    start: index of the stretch's first sample in the series. An excerpt has at least 8 samples if the stretch does."""
     if not len(change):
         return None
-    channel = int(np.argmax(_visibility(change)))
+    channel = int(np.argmax(_compute_visibility(change)))
     signal = change[:, channel]
-    rms, speed = float(np.std(signal)), float(np.sqrt(np.mean(np.diff(signal, prepend=signal[0]) ** 2)))
+    rms, rms_step = float(np.std(signal)), float(np.sqrt(np.mean(np.diff(signal, prepend=signal[0]) ** 2)))
     if not signal.any():
         return None
     # Period of a sine with the same rms and the same rms slope: 2 pi rms(x) / rms(dx/dt).
-    cycle_s = 2 * np.pi * rms / max(speed * series.sample_rate_hz, 1e-12)
-    length = int(np.clip(_CYCLES * cycle_s, _SHORTEST_S, _LONGEST_S) * series.sample_rate_hz)
+    cycle_s = 2 * np.pi * rms / max(rms_step * series.sample_rate_hz, 1e-12)
+    length = int(np.clip(_EXCERPT_CYCLES * cycle_s, _SHORTEST_S, _LONGEST_S) * series.sample_rate_hz)
     length = min(max(length, 8), len(signal))
     offsets = np.unique(np.linspace(0, len(signal) - length, _CANDIDATES_PER_STRETCH).astype(int))
-    strengths = [float(_visibility(signal[offset : offset + length])) for offset in offsets]
+    strengths = [float(_compute_visibility(signal[offset : offset + length])) for offset in offsets]
     offset = int(offsets[int(np.argmax(strengths))])
     return max(strengths), Excerpt(series, channel, start + offset, start + offset + length)
 
 
-def _visibility(change: FloatArray) -> FloatArray:
-    """Visibility of a change, (channels,) or a number: its variance plus `_OFFSET_WEIGHT` times its squared mean,
-    because a varying change is easier to see in a plot than an offset."""
+def _compute_visibility(change: FloatArray) -> FloatArray:
+    """Visibility of a change (n, channels) or (n,), per channel: its variance plus `_OFFSET_WEIGHT` times its squared
+    mean, because a varying change is easier to see in a plot than an offset."""
     return np.asarray(np.var(change, axis=0) + _OFFSET_WEIGHT * np.mean(change, axis=0) ** 2)
 
 
 def draw_held_out(excerpt: Excerpt | None, noise_rms: Mapping[str, float], errors: ChannelErrors) -> Figure:
-    """Figure of an excerpt, measured and predicted, and of the errors of all channels to its right; only the errors
-    where `excerpt` is None, and a note where there are none either."""
+    """Figure of an excerpt, measured and predicted, with the errors of all channels to its right; of the errors alone
+    if `excerpt` is None; of a note if there are no errors either."""
     channels = list(next(iter(errors.values()), {}))
     if excerpt is None and not channels:
-        return draw_no_data_note(new_figure(8.6, 1.6), "There are no held-out data to draw.")
-    figure = new_figure(8.8, max(4.2, 1.4 + 0.34 * len(channels)))
+        return draw_no_data_note(create_figure(8.6, 1.6), "There are no held-out data to draw.")
+    figure = create_figure(8.8, max(4.2, 1.4 + 0.34 * len(channels)))
     if excerpt is None:
         _draw_errors(figure.add_subplot(), errors)
     else:
         grid = figure.add_gridspec(2, 2, width_ratios=[1.75, 1], height_ratios=[1.5, 1])
-        above = figure.add_subplot(grid[0, 0])
-        below = figure.add_subplot(grid[1, 0], sharex=above)
-        _draw_excerpt(above, below, excerpt, noise_rms)
+        signal_axes = figure.add_subplot(grid[0, 0])
+        residual_axes = figure.add_subplot(grid[1, 0], sharex=signal_axes)
+        _draw_excerpt(signal_axes, residual_axes, excerpt, noise_rms)
         _draw_errors(figure.add_subplot(grid[:, 1]), errors)
-    handles = ([MEASURED] if excerpt else []) + [stage.handle for stage in STAGES]
+    handles = ([MEASURED_HANDLE] if excerpt else []) + [stage.handle for stage in STAGES]
     figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), fontsize=9, frameon=False)
     return figure
 
 
-def _draw_excerpt(above: Axes, below: Axes, excerpt: Excerpt, noise_rms: Mapping[str, float]) -> None:
-    """Draw the measured and predicted channel above, and the residuals over twice the noise's rms below."""
-    series, samples, k = excerpt.series, slice(excerpt.start, excerpt.stop), excerpt.channel
-    name, unit = series.channels[k], series.units[k]
-    seconds = np.arange(excerpt.start, excerpt.stop) / series.sample_rate_hz
-    measured = series.measured[samples, k]
-    signal_scale = scale_of(unit, float(np.max(np.abs(measured))))
-    residuals = [(stage, measured - getattr(series, stage.name)[samples, k]) for stage in STAGES]
+def _draw_excerpt(signal_axes: Axes, residual_axes: Axes, excerpt: Excerpt, noise_rms: Mapping[str, float]) -> None:
+    """Draw the measured and predicted signals, and the residuals with a grey band of plus and minus twice the noise's
+    rms. noise_rms: by channel, in the channel's SI unit."""
+    series, samples, channel = excerpt.series, slice(excerpt.start, excerpt.stop), excerpt.channel
+    channel_name, unit = series.channels[channel], series.units[channel]
+    time_s = np.arange(excerpt.start, excerpt.stop) / series.sample_rate_hz
+    measured = series.measured[samples, channel]
+    signal_scale = choose_scale(unit, float(np.max(np.abs(measured))))
+    residuals = [(stage, measured - getattr(series, stage.name)[samples, channel]) for stage in STAGES]
     # The residual of the given model does not set the scale: it may be so large that the others would look flat.
     largest = max(float(np.max(np.abs(deviation))) for stage, deviation in residuals if stage is not GIVEN_STAGE)
-    residual_scale = scale_of(unit, largest)
-    above.plot(seconds, signal_scale.factor * measured, color=BLACK, linewidth=2.6, alpha=0.35)
+    residual_scale = choose_scale(unit, largest)
+    signal_axes.plot(time_s, signal_scale.factor * measured, color=BLACK, linewidth=2.6, alpha=0.35)
     for stage, residual in residuals:
         for axes, values in (
-            (above, signal_scale.factor * (measured - residual)),
-            (below, residual_scale.factor * residual),
+            (signal_axes, signal_scale.factor * (measured - residual)),
+            (residual_axes, residual_scale.factor * residual),
         ):
-            axes.plot(seconds, values, color=stage.colour, linestyle=stage.dash, linewidth=stage.width)
-    noise = 2 * residual_scale.factor * noise_rms.get(name, 0.0)
-    below.axhspan(-noise, noise, color=GREY, alpha=0.3, linewidth=0, zorder=0)
-    reach = 1.25 * max(residual_scale.factor * largest, 1.5 * noise)
-    below.set_ylim(-reach, reach)
-    for axes in (above, below):
-        plain_axes(axes)
-    above.tick_params(labelbottom=False)
-    above.set_xlim(float(seconds[0]), float(seconds[-1]))
-    above.set_ylabel(f"{name} ({signal_scale.unit})", fontsize=9.5)
-    below.set_ylabel(f"residual ({residual_scale.unit})", fontsize=9.5)
-    below.set_xlabel("Time (s)", fontsize=9.5)
+            axes.plot(time_s, values, color=stage.colour, linestyle=stage.dash, linewidth=stage.width)
+    twice_noise = 2 * residual_scale.factor * noise_rms.get(channel_name, 0.0)
+    residual_axes.axhspan(-twice_noise, twice_noise, color=GREY, alpha=0.3, linewidth=0, zorder=0)
+    half_range = 1.25 * max(residual_scale.factor * largest, 1.5 * twice_noise)
+    residual_axes.set_ylim(-half_range, half_range)
+    for axes in (signal_axes, residual_axes):
+        style_axes(axes)
+    signal_axes.tick_params(labelbottom=False)
+    signal_axes.set_xlim(float(time_s[0]), float(time_s[-1]))
+    signal_axes.set_ylabel(f"{channel_name} ({signal_scale.unit})", fontsize=9.5)
+    residual_axes.set_ylabel(f"residual ({residual_scale.unit})", fontsize=9.5)
+    residual_axes.set_xlabel("Time (s)", fontsize=9.5)
 
 
 def _draw_errors(axes: Axes, errors: ChannelErrors) -> None:
-    """Draw the rms error of each channel (rows) over its noise, on a logarithmic axis, for each stage."""
-    plain_axes(axes)
+    """Draw the rms error of each channel (rows), divided by its noise, on a logarithmic axis, for each stage."""
+    style_axes(axes)
     channels = list(next(iter(errors.values())))
     rows = np.arange(len(channels), dtype=float)
     for stage in (COMPLETED_STAGE, RETUNED_STAGE, GIVEN_STAGE):
-        values = [errors[stage.name].get(name, np.nan) for name in channels] if stage.name in errors else []
+        values = [errors[stage.name].get(channel, np.nan) for channel in channels] if stage.name in errors else []
         if values:
             _draw_stage(axes, stage, np.array(values), rows)
     axes.axvline(1, color=BLACK, linewidth=1.1)
@@ -179,25 +190,25 @@ def _draw_errors(axes: Axes, errors: ChannelErrors) -> None:
     low, high = axes.get_xlim()
     low, high = min(low, 0.7), max(high, 3.0)
     axes.set_xlim(low, high)
-    ratio_ticks(axes.xaxis, low, high)
+    set_ratio_ticks(axes.xaxis, low, high)
     axes.set_yticks(rows, channels)
     axes.set_ylim(len(channels) - 0.4, -0.6)
     axes.grid(False, axis="y")
     axes.set_xlabel("Error / noise, all held-out data", fontsize=9.5)
 
 
-def _draw_stage(axes: Axes, stage: Stage, values: FloatArray, rows: FloatArray) -> None:
+def _draw_stage(axes: Axes, stage: StageStyle, values: FloatArray, rows: FloatArray) -> None:
     """Draw the errors of one stage as lines from the noise level (1); stages are offset within a channel's row."""
     positions = rows + 0.24 * (STAGES.index(stage) - 1)
     axes.hlines(positions, 1.0, values, color=stage.colour, linewidth=1.6, alpha=0.75)
     axes.plot(values, positions, _MARKERS[stage.name], color=stage.colour, markersize=5)
 
 
-def _alternative_text(errors: ChannelErrors) -> str:
+def _describe_errors(errors: ChannelErrors) -> str:
     """Description for screen readers: the errors of each stage by channel."""
     sentences = []
     for stage in STAGES:
         if stage.name in errors:
-            values = ", ".join(f"{name} {value:.3g}" for name, value in errors[stage.name].items())
-            sentences.append(f"{stage.words.capitalize()}, error over noise: {values}.")
+            values = ", ".join(f"{channel} {value:.3g}" for channel, value in errors[stage.name].items())
+            sentences.append(f"{stage.label.capitalize()}, error over noise: {values}.")
     return " ".join(sentences)

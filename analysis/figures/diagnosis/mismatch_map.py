@@ -10,9 +10,9 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
-from analysis.figures.diagnosis.stage_style import STAGES, Stage
+from analysis.figures.diagnosis.stage_style import STAGES, StageStyle
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, GREY, draw_no_data_note, new_figure, ratio_ticks
+from analysis.figures.style import BLACK, GREY, create_figure, draw_no_data_note, set_ratio_ticks
 from equalizer.signals.signal import FloatArray
 
 _LEAST_COLOUR_LIMIT = 300.0
@@ -43,7 +43,7 @@ Maps = Mapping[str, tuple[MismatchCell, ...]]
 class _Layout:
     """Stages (columns of panels), levels (rows of panels), bands and channels (columns and rows of cells) of a map."""
 
-    stages: tuple[Stage, ...]
+    stages: tuple[StageStyle, ...]
     levels: tuple[float, ...]
     bands: tuple[tuple[float, float], ...]
     channels: tuple[tuple[str, str], ...]
@@ -82,8 +82,8 @@ def draw_mismatch_map(maps: Maps, input_: str, unit: str) -> Figure:
     seconds."""
     layout = _make_layout(maps, input_)
     if not layout.stages or not layout.bands:
-        return draw_no_data_note(new_figure(8.6, 1.6), "The noise is not known, so there is no map in its units.")
-    figure = new_figure(_WIDTH_IN, 0.9 + len(layout.levels) * (_PANEL_GAP_IN + _ROW_IN * len(layout.channels)))
+        return draw_no_data_note(create_figure(8.6, 1.6), "The noise is not known, so there is no map in its units.")
+    figure = create_figure(_WIDTH_IN, 0.9 + len(layout.levels) * (_PANEL_GAP_IN + _ROW_IN * len(layout.channels)))
     axes, colour_bar_axes = _add_axes(figure, layout)
     table, frames = _fill_table(maps, input_, layout)
     panels = [layout.corner(row, column) for row, column in np.ndindex(len(layout.levels), len(layout.stages))]
@@ -101,7 +101,7 @@ def draw_mismatch_map(maps: Maps, input_: str, unit: str) -> Figure:
         _write_numbers(axes, table, panels, layout)
     _label_axes(axes, layout, unit)
     bar = figure.colorbar(image, cax=colour_bar_axes)
-    ratio_ticks(bar.ax.yaxis, 1.0, largest)
+    set_ratio_ticks(bar.ax.yaxis, 1.0, largest)
     bar.set_label("residual / noise", fontsize=9)
     colour_bar_axes.tick_params(labelsize=8)
     return figure
@@ -181,7 +181,7 @@ def _label_axes(axes: Axes, layout: _Layout, unit: str) -> None:
     axes.spines[:].set_visible(False)
     axes.set_xlabel("Octave from (Hz)", fontsize=9.5)
     for column in stages:
-        axes.annotate(layout.stages[column].words, (float(layout.corner(0, column)[0]) - 0.5, -0.5), xytext=(0, 4),
+        axes.annotate(layout.stages[column].label, (float(layout.corner(0, column)[0]) - 0.5, -0.5), xytext=(0, 4),
                       textcoords="offset points", fontsize=10)  # fmt: skip
     middle = (len(layout.channels) - 1) / 2
     for row in levels:
@@ -247,7 +247,7 @@ def _write_alternative_text(maps: Maps, input_: str) -> str:
         worst = max(cells, key=lambda cell: cell.in_noise)
         count = sum(cell.significant for cell in cells)
         sentences.append(
-            f"{stage.words.capitalize()}: {count} of {len(cells)} cells differ significantly; the worst is "
+            f"{stage.label.capitalize()}: {count} of {len(cells)} cells differ significantly; the worst is "
             f"{worst.output} at {worst.band_hz[0]:g} to {worst.band_hz[1]:g} Hz and {worst.amplitude:g}, with "
             f"{worst.in_noise:.3g} times the noise."
         )

@@ -1,6 +1,7 @@
 """Figure of a real recording: a held-out excerpt, measured and predicted, and the held-out errors of all models.
 
-Errors are rms errors relative to the signal, on a logarithmic axis; the noise is the lower limit of any model.
+Errors are rms errors relative to the signal, on a logarithmic axis; the noise is the lower limit of any model. Called
+by `write_real` and `real_report`.
 """
 
 import numpy as np
@@ -8,21 +9,21 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.diagnosis.real_answer.real_answer import DrawnExcerpt, RealAnswer
-from analysis.diagnosis.unit_wording import scale_of
-from analysis.figures.diagnosis.stage_style import COMPLETED_STAGE, MEASURED, RETUNED_STAGE
+from analysis.diagnosis.unit_wording import choose_scale
+from analysis.figures.diagnosis.stage_style import COMPLETED_STAGE, MEASURED_HANDLE, RETUNED_STAGE
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, GREEN, GREY, ORANGE, draw_no_data_note, new_figure, plain_axes
+from analysis.figures.style import BLACK, GREEN, GREY, ORANGE, create_figure, draw_no_data_note, style_axes
 
 _LEAST_ERROR = 1e-4
 """Smallest error, relative to the signal, that is drawn; smaller ones are drawn at this value."""
 
 
-def real_picture(answer: RealAnswer) -> Picture:
-    """Picture of a recording's held-out data, with the errors as its text for screen readers."""
-    rows = error_rows(answer)
+def make_real_picture(answer: RealAnswer) -> Picture:
+    """Make the picture of a recording's held-out data, with the errors as its text for screen readers."""
+    rows = list_error_rows(answer)
     text = "; ".join(f"{name} {100 * value:.3g} %" for name, value, _ in rows)
     return Picture(
-        name=f"held-out-{_plain_name(answer.folder)}-{_plain_name(answer.recording)}",
+        name=f"held-out-{_make_plain_name(answer.folder)}-{_make_plain_name(answer.recording)}",
         title=f"Held-out data of {answer.recording}",
         caption="Left: where the effects found change the prediction most. Right: errors on all held-out data as a "
         "share of the signal, logarithmic; shorter is better.",
@@ -31,8 +32,8 @@ def real_picture(answer: RealAnswer) -> Picture:
     )
 
 
-def error_rows(answer: RealAnswer) -> list[tuple[str, float, str]]:
-    """Per model: name, held-out error relative to the signal, colour. Unknown errors and zeros are left out; empty
+def list_error_rows(answer: RealAnswer) -> list[tuple[str, float, str]]:
+    """List per model: name, held-out error relative to the signal, colour. Unknown errors and zeros are left out; empty
     where nothing was held out."""
     if answer.held_out is None:
         return []
@@ -48,38 +49,38 @@ def error_rows(answer: RealAnswer) -> list[tuple[str, float, str]]:
 
 
 def _draw_answer(excerpt: DrawnExcerpt | None, rows: list[tuple[str, float, str]]) -> Figure:
-    """The excerpt on the left and the errors on the right; a note where either is missing."""
+    """Draw the excerpt on the left and the errors on the right; a note where either is missing."""
     if excerpt is None or not rows:
-        return draw_no_data_note(new_figure(8.6, 1.6), "There are no held-out data to draw.")
-    figure = new_figure(8.8, 3.4)
+        return draw_no_data_note(create_figure(8.6, 1.6), "There are no held-out data to draw.")
+    figure = create_figure(8.8, 3.4)
     grid = figure.add_gridspec(1, 2, width_ratios=[1.75, 1])
     _draw_excerpt(figure.add_subplot(grid[0, 0]), excerpt)
     _draw_errors(figure.add_subplot(grid[0, 1]), rows)
-    handles = [MEASURED, RETUNED_STAGE.handle, COMPLETED_STAGE.handle]
+    handles = [MEASURED_HANDLE, RETUNED_STAGE.handle, COMPLETED_STAGE.handle]
     figure.legend(handles=handles, loc="outside upper center", ncols=3, fontsize=9, frameon=False)
     return figure
 
 
 def _draw_excerpt(axes: Axes, excerpt: DrawnExcerpt) -> None:
-    """Measured and predicted curves over time; the ordinate ends at 1.6 times the largest measured magnitude."""
-    plain_axes(axes)
+    """Draw measured and predicted curves over time; the ordinate ends at 1.6 times the largest measured magnitude."""
+    style_axes(axes)
     measured = np.array(excerpt.measured)
-    scale = scale_of(excerpt.unit, float(np.max(np.abs(measured), initial=0.0)))
-    seconds = excerpt.start_s + excerpt.step_s * np.arange(len(measured))
-    axes.plot(seconds, scale.factor * measured, color=BLACK, linewidth=2.6, alpha=0.35)
+    scale = choose_scale(excerpt.unit, float(np.max(np.abs(measured), initial=0.0)))
+    times_s = excerpt.start_s + excerpt.step_s * np.arange(len(measured))
+    axes.plot(times_s, scale.factor * measured, color=BLACK, linewidth=2.6, alpha=0.35)
     for stage, values in ((RETUNED_STAGE, excerpt.retuned), (COMPLETED_STAGE, excerpt.after)):
         predicted = scale.factor * np.array(values)
-        axes.plot(seconds, predicted, color=stage.colour, linestyle=stage.dash, linewidth=stage.width)
-    reach = 1.6 * scale.factor * max(float(np.max(np.abs(measured), initial=0.0)), np.finfo(float).tiny)
+        axes.plot(times_s, predicted, color=stage.colour, linestyle=stage.dash, linewidth=stage.width)
+    ordinate_limit = 1.6 * scale.factor * max(float(np.max(np.abs(measured), initial=0.0)), np.finfo(float).tiny)
     low, high = axes.get_ylim()
-    axes.set_ylim(max(low, -reach), min(high, reach))
+    axes.set_ylim(max(low, -ordinate_limit), min(high, ordinate_limit))
     axes.set_xlabel(f"Time in {excerpt.record} (s)", fontsize=9.5)
     axes.set_ylabel(f"{excerpt.channel} ({scale.unit})", fontsize=9.5)
 
 
 def _draw_errors(axes: Axes, rows: list[tuple[str, float, str]]) -> None:
-    """Horizontal bars of the errors, labelled in per cent of the signal. rows: as from `error_rows`."""
-    plain_axes(axes)
+    """Draw the errors as horizontal bars, labelled in per cent of the signal. rows: as from `list_error_rows`."""
+    style_axes(axes)
     positions = np.arange(len(rows))
     values = [max(value, _LEAST_ERROR) for _, value, _ in rows]
     low = 0.5 * min(values)
@@ -99,6 +100,6 @@ def _draw_errors(axes: Axes, rows: list[tuple[str, float, str]]) -> None:
     axes.set_xticks([], minor=True)
 
 
-def _plain_name(name: str) -> str:
-    """The name with a hyphen for every character that is no letter or digit."""
+def _make_plain_name(name: str) -> str:
+    """Make a name for files and links: the name with a hyphen for every character that is no letter or digit."""
     return "".join(character if character.isalnum() else "-" for character in name)

@@ -15,7 +15,7 @@ from analysis.diagnosis.result.residual_spectrum import RemainderSpectrum
 from analysis.diagnosis.unit_wording import typeset_unit
 from analysis.figures.diagnosis.stage_style import COMPLETED_STAGE, RETUNED_STAGE
 from analysis.figures.picture import Picture
-from analysis.figures.style import GREY, draw_no_data_note, new_figure, plain_axes, power_of_ten
+from analysis.figures.style import GREY, create_figure, draw_no_data_note, format_power_of_ten, style_axes
 
 _COLUMNS = 3
 """Largest number of panels in a row."""
@@ -39,10 +39,10 @@ def draw_remainder(spectra: Sequence[RemainderSpectrum]) -> Figure:
     """Figure with a panel per channel: densities of the signal, of the residuals of the re-tuned and the completed
     model, and of the noise; a note where there are no spectra."""
     if not spectra:
-        return draw_no_data_note(new_figure(8.6, 1.6), "There are no held-out data to draw.")
+        return draw_no_data_note(create_figure(8.6, 1.6), "There are no held-out data to draw.")
     columns = min(_COLUMNS, len(spectra))
     rows = -(-len(spectra) // columns)
-    figure = new_figure(8.8, 0.9 + (2.1 if columns > 1 else 2.6) * rows)
+    figure = create_figure(8.8, 0.9 + (2.1 if columns > 1 else 2.6) * rows)
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
     for axes in grid.ravel()[len(spectra) :]:
         axes.set_visible(False)
@@ -56,7 +56,7 @@ def draw_remainder(spectra: Sequence[RemainderSpectrum]) -> Figure:
 
 def _draw_panel(axes: Axes, spectrum: RemainderSpectrum) -> None:
     """The densities of one channel on logarithmic axes."""
-    plain_axes(axes)
+    style_axes(axes)
     axes.loglog(spectrum.frequency_hz, spectrum.measured, color=GREY, linewidth=0.9)
     if np.isfinite(spectrum.noise).any():
         axes.loglog(spectrum.frequency_hz, spectrum.noise, color=GREY, linewidth=4, alpha=0.4)
@@ -65,7 +65,7 @@ def _draw_panel(axes: Axes, spectrum: RemainderSpectrum) -> None:
     axes.set_title(f"{spectrum.channel} ({typeset_unit(spectrum.unit)}/√Hz)", fontsize=9, loc="left", pad=3)
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.yaxis.set_major_locator(LogLocator(numticks=5))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: format_power_of_ten(value)))
     # Minor ticks would double the time to draw the figure.
     axes.yaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_minor_locator(NullLocator())

@@ -1,7 +1,7 @@
 """Figures of the rival explanations in each round of the search, with the error that each of them leaves.
 
 Errors are geometric means, over the channels, of the rms error over the rms noise (1 = noise alone), on the samples
-that decided the choice and, where computed, on held-out samples.
+that decided the choice and, where computed, on held-out samples. Called by `diagnosis_pictures`.
 """
 
 from collections.abc import Sequence
@@ -12,14 +12,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.diagnosis.effect_words import noun_of
+from analysis.diagnosis.effect_words import get_noun
 from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.hypothesis import Claim
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.figures.diagnosis.stage_style import COMPLETED_STAGE, RETUNED_STAGE
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, GREY, draw_no_data_note, new_figure, plain_axes, ratio_ticks
+from analysis.figures.style import BLACK, GREY, create_figure, draw_no_data_note, set_ratio_ticks, style_axes
 from equalizer.effects.placing import place_of_effect
 from equalizer.signals.signal import FloatArray
 
@@ -47,18 +47,20 @@ class TriedExplanation:
 
 
 def list_explanations(round_: Sequence[FittedCandidate], axes: Sequence[str]) -> tuple[TriedExplanation, ...]:
-    """The best fit of each hypothesis of a round: first the round's choice, which may have a larger error than a less
-    simple one; then the others, the smallest error first. axes: displayed names of the axes."""
+    """List the best fit of each hypothesis of a round, at most `MOST_RIVALS`: first the round's choice, which may have
+    a larger error than a less simple one; then the others, the smallest error first. axes: displayed names of the
+    axes."""
     best: dict[object, TriedExplanation] = {}
     for candidate in round_:
-        words = ", ".join(_claim_words(claim, axes) for claim in candidate.fitted.hypothesis.claims[-1:])
+        words = ", ".join(_describe_claim(claim, axes) for claim in candidate.fitted.hypothesis.claims[-1:])
         best.setdefault(candidate.fitted.hypothesis.key, _make_explanation(words, candidate.score))
     chosen, alternatives = list(best.values())[:1], list(best.values())[1:]
     return (*chosen, *sorted(alternatives, key=lambda rival: rival.training_error))[:MOST_RIVALS]
 
 
-def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Picture, ...]:
-    """A picture per round in which several explanations were tried; folded where none of them was added."""
+def make_rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Picture, ...]:
+    """Make a picture per round in which several explanations were tried, for at most five rounds; folded where none of
+    them was added."""
     retuned = _make_explanation("re-tuned, no physics", explanation.retuned.score)
     pictures = []
     tested_rounds = [number for number, round_ in enumerate(explanation.rounds, start=1) if len(round_) > 1]
@@ -82,7 +84,7 @@ def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Pict
                     figure=draw_rivals(explanations, retuned, is_accepted),
                     folded=not is_accepted,
                     bitmap=is_accepted,
-                    alternative=" ".join(_alternative_text(rival) for rival in explanations),
+                    alternative=" ".join(_describe_rival(rival) for rival in explanations),
                 )
             )
     return tuple(pictures)
@@ -91,19 +93,19 @@ def rivals_pictures(explanation: Explanation, axes: Sequence[str]) -> tuple[Pict
 def draw_rivals(
     explanations: Sequence[TriedExplanation], retuned: TriedExplanation, is_accepted: bool = True
 ) -> Figure:
-    """Figure with a row per explanation, the chosen one on top. is_accepted: whether the chosen explanation was added,
+    """Draw a row per explanation, the chosen one on top. is_accepted: whether the chosen explanation was added,
     and is marked."""
     if not explanations:
-        return draw_no_data_note(new_figure(7.4, 1.4), "Nothing was tried.")
-    figure = new_figure(8.8, 1.05 + 0.3 * len(explanations))
+        return draw_no_data_note(create_figure(7.4, 1.4), "Nothing was tried.")
+    figure = create_figure(8.8, 1.05 + 0.3 * len(explanations))
     axes = figure.add_subplot()
-    plain_axes(axes)
-    for row, item in enumerate(explanations):
+    style_axes(axes)
+    for row, tried in enumerate(explanations):
         colour = COMPLETED_STAGE.colour if row == 0 and is_accepted else GREY
-        axes.plot([item.training_error, item.test], [row, row], color=colour, linewidth=1.2, zorder=2)
-        axes.plot(item.training_error, row, "o", color=colour, markersize=6.5, zorder=3)
-        if np.isfinite(item.test):
-            axes.plot(item.test, row, "o", color=colour, markersize=6.5, markerfacecolor="white", zorder=3)
+        axes.plot([tried.training_error, tried.test], [row, row], color=colour, linewidth=1.2, zorder=2)
+        axes.plot(tried.training_error, row, "o", color=colour, markersize=6.5, zorder=3)
+        if np.isfinite(tried.test):
+            axes.plot(tried.test, row, "o", color=colour, markersize=6.5, markerfacecolor="white", zorder=3)
     axes.axvline(
         retuned.training_error,
         color=RETUNED_STAGE.colour,
@@ -112,34 +114,36 @@ def draw_rivals(
         zorder=1,
     )
     axes.axvline(1, color=BLACK, linewidth=1.0, zorder=1)
-    _draw_mark(axes, 1.0, "noise", "right")
-    _draw_mark(axes, retuned.training_error, "re-tuned", "left")
+    _draw_label(axes, 1.0, "noise", "right")
+    _draw_label(axes, retuned.training_error, "re-tuned", "left")
     axes.set_yticks(range(len(explanations)), [rival.words for rival in explanations])
     if is_accepted:
         axes.get_yticklabels()[0].set_fontweight("bold")
     axes.set_ylim(len(explanations) - 0.5, -0.5)
     axes.grid(False, axis="y")
-    values = np.array(
+    drawn_errors = np.array(
         [
             *(rival.training_error for rival in explanations),
             *(rival.test for rival in explanations),
             retuned.training_error,
         ]
     )
-    _scale_axis(axes, values[np.isfinite(values)])
+    _scale_axis(axes, drawn_errors[np.isfinite(drawn_errors)])
     axes.set_xlabel("Error / noise", fontsize=9.5)
     return figure
 
 
-def _draw_mark(axes: Axes, position: float, label: str, side: Literal["left", "right"]) -> None:
-    """A label above the axes at the abscissa `position`. side: horizontal alignment of the text, as in Matplotlib."""
+def _draw_label(axes: Axes, position: float, label: str, side: Literal["left", "right"]) -> None:
+    """Draw a label above the axes at the abscissa `position`. side: horizontal alignment of the text, as in
+    Matplotlib."""
     axes.annotate(
         label, (position, 1), xycoords=("data", "axes fraction"), xytext=(5 if side == "right" else -5, 2),
         textcoords="offset points", ha=side, fontsize=8.5, annotation_clip=False,
     )  # fmt: skip
 
 
-def _alternative_text(rival: TriedExplanation) -> str:
+def _describe_rival(rival: TriedExplanation) -> str:
+    """Describe an explanation and its errors, for screen readers."""
     held_out_text = f", held-out {rival.test:.3g}" if np.isfinite(rival.test) else ""
     return f"{rival.words}: {rival.training_error:.3g}{held_out_text}."
 
@@ -150,12 +154,12 @@ def _scale_axis(axes: Axes, values: FloatArray) -> None:
     axes.set_xscale("log" if high > 4 else "linear")
     axes.set_xlim(low, max(high, 1.5))
     if high > 4:
-        ratio_ticks(axes.xaxis, low, high)
+        set_ratio_ticks(axes.xaxis, low, high)
 
 
-def _claim_words(claim: Claim, axes: Sequence[str]) -> str:
-    """Effect and axis of a claim, or how its axes share parameters, in words."""
-    noun = noun_of(claim.effect.name)
+def _describe_claim(claim: Claim, axes: Sequence[str]) -> str:
+    """Describe effect and axis of a claim in words, or how its axes share parameters."""
+    noun = get_noun(claim.effect.name)
     if claim.spread != "one" or place_of_effect(claim.effect) == "hand":
         return f"{noun}, {'all alike' if claim.spread == 'all' else 'each its own'}" if len(claim.sites) > 1 else noun
     site = claim.sites[0]
@@ -163,10 +167,11 @@ def _claim_words(claim: Claim, axes: Sequence[str]) -> str:
 
 
 def _make_explanation(words: str, score: FitScore) -> TriedExplanation:
-    """The explanation with the geometric means of its errors."""
+    """Make the explanation with the geometric means of its errors over the channels."""
     training_errors = np.concatenate([score.fit, score.choose])
-    return TriedExplanation(words, _geometric_mean(training_errors), _geometric_mean(score.test))
+    return TriedExplanation(words, _compute_geometric_mean(training_errors), _compute_geometric_mean(score.test))
 
 
-def _geometric_mean(values: FloatArray) -> float:
+def _compute_geometric_mean(values: FloatArray) -> float:
+    """Compute the geometric mean of errors; values below 1e-6 count as 1e-6, NaN gives NaN."""
     return float(np.exp(np.mean(np.log(np.maximum(values, 1e-6)))))

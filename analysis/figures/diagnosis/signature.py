@@ -10,11 +10,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from analysis.diagnosis.effect_words import noun_of
+from analysis.diagnosis.effect_words import get_noun
 from analysis.diagnosis.result.findings import Signature
-from analysis.diagnosis.unit_wording import scale_of
+from analysis.diagnosis.unit_wording import choose_scale
 from analysis.figures.picture import Picture
-from analysis.figures.style import BLACK, BLUE, GREY, draw_no_data_note, new_figure, plain_axes
+from analysis.figures.style import BLACK, BLUE, GREY, create_figure, draw_no_data_note, style_axes
 from analysis.wording import capitalise, typeset
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.signal import FloatArray
@@ -26,12 +26,12 @@ _EXTRAPOLATION_NOTE = " Shaded: outside the recorded range, where the formula is
 """Sentence of the caption where the law is drawn beyond the recorded range, as an extrapolation."""
 
 
-def signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
-    """One picture per signature, with caption and alternative text; names are numbered from 1."""
+def make_signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
+    """Make a picture per signature, with caption and alternative text; names are numbered from 1."""
     return tuple(
         Picture(
             name=f"signature-{number}",
-            title=f"Signature of {noun_of(signature.effect)}{f' ({signature.axis})' if signature.axis else ''}",
+            title=f"Signature of {get_noun(signature.effect)}{f' ({signature.axis})' if signature.axis else ''}",
             caption="Dots: residual of the model with all other effects found but without this one, mean per bin; "
             "bars: two standard errors. "
             + (
@@ -42,22 +42,22 @@ def signature_pictures(signatures: Sequence[Signature]) -> tuple[Picture, ...]:
             + (_BANDWIDTH_NOTE if signature.ordinate_label.startswith("missing") else "")
             + (_EXTRAPOLATION_NOTE if signature.visited_range else ""),
             figure=draw_signature(signature),
-            alternative=_alternative_text(signature),
+            alternative=_describe_signature(signature),
         )
         for number, signature in enumerate(signatures, start=1)
     )
 
 
 def draw_signature(signature: Signature) -> Figure:
-    """Figure of one signature: dots with two standard errors, and the fitted law as a line. Spectra have logarithmic
-    axes; the range that was not recorded is shaded. A note where there is no bin."""
-    figure = new_figure(8.8, 4.0)
+    """Draw one signature: dots with bars of two standard errors, and the fitted law as a line. Spectra have logarithmic
+    axes; the range that was not recorded is shaded. Without a bin, the figure holds a note instead."""
+    figure = create_figure(8.8, 4.0)
     if not len(signature.measured_abscissa):
         return draw_no_data_note(figure, "Too few samples show this effect to draw it.")
     axes = figure.add_subplot()
-    plain_axes(axes)
-    x_label, x_factor = _scale_label(signature.abscissa_label, signature.measured_abscissa)
-    y_label, y_factor = _scale_label(signature.ordinate_label, np.concatenate([signature.measured, signature.law]))
+    style_axes(axes)
+    x_label, x_factor = _rescale_label(signature.abscissa_label, signature.measured_abscissa)
+    y_label, y_factor = _rescale_label(signature.ordinate_label, np.concatenate([signature.measured, signature.law]))
     is_spectrum = signature.abscissa_label.startswith("frequency")
     axes.errorbar(
         x_factor * signature.measured_abscissa, y_factor * signature.measured, yerr=2 * y_factor * signature.spread,
@@ -82,7 +82,7 @@ def draw_signature(signature: Signature) -> Figure:
         axes.axhline(0, color=GREY, linewidth=0.8, zorder=1)
         if signature.visited_range is not None:
             axes.set_ylim(_find_visited_limits(signature, y_factor))
-        for range_start, range_end in _unvisited_ranges(signature):
+        for range_start, range_end in _find_unvisited_ranges(signature):
             axes.axvspan(x_factor * range_start, x_factor * range_end, color=GREY, alpha=0.15, linewidth=0, zorder=0)
         if signature.measured_abscissa.min() < 0 < signature.measured_abscissa.max():
             axes.axvline(0, color=GREY, linewidth=0.8, zorder=1)
@@ -92,27 +92,28 @@ def draw_signature(signature: Signature) -> Figure:
     return figure
 
 
-def _scale_label(text: str, values: FloatArray) -> tuple[str, float]:
-    """ "velocity of x (m/s)" as "Velocity of x (mm/s)", with the factor that goes with it."""
+def _rescale_label(text: str, values: FloatArray) -> tuple[str, float]:
+    """Choose the unit prefix of an axis label by the largest value: "velocity of x (m/s)" becomes "Velocity of x
+    (mm/s)". Returns the label and the factor to multiply the values with; spectra keep their unit (factor 1)."""
     words, bracket, unit_text = text.rpartition(" (")
     if not bracket or "/√" in unit_text or unit_text.startswith("Hz"):
         return capitalise(text), 1.0
-    scale = scale_of(unit_text.removesuffix(")"), float(np.max(np.abs(values))))
+    scale = choose_scale(unit_text.removesuffix(")"), float(np.max(np.abs(values))))
     return f"{capitalise(words)} ({scale.unit})", scale.factor
 
 
-def _find_visited_limits(signature: Signature, factor: float) -> tuple[float, float]:
+def _find_visited_limits(signature: Signature, unit_factor: float) -> tuple[float, float]:
     """Limits of the ordinate from dots and law within the recorded range, with a margin of 0.75 of their span on either
-    side: beyond the range, a formula may have a pole. The signature must have such a range."""
+    side: beyond the range, a formula may have a pole. `visited_range` must not be None."""
     assert signature.visited_range is not None
     low, high = signature.visited_range
-    law = signature.law[(signature.law_abscissa >= low) & (signature.law_abscissa <= high)]
-    values = factor * np.concatenate([signature.measured, law])
+    law_in_range = signature.law[(signature.law_abscissa >= low) & (signature.law_abscissa <= high)]
+    values = unit_factor * np.concatenate([signature.measured, law_in_range])
     margin = 0.75 * max(float(np.ptp(values)), 1e-300)
     return float(values.min()) - margin, float(values.max()) + margin
 
 
-def _unvisited_ranges(signature: Signature) -> tuple[tuple[float, float], ...]:
+def _find_unvisited_ranges(signature: Signature) -> tuple[tuple[float, float], ...]:
     """Intervals of the abscissa in which the law is drawn but nothing was recorded; empty where these are not known."""
     if signature.visited_range is None:
         return ()
@@ -120,20 +121,21 @@ def _unvisited_ranges(signature: Signature) -> tuple[tuple[float, float], ...]:
     return ((float(signature.law_abscissa.min()), low), (high, float(signature.law_abscissa.max())))
 
 
-def _alternative_text(signature: Signature) -> str:
-    """Description for screen readers: range of the dots, and rms distance of the law from them."""
+def _describe_signature(signature: Signature) -> str:
+    """Description for screen readers: first and last dot, and rms distance of the law from the dots, relative to their
+    rms."""
     if not len(signature.measured_abscissa) or not len(signature.law_abscissa):
         return ""
     order = np.argsort(signature.law_abscissa)
-    law = np.interp(signature.measured_abscissa, signature.law_abscissa[order], signature.law[order])
-    size = float(np.sqrt(np.mean(signature.measured**2)))
-    rms_distance = float(np.sqrt(np.mean((signature.measured - law) ** 2)))
-    share = f"{100 * rms_distance / size:.2g} %" if size else "nothing"
+    law_at_dots = np.interp(signature.measured_abscissa, signature.law_abscissa[order], signature.law[order])
+    rms_measured = float(np.sqrt(np.mean(signature.measured**2)))
+    rms_distance = float(np.sqrt(np.mean((signature.measured - law_at_dots) ** 2)))
+    share_text = f"{100 * rms_distance / rms_measured:.2g} %" if rms_measured else "nothing"
     first, last = (
-        f"{typeset(f'{signature.measured[end]:.3g}')} at {typeset(f'{signature.measured_abscissa[end]:.3g}')}"
-        for end in (0, -1)
+        f"{typeset(f'{signature.measured[index]:.3g}')} at {typeset(f'{signature.measured_abscissa[index]:.3g}')}"
+        for index in (0, -1)
     )
     return (
         f"{capitalise(signature.ordinate_label)} against {signature.abscissa_label}: from {first} to {last}. The "
-        f"fitted law differs from the dots by {share} of their size, rms."
+        f"fitted law differs from the dots by {share_text} of their size, rms."
     )

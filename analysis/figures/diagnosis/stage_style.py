@@ -1,6 +1,6 @@
-"""Style of the three predictions in all figures of a diagnosis: colour, dash, line width and name.
+"""Line styles and legend labels of the three model predictions, shared by all figures of a diagnosis.
 
-The stages are the model as given, the re-tuned model, and the completed model with the effects found.
+A stage is a state of the model: as given, re-tuned (parameters fitted again), or completed with the effects found.
 """
 
 from dataclasses import dataclass
@@ -15,14 +15,15 @@ Dash = Literal["-"] | tuple[float, tuple[float, ...]]
 
 
 @dataclass(frozen=True, slots=True)
-class Stage:
-    """Style of a prediction (as given, re-tuned or completed) in all figures of a diagnosis."""
+class StageStyle:
+    """Line style and legend label of the prediction of one stage."""
 
     name: str
     """Key of the stage in the values of `Findings`, such as `channel_errors`."""
-    words: str
-    """Name of the stage in a legend."""
+    label: str
+    """Label in a legend."""
     colour: str
+    """Colour of Matplotlib, from `analysis.figures.style`."""
     dash: Dash
     width: float
     """Line width in points."""
@@ -30,12 +31,12 @@ class Stage:
     @property
     def handle(self) -> Line2D:
         """A line without data in this style, for a legend."""
-        return Line2D([], [], color=self.colour, linestyle=self.dash, linewidth=self.width, label=self.words)
+        return Line2D([], [], color=self.colour, linestyle=self.dash, linewidth=self.width, label=self.label)
 
 
-GIVEN_STAGE = Stage("before", "as given", ORANGE, (0, (1.2, 1.2)), 1.4)
-RETUNED_STAGE = Stage("retuned", "re-tuned", PURPLE, (0, (4, 1.6)), 1.4)
-COMPLETED_STAGE = Stage("after", "with the effects found", BLUE, "-", 1.4)
+GIVEN_STAGE = StageStyle("before", "as given", ORANGE, (0, (1.2, 1.2)), 1.4)
+RETUNED_STAGE = StageStyle("retuned", "re-tuned", PURPLE, (0, (4, 1.6)), 1.4)
+COMPLETED_STAGE = StageStyle("after", "with the effects found", BLUE, "-", 1.4)
 STAGES = (GIVEN_STAGE, RETUNED_STAGE, COMPLETED_STAGE)
-MEASURED = Line2D([], [], color=BLACK, linewidth=2.6, alpha=0.35, label="measured")
+MEASURED_HANDLE = Line2D([], [], color=BLACK, linewidth=2.6, alpha=0.35, label="measured")
 """Legend entry of the measured signal."""

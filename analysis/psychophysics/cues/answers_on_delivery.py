@@ -1,15 +1,16 @@
 """Whether answers followed the delivery within a direction: logistic regression of answers on residuals.
 
 A residual is a trial's cue value against the others of that participant, direction and level, so the direction itself
-explains none of it. A participant who takes "stronger" for the first direction answers "first" more often at positive
-residuals, whichever direction was played. One who feels directions does not: more strength then makes both directions
-clearer, which is a term of its own.
+explains none of it. A participant who judges by strength answers "first" more often at positive residuals, whichever
+direction was played. For a participant who judges by direction, more strength makes both directions clearer, which is
+the separate term c.
 
     logit P(answer first) = person + side (a + b level + c residual) + g residual
 
-Spectrum and coupling are asked beside the strength, its residual with the same two terms: where the level is roved,
-what is not in proportion to it follows it. The level is in dB from the mean of the participant's levels; g is the cue,
-in logits per dB. Answers follow levels and levels earlier answers, but the residual of a trial depends on neither.
+side is +1 or -1 for the direction shown. For spectrum and coupling, the residual of the strength is added with the same
+two terms, as both vary with a roved level. The level is in dB from the mean of the participant's levels; g is the
+effect of the cue, in logits per dB. The staircase makes levels depend on earlier answers, but not the residual of a
+trial. Called by `cue_findings`.
 
 Source: the regression of answers on trial-by-trial stimuli, A. J. Ahumada, J. Lovell, J. Acoust. Soc. Am. 49 (1971),
 1751-1756.
@@ -23,18 +24,18 @@ from numpy.typing import NDArray
 from scipy.special import expit
 from scipy.stats import norm
 
-from analysis.psychophysics.cues.cue_ability import USUAL_NOISE_DB, same_level_difference
+from analysis.psychophysics.cues.cue_sensitivity import TYPICAL_NOISE_DB, fit_same_level_difference
 from analysis.psychophysics.cues.delivered_cues import Cue, DeliveredTrials
 from equalizer.signals.signal import FloatArray
 
 LOGITS_PER_D = 1.702
 """A logistic curve over this times z is a normal one within 0.01 (D. C. Haley, Stanford technical report 15, 1952)."""
-CUE_ONLY_SLOPE = LOGITS_PER_D / USUAL_NOISE_DB
+CUE_ONLY_SLOPE = LOGITS_PER_D / TYPICAL_NOISE_DB
 """Slope in logits per dB of a participant with the usual internal noise who goes by the cue alone."""
-STEPS, SETTLED = 50, 1e-8
-"""Most Newton steps of the logistic regression, and relative change at which it has converged."""
-LEAST_SD_DB = 1e-6
-"""A residual that varies by less is rounding."""
+MOST_NEWTON_STEPS, LEAST_LIKELIHOOD_GAIN = 50, 1e-8
+"""Largest number of Newton steps of the logistic regression, and gain in log-likelihood at which it has converged."""
+LEAST_RESIDUAL_SD_DB = 1e-6
+"""Standard deviation of a residual below which it is rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +51,7 @@ class AnswersOnDelivery:
     delivery did not vary within a direction, or the answers fix no slope."""
     lower: float | None
     upper: float | None
-    """95 %."""
+    """Limits of the 95 % Wald interval of the slope, logits per dB."""
     p: float | None
 
     @property
@@ -59,100 +60,124 @@ class AnswersOnDelivery:
         return self.lower is not None and self.upper is not None and self.upper - self.lower < CUE_ONLY_SLOPE
 
 
-def answers_on_delivery(trials: DeliveredTrials) -> tuple[AnswersOnDelivery, ...]:
-    """A regression for each cue; all but the strength have the strength's residual beside theirs."""
-    strength = trials.values_db.get(Cue.INTENSITY)
+def regress_answers_on_delivery(trials: DeliveredTrials) -> tuple[AnswersOnDelivery, ...]:
+    """Compute a regression for each measured cue; all but that of the strength include the strength's residual."""
+    strength_db = trials.values_db.get(Cue.INTENSITY)
     return tuple(
-        _regress(trials, cue, values_db, None if cue is Cue.INTENSITY else strength)
+        _regress_answers_on_cue(trials, cue, values_db, None if cue is Cue.INTENSITY else strength_db)
         for cue, values_db in trials.values_db.items()
     )
 
 
-def _regress(
+def _regress_answers_on_cue(
     trials: DeliveredTrials, cue: Cue, values_db: FloatArray, strength_db: FloatArray | None
 ) -> AnswersOnDelivery:
-    """strength_db: asked beside the cue; None = it is the cue, or was not measured."""
-    residual, has_residual = _residuals(trials, values_db)
-    n = int(has_residual.sum())
-    if n == 0:
+    """Regress the answers on one cue. values_db: (n,), values of the cue. strength_db: (n,), strength as a further
+    regressor; None = it is the cue itself, or was not measured."""
+    residual_db, has_residual = _compute_residuals(trials, values_db)
+    trial_count = int(has_residual.sum())
+    if trial_count == 0:
         return AnswersOnDelivery(trials.frequency_hz, cue, 0, 0.0, None, None, None, None)
-    residual, person, side, answer = (
-        residual[has_residual],
+    residual_db, person, side, answer = (
+        residual_db[has_residual],
         trials.person[has_residual],
         trials.side[has_residual],
         trials.answer[has_residual],
     )
-    sd = float(residual.std())
-    slope = error = None
-    if sd > LEAST_SD_DB:
-        level = trials.nominal_db[has_residual] - _group_means(trials.nominal_db[has_residual], person)
-        people = (person[:, None] == np.unique(person)).astype(np.float64)
-        strength_terms = _strength_terms(trials, strength_db, has_residual)
-        side_terms = np.column_stack([np.ones(n), level, residual / sd, strength_terms])
-        design = np.column_stack([people, side[:, None] * side_terms, strength_terms, residual / sd])
-        slope, error = _logistic_slope(design, answer > 0)
-    if slope is None or error is None:
-        return AnswersOnDelivery(trials.frequency_hz, cue, n, sd, None, None, None, None)
-    half_width = float(norm.ppf(0.975)) * error
+    residual_sd_db = float(residual_db.std())
+    slope = standard_error = None
+    if residual_sd_db > LEAST_RESIDUAL_SD_DB:
+        centred_level_db = trials.nominal_db[has_residual] - _compute_group_means(
+            trials.nominal_db[has_residual], person
+        )
+        person_indicators = (person[:, None] == np.unique(person)).astype(np.float64)
+        strength_terms = _make_strength_terms(trials, strength_db, has_residual)
+        side_terms = np.column_stack(
+            [np.ones(trial_count), centred_level_db, residual_db / residual_sd_db, strength_terms]
+        )
+        design = np.column_stack(
+            [person_indicators, side[:, None] * side_terms, strength_terms, residual_db / residual_sd_db]
+        )
+        slope, standard_error = _fit_logistic_slope(design, answer > 0)
+    if slope is None or standard_error is None:
+        return AnswersOnDelivery(trials.frequency_hz, cue, trial_count, residual_sd_db, None, None, None, None)
+    half_width = float(norm.ppf(0.975)) * standard_error
     return AnswersOnDelivery(
-        trials.frequency_hz, cue, n, sd, slope / sd, (slope - half_width) / sd, (slope + half_width) / sd,
-        float(2.0 * norm.sf(abs(slope / error))),
+        trials.frequency_hz, cue, trial_count, residual_sd_db, slope / residual_sd_db,
+        (slope - half_width) / residual_sd_db, (slope + half_width) / residual_sd_db,
+        float(2.0 * norm.sf(abs(slope / standard_error))),
     )  # fmt: skip
 
 
-def _strength_terms(
+def _make_strength_terms(
     trials: DeliveredTrials, strength_db: FloatArray | None, has_residual: NDArray[np.bool_]
 ) -> FloatArray:
-    """(n, 1), standardised; (n, 0) where it was not measured or did not vary."""
-    residual = (
-        np.zeros(int(has_residual.sum())) if strength_db is None else _residuals(trials, strength_db)[0][has_residual]
+    """Make the strength regressor (n, 1), standardised; (n, 0) where it was not measured or did not vary."""
+    residual_db = (
+        np.zeros(int(has_residual.sum()))
+        if strength_db is None
+        else _compute_residuals(trials, strength_db)[0][has_residual]
     )
-    sd = float(residual.std())
-    return residual[:, None] / sd if sd > LEAST_SD_DB else np.zeros((len(residual), 0))
+    residual_sd_db = float(residual_db.std())
+    return (
+        residual_db[:, None] / residual_sd_db
+        if residual_sd_db > LEAST_RESIDUAL_SD_DB
+        else np.zeros((len(residual_db), 0))
+    )
 
 
-def _residuals(trials: DeliveredTrials, values_db: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """(n,), and where they are known: not for a trial without the value, nor a participant with too few of them."""
-    residual, has_residual = np.zeros(len(values_db)), np.zeros(len(values_db), dtype=np.bool_)
+def _compute_residuals(trials: DeliveredTrials, values_db: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Compute the residuals (n,) in dB, and a mask (n,) of where they exist: not for a trial without the value, nor for
+    a participant with too few values."""
+    residual_db, has_residual = np.zeros(len(values_db)), np.zeros(len(values_db), dtype=np.bool_)
     for person in range(len(trials.subjects)):
-        of_person = (trials.person == person) & np.isfinite(values_db)
-        fit = same_level_difference(values_db[of_person], trials.nominal_db[of_person], trials.side[of_person])
+        is_of_person = (trials.person == person) & np.isfinite(values_db)
+        fit = fit_same_level_difference(
+            values_db[is_of_person], trials.nominal_db[is_of_person], trials.side[is_of_person]
+        )
         if fit is not None:
-            residual[of_person], has_residual[of_person] = fit.residual_db, True
-    return residual, has_residual
+            residual_db[is_of_person], has_residual[is_of_person] = fit.residual_db, True
+    return residual_db, has_residual
 
 
-def _group_means(values: FloatArray, group: NDArray[np.intp]) -> FloatArray:
-    """Each entry's mean over its group."""
+def _compute_group_means(values: FloatArray, group: NDArray[np.intp]) -> FloatArray:
+    """Compute the mean of each entry's group, (n,). group: (n,), index of the group."""
     _, group_index = np.unique(group, return_inverse=True)
     means: FloatArray = (np.bincount(group_index, weights=values) / np.bincount(group_index))[group_index]
     return means
 
 
-def _logistic_slope(design: FloatArray, answered: NDArray[np.bool_]) -> tuple[float, float] | tuple[None, None]:
-    """Last coefficient of a logistic regression, and its standard error; None where the answers fix none.
+def _fit_logistic_slope(
+    design: FloatArray, answered_first: NDArray[np.bool_]
+) -> tuple[float, float] | tuple[None, None]:
+    """Fit a logistic regression; returns its last coefficient and standard error, None where they are not determined or
+    the search does not converge. design: (n, p); answered_first: (n,).
 
-    Newton's method, its step halved where it does not gain; the log-likelihood is concave.
+    Newton's method with step halving; the log-likelihood is concave.
     """
     beta = np.zeros(design.shape[1])
-    value = _log_likelihood(design, answered, beta)
-    for _ in range(STEPS):
-        p = expit(design @ beta)
-        information = design.T @ (design * (p * (1.0 - p))[:, None])
+    log_likelihood = _compute_log_likelihood(design, answered_first, beta)
+    for _ in range(MOST_NEWTON_STEPS):
+        probability = expit(design @ beta)
+        information = design.T @ (design * (probability * (1.0 - probability))[:, None])
         if np.linalg.cond(information) > 1e12:
             return None, None
-        step = np.linalg.solve(information, design.T @ (answered - p))
+        step = np.linalg.solve(information, design.T @ (answered_first - probability))
         step_fraction = 1.0
         while (
-            trial_value := _log_likelihood(design, answered, beta + step_fraction * step)
-        ) < value and step_fraction > 1e-3:
+            new_log_likelihood := _compute_log_likelihood(design, answered_first, beta + step_fraction * step)
+        ) < log_likelihood and step_fraction > 1e-3:
             step_fraction /= 2.0
-        beta, gain, value = beta + step_fraction * step, trial_value - value, trial_value
-        if abs(gain) < SETTLED:
+        beta, likelihood_gain, log_likelihood = (
+            beta + step_fraction * step,
+            new_log_likelihood - log_likelihood,
+            new_log_likelihood,
+        )
+        if abs(likelihood_gain) < LEAST_LIKELIHOOD_GAIN:
             return float(beta[-1]), math.sqrt(float(np.linalg.inv(information)[-1, -1]))
     return None, None
 
 
-def _log_likelihood(design: FloatArray, answered: NDArray[np.bool_], beta: FloatArray) -> float:
-    eta = design @ beta
-    return float((answered * eta - np.logaddexp(0.0, eta)).sum())
+def _compute_log_likelihood(design: FloatArray, answered_first: NDArray[np.bool_], beta: FloatArray) -> float:
+    logit = design @ beta
+    return float((answered_first * logit - np.logaddexp(0.0, logit)).sum())

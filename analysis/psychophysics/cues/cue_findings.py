@@ -1,24 +1,25 @@
 """Whether a cue other than the direction explains the answers, per frequency and cue, with warnings as sentences.
 
-Two kinds of evidence: the d' that the cue alone would give a participant with a stated internal noise (`cue_ability`),
-and whether the answers depended on the cue among trials of the same direction (`answers_on_delivery`), with Holm's
-correction over all cues and frequencies.
+Two kinds of evidence: the d' that the cue alone would give a participant with a stated internal noise
+(`cue_sensitivity`), and whether the answers depended on the cue among trials of the same direction
+(`answers_on_delivery`), with Holm's correction over all cues and frequencies.
+Called by `analysis.psychophysics.study_analysis`; `analysis.reports.cue_section` shows the findings.
 """
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from statistics import NormalDist, fmean, median
 
-from analysis.psychophysics.bias import response_bias
-from analysis.psychophysics.cues.answers_on_delivery import AnswersOnDelivery, answers_on_delivery
-from analysis.psychophysics.cues.cue_ability import (
+from analysis.psychophysics.bias import estimate_response_bias
+from analysis.psychophysics.cues.answers_on_delivery import AnswersOnDelivery, regress_answers_on_delivery
+from analysis.psychophysics.cues.cue_sensitivity import (
     INTERNAL_NOISE_DB,
-    USUAL_NOISE_DB,
-    CueAbility,
-    cue_abilities,
+    TYPICAL_NOISE_DB,
+    CueSensitivity,
+    estimate_cue_sensitivities,
 )
 from analysis.psychophysics.cues.delivered_cues import Cue, CueGap, DeliveredTrials, select_delivered_trials
-from analysis.psychophysics.group_contrasts import holm_correction
+from analysis.psychophysics.group_contrasts import apply_holm_correction
 from analysis.wording import conjoin, format_number, format_p_text, format_signed
 from protocols.trial import Trial
 
@@ -32,7 +33,7 @@ class CueFinding:
 
     frequency_hz: float
     cue: Cue
-    people: tuple[CueAbility, ...]
+    people: tuple[CueSensitivity, ...]
     difference_db: float
     """Median of the participants' differences, first direction minus second by angle."""
     largest_db: float
@@ -46,7 +47,7 @@ class CueFinding:
     participant was shown both directions."""
     noticed_by: tuple[str, ...]
     """Participants for whom even the end of the difference's interval nearer to 0 gives a d' of 1 or more, with an
-    internal noise of `USUAL_NOISE_DB`."""
+    internal noise of `TYPICAL_NOISE_DB`."""
     answers: AnswersOnDelivery
     p_holm: float | None
     """p value of `answers` with Holm's correction over all cues and frequencies; None where no test was possible."""
@@ -58,58 +59,65 @@ class CueFinding:
         return self.p_holm is not None and self.p_holm < SIGNIFICANCE_LEVEL
 
 
-def cue_findings(trials: Iterable[Trial]) -> tuple[CueFinding, ...]:
-    """Findings by frequency and cue, over the measured test trials; empty without any."""
-    parts = [
-        (group, cue_abilities(group), regressed)
+def compute_cue_findings(trials: Iterable[Trial]) -> tuple[CueFinding, ...]:
+    """Compute the findings by frequency and cue, over the measured test trials; empty without any."""
+    regressions = [
+        (group, estimate_cue_sensitivities(group), regression)
         for group in select_delivered_trials(trials)
-        for regressed in answers_on_delivery(group)
+        for regression in regress_answers_on_delivery(group)
     ]
-    tested = [regressed.p for _, _, regressed in parts if regressed.p is not None]
-    corrected = iter(holm_correction(tested))
+    p_values = [regression.p for _, _, regression in regressions if regression.p is not None]
+    corrected_p_values = iter(apply_holm_correction(p_values))
     findings = []
-    for group, abilities, regressed in parts:
-        p_holm = next(corrected) if regressed.p is not None else None
-        if same_cue := tuple(ability for ability in abilities if ability.cue is regressed.cue):
-            findings.append(_make_finding(group, same_cue, regressed, p_holm))
+    for group, sensitivities, regression in regressions:
+        p_holm = next(corrected_p_values) if regression.p is not None else None
+        if cue_sensitivities := tuple(
+            sensitivity for sensitivity in sensitivities if sensitivity.cue is regression.cue
+        ):
+            findings.append(_make_finding(group, cue_sensitivities, regression, p_holm))
     return tuple(findings)
 
 
 def _make_finding(
-    group: DeliveredTrials, people: tuple[CueAbility, ...], regressed: AnswersOnDelivery, p_holm: float | None
+    group: DeliveredTrials, people: tuple[CueSensitivity, ...], regression: AnswersOnDelivery, p_holm: float | None
 ) -> CueFinding:
-    """The finding on the cue of `regressed`. people: abilities of all participants by this cue, at least one."""
+    """Make the finding on the cue of `regression`. people: sensitivities of all participants by this cue, at least
+    one."""
     return CueFinding(
         frequency_hz=group.frequency_hz,
-        cue=regressed.cue,
+        cue=regression.cue,
         people=people,
-        difference_db=median([ability.difference_db for ability in people]),
-        largest_db=max((ability.difference_db for ability in people), key=abs),
-        spread_db=median([ability.spread_db for ability in people]),
-        abilities=tuple(median([ability.ability(noise) for ability in people]) for noise in INTERNAL_NOISE_DB),
+        difference_db=median([sensitivity.difference_db for sensitivity in people]),
+        largest_db=max((sensitivity.difference_db for sensitivity in people), key=abs),
+        spread_db=median([sensitivity.spread_db for sensitivity in people]),
+        abilities=tuple(
+            median([sensitivity.d_prime(noise_db) for sensitivity in people]) for noise_db in INTERNAL_NOISE_DB
+        ),
         observed_d_prime=_average_d_prime(group),
-        noticed_by=tuple(ability.subject for ability in people if ability.noticeable),
-        answers=regressed,
+        noticed_by=tuple(sensitivity.subject for sensitivity in people if sensitivity.is_noticeable),
+        answers=regression,
         p_holm=p_holm,
     )
 
 
 def _average_d_prime(group: DeliveredTrials) -> float | None:
-    """Mean of d' over participants; None where no participant was shown both directions."""
+    """Average d' over participants; None where no participant was shown both directions."""
     d_primes = []
     for person in range(len(group.subjects)):
-        of_person = group.person == person
-        directions = [1 if side > 0 else 2 for side in group.side[of_person]]
-        bias = response_bias(directions, [bool(is_correct) for is_correct in (group.answer == group.side)[of_person]])
+        is_of_person = group.person == person
+        directions = [1 if side > 0 else 2 for side in group.side[is_of_person]]
+        bias = estimate_response_bias(
+            directions, [bool(is_correct) for is_correct in (group.answer == group.side)[is_of_person]]
+        )
         if bias is not None:
             d_primes.append(bias.d_prime)
     return fmean(d_primes) if d_primes else None
 
 
-def cue_warnings(findings: Sequence[CueFinding], gaps: Sequence[CueGap] = ()) -> tuple[str, ...]:
-    """Warnings for the interpretation of the thresholds; empty where no cue is notable. A gap is named only where some
-    trials lack a measurement, not where all do, as in a study that measured no harmonics."""
-    noticed_texts = [_describe_noticed(finding) for finding in findings if finding.noticed_by]
+def make_cue_warnings(findings: Sequence[CueFinding], gaps: Sequence[CueGap] = ()) -> tuple[str, ...]:
+    """Make warnings for the interpretation of the thresholds, one sentence each; empty where no cue is notable. A gap
+    is named only where some trials lack a measurement, not where all do, as in a study that measured no harmonics."""
+    noticed_texts = [_describe_noticed_cue(finding) for finding in findings if finding.noticed_by]
     followed_texts = [
         f"{finding.cue.value} at {finding.frequency_hz:g} Hz ({format_signed(finding.answers.slope or 0.0)} logits per "
         f"dB, Holm's {format_p_text(finding.p_holm)})"
@@ -120,7 +128,7 @@ def cue_warnings(findings: Sequence[CueFinding], gaps: Sequence[CueGap] = ()) ->
     if noticed_texts:
         sentences.append(
             f"The two directions differed in more than their direction, by what a participant with an internal "
-            f"noise of {USUAL_NOISE_DB:g} dB notices: {conjoin(noticed_texts)}. So those answers need not be "
+            f"noise of {TYPICAL_NOISE_DB:g} dB notices: {conjoin(noticed_texts)}. So those answers need not be "
             "about the direction."
         )
     if followed_texts:
@@ -128,33 +136,34 @@ def cue_warnings(findings: Sequence[CueFinding], gaps: Sequence[CueGap] = ()) ->
             f"Within a direction, answers followed what was delivered, so direction was not the only cue: "
             f"{conjoin(followed_texts)}."
         )
-    if sentence := gap_text([gap for gap in gaps if gap.missing < gap.trials]):
-        sentences.append(sentence)
+    if gap_sentence := describe_cue_gaps([gap for gap in gaps if gap.missing < gap.trials]):
+        sentences.append(gap_sentence)
     return tuple(sentences)
 
 
-def gap_text(gaps: Sequence[CueGap]) -> str:
-    """Sentence on trials without a measurement of a cue; empty where none is missing."""
+def describe_cue_gaps(gaps: Sequence[CueGap]) -> str:
+    """Describe trials without a measurement of a cue in sentences; empty without gaps."""
     if not gaps:
         return ""
-    parts = [
+    gap_texts = [
         f"{gap.cue.value} at {gap.frequency_hz:g} Hz in "
         + ("any trial" if gap.missing == gap.trials else f"{gap.missing} of {gap.trials} trials")
         for gap in gaps
     ]
     return (
-        f"Whether direction was the cue is judged by the trials measured for it. Not measured: {conjoin(parts)}. All "
-        "other analyses include these trials, too."
+        f"Whether direction was the cue is judged by the trials measured for it. Not measured: {conjoin(gap_texts)}. "
+        "All other analyses include these trials, too."
     )
 
 
-def _describe_noticed(finding: CueFinding) -> str:
-    """Phrase on a cue with its difference, the participants who notice it, and the share Phi(d' / 2) right by it."""
-    ability = finding.abilities[INTERNAL_NOISE_DB.index(USUAL_NOISE_DB)]
-    percent_correct = 100.0 * NormalDist().cdf(ability / 2.0)
+def _describe_noticed_cue(finding: CueFinding) -> str:
+    """Describe a noticed cue in a phrase, with its difference, the participants who notice it, and the share Phi(d' /
+    2) right by it."""
+    d_prime = finding.abilities[INTERNAL_NOISE_DB.index(TYPICAL_NOISE_DB)]
+    percent_correct = 100.0 * NormalDist().cdf(d_prime / 2.0)
     return (
         f"{finding.cue.value} at {finding.frequency_hz:g} Hz ({format_signed(finding.difference_db, 1)} dB at the "
         f"median, {len(finding.noticed_by)} of {len(finding.people)} participants; alone d' "
-        f"{format_number(ability, 1)}, {percent_correct:.0f} % right; the answers' d' "
+        f"{format_number(d_prime, 1)}, {percent_correct:.0f} % right; the answers' d' "
         f"{format_number(finding.observed_d_prime, 1)})"
     )

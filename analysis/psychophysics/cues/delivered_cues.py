@@ -6,7 +6,8 @@ the level of the staircase L in N:
     intensity 20 log10(a / L)      spectrum 20 log10(1 + h / a)      coupling 20 log10(1 + c / a)
 
 Spectrum and coupling are the contributions of h and c to the amplitude if they were in phase with it, an upper bound.
-In dB all three can be compared with the same internal noise of a participant.
+In dB all three can be compared with the same internal noise of a participant. Used by the
+other modules of `cues` and by `power.felt_delivery`.
 """
 
 import math
@@ -64,54 +65,67 @@ class CueGap:
 
 
 def select_delivered_trials(trials: Iterable[Trial]) -> tuple[DeliveredTrials, ...]:
-    """The counted test trials with a measured acceleration, grouped by frequency, ascending; empty without any."""
-    chosen = [t for t in trials if t.phase is Phase.TEST and t.counts and t.delivered_mps2 and t.level_n > 0]
-    swapped_sessions = _find_swapped_sessions(chosen)
-    groups = []
-    for frequency_hz in sorted({trial.frequency_hz for trial in chosen}):
-        rows = [trial for trial in chosen if trial.frequency_hz == frequency_hz]
-        subjects = tuple(dict.fromkeys(trial.subject for trial in rows))
+    """Select the counted test trials with a measured acceleration, grouped by frequency, ascending; empty without
+    any."""
+    measured_trials = [t for t in trials if t.phase is Phase.TEST and t.is_valid and t.delivered_mps2 and t.level_n > 0]
+    swapped_sessions = _find_swapped_sessions(measured_trials)
+    delivered_groups = []
+    for frequency_hz in sorted({trial.frequency_hz for trial in measured_trials}):
+        frequency_trials = [trial for trial in measured_trials if trial.frequency_hz == frequency_hz]
+        subjects = tuple(dict.fromkeys(trial.subject for trial in frequency_trials))
         person_index = {subject: index for index, subject in enumerate(subjects)}
-        signs = np.array([-1.0 if (trial.subject, trial.session) in swapped_sessions else 1.0 for trial in rows])
-        groups.append(
+        signs = np.array(
+            [-1.0 if (trial.subject, trial.session) in swapped_sessions else 1.0 for trial in frequency_trials]
+        )
+        delivered_groups.append(
             DeliveredTrials(
                 frequency_hz=frequency_hz,
                 subjects=subjects,
-                person=np.array([person_index[trial.subject] for trial in rows]),
-                side=signs * np.array([3.0 - 2.0 * trial.direction_shown for trial in rows]),
-                answer=signs * np.array([3.0 - 2.0 * (trial.answer or 0) for trial in rows]),
-                nominal_db=_db([trial.staircase_n for trial in rows]),
-                played_db=_db([trial.level_n for trial in rows]),
-                values_db={cue: _db(values) for cue, value in _VALUES.items() if (values := _cue_values(rows, value))},
+                person=np.array([person_index[trial.subject] for trial in frequency_trials]),
+                side=signs * np.array([3.0 - 2.0 * trial.direction_shown for trial in frequency_trials]),
+                answer=signs * np.array([3.0 - 2.0 * (trial.answer or 0) for trial in frequency_trials]),
+                nominal_db=_convert_to_db([trial.staircase_n for trial in frequency_trials]),
+                played_db=_convert_to_db([trial.level_n for trial in frequency_trials]),
+                values_db={
+                    cue: _convert_to_db(ratios)
+                    for cue, compute_ratio in _RATIO_FUNCTIONS.items()
+                    if (ratios := _read_cue_values(frequency_trials, compute_ratio))
+                },
             )
         )
-    return tuple(groups)
+    return tuple(delivered_groups)
 
 
-def cue_gaps(trials: Iterable[Trial]) -> tuple[CueGap, ...]:
-    """Missing measurements by frequency (ascending) and cue; empty where nothing is missing."""
+def find_cue_gaps(trials: Iterable[Trial]) -> tuple[CueGap, ...]:
+    """Count the missing measurements by frequency (ascending) and cue; empty where nothing is missing."""
     gaps = []
     for group in select_delivered_trials(trials):
-        n = len(group.person)
+        trial_count = len(group.person)
         for cue in Cue:
             values_db = group.values_db.get(cue)
-            missing = n if values_db is None else int(np.isnan(values_db).sum())
-            if missing:
-                gaps.append(CueGap(group.frequency_hz, cue, missing, n))
+            missing_count = trial_count if values_db is None else int(np.isnan(values_db).sum())
+            if missing_count:
+                gaps.append(CueGap(group.frequency_hz, cue, missing_count, trial_count))
     return tuple(gaps)
 
 
 def _find_swapped_sessions(trials: list[Trial]) -> frozenset[tuple[str, str]]:
-    """Participant and session of each session in which label 1 is the direction at the larger angle. Labels belong to
-    the session: they may be swapped when a participant comes again. A session with trials of one direction only is
+    """Find participant and session of each session in which label 1 is the direction at the larger angle. Labels belong
+    to the session: they may be swapped when a participant comes again. A session with trials of one direction only is
     compared with the larger angle of all sessions."""
-    angles: dict[tuple[str, str], dict[int, float]] = {}
+    angles_by_session: dict[tuple[str, str], dict[int, float]] = {}
     for trial in trials:
         if trial.angle_deg is not None:
-            angles.setdefault((trial.subject, trial.session), {})[trial.direction_shown] = trial.angle_deg
-    pooled = {angle for session_angles in angles.values() for angle in session_angles.values()}
-    larger_deg = max(pooled) if len(pooled) == 2 else None
-    return frozenset(name for name, session_angles in angles.items() if _is_swapped(session_angles, larger_deg))
+            angles_by_session.setdefault((trial.subject, trial.session), {})[trial.direction_shown] = trial.angle_deg
+    all_angles_deg = {
+        angle_deg for session_angles in angles_by_session.values() for angle_deg in session_angles.values()
+    }
+    larger_deg = max(all_angles_deg) if len(all_angles_deg) == 2 else None
+    return frozenset(
+        session_key
+        for session_key, session_angles in angles_by_session.items()
+        if _is_swapped(session_angles, larger_deg)
+    )
 
 
 def _is_swapped(session_angles: dict[int, float], larger_deg: float | None) -> bool:
@@ -119,39 +133,39 @@ def _is_swapped(session_angles: dict[int, float], larger_deg: float | None) -> b
     the study's two directions, None where their number is not two."""
     if len(session_angles) == 2:
         return session_angles[1] > session_angles[2]
-    ((label, angle),) = session_angles.items()
-    return larger_deg is not None and (label == 1) == (angle == larger_deg)
+    ((label, angle_deg),) = session_angles.items()
+    return larger_deg is not None and (label == 1) == (angle_deg == larger_deg)
 
 
-def _cue_values(rows: list[Trial], read_value: Callable[[Trial], float | None]) -> list[float]:
-    """Value of each trial, NaN where it has none; empty where no trial has a value."""
-    values = [read_value(trial) for trial in rows]
-    is_measured = any(value is not None for value in values)
-    return [math.nan if value is None else value for value in values] if is_measured else []
+def _read_cue_values(trials: list[Trial], compute_ratio: Callable[[Trial], float | None]) -> list[float]:
+    """Read the ratio of each trial, NaN where it has none; empty where no trial has a value."""
+    ratios = [compute_ratio(trial) for trial in trials]
+    is_measured = any(ratio is not None for ratio in ratios)
+    return [math.nan if ratio is None else ratio for ratio in ratios] if is_measured else []
 
 
-def _intensity(trial: Trial) -> float | None:
-    """Delivered amplitude over the level of the staircase, m/s^2 per N."""
+def _compute_intensity_ratio(trial: Trial) -> float | None:
+    """Compute the delivered amplitude over the level of the staircase, m/s^2 per N."""
     return (trial.delivered_mps2 or math.nan) / trial.staircase_n
 
 
-def _spectrum(trial: Trial) -> float | None:
-    """1 + h / a; None without a measurement of the harmonics."""
+def _compute_spectrum_ratio(trial: Trial) -> float | None:
+    """Compute 1 + h / a; None without a measurement of the harmonics."""
     return None if trial.harmonics_mps2 is None else 1.0 + trial.harmonics_mps2 / (trial.delivered_mps2 or math.nan)
 
 
-def _coupling(trial: Trial) -> float | None:
-    """1 + c / a; None without a measurement across the direction."""
+def _compute_coupling_ratio(trial: Trial) -> float | None:
+    """Compute 1 + c / a; None without a measurement across the direction."""
     return None if trial.off_axis_mps2 is None else 1.0 + trial.off_axis_mps2 / (trial.delivered_mps2 or math.nan)
 
 
-_VALUES: dict[Cue, Callable[[Trial], float | None]] = {
-    Cue.INTENSITY: _intensity,
-    Cue.SPECTRUM: _spectrum,
-    Cue.COUPLING: _coupling,
+_RATIO_FUNCTIONS: dict[Cue, Callable[[Trial], float | None]] = {
+    Cue.INTENSITY: _compute_intensity_ratio,
+    Cue.SPECTRUM: _compute_spectrum_ratio,
+    Cue.COUPLING: _compute_coupling_ratio,
 }
 
 
-def _db(values: list[float]) -> FloatArray:
-    """20 log10 of amplitudes or levels; NaN for NaN."""
-    return 20.0 * np.log10(np.array(values, dtype=np.float64))
+def _convert_to_db(amplitudes: list[float]) -> FloatArray:
+    """Convert amplitudes, ratios or levels to dB, 20 log10; NaN for NaN."""
+    return 20.0 * np.log10(np.array(amplitudes, dtype=np.float64))

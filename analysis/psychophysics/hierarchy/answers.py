@@ -73,14 +73,14 @@ class Answers:
 
 
 def count_answers(trials: Iterable[Trial], frequencies_hz: Iterable[float]) -> Answers | None:
-    """All valid answers (`Trial.counts`) of the test phase at these frequencies; no participant is dropped. None where
-    there is no such answer.
+    """All valid answers (`Trial.is_valid`) of the test phase at these frequencies; no participant is dropped. None
+    without any such answer.
 
     Answers of an unfinished run count too: where a run stops depends on the answers before, not on the threshold
     itself, so that the stopping rule does not enter the likelihood.
     """
     sorted_hz = tuple(sorted(frequencies_hz))
-    rows = [t for t in trials if t.phase is Phase.TEST and t.counts and t.frequency_hz in sorted_hz]
+    rows = [t for t in trials if t.phase is Phase.TEST and t.is_valid and t.frequency_hz in sorted_hz]
     if not rows:
         return None
     subjects = tuple(dict.fromkeys(trial.subject for trial in rows))

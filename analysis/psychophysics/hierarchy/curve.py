@@ -23,7 +23,7 @@ from scipy.special import erfcx, log_ndtr, ndtr, ndtri_exp
 
 from equalizer.signals.signal import FloatArray
 
-TARGET = 0.5 ** (1 / 3)
+TARGET_PROPORTION = 0.5 ** (1 / 3)
 """Share of right answers at a threshold: where one wrong and three right answers in a row are equally likely."""
 NEPER_PER_DB = math.log(10.0) / 20.0
 """Natural logarithm of an amplitude ratio of 1 dB."""
@@ -39,29 +39,29 @@ class Family(StrEnum):
     GAUSS = "gauss"
 
 
-_SHARE = 2.0 * TARGET - 1.0
-"""F at the threshold, so that 1/2 + F/2 is `TARGET`."""
-AT_THRESHOLD = {
-    Family.WEIBULL: math.log(-math.log(1.0 - _SHARE)),
-    Family.LOGISTIC: math.log(_SHARE / (1.0 - _SHARE)),
-    Family.GAUSS: NormalDist().inv_cdf(_SHARE),
+_F_AT_THRESHOLD = 2.0 * TARGET_PROPORTION - 1.0
+"""F at the threshold, so that 1/2 + F/2 is `TARGET_PROPORTION`."""
+T_AT_THRESHOLD = {
+    Family.WEIBULL: math.log(-math.log(1.0 - _F_AT_THRESHOLD)),
+    Family.LOGISTIC: math.log(_F_AT_THRESHOLD / (1.0 - _F_AT_THRESHOLD)),
+    Family.GAUSS: NormalDist().inv_cdf(_F_AT_THRESHOLD),
 }
 """t0 of each family."""
-USUAL_SLOPE = {Family.WEIBULL: 2.0, Family.LOGISTIC: 3.0, Family.GAUSS: 1.9}
+STARTING_SLOPE = {Family.WEIBULL: 2.0, Family.LOGISTIC: 3.0, Family.GAUSS: 1.9}
 """Slopes at which a search begins: a Weibull slope of 2 over newtons, and slopes about as steep at the threshold."""
 
 
-def sensitivity(t: FloatArray, family: Family) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """q(t) and its first two derivatives, each in the shape of t."""
-    log_survival, h1, h2 = _log_survival(np.minimum(t, LARGEST_T), family)
+def compute_sensitivity(t: FloatArray, family: Family) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Compute q(t) and its first two derivatives, each in the shape of t."""
+    log_survival, h1, h2 = _compute_log_survival(np.minimum(t, LARGEST_T), family)
     # Phi(-q) = (1 - F) / 2. With w the logarithm of that: dq/dw = -M, M the Mills ratio Phi(-q) / phi(q).
     q = -ndtri_exp(log_survival - math.log(2.0))
     mills = math.sqrt(math.pi / 2) * erfcx(q / math.sqrt(2.0))
     return q, -mills * h1, mills * (q * mills - 1.0) * h1**2 - mills * h2
 
 
-def mean_evidence(t: FloatArray, family: Family) -> FloatArray:
-    """q(t) without its derivatives, in the shape of t: a quarter of the time of `sensitivity`."""
+def compute_mean_evidence(t: FloatArray, family: Family) -> FloatArray:
+    """Compute q(t) without its derivatives, in the shape of t: a quarter of the time of `compute_sensitivity`."""
     t = np.minimum(t, LARGEST_T)
     match family:
         case Family.WEIBULL:
@@ -74,16 +74,16 @@ def mean_evidence(t: FloatArray, family: Family) -> FloatArray:
     return q
 
 
-def share_right(evidence: FloatArray, lapse: float) -> FloatArray:
-    """P(right) in the shape of evidence, the mean q(t) - side * criterion in units of d'; lapse: lapse rate, the
-    probability of a wrong answer at any level however high: half of all inattentive answers, as the other half are
+def compute_proportion_correct(evidence: FloatArray, lapse: float) -> FloatArray:
+    """Compute P(right) in the shape of evidence, the mean q(t) - side * criterion in units of d'; lapse: lapse rate,
+    the probability of a wrong answer at any level however high: half of all inattentive answers, as the other half are
     right by chance."""
-    share: FloatArray = lapse + (1.0 - 2.0 * lapse) * ndtr(evidence)
-    return share
+    proportion_correct: FloatArray = lapse + (1.0 - 2.0 * lapse) * ndtr(evidence)
+    return proportion_correct
 
 
-def _log_survival(t: FloatArray, family: Family) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """log(1 - F) and its first two derivatives by t."""
+def _compute_log_survival(t: FloatArray, family: Family) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Compute log(1 - F) and its first two derivatives by t."""
     match family:
         case Family.WEIBULL:
             log_survival = -np.exp(t)

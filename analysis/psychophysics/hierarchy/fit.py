@@ -1,8 +1,10 @@
 """Fit of the hierarchical psychometric model to all answers of a study, by penalized maximum marginal likelihood.
 
-Each person has a threshold per frequency, a slope and a criterion, drawn from normal distributions whose parameters are
-estimated (`marginal`). The persons' parameters are integrated out, first by Laplace's method (`objective`), then by
-adaptive quadrature (`refine`). `inference` takes intervals from the scores and the curvature of the fit.
+Each of n persons has a threshold (dB) at each of k frequencies, a log-slope and a response criterion. These latent
+parameters are drawn from normal distributions, whose means and standard deviations are estimated (`marginal`, with the
+sources). The latent parameters are integrated out, first by Laplace's method (`objective`), then by adaptive
+quadrature (`refine`). Called by `primary` and by simulations of power; `inference` computes intervals from the scores
+and the curvature of the fit.
 """
 
 from dataclasses import dataclass
@@ -14,13 +16,14 @@ from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import Family
 from analysis.psychophysics.hierarchy.marginal import Layout
 from analysis.psychophysics.hierarchy.objective import Objective, Prior, maximise
-from analysis.psychophysics.hierarchy.refine import Refinement
+from analysis.psychophysics.hierarchy.refine import QuadratureSearch
 from equalizer.signals.signal import FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HierarchicalFit:
-    """Fitted parameters of the population and of n persons at k frequencies, with the derivatives at the maximum."""
+    """Fitted parameters of the population and of n persons at k frequencies, with the derivatives of the likelihood at
+    the maximum."""
 
     answers: Answers
     family: Family
@@ -30,8 +33,9 @@ class HierarchicalFit:
     """(n, k + 2): posterior modes of each person's thresholds (dB), log-slope and criterion, at the population's
     parameters."""
     shared_means: FloatArray
-    """(n, 2): posterior means of each person's log-slope and criterion with the thresholds integrated out. In the joint
-    mode (`latent`) slopes are too steep, because each threshold adapts to its own answers."""
+    """(n, 2): posterior means of each person's log-slope and criterion, which all frequencies share, with the
+    thresholds integrated out. In the joint mode (`latent`) slopes are too steep, because each threshold adapts to its
+    own answers."""
     shared_errors: FloatArray
     """(n, 2): posterior standard deviations of `shared_means`."""
     log_likelihood: float
@@ -41,7 +45,7 @@ class HierarchicalFit:
     curvature: FloatArray
     """(k + 6, k + 6): Hessian of minus the penalized log marginal likelihood."""
     converged: bool
-    """Whether the last search settled within its number of steps."""
+    """Whether the last Newton search converged within its maximum number of steps (`refine.MOST_NEWTON_STEPS`)."""
 
     @property
     def layout(self) -> Layout:
@@ -56,15 +60,15 @@ class HierarchicalFit:
     @property
     def lapse(self) -> float:
         """Lapse rate common to all persons: probability of a wrong answer at the highest levels (see
-        `curve.share_right`)."""
+        `curve.compute_proportion_correct`)."""
         return float(expit(self.parameters[self.layout.lapse]))
 
 
 def fit_hierarchy(answers: Answers, family: Family = Family.WEIBULL, prior: Prior | None = None) -> HierarchicalFit:
-    """Maximum a posteriori fit of the population parameters, with all persons' latent parameters integrated out: first
-    by Laplace's method, then by quadrature. answers: of two persons at least. prior: None: the defaults of `Prior`."""
+    """Fit the population parameters by maximum a posteriori, with all persons' latent parameters integrated out: first
+    by Laplace's method, then by quadrature. answers: of at least two persons. prior: None = the defaults of `Prior`."""
     objective = Objective(answers, family, prior or Prior())
-    maximum = Refinement(objective).maximum(maximise(objective, objective.start).x)
+    maximum = QuadratureSearch(objective).find_maximum(maximise(objective, objective.start).x)
     return HierarchicalFit(
         answers=answers,
         family=family,

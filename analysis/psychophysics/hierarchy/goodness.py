@@ -8,7 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, sensitivity, share_right
+from analysis.psychophysics.hierarchy.curve import (
+    NEPER_PER_DB,
+    T_AT_THRESHOLD,
+    compute_proportion_correct,
+    compute_sensitivity,
+)
 from analysis.psychophysics.hierarchy.fit import HierarchicalFit
 from equalizer.signals.signal import FloatArray
 
@@ -67,5 +72,7 @@ def predict_shares(fit: HierarchicalFit) -> FloatArray:
     cells, k = fit.answers, fit.layout.k
     person = cells.person
     pace = np.exp(fit.latent[person, k]) * NEPER_PER_DB
-    t = AT_THRESHOLD[fit.family] + pace * (cells.level_db - fit.latent[:, :k].ravel()[cells.run])
-    return share_right(sensitivity(t, fit.family)[0] - cells.side * fit.latent[person, k + 1], fit.lapse)
+    t = T_AT_THRESHOLD[fit.family] + pace * (cells.level_db - fit.latent[:, :k].ravel()[cells.run])
+    return compute_proportion_correct(
+        compute_sensitivity(t, fit.family)[0] - cells.side * fit.latent[person, k + 1], fit.lapse
+    )

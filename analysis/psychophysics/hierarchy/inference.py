@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
-from analysis.psychophysics.group_contrasts import mean_errors
+from analysis.psychophysics.group_contrasts import compute_mean_errors
 from analysis.psychophysics.hierarchy.fit import HierarchicalFit
 from analysis.psychophysics.hierarchy.objective import Objective, Prior
-from analysis.psychophysics.hierarchy.refine import Refinement
+from analysis.psychophysics.hierarchy.refine import QuadratureSearch
 from equalizer.signals.signal import FloatArray
 
 BOUND_ROOT, BOUND_STEPS = 0.03, 8
@@ -96,7 +96,7 @@ def estimate_medians(
     """Median threshold at each frequency. Below the cap: two-sided t interval over pseudo-thresholds. Above it: profile
     bound at the level of the lower end of a two-sided interval (see `find_lower_bound`). With two people at a frequency
     there is no interval below the cap: with one degree of freedom it would contain nearly every threshold."""
-    errors = mean_errors(compute_pseudo_thresholds(fit), fit.answers.has_enough_answers)
+    errors = compute_mean_errors(compute_pseudo_thresholds(fit), fit.answers.has_enough_answers)
     half_width = student.ppf(0.5 + confidence / 2, errors.df) * errors.error
     medians = []
     for index, frequency_hz in enumerate(fit.answers.frequencies_hz):
@@ -123,8 +123,8 @@ def find_lower_bound(
     df: degrees of freedom; None: n - 1 of all persons. Returns None where no bound is found within `LONGEST_SEARCH_DB`
     below the estimate.
     """
-    search = Refinement(Objective(fit.answers, fit.family, prior))
-    best = search.lowest_cost(fit.parameters)
+    search = QuadratureSearch(Objective(fit.answers, fit.family, prior))
+    best = search.find_lowest_cost(fit.parameters)
     target_root = float(student.ppf(confidence, fit.answers.persons - 1 if df is None else df))
     unit_step = np.eye(len(fit.parameters))[index]
     direction = np.linalg.solve(fit.curvature, unit_step)
@@ -134,9 +134,9 @@ def find_lower_bound(
         """Root of the likelihood ratio with the mean held below_db lower; linear if the log-likelihood is quadratic."""
         # The other parameters start where a quadratic likelihood has them. With few answers the cost has several
         # minima: where the root reaches its target, a second search starts with the others at the estimate.
-        cost = search.lowest_cost(fit.parameters - below_db * direction, fixed_index=index)
+        cost = search.find_lowest_cost(fit.parameters - below_db * direction, fixed_index=index)
         if math.sqrt(max(0.0, 2.0 * (cost - best))) >= target_root:
-            cost = min(cost, search.lowest_cost(fit.parameters - below_db * unit_step, fixed_index=index))
+            cost = min(cost, search.find_lowest_cost(fit.parameters - below_db * unit_step, fixed_index=index))
         return math.sqrt(max(0.0, 2.0 * (cost - best)))
 
     inner_db, inner_root, outer_db = 0.0, 0.0, 2.0
@@ -165,15 +165,15 @@ def estimate_direction_limit(
 ) -> DirectionLimit:
     """Estimate the direction limit from pseudo-thresholds (n, k), interpolated linearly over the log of the frequency.
     Its interval goes from the lowest to the highest frequency at which the interval of the median contains the cap.
-    has_answers: (n, k), see `mean_errors`; None: all. above_cap_hz: frequencies whose profile bound is above the cap,
-    where intervals by influence functions are too wide; the limit is excluded from each of them up to the next
+    has_answers: (n, k), see `compute_mean_errors`; None: all. above_cap_hz: frequencies whose profile bound is above
+    the cap, where intervals by influence functions are too wide; the limit is excluded from each of them up to the next
     frequency with an estimate below the cap."""
     grid = np.geomspace(frequencies_hz[0], frequencies_hz[-1], 2001)
     weights = np.array([np.interp(np.log(grid), np.log(frequencies_hz), row) for row in np.eye(len(frequencies_hz))])
     interpolated_db = pseudo @ weights
     median_db = interpolated_db.mean(axis=0)
     without_answers = np.zeros(pseudo.shape) if has_answers is None else (~has_answers).astype(np.float64)
-    errors = mean_errors(interpolated_db, without_answers @ (weights > 0) == 0)
+    errors = compute_mean_errors(interpolated_db, without_answers @ (weights > 0) == 0)
     half_width = student.ppf(0.5 + confidence / 2, errors.df) * errors.error
     crossings = np.flatnonzero((median_db[:-1] < cap_db) & (median_db[1:] >= cap_db))
     contains_cap = (median_db - half_width <= cap_db) & (median_db + half_width >= cap_db)

@@ -13,7 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.psychophysics.hierarchy.answers import Answers
-from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family, sensitivity, share_right
+from analysis.psychophysics.hierarchy.curve import (
+    NEPER_PER_DB,
+    T_AT_THRESHOLD,
+    Family,
+    compute_proportion_correct,
+    compute_sensitivity,
+)
 from equalizer.signals.signal import FloatArray
 
 
@@ -104,7 +110,7 @@ class TrialLikelihood:
         """Per cell (m,): t - t0, mean of the evidence q - side c, and the first two derivatives of q by t."""
         cells, k = self.answers, self.frequencies
         tau = pace[self._person] * (cells.level_db - latent[:, :k].ravel()[cells.run])
-        q, q1, q2 = sensitivity(AT_THRESHOLD[self.family] + tau, self.family)
+        q, q1, q2 = compute_sensitivity(T_AT_THRESHOLD[self.family] + tau, self.family)
         return tau, q - cells.side * latent[:, k + 1][self._person], q1, q2
 
     def _sum_by_run(self, rows: list[FloatArray]) -> FloatArray:
@@ -120,7 +126,7 @@ class _Evidence:
 
     def __init__(self, a: FloatArray, right: FloatArray, wrong: FloatArray, lapse: float) -> None:
         density, attentive = np.exp(-(a**2) / 2) / math.sqrt(2.0 * math.pi), 1.0 - 2.0 * lapse
-        self.p = share_right(a, lapse)
+        self.p = compute_proportion_correct(a, lapse)
         self.wrong_p = 1.0 - self.p
         self.p1 = attentive * density
         # 1 - 2 Phi(a), because 1 - 2 p = (1 - 2 lapse) (1 - 2 Phi(a)).

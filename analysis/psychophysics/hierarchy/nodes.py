@@ -23,7 +23,7 @@ from equalizer.signals.signal import FloatArray
 
 
 @dataclass(frozen=True, slots=True)
-class Counts:
+class NodeCounts:
     """Number of nodes of each kind."""
 
     shared: int
@@ -36,13 +36,13 @@ class Counts:
     """Inner, of the threshold at each frequency."""
 
 
-COARSE, FINE, FIXED = Counts(3, 5, 3, 5), Counts(5, 5, 3, 7), Counts(5, 7, 3, 7)
+COARSE_COUNTS, FINE_COUNTS, FIXED_COUNTS = NodeCounts(3, 5, 3, 5), NodeCounts(5, 5, 3, 7), NodeCounts(5, 7, 3, 7)
 """Numbers of nodes. With FINE, medians are within 0.03 dB of those with twice as many of each kind, also where most are
 above the cap. FIXED has more nodes, which keep their places, for fits that do not settle with FINE because a person's
 posterior has two maxima."""
 
 
-LEAST_SHARE = 1e-4
+LEAST_VARIANCE_SHARE = 1e-4
 """Share of the variance of the node positions that is added to the posterior variance, which would be 0 where all
 weight is on a single node. Chosen by hand."""
 
@@ -109,9 +109,9 @@ class Population:
         )
 
 
-def laplace_moments(parameters: FloatArray, mode: FloatArray, information: FloatArray) -> Moments:
-    """Posterior moments of each person by Laplace's method. mode: (n, k + 2), posterior mode; information: (n, k + 2,
-    k + 2), expected information of the answers there."""
+def compute_laplace_moments(parameters: FloatArray, mode: FloatArray, information: FloatArray) -> Moments:
+    """Compute the posterior moments of each person by Laplace's method. mode: (n, k + 2), posterior mode; information:
+    (n, k + 2, k + 2), expected information of the answers there."""
     k = mode.shape[1] - 2
     population, index = Population.from_parameters(parameters, k), np.arange(k)
     interaction_variance, shared_variance = population.interaction_sd**2, population.shared_sd**2
@@ -130,57 +130,58 @@ def laplace_moments(parameters: FloatArray, mode: FloatArray, information: Float
     return Moments(shared_means, covariance, mode[:, :k], coupling * variance[..., None], variance)
 
 
-def place_nodes(moments: Moments, counts: Counts) -> Nodes:
-    """Nodes with log weights for each person: outer nodes for u, b and c, inner nodes for each threshold, both scaled
-    by the moments. counts: number of nodes by latent parameter."""
+def place_nodes(moments: Moments, counts: NodeCounts) -> Nodes:
+    """Place nodes with log weights for each person: outer nodes for u, b and c, inner nodes for each threshold, both
+    scaled by the moments. counts: number of nodes by latent parameter."""
     cholesky = np.linalg.cholesky(moments.covariance)
-    positions, log_weights = _product_rule(counts)
-    steps = np.einsum("nab,qb->nqa", cholesky, positions)
-    centre = moments.threshold[:, None] + np.einsum("nka,nqa->nqk", moments.regression, steps)
-    inner_positions, inner_weights = _gauss_hermite_rule(counts.threshold)
-    sd = np.sqrt(moments.variance)[:, None, :, None]
+    positions, log_weights = _make_product_rule(counts)
+    deviations = np.einsum("nab,qb->nqa", cholesky, positions)
+    threshold_centre_db = moments.threshold[:, None] + np.einsum("nka,nqa->nqk", moments.regression, deviations)
+    inner_positions, inner_weights = _make_gauss_hermite_rule(counts.threshold)
+    threshold_sd_db = np.sqrt(moments.variance)[:, None, :, None]
     return Nodes(
-        shared=moments.shared[:, None] + steps,
+        shared=moments.shared[:, None] + deviations,
         log_weight=log_weights + np.log(np.diagonal(cholesky, axis1=1, axis2=2)).sum(axis=1)[:, None],
-        threshold=centre[..., None] + sd * inner_positions,
-        log_weight_inside=inner_weights + np.log(sd),
+        threshold=threshold_centre_db[..., None] + threshold_sd_db * inner_positions,
+        log_weight_inside=inner_weights + np.log(threshold_sd_db),
     )
 
 
-def posterior_moments(nodes: Nodes, weight: FloatArray, inner_weight: FloatArray) -> Moments:
-    """Posterior moments by the nodes. weight: (n, q), posterior probabilities of the outer nodes; inner_weight: (n, q,
-    k, r), those of the inner nodes at each outer node."""
+def compute_posterior_moments(nodes: Nodes, weight: FloatArray, inner_weight: FloatArray) -> Moments:
+    """Compute the posterior moments by the nodes. weight: (n, q), posterior probabilities of the outer nodes;
+    inner_weight: (n, q, k, r), those of the inner nodes at each outer node."""
     shared = np.einsum("nq,nqa->na", weight, nodes.shared)
     deviation = nodes.shared - shared[:, None]
     covariance = np.einsum("nq,nqa,nqb->nab", weight, deviation, deviation)
-    covariance += LEAST_SHARE * np.einsum("na,ab->nab", nodes.shared.var(axis=1), np.eye(3))
-    means = np.einsum("nqkr,nqkr->nqk", inner_weight, nodes.threshold)
-    threshold = np.einsum("nq,nqk->nk", weight, means)
-    threshold_deviation = means - threshold[:, None]
+    covariance += LEAST_VARIANCE_SHARE * np.einsum("na,ab->nab", nodes.shared.var(axis=1), np.eye(3))
+    inner_means = np.einsum("nqkr,nqkr->nqk", inner_weight, nodes.threshold)
+    threshold = np.einsum("nq,nqk->nk", weight, inner_means)
+    threshold_deviation = inner_means - threshold[:, None]
     regression = np.einsum("nq,nqa,nqk->nka", weight, deviation, threshold_deviation) @ np.linalg.pinv(
         covariance, hermitian=True
     )
     residual = threshold_deviation - np.einsum("nka,nqa->nqk", regression, deviation)
-    spread = np.einsum("nqkr,nqkr->nqk", inner_weight, (nodes.threshold - means[..., None]) ** 2)
-    variance = np.einsum("nq,nqk->nk", weight, spread + residual**2)
-    variance += LEAST_SHARE * nodes.threshold.var(axis=3).mean(axis=1)
+    inner_variance = np.einsum("nqkr,nqkr->nqk", inner_weight, (nodes.threshold - inner_means[..., None]) ** 2)
+    variance = np.einsum("nq,nqk->nk", weight, inner_variance + residual**2)
+    variance += LEAST_VARIANCE_SHARE * nodes.threshold.var(axis=3).mean(axis=1)
     return Moments(shared, covariance, threshold, regression, variance)
 
 
 @cache
-def _gauss_hermite_rule(count: int) -> tuple[FloatArray, FloatArray]:
-    """Gauss-Hermite positions x, and log(w / sum of w) + x² / 2: the sum of exp(log weight) f(x) is then the integral
-    of f over the real line, divided by sqrt(2 pi), the constant of the normal prior densities."""
+def _make_gauss_hermite_rule(count: int) -> tuple[FloatArray, FloatArray]:
+    """Make Gauss-Hermite positions x, and log(w / sum of w) + x² / 2: the sum of exp(log weight) f(x) is then the
+    integral of f over the real line, divided by sqrt(2 pi), the constant of the normal prior densities."""
     positions, weights = np.polynomial.hermite_e.hermegauss(count)
     return positions, np.log(weights / weights.sum()) + positions**2 / 2.0
 
 
 @cache
-def _product_rule(counts: Counts) -> tuple[FloatArray, FloatArray]:
-    """Product rule over u, b and c: standard positions (q, 3) and log weights (q,)."""
-    rules = [
-        list(zip(*_gauss_hermite_rule(count), strict=True)) for count in (counts.shared, counts.slope, counts.criterion)
+def _make_product_rule(counts: NodeCounts) -> tuple[FloatArray, FloatArray]:
+    """Make the product rule over u, b and c: standard positions (q, 3) and log weights (q,)."""
+    axis_rules = [
+        list(zip(*_make_gauss_hermite_rule(count), strict=True))
+        for count in (counts.shared, counts.slope, counts.criterion)
     ]
-    nodes = list(product(*rules))
+    nodes = list(product(*axis_rules))
     positions = np.array([[position for position, _ in node] for node in nodes])
     return positions, np.array([sum(weight for _, weight in node) for node in nodes])

@@ -12,7 +12,7 @@ from scipy.optimize import OptimizeResult, minimize
 from scipy.special import expit, logit
 
 from analysis.psychophysics.hierarchy.answers import Answers
-from analysis.psychophysics.hierarchy.curve import USUAL_SLOPE, Family
+from analysis.psychophysics.hierarchy.curve import STARTING_SLOPE, Family
 from analysis.psychophysics.hierarchy.likelihood import TrialLikelihood
 from analysis.psychophysics.hierarchy.marginal import Layout, Marginal
 from equalizer.signals.signal import FloatArray
@@ -104,7 +104,7 @@ def find_starting_parameters(answers: Answers, family: Family) -> FloatArray:
         answer_counts > 0, level_sums / np.maximum(answer_counts, 1), level_sums.sum() / answer_counts.sum()
     )
     # SDs of 2.5 dB (persons), 2.0 dB (person x frequency), 0.30 (log-slope) and 0.20 d' (criterion); lapse rate 2 %.
-    return np.concatenate([means, [0.9, 0.7, np.log(USUAL_SLOPE[family]), -1.2, -1.6, logit(0.02)]])
+    return np.concatenate([means, [0.9, 0.7, np.log(STARTING_SLOPE[family]), -1.2, -1.6, logit(0.02)]])
 
 
 def maximise(objective: Objective, start: FloatArray, fixed_index: int | None = None) -> OptimizeResult:

@@ -1,7 +1,7 @@
 """Observed shares of right answers by level, and fitted curves, for figures of psychometric functions.
 
 Levels are binned; each bin has the share of right answers with Wilson's 95 % interval. The curve of a person is the
-probability of a right answer of `curve.share_right`, averaged over both directions.
+probability of a right answer of `curve.compute_proportion_correct`, averaged over both directions.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 
 from analysis.psychophysics.catch_trials import wilson_interval
 from analysis.psychophysics.hierarchy.answers import Answers
-from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family, sensitivity, share_right
+from analysis.psychophysics.hierarchy.curve import (
+    NEPER_PER_DB,
+    T_AT_THRESHOLD,
+    Family,
+    compute_proportion_correct,
+    compute_sensitivity,
+)
 from analysis.psychophysics.hierarchy.primary import PersonEstimate
 from equalizer.signals.signal import FloatArray
 from protocols.procedure.staircase import to_db
@@ -92,8 +98,11 @@ def average_person_curves(
 
 def evaluate_person_curve(above_db: FloatArray, person: PersonEstimate, fit: FittedCurves) -> FloatArray:
     """Probability of a right answer, the mean over both directions. above_db: levels re the threshold, any shape."""
-    q = sensitivity(AT_THRESHOLD[fit.family] + person.slope * NEPER_PER_DB * above_db, fit.family)[0]
-    return (share_right(q - person.criterion, fit.lapse) + share_right(q + person.criterion, fit.lapse)) / 2.0
+    q = compute_sensitivity(T_AT_THRESHOLD[fit.family] + person.slope * NEPER_PER_DB * above_db, fit.family)[0]
+    return (
+        compute_proportion_correct(q - person.criterion, fit.lapse)
+        + compute_proportion_correct(q + person.criterion, fit.lapse)
+    ) / 2.0
 
 
 def _bin_shares(answers: Answers, selected: NDArray[np.bool_], level_db: FloatArray) -> tuple[ObservedShare, ...]:

@@ -1,4 +1,8 @@
-"""The primary analysis of a study, from its answers to medians, contrasts, spreads and the direction limit."""
+"""Primary analysis of a study by the hierarchical psychometric model: from all answers to median thresholds, contrasts
+between frequencies, standard deviations between persons, and the direction limit. Called by `study_analysis`.
+
+The cap is the largest force that was played. n: persons, k: frequencies.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.psychophysics.group_contrasts import Contrast, contrasts, pair_contrast
+from analysis.psychophysics.group_contrasts import Contrast, compute_contrasts, compute_pair_contrast
 from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import Family
 from analysis.psychophysics.hierarchy.fit import HierarchicalFit, fit_hierarchy
@@ -18,28 +22,31 @@ from analysis.psychophysics.hierarchy.inference import (
     estimate_direction_limit,
     estimate_medians,
 )
-from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, RunLikelihood, run_likelihoods
-from analysis.psychophysics.repeated_measures import RepeatedMeasures, repeated_measures
+from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, RunLikelihood, compute_run_likelihoods
+from analysis.psychophysics.repeated_measures import RepeatedMeasures, analyse_repeated_measures
 from equalizer.signals.signal import FloatArray
 from protocols.procedure.staircase import to_db
 
 CONFIDENCE = 0.95
 """Default confidence of all intervals."""
 FAR_ABOVE_DB = 6.0
-"""Of two medians that both lie this far above the cap no difference is reported: the right answers are hardly more than
-chance at all levels, the sizes are extrapolated, and their differences have no known error."""
+"""Distance of a median above the cap (dB) from which it counts as far above. Between two such medians no difference is
+reported: correct answers are hardly above chance at all levels, so that both are extrapolated with an unknown error."""
 FAR_ABOVE_NOTE = "Two medians or more lie at more than twice the cap: their differences are not known."
 
 
 @dataclass(frozen=True, slots=True)
 class PersonEstimate:
-    """One person's parameters, shrunk towards the population's where their own answers say little (posterior mode)."""
+    """One person's parameters. Each is a posterior estimate, shrunk towards the population's where the person's own
+    answers carry little information; see `estimate_persons`."""
 
     subject: str
     thresholds_n: tuple[float, ...]
     """At each frequency; above the cap, only an extrapolation that the answers do not contradict."""
     above_cap: tuple[bool, ...]
+    """Whether the threshold at each frequency is above the cap."""
     slope: float
+    """Slope of the psychometric function, in the units of `curve`."""
     criterion: float
     """c in units of d', positive for a tendency to answer 2."""
 
@@ -55,32 +62,40 @@ class PrimaryAnalysis:
     confidence: float
     medians: tuple[MedianThreshold, ...]
     overall: RepeatedMeasures
-    """Over the pseudo-thresholds in dB."""
+    """Analysis of variance over the pseudo-thresholds in dB."""
     contrasts: tuple[Contrast, ...]
+    """Each frequency against the lowest."""
     limit: DirectionLimit
     persons: tuple[PersonEstimate, ...]
     runs: tuple[RunLikelihood, ...]
-    """Likelihood of each person's threshold at each frequency, by those answers alone."""
+    """Likelihood of each person's threshold at each frequency, by the answers there alone."""
     person_sd_db: float
-    """Standard deviation between people, common to all frequencies."""
+    """Standard deviation of thresholds between persons, common to all frequencies."""
     frequency_sd_db: float
     """Standard deviation of the interaction person x frequency."""
     slope: float
+    """Median slope of the population, in the units of `curve`."""
     slope_log_sd: float
+    """Standard deviation of the natural logarithm of the slope between persons."""
     criterion_sd: float
+    """Standard deviation of the criterion between persons, in units of d'."""
     lapse: float
+    """Lapse rate common to all persons."""
     goodness: GoodnessOfFit
     converged: bool
-    """Both fits: that of all answers, and that of the analysis of variance where some people are left out of it."""
+    """Whether both fits converged: that of all answers, and that of the analysis of variance where it leaves out
+    persons."""
     missing_hz: tuple[float, ...] = ()
-    """Frequencies of the protocol without any answer: the model leaves them out."""
+    """Frequencies of the protocol without any answer, which the model leaves out."""
     declared_contrast: Contrast | None = None
-    """Result for the protocol's declared pair; None where none is declared, or where it cannot be tested."""
+    """Contrast of the two frequencies that the protocol declares; None without a declaration, or where it cannot be
+    tested."""
     far_above_hz: tuple[float, ...] = ()
-    """Frequencies whose medians lie `FAR_ABOVE_DB` above the cap; two of them have no contrast."""
+    """Frequencies whose medians lie more than `FAR_ABOVE_DB` above the cap; there is no contrast between two of
+    them."""
 
 
-def primary_analysis(
+def compute_primary_analysis(
     answers: Answers | None,
     cap_n: float,
     family: Family = Family.WEIBULL,
@@ -88,118 +103,127 @@ def primary_analysis(
     declared_hz: Sequence[float] = (),
 ) -> PrimaryAnalysis | None:
     """Fit the hierarchical model to all answers; None with fewer than two persons or two frequencies with answers.
-    declared_hz: the declared contrast's frequencies, first minus second, or none."""
+    cap_n: largest force that was played, N. confidence: of all intervals. declared_hz: two frequencies of the declared
+    contrast, first minus second, or empty."""
     if answers is None or answers.persons < 2:
         return None
     requested_hz, answers = answers.frequencies_hz, drop_unanswered_frequencies(answers)
     if len(answers.frequencies_hz) < 2:
         return None
     fit = fit_hierarchy(answers, family)
-    cap_db, frequencies = to_db(cap_n), answers.frequencies_hz
-    parameters, k, sds = fit.parameters, fit.layout.k, np.exp(fit.parameters[fit.layout.log_sds])
+    cap_db, frequencies_hz = to_db(cap_n), answers.frequencies_hz
+    parameters, k, standard_deviations = fit.parameters, fit.layout.k, np.exp(fit.parameters[fit.layout.log_sds])
     persons = estimate_persons(answers.subjects, np.hstack([fit.latent[:, :-2], fit.shared_means]), cap_db)
-    medians, compared = estimate_medians(fit, cap_db, confidence), _compare(fit, cap_db, confidence, declared_hz)
-    above_hz = [m.frequency_hz for m in medians if m.above_cap and m.lower_db is not None and m.lower_db > cap_db]
+    medians, comparison = (
+        estimate_medians(fit, cap_db, confidence),
+        _compare_frequencies(fit, cap_db, confidence, declared_hz),
+    )
+    bound_above_hz = [m.frequency_hz for m in medians if m.above_cap and m.lower_db is not None and m.lower_db > cap_db]
     return PrimaryAnalysis(
-        family=family,
-        trials=answers.trials,
-        frequencies_hz=frequencies,
-        confidence=confidence,
+        family=family, trials=answers.trials,
+        frequencies_hz=frequencies_hz, confidence=confidence,
         medians=medians,
-        overall=compared.overall,
-        contrasts=compared.contrasts,
-        limit=estimate_direction_limit(frequencies, compute_pseudo_thresholds(fit), cap_db, confidence,
-                              answers.has_enough_answers, above_hz),
+        overall=comparison.overall,
+        contrasts=comparison.contrasts,
+        limit=estimate_direction_limit(frequencies_hz, compute_pseudo_thresholds(fit), cap_db, confidence,
+                              answers.has_enough_answers, bound_above_hz),
         persons=persons,
-        runs=run_likelihoods(answers, _nuisances(fit, persons), cap_db, family, confidence),
-        person_sd_db=float(sds[0]), frequency_sd_db=float(sds[1]),
+        runs=compute_run_likelihoods(answers, _make_nuisances(fit, persons), cap_db, family, confidence),
+        person_sd_db=float(standard_deviations[0]), frequency_sd_db=float(standard_deviations[1]),
         slope=float(np.exp(parameters[k + 2])),
-        slope_log_sd=float(sds[2]), criterion_sd=float(sds[3]),
-        lapse=fit.lapse,
-        goodness=goodness_of_fit(fit),
-        converged=fit.converged and compared.converged,
-        missing_hz=tuple(frequency_hz for frequency_hz in requested_hz if frequency_hz not in frequencies),
-        declared_contrast=compared.declared,
-        far_above_hz=compared.far_above_hz,
+        slope_log_sd=float(standard_deviations[2]), criterion_sd=float(standard_deviations[3]),
+        lapse=fit.lapse, goodness=goodness_of_fit(fit),
+        converged=fit.converged and comparison.converged,
+        missing_hz=tuple(frequency_hz for frequency_hz in requested_hz if frequency_hz not in frequencies_hz),
+        declared_contrast=comparison.declared,
+        far_above_hz=comparison.far_above_hz,
     )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class _FrequencyComparison:
-    """Differences between frequencies."""
+    """Differences between frequencies, as in `PrimaryAnalysis`."""
 
     overall: RepeatedMeasures
     contrasts: tuple[Contrast, ...]
     declared: Contrast | None
     far_above_hz: tuple[float, ...]
     converged: bool
-    """Whether the fit of the analysis of variance found its end."""
+    """Whether the fit of the analysis of variance converged."""
 
 
-def _compare(
+def _compare_frequencies(
     fit: HierarchicalFit, cap_db: float, confidence: float, declared_hz: Sequence[float]
 ) -> _FrequencyComparison:
-    frequencies, sufficient, pseudo = (
+    """Compare the frequencies by pseudo-thresholds, without differences between two medians far above the cap."""
+    frequencies_hz, has_enough_answers, pseudo_thresholds_db = (
         fit.answers.frequencies_hz,
         fit.answers.has_enough_answers,
         compute_pseudo_thresholds(fit),
     )
-    far_above = fit.means_db > cap_db + FAR_ABOVE_DB
+    is_far_above_cap = fit.means_db > cap_db + FAR_ABOVE_DB
     far_above_hz = tuple(
-        frequency_hz for frequency_hz, is_far_above in zip(frequencies, far_above, strict=True) if is_far_above
+        frequency_hz for frequency_hz, is_above in zip(frequencies_hz, is_far_above_cap, strict=True) if is_above
     )
-    # The first is the reference: from one far above the cap, another such has no difference.
-    determined = ~(far_above & far_above[0]) | (np.arange(len(far_above)) == 0)
+    # Contrasts are against the first frequency: if it is far above the cap, others far above it have no contrast.
+    determined = ~(is_far_above_cap & is_far_above_cap[0]) | (np.arange(len(is_far_above_cap)) == 0)
     declared = None
     if not set(declared_hz) <= set(far_above_hz):
-        declared = pair_contrast(frequencies, pseudo, declared_hz, confidence, sufficient)
-    overall, converged = _test_overall(fit.answers, pseudo, fit.family, far_above)
+        declared = compute_pair_contrast(
+            frequencies_hz, pseudo_thresholds_db, declared_hz, confidence, has_enough_answers
+        )
+    overall, converged = _test_frequency_effect(fit.answers, pseudo_thresholds_db, fit.family, is_far_above_cap)
     return _FrequencyComparison(
         overall=overall,
-        contrasts=contrasts(frequencies, pseudo, confidence, sufficient & determined),
+        contrasts=compute_contrasts(frequencies_hz, pseudo_thresholds_db, confidence, has_enough_answers & determined),
         declared=declared,
         far_above_hz=far_above_hz,
         converged=converged,
     )
 
 
-def _test_overall(
-    answers: Answers, pseudo: FloatArray, family: Family, far_above: NDArray[np.bool_]
+def _test_frequency_effect(
+    answers: Answers, pseudo_thresholds_db: FloatArray, family: Family, is_far_above_cap: NDArray[np.bool_]
 ) -> tuple[RepeatedMeasures, bool]:
-    """Analysis of variance within participants, and whether its own fit found its end; none where two medians or more
-    lie far above the cap: the difference between these is one of those it tests. Of those without answers at some
-    frequency a pseudo-threshold there says nothing: they are left out, and the model is fitted to the others alone."""
-    if far_above.sum() > 1:
-        empty = repeated_measures((), ())
-        return replace(empty, participants=answers.persons, conditions=len(far_above), notes=(FAR_ABOVE_NOTE,)), True
+    """Test the effect of frequency by a repeated-measures analysis of variance of the pseudo-thresholds (n, k); returns
+    it, and whether the fit of its pseudo-thresholds converged. is_far_above_cap: (k,), of the medians.
+
+    With two medians or more far above the cap the result is empty, because their unknown difference would be tested,
+    too. Persons without enough answers at some frequency are left out, because their pseudo-threshold there carries no
+    information; the model is then fitted to the other persons alone."""
+    if is_far_above_cap.sum() > 1:
+        empty = analyse_repeated_measures((), ())
+        return replace(
+            empty, participants=answers.persons, conditions=len(is_far_above_cap), notes=(FAR_ABOVE_NOTE,)
+        ), True
     is_complete: NDArray[np.bool_] = np.asarray(answers.has_enough_answers.all(axis=1))
-    values, converged = np.full(pseudo.shape, np.nan), True
+    complete_db, converged = np.full(pseudo_thresholds_db.shape, np.nan), True
     if is_complete.all():
-        values = pseudo
+        complete_db = pseudo_thresholds_db
     elif is_complete.sum() > 1:
         fit = fit_hierarchy(select_persons(answers, is_complete), family)
-        values[is_complete], converged = compute_pseudo_thresholds(fit), fit.converged
-    return repeated_measures(answers.subjects, values.tolist()), converged
+        complete_db[is_complete], converged = compute_pseudo_thresholds(fit), fit.converged
+    return analyse_repeated_measures(answers.subjects, complete_db.tolist()), converged
 
 
-def select_persons(answers: Answers, chosen: NDArray[np.bool_]) -> Answers:
-    """Answers of some of the persons. chosen: (persons,)."""
-    k, cells = len(answers.frequencies_hz), chosen[answers.person]
-    subjects = tuple(subject for subject, is_chosen in zip(answers.subjects, chosen, strict=True) if is_chosen)
-    new_index = np.cumsum(chosen) - 1
+def select_persons(answers: Answers, is_selected: NDArray[np.bool_]) -> Answers:
+    """Answers of a subset of the persons. is_selected: (persons,)."""
+    k, is_selected_cell = len(answers.frequencies_hz), is_selected[answers.person]
+    subjects = tuple(subject for subject, is_kept in zip(answers.subjects, is_selected, strict=True) if is_kept)
+    new_person_index = np.cumsum(is_selected) - 1
     return Answers(
         subjects=subjects,
         frequencies_hz=answers.frequencies_hz,
-        run=(new_index[answers.person] * k + answers.run % k)[cells],
-        level_db=answers.level_db[cells],
-        side=answers.side[cells],
-        right=answers.right[cells],
-        wrong=answers.wrong[cells],
+        run=(new_person_index[answers.person] * k + answers.run % k)[is_selected_cell],
+        level_db=answers.level_db[is_selected_cell],
+        side=answers.side[is_selected_cell],
+        right=answers.right[is_selected_cell],
+        wrong=answers.wrong[is_selected_cell],
     )
 
 
-def _nuisances(fit: HierarchicalFit, persons: Sequence[PersonEstimate]) -> list[Nuisance]:
-    """Slope and criterion of each person from all answers."""
+def _make_nuisances(fit: HierarchicalFit, persons: Sequence[PersonEstimate]) -> list[Nuisance]:
+    """Distributions of slope and criterion of each person, from the model of all answers."""
     return [
         Nuisance(person.slope, person.criterion, (fit.lapse,), *map(float, errors))
         for person, errors in zip(persons, fit.shared_errors, strict=True)
@@ -207,16 +231,19 @@ def _nuisances(fit: HierarchicalFit, persons: Sequence[PersonEstimate]) -> list[
 
 
 def drop_unanswered_frequencies(answers: Answers) -> Answers:
-    """The same answers without the frequencies that have none: a mean without data would have no estimate."""
+    """The same answers without frequencies that have none, because a mean without data has no estimate."""
     k = len(answers.frequencies_hz)
-    answered, new_index = np.unique(answers.run % k, return_inverse=True)
-    frequencies_hz = tuple(answers.frequencies_hz[index] for index in answered)
-    return replace(answers, frequencies_hz=frequencies_hz, run=answers.run // k * len(answered) + new_index)
+    answered_indices, new_frequency_index = np.unique(answers.run % k, return_inverse=True)
+    frequencies_hz = tuple(answers.frequencies_hz[frequency_index] for frequency_index in answered_indices)
+    return replace(
+        answers, frequencies_hz=frequencies_hz, run=answers.run // k * len(answered_indices) + new_frequency_index
+    )
 
 
 def estimate_persons(subjects: Sequence[str], latent: FloatArray, cap_db: float) -> tuple[PersonEstimate, ...]:
-    """Thresholds, slope and criterion of each person. latent: (n, k + 2), thresholds in dB (modes), log-slope and
-    criterion (means with the thresholds integrated out)."""
+    """Thresholds, slope and criterion of each person. latent: (n, k + 2): thresholds in dB re 1 N, natural logarithm of
+    the slope, and criterion. The primary analysis gives posterior modes of the thresholds, and posterior means of slope
+    and criterion with the thresholds integrated out."""
     return tuple(
         PersonEstimate(
             subject=subject,

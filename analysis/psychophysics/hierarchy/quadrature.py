@@ -17,9 +17,16 @@ import numpy as np
 from scipy.special import ndtr
 
 from analysis.psychophysics.hierarchy.answers import Answers
-from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family, mean_evidence
+from analysis.psychophysics.hierarchy.curve import NEPER_PER_DB, T_AT_THRESHOLD, Family, compute_mean_evidence
 from analysis.psychophysics.hierarchy.marginal import Layout
-from analysis.psychophysics.hierarchy.nodes import Counts, Moments, Nodes, Population, place_nodes, posterior_moments
+from analysis.psychophysics.hierarchy.nodes import (
+    Moments,
+    NodeCounts,
+    Nodes,
+    Population,
+    compute_posterior_moments,
+    place_nodes,
+)
 from equalizer.signals.signal import FloatArray
 
 
@@ -62,7 +69,7 @@ class _PersonAnswers:
         threshold: (q, k, r)."""
         pace = np.exp(shared[:, 1, None]) * NEPER_PER_DB
         above_db = self._level_db[:, None, None] - threshold[:, self._frequency_index].swapaxes(0, 1)
-        q = mean_evidence(AT_THRESHOLD[self._family] + pace * above_db, self._family)
+        q = compute_mean_evidence(T_AT_THRESHOLD[self._family] + pace * above_db, self._family)
         attentive_p = ndtr(self._sign * (q[self._level] - self._side * shared[:, 2, None]))
         answer_p = lapse + (1.0 - 2.0 * lapse) * attentive_p
         by_lapse = (1.0 - 2.0 * attentive_p) / answer_p
@@ -91,7 +98,7 @@ class Quadrature:
         return value, lapse_slope * first, lapse_slope**2 * second + lapse_slope * (1.0 - 2.0 * lapse) * first
 
 
-def integrate(quadrature: Quadrature, parameters: FloatArray, moments: Moments, counts: Counts) -> Integrals:
+def integrate(quadrature: Quadrature, parameters: FloatArray, moments: Moments, counts: NodeCounts) -> Integrals:
     """Log marginal likelihoods and derivatives at the parameters (size,) of `Layout`. moments: posterior moments at
     these parameters, or at parameters close to them. counts: number of nodes."""
     k = quadrature.k
@@ -120,7 +127,7 @@ def integrate(quadrature: Quadrature, parameters: FloatArray, moments: Moments, 
     hessian += _assemble_within_node_covariance(covariance) + _compute_mean_hessian(
         scores, lapse_curvature, population, quadrature.people
     )
-    return Integrals(value, scores, hessian, posterior_moments(nodes, weight, inner_weight))
+    return Integrals(value, scores, hessian, compute_posterior_moments(nodes, weight, inner_weight))
 
 
 def _normalise(log_terms: FloatArray) -> tuple[FloatArray, FloatArray]:

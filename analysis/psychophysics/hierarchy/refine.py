@@ -2,36 +2,43 @@
 
 Newton's method with the Hessian of `quadrature`: first with coarse nodes, then with fine ones. Nodes are placed anew
 after each step by the posterior moments of the last evaluation; a search that does not settle is repeated with nodes
-that keep their places. The same search, with a parameter held, gives profile likelihoods for `inference`.
-"""
+that keep their places. The same search, with a parameter fixed, gives profile likelihoods for `inference`; `fit` calls
+it for the maximum."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.psychophysics.hierarchy.nodes import COARSE, FINE, FIXED, Counts, Moments, laplace_moments
+from analysis.psychophysics.hierarchy.nodes import (
+    COARSE_COUNTS,
+    FINE_COUNTS,
+    FIXED_COUNTS,
+    Moments,
+    NodeCounts,
+    compute_laplace_moments,
+)
 from analysis.psychophysics.hierarchy.objective import Objective, maximise
 from analysis.psychophysics.hierarchy.quadrature import Quadrature, integrate
 from equalizer.signals.signal import FloatArray
 
-NEWTON_STEPS = 10
+MOST_NEWTON_STEPS = 10
 """Largest number of Newton steps of one search. Chosen by hand."""
-SETTLED = {COARSE: 0.1, FINE: 1e-3, FIXED: 1e-3}
+LARGEST_DECREMENT = {COARSE_COUNTS: 0.1, FINE_COUNTS: 1e-3, FIXED_COUNTS: 1e-3}
 """Newton decrement (twice the gain in log-likelihood expected from the next step) below which a search ends, by kind of
 nodes: 0.001 is a step of a thirtieth of a standard error."""
-LONGEST_STEP = 2.0, 0.5
+LONGEST_STEPS = 2.0, 0.5
 """Longest Newton step, in a mean (dB) and in all logarithms."""
 LEAST_CURVATURE = 1e-3
 """Least curvature for a Newton step: below it the step's length is undetermined."""
-SAME_HEIGHT = 0.03
+ACCEPTED_COST_RISE = 0.03
 """Rise of the cost up to which a step is accepted: the nodes move from step to step, and the value with them."""
 STEP_ATTEMPTS = 3
 """Number of attempts per step, each a quarter as long as the one before."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Refined:
-    """The maximum by quadrature, with gradients and Hessian there."""
+class QuadratureEvaluation:
+    """The penalized marginal likelihood by quadrature at given parameters, with gradients and Hessian."""
 
     parameters: FloatArray
     cost: float
@@ -47,89 +54,99 @@ class Refined:
     converged: bool
 
 
-class Refinement:
+class QuadratureSearch:
     """Searches for the maximum of one objective by quadrature."""
 
     def __init__(self, objective: Objective) -> None:
         self.objective, self._quadrature = objective, Quadrature(objective.answers, objective.family)
-        bounds = [(-np.inf if a is None else a, np.inf if b is None else b) for a, b in objective.bounds]
+        bounds = [
+            (-np.inf if lower is None else lower, np.inf if upper is None else upper)
+            for lower, upper in objective.bounds
+        ]
         self._lower, self._upper = np.array(bounds).T
-        self._longest = np.full(len(bounds), LONGEST_STEP[1])
-        self._longest[: objective.layout.k] = LONGEST_STEP[0]
+        self._longest = np.full(len(bounds), LONGEST_STEPS[1])
+        self._longest[: objective.layout.k] = LONGEST_STEPS[0]
 
-    def maximum(self, parameters: FloatArray) -> Refined:
-        """The maximum by fine nodes; `converged` is False where no search settled. parameters: maximum by Laplace's
-        method."""
-        coarse = self._search(self._evaluate_start(parameters, COARSE), COARSE)
-        fine = self._search(self._evaluate(coarse.parameters, coarse.moments, FINE), FINE)
+    def find_maximum(self, parameters: FloatArray) -> QuadratureEvaluation:
+        """Find the maximum by fine nodes; `converged` is False where no search settled. parameters: maximum by
+        Laplace's method."""
+        coarse = self._search_minimum(self._evaluate_start(parameters, COARSE_COUNTS), COARSE_COUNTS)
+        fine = self._search_minimum(self._evaluate(coarse.parameters, coarse.moments, FINE_COUNTS), FINE_COUNTS)
         if fine.converged:
             return fine
-        return self._search(self._evaluate(fine.parameters, fine.moments, FIXED), FIXED)
+        return self._search_minimum(self._evaluate(fine.parameters, fine.moments, FIXED_COUNTS), FIXED_COUNTS)
 
-    def lowest_cost(self, parameters: FloatArray, fixed_index: int | None = None) -> float:
-        """Lowest cost near these parameters, by coarse nodes. fixed_index: index of a parameter that keeps its value
-        (profile likelihood)."""
-        minimum = self._search(self._evaluate_start(parameters, COARSE), COARSE, fixed_index)
+    def find_lowest_cost(self, parameters: FloatArray, fixed_index: int | None = None) -> float:
+        """Find the lowest cost near these parameters, by coarse nodes. fixed_index: index of a parameter that keeps its
+        value (profile likelihood)."""
+        minimum = self._search_minimum(self._evaluate_start(parameters, COARSE_COUNTS), COARSE_COUNTS, fixed_index)
         if not minimum.converged:
-            laplace = maximise(self.objective, parameters, fixed_index).x
-            minimum = self._search(self._evaluate_start(laplace, COARSE), COARSE, fixed_index)
+            laplace_parameters = maximise(self.objective, parameters, fixed_index).x
+            minimum = self._search_minimum(
+                self._evaluate_start(laplace_parameters, COARSE_COUNTS), COARSE_COUNTS, fixed_index
+            )
         # The quadratic approximation gives the rest of the way to the minimum: half the Newton decrement.
-        return minimum.cost + 0.5 * float(minimum.slope @ self._newton_step(minimum, fixed_index))
+        return minimum.cost + 0.5 * float(minimum.slope @ self._compute_newton_step(minimum, fixed_index))
 
-    def _evaluate_start(self, parameters: FloatArray, counts: Counts) -> Refined:
-        """Evaluation at the parameters, clipped to their bounds, with nodes placed by Laplace's method."""
+    def _evaluate_start(self, parameters: FloatArray, counts: NodeCounts) -> QuadratureEvaluation:
+        """Evaluate the cost at the parameters, clipped to their bounds, with nodes placed by Laplace's method."""
         parameters = np.clip(parameters, self._lower, self._upper)
-        moments = laplace_moments(parameters, *self.objective.marginal.find_modes(parameters))
+        moments = compute_laplace_moments(parameters, *self.objective.marginal.find_modes(parameters))
         return self._evaluate(parameters, moments, counts)
 
-    def _search(self, current: Refined, counts: Counts, fixed_index: int | None = None) -> Refined:
-        """Newton's method from `current` until the decrement is below `SETTLED`; `converged` is False where it is
-        not."""
-        for _ in range(NEWTON_STEPS):
-            step = self._newton_step(current, fixed_index)
-            if -float(current.slope @ step) < SETTLED[counts]:
+    def _search_minimum(
+        self, current: QuadratureEvaluation, counts: NodeCounts, fixed_index: int | None = None
+    ) -> QuadratureEvaluation:
+        """Minimise the cost by Newton's method from `current` until the decrement is below `LARGEST_DECREMENT`;
+        `converged` is False where it is not."""
+        for _ in range(MOST_NEWTON_STEPS):
+            step = self._compute_newton_step(current, fixed_index)
+            if -float(current.slope @ step) < LARGEST_DECREMENT[counts]:
                 return current
             step_fraction = 1.0 / max(1.0, float(np.abs(step / self._longest).max()))
             for _ in range(STEP_ATTEMPTS):
-                trial = self._evaluate(
+                candidate = self._evaluate(
                     np.clip(current.parameters + step_fraction * step, self._lower, self._upper),
                     current.moments,
                     counts,
                 )
-                if trial.cost <= current.cost + SAME_HEIGHT:
+                if candidate.cost <= current.cost + ACCEPTED_COST_RISE:
                     break
                 step_fraction /= 4.0
             else:
                 # No step lowers the cost, because the nodes do not fit the posterior yet: place them anew, by the
                 # moments of the last evaluation, without a step.
-                trial = self._evaluate(current.parameters, current.moments, counts)
-            current = replace(trial, moments=current.moments) if counts is FIXED else trial
+                candidate = self._evaluate(current.parameters, current.moments, counts)
+            current = replace(candidate, moments=current.moments) if counts is FIXED_COUNTS else candidate
         return replace(current, converged=False)
 
-    def _newton_step(self, current: Refined, fixed_index: int | None) -> FloatArray:
-        """Newton step (size,); 0 for the held parameter, and for parameters at a bound that the step would cross."""
-        at_bound = ((current.parameters <= self._lower) & (current.slope > 0)) | (
+    def _compute_newton_step(self, current: QuadratureEvaluation, fixed_index: int | None) -> FloatArray:
+        """Compute the Newton step (size,); 0 for the fixed parameter, and for parameters at a bound that the step would
+        cross."""
+        is_at_bound = ((current.parameters <= self._lower) & (current.slope > 0)) | (
             (current.parameters >= self._upper) & (current.slope < 0)
         )
-        free = (np.arange(len(current.parameters)) != fixed_index) & ~at_bound
-        values, vectors = np.linalg.eigh(current.curvature[np.ix_(free, free)])
+        is_free = (np.arange(len(current.parameters)) != fixed_index) & ~is_at_bound
+        eigenvalues, eigenvectors = np.linalg.eigh(current.curvature[np.ix_(is_free, is_free)])
         step = np.zeros(len(current.parameters))
         # Eigenvalues by magnitude: the step lowers the cost also where the curvature is negative.
-        step[free] = -vectors @ ((vectors.T @ current.slope[free]) / np.maximum(np.abs(values), LEAST_CURVATURE))
+        step[is_free] = -eigenvectors @ (
+            (eigenvectors.T @ current.slope[is_free]) / np.maximum(np.abs(eigenvalues), LEAST_CURVATURE)
+        )
         return step
 
-    def _evaluate(self, parameters: FloatArray, moments: Moments, counts: Counts) -> Refined:
-        """Cost with derivatives at the parameters, by nodes placed by the moments."""
+    def _evaluate(self, parameters: FloatArray, moments: Moments, counts: NodeCounts) -> QuadratureEvaluation:
+        """Evaluate the cost with derivatives at the parameters, by nodes placed by the moments."""
         integrals = integrate(self._quadrature, parameters, moments, counts)
-        penalty, slope = self.objective.log_prior(parameters)
-        value = float(integrals.value.sum())
-        return Refined(
+        log_prior, prior_gradient = self.objective.log_prior(parameters)
+        log_likelihood = float(integrals.value.sum())
+        return QuadratureEvaluation(
             parameters=parameters,
-            cost=-value - penalty,
-            log_likelihood=value,
+            cost=-log_likelihood - log_prior,
+            log_likelihood=log_likelihood,
             scores=integrals.scores,
             curvature=-integrals.hessian - self.objective.log_prior_hessian(parameters),
-            slope=-integrals.scores.sum(axis=0) - slope,
+            slope=-integrals.scores.sum(axis=0) - prior_gradient,
             moments=integrals.moments,
             converged=True,
         )

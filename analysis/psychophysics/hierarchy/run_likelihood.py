@@ -1,9 +1,9 @@
 """Maximum-likelihood threshold of each participant at each frequency, with a likelihood interval.
 
 The answers of all runs of a participant at a frequency are pooled; most have one run there. Some 60 trials do not
-determine a slope. The likelihood of the threshold is therefore averaged over a
-distribution of slope, criterion and lapse rate (`Nuisance`), from the model of all answers or from usual values. No
-prior of the threshold enters: estimate and interval rest on these answers alone, without shrinkage.
+determine a slope. The likelihood of the threshold is therefore averaged over a distribution of slope, criterion and
+lapse rate (`Nuisance`), from the model of all answers or from usual values. The threshold has no prior: estimate and
+interval rest on these answers alone, without shrinkage. Called by `primary` and `single_persons`.
 
 After right answers only, the likelihood rises towards low thresholds without a maximum: there is no estimate, only an
 upper bound. Where the estimate is above the cap there is only a lower bound. Each bound is that end of the two-sided
@@ -22,14 +22,20 @@ from scipy.special import logsumexp
 from scipy.stats import chi2
 
 from analysis.psychophysics.hierarchy.answers import Answers
-from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family, sensitivity, share_right
+from analysis.psychophysics.hierarchy.curve import (
+    NEPER_PER_DB,
+    T_AT_THRESHOLD,
+    Family,
+    compute_proportion_correct,
+    compute_sensitivity,
+)
 from equalizer.signals.signal import FloatArray
 
 GRID_STEP_DB, GRID_MARGIN_DB = 0.1, 30.0
 """Step of the grid of thresholds (dB), and its reach below the lowest level and above the highest level or the cap."""
 QUADRATURE_NODES = 7
 """Number of nodes of the Gauss-Hermite quadrature over slopes, and of that over criteria."""
-ROUNDING = 1e-9
+EQUAL_LOG_LIKELIHOOD = 1e-9
 """Difference of log-likelihoods below which they count as equal."""
 
 
@@ -70,52 +76,59 @@ class RunLikelihood:
     """True where the likelihood is highest at the lower end of the grid, as after right answers only."""
 
 
-def run_likelihoods(
+def compute_run_likelihoods(
     answers: Answers,
     nuisances: Sequence[Nuisance],
     cap_db: float,
     family: Family = Family.WEIBULL,
     confidence: float = 0.95,
 ) -> tuple[RunLikelihood, ...]:
-    """Threshold and interval of each participant at each frequency with answers, in the order of `Answers.run`.
+    """Compute threshold and interval of each participant at each frequency with answers, in the order of `Answers.run`.
     nuisances: an entry per subject of the answers. cap_db: cap in dB re 1 N. confidence: of the two-sided interval."""
-    k = len(answers.frequencies_hz)
-    likelihoods = []
+    frequency_count = len(answers.frequencies_hz)
+    run_estimates = []
     for run_index in np.unique(answers.run):
-        person_index, frequency_index = divmod(int(run_index), k)
-        grid, log_likelihood = _likelihood_on_grid(answers, int(run_index), nuisances[person_index], cap_db, family)
-        trials = int((answers.right + answers.wrong)[answers.run == run_index].sum())
-        estimate_and_ends = _find_likelihood_interval(grid, log_likelihood, cap_db, confidence)
-        likelihoods.append(
+        person_index, frequency_index = divmod(int(run_index), frequency_count)
+        grid_db, log_likelihood = _compute_likelihood_on_grid(
+            answers, int(run_index), nuisances[person_index], cap_db, family
+        )
+        answer_count = int((answers.right + answers.wrong)[answers.run == run_index].sum())
+        estimate_and_ends = _find_likelihood_interval(grid_db, log_likelihood, cap_db, confidence)
+        run_estimates.append(
             RunLikelihood(
-                answers.subjects[person_index], answers.frequencies_hz[frequency_index], trials, *estimate_and_ends
+                answers.subjects[person_index],
+                answers.frequencies_hz[frequency_index],
+                answer_count,
+                *estimate_and_ends,
             )
         )
-    return tuple(likelihoods)
+    return tuple(run_estimates)
 
 
-def _likelihood_on_grid(
+def _compute_likelihood_on_grid(
     answers: Answers, run_index: int, nuisance: Nuisance, cap_db: float, family: Family
 ) -> tuple[FloatArray, FloatArray]:
-    """Grid of thresholds (g,) in dB, and the logarithm of the likelihood at each, averaged over slope, criterion and
-    lapse rate."""
-    cells = answers.run == run_index
-    level, side = answers.level_db[cells], answers.side[cells]
-    grid = np.arange(level.min() - GRID_MARGIN_DB, max(level.max(), cap_db) + GRID_MARGIN_DB, GRID_STEP_DB)
+    """Compute a grid of thresholds (g,) in dB, and the logarithm of the likelihood at each, averaged over slope,
+    criterion and lapse rate."""
+    is_in_run = answers.run == run_index
+    level_db, side = answers.level_db[is_in_run], answers.side[is_in_run]
+    grid_db = np.arange(level_db.min() - GRID_MARGIN_DB, max(level_db.max(), cap_db) + GRID_MARGIN_DB, GRID_STEP_DB)
     log_likelihoods, weights = [], []
-    for u, slope_weight in _gauss_hermite_nodes(nuisance.slope_log_sd):
-        t = AT_THRESHOLD[family] + nuisance.slope * math.exp(u) * NEPER_PER_DB * (level[None, :] - grid[:, None])
-        q = sensitivity(t, family)[0]
-        for c, criterion_weight in _gauss_hermite_nodes(nuisance.criterion_sd):
+    for u, slope_weight in _make_gauss_hermite_nodes(nuisance.slope_log_sd):
+        t = T_AT_THRESHOLD[family] + nuisance.slope * math.exp(u) * NEPER_PER_DB * (
+            level_db[None, :] - grid_db[:, None]
+        )
+        q = compute_sensitivity(t, family)[0]
+        for c, criterion_weight in _make_gauss_hermite_nodes(nuisance.criterion_sd):
             for lapse in nuisance.lapses:
-                p = share_right(q - side * (nuisance.criterion + c), lapse)
-                log_likelihoods.append(np.log(p) @ answers.right[cells] + np.log1p(-p) @ answers.wrong[cells])
+                p = compute_proportion_correct(q - side * (nuisance.criterion + c), lapse)
+                log_likelihoods.append(np.log(p) @ answers.right[is_in_run] + np.log1p(-p) @ answers.wrong[is_in_run])
                 weights.append(slope_weight * criterion_weight / len(nuisance.lapses))
-    return grid, logsumexp(log_likelihoods, axis=0, b=np.array(weights)[:, None])
+    return grid_db, logsumexp(log_likelihoods, axis=0, b=np.array(weights)[:, None])
 
 
-def _gauss_hermite_nodes(sd: float) -> list[tuple[float, float]]:
-    """Positions and weights of Gauss-Hermite quadrature for a normal distribution with mean 0 and this sd."""
+def _make_gauss_hermite_nodes(sd: float) -> list[tuple[float, float]]:
+    """Make positions and weights of Gauss-Hermite quadrature for a normal distribution with mean 0 and this sd."""
     if sd == 0.0:
         return [(0.0, 1.0)]
     positions, weights = np.polynomial.hermite_e.hermegauss(QUADRATURE_NODES)
@@ -123,20 +136,20 @@ def _gauss_hermite_nodes(sd: float) -> list[tuple[float, float]]:
 
 
 def _find_likelihood_interval(
-    grid: FloatArray, log_likelihood: FloatArray, cap_db: float, confidence: float
+    grid_db: FloatArray, log_likelihood: FloatArray, cap_db: float, confidence: float
 ) -> tuple[float | None, float | None, float | None, bool]:
-    """Estimate, lower end, upper end, and whether the maximum is at the lower end of the grid (`RunLikelihood`). grid,
-    log_likelihood: (g,)."""
-    best = float(grid[log_likelihood.argmax()])
-    below, above = bool(log_likelihood[0] >= log_likelihood.max() - ROUNDING), best > cap_db
-    in_interval = np.flatnonzero(log_likelihood >= log_likelihood.max() - chi2.ppf(confidence, 1) / 2)
-    lower = float(grid[in_interval[0]]) if in_interval[0] > 0 else None
-    upper = float(grid[in_interval[-1]]) if in_interval[-1] < len(grid) - 1 else None
-    if below:
-        return None, None, upper, True
-    return (None, lower, None, False) if above else (best, lower, upper, False)
+    """Find estimate, lower end, upper end (dB), and whether the maximum is at the lower end of the grid
+    (`RunLikelihood`). grid, log_likelihood: (g,)."""
+    best_db = float(grid_db[log_likelihood.argmax()])
+    is_below, is_above_cap = bool(log_likelihood[0] >= log_likelihood.max() - EQUAL_LOG_LIKELIHOOD), best_db > cap_db
+    interval_indices = np.flatnonzero(log_likelihood >= log_likelihood.max() - chi2.ppf(confidence, 1) / 2)
+    lower_db = float(grid_db[interval_indices[0]]) if interval_indices[0] > 0 else None
+    upper_db = float(grid_db[interval_indices[-1]]) if interval_indices[-1] < len(grid_db) - 1 else None
+    if is_below:
+        return None, None, upper_db, True
+    return (None, lower_db, None, False) if is_above_cap else (best_db, lower_db, upper_db, False)
 
 
-def newton_or_none(db: float | None) -> float | None:
-    """Newtons from a level in dB re 1 N; None for None."""
+def convert_to_newton(db: float | None) -> float | None:
+    """Convert a level in dB re 1 N to newtons; None for None."""
     return None if db is None else math.pow(10.0, db / 20.0)

@@ -17,7 +17,7 @@ from scipy.special import expit
 from scipy.stats import beta
 
 from analysis.psychophysics.hierarchy.answers import Answers
-from analysis.psychophysics.hierarchy.curve import USUAL_SLOPE, Family
+from analysis.psychophysics.hierarchy.curve import STARTING_SLOPE, Family
 from analysis.psychophysics.hierarchy.objective import LAPSE_BOUNDS, Objective, Prior
 from analysis.psychophysics.hierarchy.primary import (
     CONFIDENCE,
@@ -25,7 +25,7 @@ from analysis.psychophysics.hierarchy.primary import (
     drop_unanswered_frequencies,
     estimate_persons,
 )
-from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, RunLikelihood, run_likelihoods
+from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, RunLikelihood, compute_run_likelihoods
 from protocols.procedure.staircase import to_db
 
 SLOPE_LOG_SD, CRITERION_SD = 0.4, 0.3
@@ -74,6 +74,6 @@ def fit_single_persons(
     lapse = float(expit(parameters[layout.lapse]))
     persons = estimate_persons(answers.subjects, objective.marginal.latent, cap_db)
     lapses = tuple(float(lapse) for lapse in beta.ppf(LAPSE_QUANTILES, prior.lapse_wrong, prior.lapse_right))
-    nuisance = Nuisance(USUAL_SLOPE[family], 0.0, lapses, SLOPE_LOG_SD, CRITERION_SD)
-    runs = run_likelihoods(answers, [nuisance] * answers.persons, cap_db, family, confidence)
+    nuisance = Nuisance(STARTING_SLOPE[family], 0.0, lapses, SLOPE_LOG_SD, CRITERION_SD)
+    runs = compute_run_likelihoods(answers, [nuisance] * answers.persons, cap_db, family, confidence)
     return SinglePersons(family, answers.frequencies_hz, confidence, persons, lapse, runs)

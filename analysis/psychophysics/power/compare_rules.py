@@ -1,11 +1,11 @@
-"""Comparison of rules that choose levels (staircases, Psi) by the error of a threshold, on simulated people.
+"""Compares adaptive procedures (staircases, Psi) by the error of their threshold estimates, on simulated people.
 
-Each person takes one run under every rule, with the same random numbers: trial 7 has the same draw under every rule, so
-that differences between rules are paired.
+Each person takes one run under every rule, with the same random numbers (trial 7 has the same draw under every rule),
+so that differences between rules are paired. Called by the command `hapteq power`.
 
-Measure of efficiency: the sweat factor of M. M. Taylor, C. D. Creelman, J. Acoust. Soc. Am. 41 (1967), 782-787, is the
-variance of the estimate times the number of trials. Here: its square root with the mean square error in place of the
-variance, in dB.
+Efficiency is measured by the sweat factor (M. M. Taylor, C. D. Creelman, J. Acoust. Soc. Am. 41 (1967), 782-787),
+variance of the estimate times number of trials. `RuleResult.error_per_trial_db` is its square root, with the mean
+square error in place of the variance.
 """
 
 import math
@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, USUAL_SLOPE, sensitivity
+from analysis.psychophysics.hierarchy.curve import NEPER_PER_DB, STARTING_SLOPE, T_AT_THRESHOLD, compute_sensitivity
 from analysis.psychophysics.power.simulated_study import Crowd
 from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS
 from equalizer.signals.signal import FloatArray
@@ -33,17 +33,17 @@ from protocols.procedure.staircase import (
     to_newton,
 )
 
-_KEY = 0x9517
-"""Word of the seed that separates these draws from those of whole studies."""
+_SEED_KEY = 0x9517
+"""Part of the seed that makes these draws independent of those of simulated studies. Arbitrary."""
 
 
 @dataclass(frozen=True, slots=True)
 class RuleResult:
-    """Error, bias and length of the runs of simulated people under a rule."""
+    """Error, bias and length of the runs of all simulated people under one rule."""
 
     rule: str
     runs: int
-    """Number of runs that ended with a threshold; the errors are over these. NaN without any."""
+    """Number of runs that ended with a threshold. Errors are over these; NaN without such runs."""
     trials: float
     """Mean number of trials per run, over all runs."""
     bias_db: float
@@ -52,9 +52,9 @@ class RuleResult:
     error_db: float
     """Root mean square error of one run's estimate."""
     error_per_trial_db: float
-    """`error_db` times the square root of `trials`."""
+    """`error_db` times the square root of `trials` (see the module): error of an equally efficient run of one trial."""
     highest_n: float
-    """Highest level played in any run, N."""
+    """Highest amplitude played in any run, N."""
 
 
 class ComparedPerson(NamedTuple):
@@ -69,8 +69,8 @@ class ComparedPerson(NamedTuple):
 
 
 def list_compared_rules(rule: StaircaseRule) -> dict[str, StaircaseRule]:
-    """Rules by name: the protocol's up-down rule with each interpretation of its change of step (`StepChange`), and Psi
-    with 30 and 60 trials."""
+    """Rules to compare, by name: the protocol's up-down rule with each interpretation of its change of step
+    (`StepChange`), and Psi with 30 and with 60 trials."""
     names = {
         StepChange.AFTER_REVERSAL: "staircase, new step after the reversal",
         StepChange.AT_REVERSAL: "staircase, new step at the reversal",
@@ -84,17 +84,18 @@ def list_compared_rules(rule: StaircaseRule) -> dict[str, StaircaseRule]:
 
 
 def compare_rules(crowd: Crowd, rules: Mapping[str, StaircaseRule], people: int, seed: int) -> tuple[RuleResult, ...]:
-    """One run of each person under every rule; the people are drawn from the crowd's first frequency."""
-    return tuple(_rule_result(name, rule, crowd, people, seed) for name, rule in rules.items())
+    """Simulate one run of each person under every rule. The thresholds of the people are those of the crowd at its
+    first frequency."""
+    return tuple(_evaluate_rule(name, rule, crowd, people, seed) for name, rule in rules.items())
 
 
-def _rule_result(name: str, rule: StaircaseRule, crowd: Crowd, people: int, seed: int) -> RuleResult:
-    """Result of one rule over all people."""
+def _evaluate_rule(name: str, rule: StaircaseRule, crowd: Crowd, people: int, seed: int) -> RuleResult:
+    """Simulate a run of every person under one rule, and summarise their errors."""
     errors, trials, highest = [], [], 0.0
-    for number in range(people):
-        true_db, state, top_n = simulate_person(crowd, rule, (seed, _KEY, number))
+    for person_index in range(people):
+        true_db, state, run_highest_n = simulate_person(crowd, rule, (seed, _SEED_KEY, person_index))
         trials.append(state.trials)
-        highest = max(highest, top_n)
+        highest = max(highest, run_highest_n)
         if is_complete(rule, state):
             errors.append(estimate_db(rule, state) - true_db)
     error_array = np.array(errors) if errors else np.array([math.nan])
@@ -114,22 +115,22 @@ def _rule_result(name: str, rule: StaircaseRule, crowd: Crowd, people: int, seed
 def simulate_person(crowd: Crowd, rule: StaircaseRule, key: tuple[int, ...]) -> tuple[float, StaircaseState, float]:
     """Simulate a run of a person drawn from the crowd. key: seeds the draws. Returns the true threshold (dB re 1 N),
     the last state, and the highest level played (N)."""
-    random = np.random.default_rng(key)
+    generator = np.random.default_rng(key)
     spread = crowd.frequency_sd_db[0] if isinstance(crowd.frequency_sd_db, tuple) else crowd.frequency_sd_db
-    true_db = to_db(crowd.medians_n[0]) + math.hypot(crowd.person_sd_db, spread) * random.standard_normal()
-    slope = (crowd.slope or USUAL_SLOPE[crowd.family]) * math.exp(crowd.slope_log_sd * random.standard_normal())
-    person = ComparedPerson(float(true_db), slope, crowd.criterion_sd * random.standard_normal())
-    draws = random.random((MOST_TRIALS, 2))
+    true_db = to_db(crowd.medians_n[0]) + math.hypot(crowd.person_sd_db, spread) * generator.standard_normal()
+    slope = (crowd.slope or STARTING_SLOPE[crowd.family]) * math.exp(crowd.slope_log_sd * generator.standard_normal())
+    person = ComparedPerson(float(true_db), slope, crowd.criterion_sd * generator.standard_normal())
+    draws = generator.random((MOST_TRIALS, 2))
     # The draws of roving come last, so that all others are the same with roving and without it.
-    state, played_n = answer_trials(crowd, rule, person, np.column_stack([draws, random.random(MOST_TRIALS)]))
+    state, played_n = answer_trials(crowd, rule, person, np.column_stack([draws, generator.random(MOST_TRIALS)]))
     return person.threshold_db, state, max(played_n)
 
 
 def answer_trials(
     crowd: Crowd, rule: StaircaseRule, person: ComparedPerson, draws: FloatArray
 ) -> tuple[StaircaseState, list[float]]:
-    """The run's last state, and the level of each trial as played (N). draws: (trials, 3) in [0, 1), for the
-    direction, the answer, and the amplitude where levels are roved; Psi plays its levels as they are."""
+    """The run's last state, and the amplitude (N) that each trial played. draws: (trials, 3) in [0, 1), for the
+    direction, the answer, and the roving of the amplitude; levels of Psi are not roved."""
     state, played_n = begin_staircase(rule), list[float]()
     rove_db = 0.0 if rule.is_bayesian else crowd.rove_db
     while not is_finished(rule, state) and state.trials < len(draws):
@@ -142,11 +143,13 @@ def answer_trials(
 
 
 def _is_correct(crowd: Crowd, scaled_db: float, criterion: float, draw: FloatArray) -> bool:
-    """Whether a trial is answered right. scaled_db: slope times dB above the threshold; draw: (3,), of
-    `answer_trials`."""
-    q = float(sensitivity(np.array([AT_THRESHOLD[crowd.family] + NEPER_PER_DB * scaled_db]), crowd.family)[0][0])
-    side = 1.0 if draw[0] < 0.5 else -1.0
-    p_correct = crowd.lapse + (1.0 - 2.0 * crowd.lapse) * NormalDist().cdf(q - side * criterion)
+    """Whether a trial is answered right: Phi(d'/2 - c) or Phi(d'/2 + c) by direction, mixed with lapses. scaled_db:
+    slope times dB above the threshold. criterion: c. draw: (3,), see `answer_trials`."""
+    half_d_prime = float(
+        compute_sensitivity(np.array([T_AT_THRESHOLD[crowd.family] + NEPER_PER_DB * scaled_db]), crowd.family)[0][0]
+    )
+    direction_sign = 1.0 if draw[0] < 0.5 else -1.0
+    p_correct = crowd.lapse + (1.0 - 2.0 * crowd.lapse) * NormalDist().cdf(half_d_prime - direction_sign * criterion)
     return bool(draw[1] < p_correct)
 
 

@@ -1,9 +1,8 @@
-"""Stimuli of a device as simulated people feel them: strength, coupling and harmonics by frequency, direction and
-level.
+"""Delivered stimuli for simulated participants: strength, coupling and harmonics by frequency, direction and level.
 
-As `study.participants.delivered_feeler`: the felt amplitude is sqrt(along^2 - across^2), harmonics add to the threshold
-in squares, and the threshold rises during a run (adaptation). The level matters, because friction absorbs weak forces.
-"""
+Model of `study.participants.delivered_feeler`: the felt amplitude is sqrt(along^2 - across^2), harmonics add to the
+threshold in squares, and the threshold rises during a run (adaptation). The level matters, because friction absorbs
+weak forces. Called by `study.cli.power`; `simulated_study` uses the tables."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -14,9 +13,9 @@ from analysis.psychophysics.cues.delivered_cues import Cue, DeliveredTrials, sel
 from equalizer.signals.signal import FloatArray
 from protocols.trial import Trial
 
-Row = tuple[float, float, float, float]
-"""Level in dB re 1 N; amplitudes along, across, and of harmonics, over that of a flawless device at this level."""
-Table = tuple[Row, ...]
+DeliveryRow = tuple[float, float, float, float]
+"""Level in dB re 1 N; amplitudes along, across, and of harmonics, over that of an ideal device at this level."""
+DeliveryTable = tuple[DeliveryRow, ...]
 """Delivery by rising level; interpolated linearly over dB, constant beyond the ends."""
 
 
@@ -24,62 +23,68 @@ Table = tuple[Row, ...]
 class FeltDelivery:
     """Tables of the delivered stimulus by frequency and direction, with masking and adaptation of simulated people."""
 
-    tables: tuple[tuple[Table, Table], ...]
+    tables: tuple[tuple[DeliveryTable, DeliveryTable], ...]
     """Per frequency of the crowd: of direction 1 and 2."""
     masking: float = 1.0
     """Factor by which harmonics add to the threshold, in squares (masking)."""
     adaptation_db: float = 1.0
-    """Rise of the threshold in a long run."""
+    """Rise of the threshold in a long run, dB."""
     adaptation_trials: float = 20.0
     """Time constant of adaptation, in trials."""
 
 
-def felt_delivery(
+def tabulate_felt_delivery(
     trials: Iterable[Trial], frequencies_hz: Sequence[float], flawless_mps2_per_n: Sequence[float]
 ) -> FeltDelivery:
-    """Medians over the measured test trials, by played levels rounded to 1 dB. flawless_mps2_per_n: along the
+    """Tabulate medians over the measured test trials, by played levels rounded to 1 dB. flawless_mps2_per_n: along the
     direction, at each frequency. What no trial of a level was measured for counts as absent. Raises ValueError where a
     frequency lacks a measured direction."""
-    groups = {group.frequency_hz: group for group in select_delivered_trials(trials)}
-    if missing := [f"{f:g} Hz" for f in frequencies_hz if f not in groups or len(set(groups[f].side.tolist())) < 2]:
-        raise ValueError(f"no measured trials of both directions at {', '.join(missing)}")
+    groups_by_frequency = {group.frequency_hz: group for group in select_delivered_trials(trials)}
+    if missing_frequencies := [
+        f"{frequency:g} Hz"
+        for frequency in frequencies_hz
+        if frequency not in groups_by_frequency or len(set(groups_by_frequency[frequency].side.tolist())) < 2
+    ]:
+        raise ValueError(f"no measured trials of both directions at {', '.join(missing_frequencies)}")
     return FeltDelivery(
         tuple(
             (
-                _delivery_table(groups[frequency_hz], 1.0, flawless),
-                _delivery_table(groups[frequency_hz], -1.0, flawless),
+                _tabulate_direction(groups_by_frequency[frequency_hz], 1.0, flawless_gain),
+                _tabulate_direction(groups_by_frequency[frequency_hz], -1.0, flawless_gain),
             )
-            for frequency_hz, flawless in zip(frequencies_hz, flawless_mps2_per_n, strict=True)
+            for frequency_hz, flawless_gain in zip(frequencies_hz, flawless_mps2_per_n, strict=True)
         )
     )
 
 
-def _delivery_table(group: DeliveredTrials, side: float, flawless: float) -> Table:
+def _tabulate_direction(group: DeliveredTrials, side: float, flawless_mps2_per_n: float) -> DeliveryTable:
+    """Tabulate the delivery of one direction, by rising level. side: +1 or -1, as in `DeliveredTrials`; the gain of an
+    ideal device is in m/s^2 per N."""
     # Over the level that was played: that of the staircase differs from it where levels were roved.
-    over_played_db = group.values_db[Cue.INTENSITY] + group.nominal_db - group.played_db
-    strength = 10.0 ** (over_played_db / 20.0) / flawless
+    gain_db = group.values_db[Cue.INTENSITY] + group.nominal_db - group.played_db
+    relative_gain = 10.0 ** (gain_db / 20.0) / flawless_mps2_per_n
     columns = (
-        strength,
-        strength * _amplitude_ratio(group, Cue.COUPLING),
-        strength * _amplitude_ratio(group, Cue.SPECTRUM),
+        relative_gain,
+        relative_gain * _compute_amplitude_ratio(group, Cue.COUPLING),
+        relative_gain * _compute_amplitude_ratio(group, Cue.SPECTRUM),
     )
-    rounded = np.round(group.played_db)
-    rows: list[Row] = []
-    for level_db in np.unique(rounded[group.side == side]):
-        of_level = (group.side == side) & (rounded == level_db)
-        on_axis, off_axis, harmonics = (_median(column[of_level]) for column in columns)
+    rounded_level_db = np.round(group.played_db)
+    rows: list[DeliveryRow] = []
+    for level_db in np.unique(rounded_level_db[group.side == side]):
+        is_at_level = (group.side == side) & (rounded_level_db == level_db)
+        on_axis, off_axis, harmonics = (_compute_measured_median(column[is_at_level]) for column in columns)
         if on_axis is not None:
             rows.append((float(level_db), on_axis, off_axis or 0.0, harmonics or 0.0))
     return tuple(rows)
 
 
-def _median(values: FloatArray) -> float | None:
-    """Median over the trials that were measured; None where none was."""
+def _compute_measured_median(values: FloatArray) -> float | None:
+    """Compute the median of the finite values; None without any."""
     measured = values[np.isfinite(values)]
     return float(np.median(measured)) if len(measured) else None
 
 
-def _amplitude_ratio(group: DeliveredTrials, cue: Cue) -> FloatArray:
-    """Amplitude over that along the direction (n,), of which the cue holds the sum; NaN where it was not measured."""
+def _compute_amplitude_ratio(group: DeliveredTrials, cue: Cue) -> FloatArray:
+    """Compute h / a or c / a (n,) from the cue, 20 log10(1 + ratio); NaN where it was not measured."""
     values_db = group.values_db.get(cue)
     return np.full(len(group.side), np.nan) if values_db is None else 10.0 ** (values_db / 20.0) - 1.0

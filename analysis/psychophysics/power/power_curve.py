@@ -4,6 +4,7 @@ Each simulated study is tested at one pair of frequencies at the 5 % level by th
 (t test over pseudo-thresholds), means of runs in dB (paired t test), and the published procedure (Tukey's test in
 newtons: |difference| > q sqrt(MS_within / n)). Power is the share of studies that find the difference; without a true
 difference this share is the type-1 error.
+Called by `study.workflows.planning.simulate_power`.
 """
 
 import math
@@ -14,9 +15,9 @@ from functools import cache
 import numpy as np
 from scipy.stats import studentized_range
 
-from analysis.psychophysics.anova import one_way_anova
+from analysis.psychophysics.anova import compute_one_way_anova
 from analysis.psychophysics.catch_trials import wilson_interval
-from analysis.psychophysics.group_contrasts import pair_contrast
+from analysis.psychophysics.group_contrasts import compute_pair_contrast
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
 from analysis.psychophysics.hierarchy.inference import compute_pseudo_thresholds
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
@@ -84,67 +85,74 @@ def judge_study(
     threshold. seed: of all draws. contrast_hz: as for `find_judged_pair`."""
     study = simulate_study(crowd, rule, people, seed)
     pair_hz = find_judged_pair(crowd.frequencies_hz, contrast_hz)
-    first, second = (crowd.frequencies_hz.index(frequency_hz) for frequency_hz in pair_hz)
-    true_db = true_difference_db(crowd, contrast_hz)
-    pseudo = compute_pseudo_thresholds(fit_hierarchy(study.answers))
-    primary, means = (
-        pair_contrast(crowd.frequencies_hz, values, pair_hz, CONFIDENCE) for values in (pseudo, study.threshold_db)
+    first_index, second_index = (crowd.frequencies_hz.index(frequency_hz) for frequency_hz in pair_hz)
+    true_difference_db = compute_true_difference_db(crowd, contrast_hz)
+    pseudo_thresholds_db = compute_pseudo_thresholds(fit_hierarchy(study.answers))
+    primary_contrast, means_contrast = (
+        compute_pair_contrast(crowd.frequencies_hz, values_db, pair_hz, CONFIDENCE)
+        for values_db in (pseudo_thresholds_db, study.threshold_db)
     )
-    names = [f"{frequency:g} Hz" for frequency in crowd.frequencies_hz]
-    anova = one_way_anova({name: list(column) for name, column in zip(names, study.threshold_n.T, strict=True)})
-    difference_n = abs(float((study.threshold_n[:, first] - study.threshold_n[:, second]).mean()))
-    margin_n = _critical_range(len(names), anova.df_within or 1) * math.sqrt(
+    group_names = [f"{frequency:g} Hz" for frequency in crowd.frequencies_hz]
+    anova = compute_one_way_anova(
+        {name: list(column) for name, column in zip(group_names, study.threshold_n.T, strict=True)}
+    )
+    difference_n = abs(float((study.threshold_n[:, first_index] - study.threshold_n[:, second_index]).mean()))
+    margin_n = _compute_critical_range(len(group_names), anova.df_within or 1) * math.sqrt(
         (anova.mean_square_within or math.inf) / people
     )
     return StudyVerdict(
         people=people,
         trials=study.trials,
-        primary_found=primary is not None and primary.p < 1.0 - CONFIDENCE,
-        primary_covers=primary is not None and primary.lower_db <= true_db <= primary.upper_db,
-        primary_error_db=float((pseudo[:, first] - pseudo[:, second]).mean()) - true_db,
-        means_found=means is not None and means.p < 1.0 - CONFIDENCE,
-        means_error_db=float((study.threshold_db[:, first] - study.threshold_db[:, second]).mean()) - true_db,
+        primary_found=primary_contrast is not None and primary_contrast.p < 1.0 - CONFIDENCE,
+        primary_covers=primary_contrast is not None
+        and primary_contrast.lower_db <= true_difference_db <= primary_contrast.upper_db,
+        primary_error_db=float((pseudo_thresholds_db[:, first_index] - pseudo_thresholds_db[:, second_index]).mean())
+        - true_difference_db,
+        means_found=means_contrast is not None and means_contrast.p < 1.0 - CONFIDENCE,
+        means_error_db=float((study.threshold_db[:, first_index] - study.threshold_db[:, second_index]).mean())
+        - true_difference_db,
         published_found=difference_n > margin_n,
     )
 
 
 def find_judged_pair(frequencies_hz: tuple[float, ...], contrast_hz: tuple[float, ...]) -> tuple[float, float]:
-    """The pair to test, first minus second: the declared contrast, or without one the highest frequency minus the
-    lowest. frequencies_hz: in ascending order."""
+    """Return the pair to test, first minus second: the declared contrast, or without one the highest frequency minus
+    the lowest. frequencies_hz: in ascending order."""
     return (contrast_hz[0], contrast_hz[1]) if contrast_hz else (frequencies_hz[-1], frequencies_hz[0])
 
 
-def true_difference_db(crowd: Crowd, contrast_hz: tuple[float, ...] = ()) -> float:
-    """True difference in dB: median threshold at the first frequency of `find_judged_pair` over that at the second."""
+def compute_true_difference_db(crowd: Crowd, contrast_hz: tuple[float, ...] = ()) -> float:
+    """Compute the true difference in dB: median threshold at the first frequency of `find_judged_pair` over that at the
+    second."""
     medians_n = dict(zip(crowd.frequencies_hz, crowd.medians_n, strict=True))
     first_hz, second_hz = find_judged_pair(crowd.frequencies_hz, contrast_hz)
     return 20.0 * float(np.log10(medians_n[first_hz] / medians_n[second_hz]))
 
 
 @cache
-def _critical_range(groups: int, df: int) -> float:
-    """Quantile of the studentized range for Tukey's test with groups of equal size. Cached: computing it takes as long
-    as simulating a study."""
+def _compute_critical_range(groups: int, df: int) -> float:
+    """Compute the quantile of the studentized range for Tukey's test with groups of equal size. Cached: computing it
+    takes as long as simulating a study."""
     return float(studentized_range.ppf(CONFIDENCE, groups, df))
 
 
-def power_point(verdicts: Sequence[StudyVerdict]) -> PowerPoint:
-    """Shares and biases over simulated studies. verdicts: at least one, all with the same number of people."""
-    n = len(verdicts)
+def summarise_power(verdicts: Sequence[StudyVerdict]) -> PowerPoint:
+    """Summarise simulated studies as shares and biases. verdicts: at least one, all with the same number of people."""
+    study_count = len(verdicts)
     return PowerPoint(
         people=verdicts[0].people,
-        studies=n,
-        trials_per_person=sum(v.trials for v in verdicts) / n / verdicts[0].people,
-        primary=_wilson_share([v.primary_found for v in verdicts]),
-        means=_wilson_share([v.means_found for v in verdicts]),
-        published=_wilson_share([v.published_found for v in verdicts]),
-        coverage=_wilson_share([v.primary_covers for v in verdicts]),
-        primary_bias_db=float(np.mean([v.primary_error_db for v in verdicts])),
-        means_bias_db=float(np.mean([v.means_error_db for v in verdicts])),
+        studies=study_count,
+        trials_per_person=sum(verdict.trials for verdict in verdicts) / study_count / verdicts[0].people,
+        primary=_compute_wilson_share([verdict.primary_found for verdict in verdicts]),
+        means=_compute_wilson_share([verdict.means_found for verdict in verdicts]),
+        published=_compute_wilson_share([verdict.published_found for verdict in verdicts]),
+        coverage=_compute_wilson_share([verdict.primary_covers for verdict in verdicts]),
+        primary_bias_db=float(np.mean([verdict.primary_error_db for verdict in verdicts])),
+        means_bias_db=float(np.mean([verdict.means_error_db for verdict in verdicts])),
     )
 
 
-def _wilson_share(outcomes: Sequence[bool]) -> Share:
-    """Share of true values, with Wilson's 95 % interval."""
+def _compute_wilson_share(outcomes: Sequence[bool]) -> Share:
+    """Compute the share of true values, with Wilson's 95 % interval."""
     lower, upper = wilson_interval(sum(outcomes), len(outcomes))
     return Share(sum(outcomes) / len(outcomes), lower, upper)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.psychophysics.hierarchy.answers import Answers, count_cells
-from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, USUAL_SLOPE, Family
+from analysis.psychophysics.hierarchy.curve import NEPER_PER_DB, STARTING_SLOPE, T_AT_THRESHOLD, Family
 from analysis.psychophysics.power.felt_delivery import FeltDelivery
 from analysis.psychophysics.power.psi_kernel import pack_psi, play_psi
 from analysis.psychophysics.power.staircase_kernel import (
@@ -52,7 +52,7 @@ class Crowd:
     frequency_sd_db: tuple[float, ...] | float = 1.7
     """Standard deviation of the further deviation at each frequency: one value for all frequencies, or one each."""
     slope: float | None = None
-    """Median slope; None: `USUAL_SLOPE` of the family, as steep as a Weibull slope of 2 over newtons."""
+    """Median slope; None: `STARTING_SLOPE` of the family, as steep as a Weibull slope of 2 over newtons."""
     slope_log_sd: float = 0.25
     """Standard deviation between people of the slope's natural logarithm."""
     lapse: float = 0.02
@@ -140,9 +140,9 @@ def _draw_people(crowd: Crowd, people: int, rng: np.random.Generator) -> tuple[F
     interaction_sd_db = np.broadcast_to(np.asarray(crowd.frequency_sd_db, dtype=np.float64), (k,))
     true_db = 20.0 * np.log10(np.asarray(crowd.medians_n)) + crowd.person_sd_db * rng.standard_normal((people, 1))
     true_db = true_db + interaction_sd_db * rng.standard_normal((people, k))
-    slopes = (crowd.slope or USUAL_SLOPE[crowd.family]) * np.exp(crowd.slope_log_sd * rng.standard_normal(people))
+    slopes = (crowd.slope or STARTING_SLOPE[crowd.family]) * np.exp(crowd.slope_log_sd * rng.standard_normal(people))
     criteria = crowd.criterion_sd * rng.standard_normal(people)
-    t0, family = AT_THRESHOLD[crowd.family], FAMILIES.index(crowd.family)
+    t0, family = T_AT_THRESHOLD[crowd.family], FAMILIES.index(crowd.family)
     return true_db, [
         Participant(
             t0, slopes[person] * NEPER_PER_DB, true_db[person, frequency_index], crowd.lapse, criteria[person], family
@@ -166,7 +166,7 @@ def _compute_reversal_means(rule: StaircaseRule, tracks: Track, run_results: Seq
 
 
 def _compute_posterior_means(rule: StaircaseRule, tracks: Track, run_results: Sequence[SimulatedRun]) -> _RunThresholds:
-    """Posterior means of Psi, limited by the cap and marked as cut by it as in `thresholds.threshold_of`."""
+    """Posterior means of Psi, limited by the cap and marked as cut by it as in `thresholds.compute_run_threshold`."""
     db = np.minimum([run.mean_db for run in run_results], to_db(rule.cap_n))
     cut = np.array([run.above_cap for run in run_results]) > CUT_PROBABILITY
     return _RunThresholds(np.minimum(10.0 ** (db / 20.0), rule.cap_n), db, cut.astype(np.float64))

@@ -15,7 +15,7 @@ from equalizer.effects.effect import AxisForce, JointForce, PlacedEffect, Struct
 from equalizer.effects.simulation.command_path import ActuatorForce
 from equalizer.effects.simulation.mechanism_kernel import MAX_LAWS, law_address, no_force
 from equalizer.effects.simulation.stepping import Forces, Stepping, step_with_forces, step_without_forces
-from equalizer.plant.linear_simulation import LinearSteps, discretise_model, driven_axes
+from equalizer.plant.linear_simulation import DiscreteModel, compute_driven_axes, discretise_model
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
@@ -53,7 +53,7 @@ def build_bodies(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bod
         if isinstance(placed.effect.action, Structure):
             for site in placed.sites:
                 structure = placed.effect.action.change(structure, site, placed.values)
-    ports = list(driven_axes(structure).T)
+    ports = list(compute_driven_axes(structure).T)
     actions: list[AxisForce | JointForce] = []
     port_indices: list[int] = []
     parameters: list[FloatArray] = []
@@ -147,7 +147,7 @@ def simulate_states(
 
 def _prepare_steps(
     bodies: Bodies, driven: ActuatorForce, size: tuple[int, int], step_s: float
-) -> tuple[LinearSteps, Stepping, tuple[int, ...]]:
+) -> tuple[DiscreteModel, Stepping, tuple[int, ...]]:
     """Matrices of a linear step, the stepping function, and the ports at which forces act or are read."""
     linear = discretise_model(bodies.structure, step_s, bodies.ports)
     ports = tuple(sorted({*bodies.port, *range(bodies.axes if bodies.reads_all_axes else 0)}))
@@ -183,7 +183,7 @@ def extend_state(structure: MechanicalModel, state: FloatArray, joints: FloatArr
     return np.concatenate([positions, added_per_model @ positions, velocities, added_per_model @ velocities])
 
 
-def _output_matrix(linear: LinearSteps, outward: FloatArray, ports: tuple[int, ...], motion: bool) -> FloatArray:
+def _output_matrix(linear: DiscreteModel, outward: FloatArray, ports: tuple[int, ...], motion: bool) -> FloatArray:
     """(s + f + m, rows): from state, forces at the f ports and commands at an instant to the rows that
     `simulate_bodies` returns."""
     p, (m, r) = len(linear.position), (linear.by_command.shape[1], linear.by_axis_force.shape[1])

@@ -33,7 +33,7 @@ from equalizer.effects.simulation.instant import (
     V,
     X,
 )
-from equalizer.effects.simulation.mechanism_kernel import LAW, MAX_LAWS, READ_ONLY, Integers
+from equalizer.effects.simulation.mechanism_kernel import LAW, MAX_LAWS, READ_ONLY_MATRIX, Integers
 from equalizer.signals.signal import FloatArray
 
 _VECTOR = types.float64[::1]
@@ -64,7 +64,7 @@ def _write_seen_axes(
 
 
 @njit(
-    types.void(_LAWS, types.int64[:, ::1], _VECTOR, _VECTOR, _THREE, READ_ONLY, _MATRIX, _MATRIX, types.float64),
+    types.void(_LAWS, types.int64[:, ::1], _VECTOR, _VECTOR, _THREE, READ_ONLY_MATRIX, _MATRIX, _MATRIX, types.float64),
     cache=True, nogil=True, error_model="numpy",
 )  # fmt: skip
 def evaluate_laws_along_motion(  # noqa: PLR0913 - a kernel takes flat arrays

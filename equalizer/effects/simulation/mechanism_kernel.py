@@ -1,7 +1,9 @@
-"""Compiled time stepping of a linear structure under commands and forces that depend on the motion.
+"""Compiled time stepping of a linear structure under commands and motion-dependent forces; called by `stepping`.
 
 The linear part is exact (matrix exponential, see `stepping`). A motion-dependent force is held over a step and solved
-for implicitly by its law, from the motion at the step's end (see `instant`); several forces by Gauss-Seidel sweeps.
+for implicitly by its law, from the motion at the step's end; several forces by Gauss-Seidel sweeps. A law reads its
+parameters, its memory (state variables), and `at`, the array of the motion during the step (layout: `instant`).
+Sizes: n samples, m commands, s states, r ports (points where forces act).
 """
 
 import warnings
@@ -55,13 +57,13 @@ FORCE_TOLERANCE = 1e-7
 """Tolerance of the sweeps: relative change of a force below which the others are not solved again. The motion then
 differs by at most 1e-6 (relative) from the converged motion, for a joint with friction and an axis with friction."""
 FORCE_ROWS = 4
-"""Rows of the table of forces: mean over the step, mean over the step before, force at the step's end, and whether the
-force is to be solved again because another force has changed (1 or 0)."""
+"""Rows of the array `forces`, in N: mean over the step, mean over the step before, force at the step's end; and whether
+the force is to be solved again because another force has changed (1 or 0)."""
 _MEAN, _MEAN_BEFORE, _END, _STALE = range(FORCE_ROWS)
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
-READ_ONLY = types.Array(types.float64, 2, "C", readonly=True)
-_TABLE = types.int64[:, ::1]
+READ_ONLY_MATRIX = types.Array(types.float64, 2, "C", readonly=True)
+_INT_MATRIX = types.int64[:, ::1]
 LAW = types.float64(_VECTOR, _VECTOR, _VECTOR)
 """Signature that every force law is compiled with."""
 
@@ -70,7 +72,7 @@ StepMatrices = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 _MATRICES = types.UniTuple(_MATRIX, 4)  # type: ignore[no-untyped-call]
 _LAWS = types.UniTuple(types.FunctionType(LAW), MAX_LAWS)  # type: ignore[no-untyped-call]
-_COUNT = types.UniTuple(types.int64, 3)  # type: ignore[no-untyped-call]
+_COUNTS = types.UniTuple(types.int64, 3)  # type: ignore[no-untyped-call]
 _NOW_X, _NOW_V, _NEXT_X, _NEXT_V, _A, _FORCE, _FORCE_END = range(7)
 PORT_ROWS = 7
 """Rows of the port table: position and velocity at a step's start and, predicted, at its end; acceleration at its start
@@ -78,14 +80,13 @@ without forces; forces over the step and at its end."""
 
 
 def compile_law(law: Callable[[FloatArray, FloatArray, FloatArray], float]) -> Any:
-    """The law, compiled for calls from the kernel. numba caches its machine code next to the file that defines the
-    law."""
+    """Compile a law for calls from the kernel; numba caches the machine code next to the law's module."""
     return njit(LAW, cache=True, error_model="numpy", **NO_REFERENCE_COUNTS)(law)
 
 
 class LawAddress(types.WrapperAddressProtocol):
-    """A compiled law as argument of a kernel. Its address is looked up once; numba would do so in every call, which
-    takes five times as long as the rest of the call."""
+    """A compiled law as argument of a kernel. Its address is looked up once; numba's own lookup in every call takes
+    five times as long as the rest of the call."""
 
     def __init__(self, law: Any) -> None:
         result = law.get_compile_result(LAW)
@@ -103,26 +104,26 @@ class LawAddress(types.WrapperAddressProtocol):
 
 @cache
 def law_address(law: Any) -> LawAddress:
-    """Address of a law that `compile_law` compiled; each law is looked up once per process."""
+    """Wrap a law that `compile_law` compiled; each law is looked up once per process."""
     return LawAddress(law)
 
 
 @njit(inline="always")
 def _predict_ports(output: FloatArray, state: FloatArray, ports: FloatArray) -> None:
-    """Positions and velocities at the step's end without forces. output: (2 r, s)"""
-    count = ports.shape[1]
-    for port in range(count):
+    """Predict the ports' positions and velocities at the step's end without forces. output: (2 r or more, s)."""
+    port_count = ports.shape[1]
+    for port in range(port_count):
         x = v = 0.0
         for i in range(state.shape[0]):
             x += output[port, i] * state[i]
-            v += output[count + port, i] * state[i]
+            v += output[port_count + port, i] * state[i]
         ports[_NEXT_X, port], ports[_NEXT_V, port] = x, v
         ports[_FORCE, port] = ports[_FORCE_END, port] = 0.0
 
 
 @njit(inline="always")
 def _apply_forces(force_effects: FloatArray, state: FloatArray, ports: FloatArray) -> None:
-    """Add the forces' effect to the state, and move the ports to the step's end. force_effects: (r, s)"""
+    """Add the forces' effect to the state, and move the ports to the step's end. force_effects: (r, s), per newton."""
     for port in range(ports.shape[1]):
         ports[_NOW_X, port], ports[_NOW_V, port] = ports[_NEXT_X, port], ports[_NEXT_V, port]
         force = ports[_FORCE, port]
@@ -140,45 +141,45 @@ def _store_row(state: FloatArray, ports: FloatArray, row: FloatArray) -> None:
 
 
 @njit(inline="always")
-def _predict_accelerations(output: FloatArray, added: FloatArray, state: FloatArray, ports: FloatArray) -> None:
-    """Accelerations at the step's start without forces. output: (3 r, s). added: (s + r), the last r by commands."""
-    count = ports.shape[1]
-    for port in range(count):
-        total = added[state.shape[0] + port]
+def _predict_accelerations(output: FloatArray, contribution: FloatArray, state: FloatArray, ports: FloatArray) -> None:
+    """Predict accelerations at the step's start without forces. output: (3 r, s); contribution: (s + r,)."""
+    port_count = ports.shape[1]
+    for port in range(port_count):
+        acceleration = contribution[state.shape[0] + port]
         for i in range(state.shape[0]):
-            total += output[2 * count + port, i] * state[i]
-        ports[_A, port] = total
+            acceleration += output[2 * port_count + port, i] * state[i]
+        ports[_A, port] = acceleration
 
 
 @njit(inline="always")
 def _add_force(per_newton: FloatArray, port: int, mean: float, end: float, ports: FloatArray) -> None:
-    """Add a force at a port. per_newton: (r, 3 r), what 1 N at a port adds to all positions, velocities and
-    accelerations."""
-    count = ports.shape[1]
+    """Add a force (N) to its port, and its effect to the motion of all ports. per_newton: (r, 3 r), change of all
+    positions, velocities and accelerations by 1 N at each port."""
+    port_count = ports.shape[1]
     ports[_FORCE, port] += mean
     ports[_FORCE_END, port] += end
-    for target in range(count):
-        ports[_NEXT_X, target] += per_newton[port, target] * mean
-        ports[_NEXT_V, target] += per_newton[port, count + target] * mean
-        ports[_A, target] += per_newton[port, 2 * count + target] * mean
+    for other_port in range(port_count):
+        ports[_NEXT_X, other_port] += per_newton[port, other_port] * mean
+        ports[_NEXT_V, other_port] += per_newton[port, port_count + other_port] * mean
+        ports[_A, other_port] += per_newton[port, 2 * port_count + other_port] * mean
 
 
 @njit(inline="always")
 def _write_axis_blocks(per_newton: FloatArray, port: int, ports: FloatArray, at: FloatArray) -> None:
     """Write the motion of all ports into `at`, for the force at one of them."""
-    count = ports.shape[1]
-    for axis in range(count):
+    port_count = ports.shape[1]
+    for axis in range(port_count):
         block = LENGTH + BLOCK_SIZE * axis
         at[block + AXIS_X], at[block + AXIS_V] = ports[_NOW_X, axis], ports[_NOW_V, axis]
         at[block + AXIS_X_END], at[block + AXIS_V_END] = ports[_NEXT_X, axis], ports[_NEXT_V, axis]
         at[block + AXIS_X_PER_N] = per_newton[port, axis]
-        at[block + AXIS_V_PER_N] = per_newton[port, count + axis]
-        at[block + AXIS_A], at[block + AXIS_A_PER_N] = ports[_A, axis], per_newton[port, 2 * count + axis]
+        at[block + AXIS_V_PER_N] = per_newton[port, port_count + axis]
+        at[block + AXIS_A], at[block + AXIS_A_PER_N] = ports[_A, axis], per_newton[port, 2 * port_count + axis]
 
 
 @compile_law
 def no_force(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Law without force (0 N), which fills the unused ones of the kernel's `MAX_LAWS` arguments."""
+    """Law of no force (0 N), for the unused of the kernel's `MAX_LAWS` arguments."""
     return 0.0
 
 
@@ -187,12 +188,12 @@ def _solve_force(  # noqa: PLR0913 - a kernel takes flat arrays
     law: Any, parameters: FloatArray, memory: FloatArray, port: int, per_newton: FloatArray, ports: FloatArray,
     at: FloatArray,
 ) -> tuple[float, float]:  # fmt: skip
-    """Solve for one force with all others held, and add it to the ports: its mean over the step, and its end value."""
-    count = ports.shape[1]
+    """Solve for one force with all others held, and add it to the ports. Returns its step mean and end value (N)."""
+    port_count = ports.shape[1]
     at[X], at[V] = ports[_NOW_X, port], ports[_NOW_V, port]
     at[X_FREE], at[V_FREE] = ports[_NEXT_X, port], ports[_NEXT_V, port]
-    at[X_PER_N], at[V_PER_N] = per_newton[port, port], per_newton[port, count + port]
-    at[A_FREE], at[A_PER_N] = ports[_A, port], per_newton[port, 2 * count + port]
+    at[X_PER_N], at[V_PER_N] = per_newton[port, port], per_newton[port, port_count + port]
+    at[A_FREE], at[A_PER_N] = ports[_A, port], per_newton[port, 2 * port_count + port]
     at[F_END] = np.nan
     if at.shape[0] > LENGTH:
         _write_axis_blocks(per_newton, port, ports, at)
@@ -203,97 +204,97 @@ def _solve_force(  # noqa: PLR0913 - a kernel takes flat arrays
 
 
 @njit(
-    types.void(_LAWS, _TABLE, _VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _VECTOR, _VECTOR),
+    types.void(_LAWS, _INT_MATRIX, _VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _VECTOR, _VECTOR),
     cache=True, nogil=True, error_model="numpy", fastmath=FAST, **NO_REFERENCE_COUNTS,
 )  # fmt: skip
 def _solve_forces(  # noqa: PLR0913 - a kernel takes flat arrays
     laws: Any, table: Integers, parameters: FloatArray, memory: FloatArray, per_newton: FloatArray, ports: FloatArray,
-    forces: FloatArray, at: FloatArray, memory_before: FloatArray,
+    forces: FloatArray, at: FloatArray, start_memory: FloatArray,
 ) -> None:  # fmt: skip
-    """Solve for several forces in turn (Gauss-Seidel), extrapolating their means over the last two steps. A force
-    is solved again only if another has changed. forces: (FORCE_ROWS, items); memory_before: work space, as memory."""
+    """Solve for several forces in turn (Gauss-Seidel), starting from linear extrapolation over the last two steps. A
+    force is solved again only if another has changed. Arguments: see `step_mechanism`."""
     for i in range(memory.shape[0]):
-        memory_before[i] = memory[i]
-    for item in range(table.shape[0]):
-        mean = forces[_MEAN, item]
-        forces[_MEAN, item] += mean - forces[_MEAN_BEFORE, item]
-        forces[_MEAN_BEFORE, item], forces[_END, item], forces[_STALE, item] = mean, 0.0, 1.0
-        _add_force(per_newton, table[item, 1], forces[_MEAN, item], 0.0, ports)
+        start_memory[i] = memory[i]
+    for row in range(table.shape[0]):
+        mean = forces[_MEAN, row]
+        forces[_MEAN, row] += mean - forces[_MEAN_BEFORE, row]
+        forces[_MEAN_BEFORE, row], forces[_END, row], forces[_STALE, row] = mean, 0.0, 1.0
+        _add_force(per_newton, table[row, 1], forces[_MEAN, row], 0.0, ports)
     for sweep in range(MAX_SWEEPS):
-        for item in range(table.shape[0]):
-            if forces[_STALE, item] == 0.0:
+        for row in range(table.shape[0]):
+            if forces[_STALE, row] == 0.0:
                 continue
-            port, memory_start, memory_end, mean = table[item, 1], table[item, 4], table[item, 5], forces[_MEAN, item]
-            _add_force(per_newton, port, -mean, -forces[_END, item], ports)
+            port, memory_start, memory_end, mean = table[row, 1], table[row, 4], table[row, 5], forces[_MEAN, row]
+            _add_force(per_newton, port, -mean, -forces[_END, row], ports)
             if sweep > 0:
                 for i in range(memory_start, memory_end):
-                    memory[i] = memory_before[i]
-            parameter_start, law = table[item, 2], laws[table[item, 0]]
-            forces[_MEAN, item], forces[_END, item] = _solve_force(
+                    memory[i] = start_memory[i]
+            parameter_start, law = table[row, 2], laws[table[row, 0]]
+            forces[_MEAN, row], forces[_END, row] = _solve_force(
                 law,
-                parameters[parameter_start : table[item, 3]],
+                parameters[parameter_start : table[row, 3]],
                 memory[memory_start:memory_end],
                 port,
                 per_newton,
                 ports,
                 at,
             )
-            if not abs(forces[_MEAN, item] - mean) <= FORCE_TOLERANCE * abs(mean):
-                for force_index in range(table.shape[0]):
-                    forces[_STALE, force_index] = 1.0
-            forces[_STALE, item] = 0.0
+            if not abs(forces[_MEAN, row] - mean) <= FORCE_TOLERANCE * abs(mean):
+                for other_row in range(table.shape[0]):
+                    forces[_STALE, other_row] = 1.0
+            forces[_STALE, row] = 0.0
 
 
 @njit(
     types.void(
-        _LAWS, _TABLE, _VECTOR, _VECTOR, _MATRICES, _MATRIX, READ_ONLY, _MATRIX, _VECTOR, _COUNT, types.float64,
-        _VECTOR, _VECTOR, _MATRIX, _VECTOR,
+        _LAWS, _INT_MATRIX, _VECTOR, _VECTOR, _MATRICES, _MATRIX, READ_ONLY_MATRIX, _MATRIX, _VECTOR, _COUNTS,
+        types.float64, _VECTOR, _VECTOR, _MATRIX, _VECTOR,
     ),
     cache=True, nogil=True, error_model="numpy", fastmath=FAST, **NO_REFERENCE_COUNTS,
 )  # fmt: skip
 def step_mechanism(  # noqa: PLR0913 - a kernel takes flat arrays
     laws: Any, table: Integers, parameters: FloatArray, memory: FloatArray, step: StepMatrices, rows: FloatArray,
-    commands: FloatArray, ports: FloatArray, state: FloatArray, count: tuple[int, int, int], step_s: float,
-    added: FloatArray, at: FloatArray, forces: FloatArray, memory_before: FloatArray,
+    commands: FloatArray, ports: FloatArray, state: FloatArray, counts: tuple[int, int, int], step_s: float,
+    contribution: FloatArray, at: FloatArray, forces: FloatArray, start_memory: FloatArray,
 ) -> None:  # fmt: skip
-    """Motion under commands and motion-dependent forces; rows, ports and state are overwritten.
+    """Simulate n samples under commands and motion-dependent forces, in place.
 
-    rows: (n stride, s + r ...), contribution of the commands to the state over a step and to the ports' accelerations
-    at its start; a sample's first row becomes the state before it and the forces (r,) at that instant. commands: (n
-    stride, m), or (0, 0) where no law reads them. ports: (PORT_ROWS, r) and state: (s,) become those of the end.
-
-    table: (items, 6) law, port, begin and end in `parameters`, begin and end in `memory`. step: matrix that advances
-    the state; output matrix of the ports' positions and velocities (2 r, s), with accelerations (3 r, s) where a law
-    reads them; effect of the forces on the state (r, s); and `per_newton`. count: steps per sample; stride (1 where
-    commands are held over all steps, else the number of steps); number of the first sample.
-
-    added (s + r,), at (LENGTH or more,), forces (FORCE_ROWS, items), memory_before (like memory): work space of the
-    caller; `forces` keeps the forces from block to block.
+    rows: (n stride, s + r or more), contributions of the commands to the state over a step and to the ports'
+    accelerations at its start; on return, the first row of each sample holds the state (s,) and the forces (r,) just
+    before it. commands: (n stride, m), or (0, 0) where no law reads them. ports (PORT_ROWS, r), state (s,) and memory:
+    on return, the values at the end.
+    table: (number of forces, 6), per force the indices of law and port, its range in `parameters` and in `memory`.
+    step: matrix that advances the state; output matrix of the ports' positions and velocities (2 r, s), with
+    accelerations (3 r, s) where a law reads them; effect of the forces on the state (r, s); and `per_newton`.
+    counts: steps per sample; stride (1 where commands are held over all steps, else the number of steps); number of
+    the first sample.
+    contribution (s + r,), at (LENGTH or more,), start_memory (as memory): work space; forces (FORCE_ROWS, number of
+    forces): kept by the caller from block to block.
     """
     advance, output, force_effects, per_newton = step
-    steps, stride, first_sample = count
-    states, r = state.shape[0], ports.shape[1]
+    steps, stride, first_sample = counts
+    state_count, port_count = state.shape[0], ports.shape[1]
     law = laws[table[0, 0]]
     law_parameters, law_memory = parameters[table[0, 2] : table[0, 3]], memory[table[0, 4] : table[0, 5]]
     at[STEP_S] = step_s
-    for port in range(r):
+    for port in range(port_count):
         ports[_A, port] = np.nan
-    for k in range(rows.shape[0] // stride):
+    for sample in range(rows.shape[0] // stride):
         for step_index in range(steps):
             if step_index == 0 or stride > 1:
-                for i in range(states + r):
-                    added[i] = rows[k * stride + step_index, i]
+                for i in range(state_count + port_count):
+                    contribution[i] = rows[sample * stride + step_index, i]
                 for axis in range(commands.shape[1]):
-                    at[LENGTH + BLOCK_SIZE * axis + AXIS_COMMAND] = commands[k * stride + step_index, axis]
+                    at[LENGTH + BLOCK_SIZE * axis + AXIS_COMMAND] = commands[sample * stride + step_index, axis]
             if step_index == 0:
-                _store_row(state, ports, rows[k * stride])
-            if output.shape[0] > 2 * r:
-                _predict_accelerations(output, added, state, ports)
-            advance_state(advance, added, state)
+                _store_row(state, ports, rows[sample * stride])
+            if output.shape[0] > 2 * port_count:
+                _predict_accelerations(output, contribution, state, ports)
+            advance_state(advance, contribution, state)
             _predict_ports(output, state, ports)
-            at[TIME_S] = ((first_sample + k) * steps + step_index) * step_s
+            at[TIME_S] = ((first_sample + sample) * steps + step_index) * step_s
             if table.shape[0] == 1:
                 _solve_force(law, law_parameters, law_memory, table[0, 1], per_newton, ports, at)
             else:
-                _solve_forces(laws, table, parameters, memory, per_newton, ports, forces, at, memory_before)
+                _solve_forces(laws, table, parameters, memory, per_newton, ports, forces, at, start_memory)
             _apply_forces(force_effects, state, ports)

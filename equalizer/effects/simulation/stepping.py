@@ -24,7 +24,7 @@ from equalizer.effects.simulation.instant import BLOCK_SIZE, LENGTH
 from equalizer.effects.simulation.linear_step_kernel import advance_unforced
 from equalizer.effects.simulation.mechanism_kernel import FORCE_ROWS, PORT_ROWS, Integers, step_mechanism
 from equalizer.effects.simulation.modal_form import step_form
-from equalizer.plant.linear_simulation import LinearSteps
+from equalizer.plant.linear_simulation import DiscreteModel
 from equalizer.signals.signal import FloatArray
 
 BLOCK, BLOCK_UNDER_FORCES = 4096, 32768
@@ -39,7 +39,7 @@ class Forces:
     ports: tuple[int, ...]
     """Indices of the ports at which the forces act."""
     laws: tuple[object, ...]
-    """Addresses of the compiled laws, `LAWS` of them."""
+    """Addresses of the compiled laws, `MAX_LAWS` of them."""
     places: Integers
     """(items, 6): indices of law and port, ranges of parameters and memory of each force."""
     parameters: FloatArray
@@ -74,14 +74,14 @@ class Stepping:
     """Sets the state (2n,), positions then velocities, from which the next block starts."""
 
 
-def step_without_forces(linear: LinearSteps, steps: int, stride: int) -> Stepping:
+def step_without_forces(linear: DiscreteModel, steps: int, stride: int) -> Stepping:
     """Stepping without motion-dependent forces, a whole sample at once. steps: steps of `linear` per sample; stride:
     commands per sample, 1 where a command is held over all steps."""
     responses = [linear.by_command]
     for _ in range(steps - 1):
-        responses.append(linear.advance @ responses[-1])
+        responses.append(linear.transition @ responses[-1])
     by_command = np.hstack(responses[::-1]) if stride > 1 else np.sum(responses, axis=0)
-    form = step_form(np.linalg.matrix_power(linear.advance, steps))
+    form = step_form(np.linalg.matrix_power(linear.transition, steps))
     state = np.zeros(len(form.inward))
 
     def run(rows: FloatArray, first: int) -> None:
@@ -93,10 +93,10 @@ def step_without_forces(linear: LinearSteps, steps: int, stride: int) -> Steppin
     return Stepping(1, (form.inward @ by_command).T, form.outward, BLOCK, run, set_state)
 
 
-def step_with_forces(linear: LinearSteps, forces: Forces, steps: int, stride: int, commands: FloatArray) -> Stepping:
+def step_with_forces(linear: DiscreteModel, forces: Forces, steps: int, stride: int, commands: FloatArray) -> Stepping:
     """Stepping under motion-dependent forces. steps: steps of `linear` per sample; stride: commands per sample, 1 where
     a command is held over all steps. commands: (L * stride, m), for laws that read them."""
-    form = step_form(linear.advance)
+    form = step_form(linear.transition)
     port_indices, axis_count = np.array(forces.ports), linear.by_axis_force.shape[1]
     output = linear.motion[np.concatenate([port_indices, axis_count + port_indices, 2 * axis_count + port_indices])]
     by_force = linear.by_axis_force[:, port_indices]

@@ -20,7 +20,7 @@ import numpy as np
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import ComplexArray, FloatArray
-from equalizer.signals.spectral_density import cross_density, spectral_density
+from equalizer.signals.spectral_density import estimate_cross_density, estimate_spectral_density
 
 WINDOW_S = 2.0
 """Window of the spectra (s): lines 0.5 Hz apart."""
@@ -73,8 +73,8 @@ def missing_force_spectra(evidence: Evidence, axis: int) -> MissingForceSpectra:
     acceleration = np.gradient(evidence.axis_velocity, 1 / rate, axis=0) * used
     window = min(int(WINDOW_S * rate), len(used))
     axis_acceleration, force = acceleration[:, axis], (evidence.axis_force * used).T
-    frequency, power = spectral_density(axis_acceleration, rate, window)
-    cross = np.array([cross_density(axis_acceleration, row, rate, window)[1] for row in force]).T
+    frequency, power = estimate_spectral_density(axis_acceleration, rate, window)
+    cross = np.array([estimate_cross_density(axis_acceleration, row, rate, window)[1] for row in force]).T
     selected = (frequency > 0) & (frequency < 0.45 * rate) & (power > LEAST_POWER_SHARE * power.max())
     return MissingForceSpectra(frequency[selected], power[selected], cross[selected])
 

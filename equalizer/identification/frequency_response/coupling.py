@@ -1,26 +1,30 @@
-"""Cross-axis coupling of a frequency response."""
+"""Cross-axis coupling of a frequency response: how strongly the other axes respond when one axis is driven.
+
+Used by `coupling_onset` (frequency from which coupling disturbs) and by figures.
+"""
 
 import numpy as np
 
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 
-def worst_coupling(response: ComplexArray) -> FloatArray:
-    """Off-axis over on-axis response when one axis i is driven, for the worst axis:
+def compute_worst_coupling(response: ComplexArray) -> FloatArray:
+    """Compute the ratio of the off-axis to the on-axis response when axis i is driven, for the worst axis:
 
         max over i of sqrt(sum over j != i of |H_ji|²) / |H_ii|
 
-    response: H (..., outputs, inputs), both in the same frame. Returns (...). Raises ValueError if not square.
+    response: complex H (..., outputs, inputs), both in the same frame. Returns (...). An axis without on-axis response
+    gives a very large number. Raises ValueError if H is not square.
     """
-    require_equal_axes(response)
+    require_square_response(response)
     power = np.abs(response) ** 2
     on_axis = np.einsum("...ii->...i", power)
     off_axis = np.maximum(power.sum(axis=-2) - on_axis, 0.0)
-    ratio: FloatArray = np.sqrt(off_axis / np.maximum(on_axis, np.finfo(np.float64).tiny)).max(axis=-1)
-    return ratio
+    coupling: FloatArray = np.sqrt(off_axis / np.maximum(on_axis, np.finfo(np.float64).tiny)).max(axis=-1)
+    return coupling
 
 
-def require_equal_axes(response: ComplexArray) -> None:
+def require_square_response(response: ComplexArray) -> None:
     """Require as many outputs as inputs. Raises ValueError unless the response (..., outputs, inputs) is square."""
     outputs, inputs = response.shape[-2:]
     if outputs != inputs:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from equalizer.identification.frequency_response.coupling import require_equal_axes, worst_coupling
+from equalizer.identification.frequency_response.coupling import compute_worst_coupling, require_square_response
 from equalizer.identification.frequency_response.frequency_response import BoolArray, FrequencyResponse
 from equalizer.identification.frequency_response.local_polynomial import LocalPolynomial
 from equalizer.signals.signal import ComplexArray, FloatArray
@@ -63,8 +63,8 @@ def coupling_onset(response: FrequencyResponse, rule: OnsetRule | None = None) -
     """The frequency from which driving one axis moves the others. response: as estimated, not smoothed yet, with inputs
     and outputs in one frame. Raises ValueError if it is not square, or has too few lines above the noise."""
     rule = rule or OnsetRule()
-    require_equal_axes(response.response)
-    lines = response.of_lines(response.reliable)
+    require_square_response(response.response)
+    lines = response.select_lines(response.reliable)
     local = LocalPolynomial.from_response(lines, rule.neighbours, 2)
     smooth = local.apply(lines.response)
     above_noise = _is_above_noise(lines, local, smooth, rule)
@@ -73,13 +73,13 @@ def coupling_onset(response: FrequencyResponse, rule: OnsetRule | None = None) -
             f"coupling cannot be judged: at no line is the noise small compared with {100 * rule.threshold:g} % of "
             "the response; record more periods, or with a stronger excitation"
         )
-    onset_hz = _find_onset(lines.frequency_hz[above_noise], worst_coupling(smooth[above_noise]), rule)
+    onset_hz = _find_onset(lines.frequency_hz[above_noise], compute_worst_coupling(smooth[above_noise]), rule)
     if onset_hz is None:
         return CouplingOnset(None, None, False, rule.threshold, rule.sentence)
     near_onset = lines.frequency_hz <= max(_HIGHEST_RESAMPLED * onset_hz, lines.frequency_hz[2 * rule.neighbours])
     has_noise = bool(np.isfinite(lines.noise_variance).all())
     drawn_onsets = (
-        _bootstrap_onsets(lines.of_lines(near_onset), smooth[near_onset], above_noise[near_onset], rule)
+        _bootstrap_onsets(lines.select_lines(near_onset), smooth[near_onset], above_noise[near_onset], rule)
         if has_noise
         else None
     )
@@ -138,7 +138,7 @@ def _bootstrap_onsets(
     for _ in range(rule.draws):
         noise = generator.standard_normal((2, *size.shape)) * size
         noisy_response = smooth + local.apply(noise[0] + 1j * noise[1])
-        onset = _find_onset(lines.frequency_hz[above_noise], worst_coupling(noisy_response[above_noise]), rule)
+        onset = _find_onset(lines.frequency_hz[above_noise], compute_worst_coupling(noisy_response[above_noise]), rule)
         onsets.append(float(lines.frequency_hz[-1]) if onset is None else onset)
     return np.array(onsets)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import ComplexArray, FloatArray
-from equalizer.signals.spectral_density import hann, line_spectra
+from equalizer.signals.spectral_density import compute_line_spectra, hann
 
 BROADBAND_KINDS = ("sweep", "multisine", "noise", "binary")
 TRANSIENT_S = 5.0
@@ -142,7 +142,7 @@ def _make_experiment(recording: Recording, starts: Sequence[int], length: int, w
 
     def spectra(samples: FloatArray) -> ComplexArray:
         periods = np.stack([samples[start : start + length] for start in starts])
-        return line_spectra((periods - periods.mean(axis=1, keepdims=True)) * window[:, None])
+        return compute_line_spectra((periods - periods.mean(axis=1, keepdims=True)) * window[:, None])
 
     return Experiment(
         length,

@@ -1,5 +1,5 @@
-"""A measured frequency response, line by line, with its noise variance and coherence: the value that the estimate from
-recordings returns, and that models are fitted to."""
+"""A measured frequency response, per frequency line, with noise variance and coherence. `estimate_transfer` returns it;
+state-space models are fitted to it."""
 
 from dataclasses import dataclass
 
@@ -14,17 +14,18 @@ BoolArray = npt.NDArray[np.bool_]
 @dataclass(frozen=True, slots=True, eq=False)
 class FrequencyResponse:
     """Frequency response G(f) from the samples of the total command to those of the response; response sample k is
-    taken just before command sample k is written. Raises ValueError where shapes disagree or frequencies do not
-    rise."""
+    taken just before command sample k is written. Raises ValueError if shapes are inconsistent or the frequencies do
+    not increase."""
 
     frequency_hz: FloatArray
-    """(lines,), rising."""
+    """(lines,): frequencies, increasing."""
     response: ComplexArray
     """(lines, outputs, inputs): complex gain at each line, in output_unit per input_unit."""
     noise_variance: FloatArray
     """(lines, outputs, inputs): expected |error|² of each entry of `response`; NaN where not known."""
     coherence: FloatArray
-    """(lines, outputs): share of the response's power that the commands explain, 0 to 1; NaN where not known."""
+    """(lines, outputs): multiple coherence, the share of the response's power that the commands explain linearly, 0 to
+    1; NaN where not known."""
     reliable: BoolArray
     """(lines,): False where the estimate should not be used; `remarks` state the reasons."""
     sample_rate_hz: float
@@ -51,18 +52,18 @@ class FrequencyResponse:
     def __len__(self) -> int:
         return len(self.frequency_hz)
 
-    def within(self, low_hz: float, high_hz: float) -> "FrequencyResponse":
-        """The response on the lines of a band (Hz), its ends included."""
-        return self.of_lines((self.frequency_hz >= low_hz) & (self.frequency_hz <= high_hz))
+    def select_band(self, low_hz: float, high_hz: float) -> "FrequencyResponse":
+        """The response at the lines of a band (Hz), band limits included."""
+        return self.select_lines((self.frequency_hz >= low_hz) & (self.frequency_hz <= high_hz))
 
-    def of_lines(self, chosen: BoolArray) -> "FrequencyResponse":
-        """The response on the lines where the mask `chosen` (lines,) is true."""
+    def select_lines(self, mask: BoolArray) -> "FrequencyResponse":
+        """The response at the lines where `mask` (lines,) is true."""
         return FrequencyResponse(
-            self.frequency_hz[chosen],
-            self.response[chosen],
-            self.noise_variance[chosen],
-            self.coherence[chosen],
-            self.reliable[chosen],
+            self.frequency_hz[mask],
+            self.response[mask],
+            self.noise_variance[mask],
+            self.coherence[mask],
+            self.reliable[mask],
             self.sample_rate_hz,
             self.input_channels,
             self.output_channels,

@@ -10,7 +10,7 @@ import numpy as np
 
 from equalizer.identification.frequency_response.experiments import instrument_signal
 from equalizer.signals.recording import Recording
-from equalizer.signals.signal import ComplexArray, FloatArray, runs_of
+from equalizer.signals.signal import ComplexArray, FloatArray, find_runs
 from equalizer.signals.spectral_density import hann
 
 SETTLING_S = 0.5
@@ -94,6 +94,6 @@ def interpolate_rest(mean: FloatArray, lines_hz: FloatArray, frequency_hz: Float
 def rest_intervals(recording: Recording, settling_s: float) -> list[tuple[int, int]]:
     """Intervals (start, stop) of samples without excitation, after settling_s seconds; an interval at the very start
     counts from sample 0, because recordings begin at rest."""
-    idle_runs = runs_of((instrument_signal(recording) == 0).all(axis=1))
+    idle_runs = find_runs((instrument_signal(recording) == 0).all(axis=1))
     settling = round(settling_s * recording.sample_rate_hz)
     return [(start + (settling if start else 0), stop) for start, stop in idle_runs]

@@ -1,7 +1,7 @@
 """Averages of a frequency response over bins of equal width in octaves.
 
-Lines of a discrete Fourier transform are equally spaced in Hz; a plot over log frequency, and a comparison of records
-of different length, need averages of equal width in octaves.
+Lines of a discrete Fourier transform are equally spaced in Hz; a plot over log frequency (`analysis.figures`), and a
+comparison of records of different length (`resonances`), need averages of equal width in octaves.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,8 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OctaveBins:
-    """Means per bin. Where lines are further apart than a bin is wide, a bin is a line; empty bins are left out."""
+    """Means per bin; bins without a line are left out. Where lines are further apart than a bin is wide, each bin holds
+    a single line."""
 
     frequency_hz: FloatArray
     """(bins,): arithmetic mean of the lines' frequencies."""
@@ -26,27 +27,29 @@ class OctaveBins:
     highest: FloatArray
     """(bins, outputs, inputs): magnitude of the strongest line."""
     noise_variance: FloatArray
-    """(bins, outputs, inputs): noise variance E|error|² of a single line, averaged; that of the mean is `lines` times
-    smaller."""
+    """(bins, outputs, inputs): noise variance E|error|² of a single line, mean over the bin. For independent errors,
+    that of the mean response is `lines` times smaller."""
     lines: FloatArray
-    """(bins,): number of lines in each."""
+    """(bins,): number of lines in each bin."""
     reliable: BoolArray
-    """(bins,): whether most lines of the bin are reliable."""
+    """(bins,): whether more than half of the bin's lines are reliable."""
 
 
-def octave_bins(response: FrequencyResponse, octaves: float) -> OctaveBins:
-    """Average a response over bins of this width in octaves, which begin at its first line. It must have a line, the
-    first above 0 Hz, in ascending order."""
-    number = np.floor(np.log2(response.frequency_hz / response.frequency_hz[0]) / octaves).astype(np.int64)
-    _, starts, counts = np.unique(number, return_index=True, return_counts=True)
-    lines = counts.astype(np.float64)
+def average_octave_bins(response: FrequencyResponse, bin_width_octaves: float) -> OctaveBins:
+    """Average a response over bins of equal width in octaves; the first bin begins at the first line. Lines must be in
+    ascending order, above 0 Hz, and at least one."""
+    bin_index = np.floor(np.log2(response.frequency_hz / response.frequency_hz[0]) / bin_width_octaves).astype(np.int64)
+    _, starts, counts = np.unique(bin_index, return_index=True, return_counts=True)
+    line_counts = counts.astype(np.float64)
     magnitude = np.abs(response.response)
     return OctaveBins(
-        np.add.reduceat(response.frequency_hz, starts) / lines,
-        np.asarray(np.add.reduceat(response.response, starts, axis=0) / lines[:, None, None], dtype=np.complex128),
+        np.add.reduceat(response.frequency_hz, starts) / line_counts,
+        np.asarray(
+            np.add.reduceat(response.response, starts, axis=0) / line_counts[:, None, None], dtype=np.complex128
+        ),
         np.minimum.reduceat(magnitude, starts, axis=0),
         np.maximum.reduceat(magnitude, starts, axis=0),
-        np.add.reduceat(response.noise_variance, starts, axis=0) / lines[:, None, None],
-        lines,
-        np.add.reduceat(response.reliable.astype(np.float64), starts) > lines / 2,
+        np.add.reduceat(response.noise_variance, starts, axis=0) / line_counts[:, None, None],
+        line_counts,
+        np.add.reduceat(response.reliable.astype(np.float64), starts) > line_counts / 2,
     )

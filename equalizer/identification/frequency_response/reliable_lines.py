@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from equalizer.identification.frequency_response.frequency_response import BoolArray
-from equalizer.signals.signal import ComplexArray, FloatArray, runs_of
+from equalizer.signals.signal import ComplexArray, FloatArray, find_runs
 
 _LEAST_INDEPENDENCE = 0.1
 """Least singular value of the matrix whose columns are the excited directions, each of unit length: 1 where they are
@@ -94,7 +94,7 @@ def spring_frequency_hz(metas: Sequence[Mapping[str, Any]]) -> float:
 def _describe_spans(frequency_hz: FloatArray, chosen: BoolArray) -> str:
     """The chosen lines as text: up to three spans, such as "1 to 4 Hz and from 38 Hz on", else their number and
     range."""
-    spans = runs_of(chosen)
+    spans = find_runs(chosen)
     if len(spans) > 3:
         first, last = frequency_hz[chosen][[0, -1]]
         return f"{int(chosen.sum())} lines between {first:.4g} and {last:.4g} Hz"

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
-from equalizer.identification.frequency_response.octave_bins import OctaveBins, octave_bins
+from equalizer.identification.frequency_response.octave_bins import OctaveBins, average_octave_bins
 from equalizer.identification.frequency_response.single_mode import fit_single_mode
 from equalizer.signals.signal import FloatArray
 
@@ -69,10 +69,10 @@ def find_resonances(response: FrequencyResponse, search: ResonanceSearch | None 
     if not response.reliable.any():
         return ()
     end_lines = np.flatnonzero(response.reliable)[[0, -1]]
-    lines = response.of_lines(np.isin(np.arange(len(response)), np.arange(end_lines[0], end_lines[1] + 1)))
+    lines = response.select_lines(np.isin(np.arange(len(response)), np.arange(end_lines[0], end_lines[1] + 1)))
     resonances: list[Resonance] = []
     for peak in sorted(
-        _find_peaks(octave_bins(lines, search.bin_octaves), search), key=lambda peak: -peak.prominence_db
+        _find_peaks(average_octave_bins(lines, search.bin_octaves), search), key=lambda peak: -peak.prominence_db
     ):
         resonance = _fit_resonance(lines, peak, search)
         if resonance is None:
@@ -103,9 +103,9 @@ def _find_peaks(binned: OctaveBins, search: ResonanceSearch) -> list[_Peak]:
 def _fit_resonance(lines: FrequencyResponse, peak: _Peak, search: ResonanceSearch) -> Resonance | None:
     """Fit a mode to a peak; None where no single mode fits, or where it is not distinct from noise."""
     factor = 2**search.reach_octaves
-    peak_lines = lines.within(peak.frequency_hz / factor, peak.frequency_hz * factor)
+    peak_lines = lines.select_band(peak.frequency_hz / factor, peak.frequency_hz * factor)
     # A hundred points suffice for a single mode: more lines are averaged in bins, which saves time.
-    binned = octave_bins(peak_lines, 2 * search.reach_octaves / 100) if len(peak_lines) >= 6 else None
+    binned = average_octave_bins(peak_lines, 2 * search.reach_octaves / 100) if len(peak_lines) >= 6 else None
     if binned is None or len(binned.frequency_hz) < 6:
         return None
     entries = binned.response.reshape(1, len(binned.frequency_hz), -1)

@@ -3,6 +3,7 @@
 Such an estimate is figure 4 of Wilson, Chan, Salisbury and Niemeyer, "Multi-DOF Equalization of Haptic Devices for
 Accurate Rendering at High Frequencies". Each line uses all experiments whose period contains it, weighted by their
 number of samples; experiments of different periods are combined at the lines that they share (`shared_lines`).
+`estimate_transfer` is the first step of the identification (`state_space.identify` fits a model to its result).
 """
 
 from collections.abc import Iterator, Sequence
@@ -47,8 +48,8 @@ class EstimateSettings:
 
 def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSettings | None = None) -> FrequencyResponse:
     """Estimate the transfer function from the total command to the response. Raises TransferEstimateError where there
-    is no recording, the recordings differ in rate, channels or units, no segment is broadband and whole, an output is
-    constant, or there are fewer independent experiments than inputs."""
+    is no recording, the recordings differ in rate, channels or units, no segment is a complete broadband experiment, an
+    output is constant, or there are fewer independent experiments than inputs."""
     settings = settings or EstimateSettings()
     _check_compatible(recordings)
     experiment_set = _collect_experiments(recordings, settings)
@@ -90,25 +91,29 @@ def _collect_experiments(recordings: Sequence[Recording], settings: EstimateSett
 
 
 def _group_by_lines(experiments: Sequence[Experiment], rate_hz: float) -> Iterator[tuple[FloatArray, list[Experiment]]]:
-    """Frequencies (Hz) of each group of lines that the same experiments contain, and these experiments on the lines."""
+    """Partition all lines by the experiments that contain them; yields the frequencies (lines,), Hz, of each group, and
+    its experiments restricted to these lines."""
     lengths = sorted({experiment.length for experiment in experiments})
     # Lines as integer multiples of rate / common, common the least common multiple of the lengths: compared exactly.
-    common = int(np.lcm.reduce(np.array(lengths, dtype=np.int64)))
-    numbers = {length: np.arange(1, (length + 1) // 2, dtype=np.int64) * (common // length) for length in lengths}
-    all_lines = np.unique(np.concatenate(list(numbers.values())))
-    has_line = np.stack([np.isin(all_lines, numbers[length]) for length in lengths], axis=1)
+    common_length = int(np.lcm.reduce(np.array(lengths, dtype=np.int64)))
+    lines_by_length = {
+        length: np.arange(1, (length + 1) // 2, dtype=np.int64) * (common_length // length) for length in lengths
+    }
+    all_lines = np.unique(np.concatenate(list(lines_by_length.values())))
+    has_line = np.stack([np.isin(all_lines, lines_by_length[length]) for length in lengths], axis=1)
     for pattern in np.unique(has_line, axis=0):
-        shared = all_lines[(has_line == pattern).all(axis=1)]
-        chosen = {length for length, has_lines in zip(lengths, pattern, strict=True) if has_lines}
+        shared_lines = all_lines[(has_line == pattern).all(axis=1)]
+        chosen_lengths = {length for length, has_lines in zip(lengths, pattern, strict=True) if has_lines}
         group = [
-            _select_lines(experiment, shared // (common // experiment.length) - 1)
+            _select_lines(experiment, shared_lines // (common_length // experiment.length) - 1)
             for experiment in experiments
-            if experiment.length in chosen
+            if experiment.length in chosen_lengths
         ]
-        yield shared * (rate_hz / common), group
+        yield shared_lines * (rate_hz / common_length), group
 
 
 def _select_lines(experiment: Experiment, lines: np.ndarray[tuple[int], np.dtype[np.int64]]) -> Experiment:
+    """Restrict an experiment to lines, given by their indices (lines,)."""
     return Experiment(
         experiment.length,
         experiment.command[:, lines],
@@ -124,10 +129,11 @@ def _join_parts(
     experiment_set: ExperimentSet,
     settings: EstimateSettings,
 ) -> FrequencyResponse:
-    """Join the groups of lines in ascending order of frequency, and judge the reliability of each line."""
+    """Join the groups of lines in ascending order of frequency, and judge the reliability of each line. Raises
+    TransferEstimateError without any group."""
     command, response = recordings[0].command, recordings[0].response
     if not parts:
-        raise TransferEstimateError(_too_few_experiments_text(len(command.channels), experiment_set))
+        raise TransferEstimateError(_describe_too_few_experiments(len(command.channels), experiment_set))
     order = np.argsort(np.concatenate([part.frequency_hz for part in parts]))
     frequency_hz = np.concatenate([part.frequency_hz for part in parts])[order]
     excited = np.concatenate(
@@ -145,53 +151,59 @@ def _join_parts(
         recordings[0].sample_rate_hz,
         command.channels,
         response.channels,
-        _unit(command),
-        _unit(response),
+        _format_unit(command),
+        _format_unit(response),
         (*experiment_set.remarks, *judgement.remarks),
     )
 
 
 def _check_compatible(recordings: Sequence[Recording]) -> None:
+    """Raises TransferEstimateError without any recording, and where sample rate, channels or units differ."""
     if not recordings:
         raise TransferEstimateError("there is no recording to estimate from; give at least one")
-    first = recordings[0]
-    for number, recording in enumerate(recordings[1:], start=2):
-        for name, expected, value in (
-            ("sample rate", f"{first.sample_rate_hz:g} Hz", f"{recording.sample_rate_hz:g} Hz"),
-            ("command channels", _channels(first.command), _channels(recording.command)),
-            ("response channels", _channels(first.response), _channels(recording.response)),
+    first_recording = recordings[0]
+    for recording_number, recording in enumerate(recordings[1:], start=2):
+        for property_name, expected, value in (
+            ("sample rate", f"{first_recording.sample_rate_hz:g} Hz", f"{recording.sample_rate_hz:g} Hz"),
+            ("command channels", _describe_channels(first_recording.command), _describe_channels(recording.command)),
+            ("response channels", _describe_channels(first_recording.response), _describe_channels(recording.response)),
         ):
             if expected != value:
                 raise TransferEstimateError(
-                    f"recording {number} has the {name} {value}, but the first has {expected}; estimate them separately"
+                    f"recording {recording_number} has the {property_name} {value}, but the first has {expected}; "
+                    "estimate them separately"
                 )
 
 
 def _refuse_constant_outputs(recordings: Sequence[Recording]) -> None:
     """Raises TransferEstimateError for an output that is constant in every recording, as of a stuck sensor: its
     response would consist of rounding errors."""
-    rows = [recording.response.samples for recording in recordings]
-    constant_outputs = np.all([(samples == samples[:1]).all(axis=0) for samples in rows], axis=0)
-    names = ", ".join(
+    sample_arrays = [recording.response.samples for recording in recordings]
+    constant_outputs = np.all([(samples == samples[:1]).all(axis=0) for samples in sample_arrays], axis=0)
+    constant_names = ", ".join(
         name for name, is_constant in zip(recordings[0].response.channels, constant_outputs, strict=True) if is_constant
     )
-    if names:
+    if constant_names:
         raise TransferEstimateError(
-            f"there is no signal from {names}, not even noise: check the sensor and record again"
+            f"there is no signal from {constant_names}, not even noise: check the sensor and record again"
         )
 
 
-def _channels(signal: Signal) -> str:
-    return f"{', '.join(signal.channels)} in {_unit(signal)}"
+def _describe_channels(signal: Signal) -> str:
+    """Names and units of the channels, for an error message."""
+    return f"{', '.join(signal.channels)} in {_format_unit(signal)}"
 
 
-def _unit(signal: Signal) -> str:
+def _format_unit(signal: Signal) -> str:
+    """The common unit of all channels, or the unit of each, separated by commas."""
     return signal.unit if isinstance(signal.unit, str) else ", ".join(signal.unit)
 
 
-def _too_few_experiments_text(inputs: int, data: ExperimentSet) -> str:
+def _describe_too_few_experiments(inputs: int, experiment_set: ExperimentSet) -> str:
+    """Error message for fewer independent experiments than inputs at every line."""
     return (
-        f"{inputs} inputs need {inputs} independent experiments at each line, but the {len(data.experiments)} that "
-        "were found are not: at no line do they drive the inputs in so many directions. Record every axis "
+        f"{inputs} inputs need {inputs} independent experiments at each line, but the "
+        f"{len(experiment_set.experiments)} that were found are not: at no line do they "
+        "drive the inputs in so many directions. Record every axis "
         "separately, or as many multisines with independent phases as there are inputs"
     )

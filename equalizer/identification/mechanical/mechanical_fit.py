@@ -27,11 +27,11 @@ from equalizer.identification.mechanical.mechanical_fit_result import (
 from equalizer.identification.mechanical.mechanical_free_simulation import simulation_errors
 from equalizer.identification.mechanical.mechanical_lines import (
     SegmentLines,
-    segment_lines,
+    compute_segment_lines,
     select_band,
     split_fit_and_test,
 )
-from equalizer.identification.mechanical.mechanical_misfit import LineGroup, line_groups
+from equalizer.identification.mechanical.mechanical_misfit import LineGroup, build_line_groups
 from equalizer.identification.mechanical.mechanical_order import (
     LEAST_GAIN,
     choose_simplest,
@@ -41,11 +41,11 @@ from equalizer.identification.mechanical.mechanical_order import (
 )
 from equalizer.identification.mechanical.mechanical_refinement import RefinedFit, refine_unknowns
 from equalizer.identification.mechanical.mechanical_refusals import refuse_noise, refuse_unstable, refuse_unsuitable
-from equalizer.identification.mechanical.mechanical_start import rigid_start
+from equalizer.identification.mechanical.mechanical_start import estimate_rigid_start
 from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.identification.mechanical.modal_order import balance_fit, choose_modes
 from equalizer.identification.mechanical.modal_structure import ModalStructure
-from equalizer.identification.mechanical.physical_model import readable_model
+from equalizer.identification.mechanical.physical_model import make_physical_model
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 
@@ -107,7 +107,7 @@ def _fit_sensors_elsewhere(
     if not any(group.transient for group in groups):
         return StructureChoice(*choose_modes(groups, best.structure, band_hz, settings, on_progress))
     structure = replace(best.structure, shared=True)
-    start = replace(best, structure=structure, unknowns=best.structure.transfer_unknowns(best.unknowns, structure))
+    start = replace(best, structure=structure, unknowns=best.structure.convert_unknowns(best.unknowns, structure))
     return StructureChoice(*grow_by_stages(groups, start, band_hz, settings, on_progress))
 
 
@@ -136,7 +136,7 @@ def fit_mechanical_model(
     settings = settings or MechanicalFitSettings()
     refuse_unsuitable(recordings)
     fit, test = split_fit_and_test(recordings)
-    lines = [spectra for pair in fit if (spectra := segment_lines(*pair)) is not None]
+    lines = [spectra for pair in fit if (spectra := compute_segment_lines(*pair)) is not None]
     segments = select_band(lines, settings.band_hz)
     if sum(len(segment.frequency_hz) for segment in segments) < _LEAST_LINES:
         raise MechanicalFitRefused(
@@ -144,17 +144,17 @@ def fit_mechanical_model(
             "record a sweep, noise or a multisine along every axis"
         )
     band = _find_covered_band(segments)
-    groups = line_groups(segments, settings.floor)
+    groups = build_line_groups(segments, settings.floor)
     structure = _make_rigid_structure(recordings[0], settings, band)
-    thinned = [group.thin_out(min(LINES_PER_GROUP, -(-LINES_IN_ALL // len(groups)))) for group in groups]
+    thinned = [group.limit_lines(min(LINES_PER_GROUP, -(-LINES_IN_ALL // len(groups)))) for group in groups]
     starts = _fit_rigid_starts(segments, thinned, structure, band, settings)
     choice = choose_structure(thinned, starts, band, settings, on_progress)
-    full_groups = [group.of_lines(np.ones(len(group.frequency_hz), dtype=bool)) for group in groups]
+    full_groups = [group.select_lines(np.ones(len(group.frequency_hz), dtype=bool)) for group in groups]
     final = _refit(_include_all_lines(full_groups), choice.best, band)
     refuse_unstable(final)
-    test_lines = [spectra for pair in test if (spectra := segment_lines(*pair)) is not None]
+    test_lines = [spectra for pair in test if (spectra := compute_segment_lines(*pair)) is not None]
     on_progress(1.0)
-    model = readable_model(final, name)
+    model = make_physical_model(final, name)
     errors = _compute_channel_errors(model, lines, test_lines, band, recordings[0].response.channels)
     return MechanicalFit(
         model=model,
@@ -204,7 +204,7 @@ def _fit_rigid_starts(
     fits: list[RefinedFit[Structure]] = []
     stage_end = compute_stage_ends(band)[0]
     stage_groups = [
-        part for group in groups if len((part := group.of_lines(group.frequency_hz <= stage_end)).frequency_hz)
+        part for group in groups if len((part := group.select_lines(group.frequency_hz <= stage_end)).frequency_hz)
     ]
     for share in _BAND_SHARES:
         end = band[0] * (stage_end / band[0]) ** share
@@ -213,7 +213,9 @@ def _fit_rigid_starts(
         if lines < _LEAST_LINES * structure.inputs and (fits or share != _BAND_SHARES[-1]):
             continue
         for delayed in (False, True)[: 1 + settings.fit_delay]:
-            rigid_structure, unknowns = rigid_start(low_segments, replace(structure, delayed=delayed), settings.floor)
+            rigid_structure, unknowns = estimate_rigid_start(
+                low_segments, replace(structure, delayed=delayed), settings.floor
+            )
             fits.append(refine_unknowns(stage_groups, rigid_structure, unknowns, (band[0], stage_end)))
     return fits
 

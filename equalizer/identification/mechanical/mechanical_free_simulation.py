@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from equalizer.identification.mechanical.mechanical_lines import SegmentLines
-from equalizer.identification.mechanical.mechanical_response import free_response, sample_response
+from equalizer.identification.mechanical.mechanical_response import compute_free_response, compute_sampled_response
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import ComplexArray, FloatArray
 
@@ -41,11 +41,11 @@ def simulation_errors(
 def simulation_misfit(model: MechanicalModel, segment_lines: SegmentLines) -> ComplexArray:
     """(lines, p): measured minus simulated spectrum, in the response's unit, with the best-fitting initial state where
     the segment has a transient."""
-    response = sample_response(model, segment_lines.frequency_hz, segment_lines.rate_hz, segment_lines.hold)
+    response = compute_sampled_response(model, segment_lines.frequency_hz, segment_lines.rate_hz, segment_lines.hold)
     misfit = segment_lines.response - np.einsum("lpm,lm->lp", response, segment_lines.command)
     if not segment_lines.transient:
         return np.asarray(misfit)
-    free = free_response(model, segment_lines.frequency_hz, segment_lines.rate_hz)
+    free = compute_free_response(model, segment_lines.frequency_hz, segment_lines.rate_hz)
     if model.quantity == "acceleration":  # the last command before the segment acts directly on the first response
         feedthrough = np.broadcast_to(np.eye(model.outputs), (len(free), model.outputs, model.outputs))
         free = np.concatenate([free, feedthrough], axis=2)

@@ -1,7 +1,8 @@
 """Weighted residuals of a mechanical model on measured lines, and their Jacobian.
 
 Residual of an output at a line:  r = w (Y - G U),  with  w = 1 / sqrt(noise variance + (floor |Y|)²),  so that E|r|² is
-about 1; for segments with a transient, less the best fit of the free response of the states at both ends.
+about 1; for segments with a transient, less the best fit of the free response of the states at both ends. Called by
+`mechanical_fit` and the searches for modes (`mechanical_order`, `modal_order`).
 """
 
 from collections.abc import Callable, Sequence
@@ -12,7 +13,12 @@ import numpy as np
 from equalizer.identification.frequency_response.frequency_response import BoolArray
 from equalizer.identification.frequency_response.noise_floor import smooth_over_lines
 from equalizer.identification.mechanical.mechanical_lines import SegmentLines, have_same_lines
-from equalizer.identification.mechanical.mechanical_response import PoleForm, free_response, pole_form, sample_response
+from equalizer.identification.mechanical.mechanical_response import (
+    PoleForm,
+    compute_free_response,
+    compute_pole_form,
+    compute_sampled_response,
+)
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import ComplexArray, FloatArray
@@ -21,7 +27,7 @@ LARGEST_SCATTER = 0.25
 """Upper limit of the scatter that counts as noise, relative to a channel's largest response near a line; heuristic.
 Where resonances shift with the level, segments differ more, and without a limit lines with most of the motion would get
 little weight."""
-_LINES = 9
+_SMOOTHED_LINES = 9
 """Number of lines over which scatter and response are averaged."""
 
 
@@ -38,54 +44,65 @@ def add_scatter_noise(segments: Sequence[SegmentLines]) -> tuple[SegmentLines, .
     )
 
 
-def _raise_noise(segment: SegmentLines, same_lines: Sequence[SegmentLines]) -> SegmentLines:
+def _raise_noise(segment: SegmentLines, same_line_segments: Sequence[SegmentLines]) -> SegmentLines:
+    """The segment with its noise raised to the scatter of the segments with the same lines; unchanged where they are no
+    more than the inputs."""
     m = segment.command.shape[1]
-    if len(same_lines) <= m:
+    if len(same_line_segments) <= m:
         return segment
-    sizes = [_command_size(segment_lines) for segment_lines in same_lines]
+    command_rms = [_compute_command_rms(segment_lines) for segment_lines in same_line_segments]
     response_powers = [
-        np.abs(segment_lines.response / size) ** 2 for segment_lines, size in zip(same_lines, sizes, strict=True)
+        np.abs(segment_lines.response / rms) ** 2
+        for segment_lines, rms in zip(same_line_segments, command_rms, strict=True)
     ]
-    largest = LARGEST_SCATTER**2 * smooth_over_lines(np.max(response_powers, axis=0), _LINES)
-    scatter = np.minimum(_scatter(same_lines, sizes), largest) * _command_size(segment) ** 2
+    largest_scatter = LARGEST_SCATTER**2 * smooth_over_lines(np.max(response_powers, axis=0), _SMOOTHED_LINES)
+    scatter = (
+        np.minimum(_estimate_scatter(same_line_segments, command_rms), largest_scatter)
+        * _compute_command_rms(segment) ** 2
+    )
     return replace(segment, noise=np.fmax(segment.noise, scatter))
 
 
-def _command_size(segment_lines: SegmentLines) -> float:
-    """Rms magnitude of the command over lines and inputs."""
+def _compute_command_rms(segment_lines: SegmentLines) -> float:
+    """Rms magnitude of the command over lines and inputs, above zero."""
     return max(float(np.sqrt(np.mean(np.abs(segment_lines.command) ** 2))), 1e-300)
 
 
-def _scatter(segments: Sequence[SegmentLines], sizes: Sequence[float]) -> FloatArray:
+def _estimate_scatter(segments: Sequence[SegmentLines], command_rms: Sequence[float]) -> FloatArray:
     """(lines, p): residual power of the best linear response at each line, per degree of freedom, for a command of rms
     magnitude 1. sizes: rms magnitude of each segment's command."""
     m = segments[0].command.shape[1]
-    driven = np.array([segment.excited / size for segment, size in zip(segments, sizes, strict=True)]).T[:, :, None]
-    command = np.stack([segment.command for segment in segments], axis=1) * driven
-    response = np.stack([segment.response for segment in segments], axis=1) * driven
+    excitation_scale = np.array([segment.excited / rms for segment, rms in zip(segments, command_rms, strict=True)]).T[
+        :, :, None
+    ]
+    command = np.stack([segment.command for segment in segments], axis=1) * excitation_scale
+    response = np.stack([segment.response for segment in segments], axis=1) * excitation_scale
     basis, triangle = np.linalg.qr(command)
-    strengths = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
-    has_full_rank = strengths.min(axis=1) > 1e-6 * strengths.max()
+    diagonal_magnitudes = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
+    has_full_rank = diagonal_magnitudes.min(axis=1) > 1e-6 * diagonal_magnitudes.max()
     explained_power = np.sum(np.abs(np.swapaxes(basis.conj(), 1, 2) @ response) ** 2, axis=1)
     residual_power = np.maximum(np.sum(np.abs(response) ** 2, axis=1) - explained_power, 0.0)
-    freedom = np.count_nonzero(driven[:, :, 0], axis=1) - m
-    usable = has_full_rank & (freedom > 0)
-    total = smooth_over_lines(np.where(usable[:, None], residual_power, 0.0), _LINES)
-    return np.asarray(total / np.maximum(smooth_over_lines(np.where(usable, freedom, 0.0)[:, None], _LINES), 1e-12))
+    degrees_of_freedom = np.count_nonzero(excitation_scale[:, :, 0], axis=1) - m
+    usable = has_full_rank & (degrees_of_freedom > 0)
+    smoothed_power = smooth_over_lines(np.where(usable[:, None], residual_power, 0.0), _SMOOTHED_LINES)
+    return np.asarray(
+        smoothed_power
+        / np.maximum(smooth_over_lines(np.where(usable, degrees_of_freedom, 0.0)[:, None], _SMOOTHED_LINES), 1e-12)
+    )
 
 
 HELD_OUT_EVERY = 4
-"""Every fourth line is held out for cross-validation of structures."""
+"""One line in this many is held out for cross-validation of structures."""
 _LARGEST_TRANSIENT = 1e120
 """Amplitude of a transient's spectrum above which it is not fitted, because squares in the fit would overflow."""
-_STEP = 1e-6
-"""Relative step of finite differences."""
+_RELATIVE_STEP = 1e-6
+"""Step of finite differences, relative to the unknown, or to 1 for an unknown below 1."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineGroup:
-    """Weighted spectra of segments with the same lines, compressed by QR: residual = target - root G, with E|.|² = 1
-    per uncompressed entry."""
+    """Weighted spectra of segments with the same lines, compressed by QR: residual = target - root G, with unit
+    expected power per uncompressed entry."""
 
     frequency_hz: FloatArray
     root: ComplexArray
@@ -102,17 +119,17 @@ class LineGroup:
     rate_hz: float
     hold: Hold
 
-    def without_held_out(self) -> "LineGroup":
+    def exclude_held_out(self) -> "LineGroup":
         """The lines that are fitted, without those held out for cross-validation."""
-        return self.of_lines(~self.held_out)
+        return self.select_lines(~self.held_out)
 
-    def thin_out(self, most_lines: int) -> "LineGroup":
-        """Keep at most `most_lines` lines: every second, third, ... line, with held-out lines chosen anew."""
+    def limit_lines(self, most_lines: int) -> "LineGroup":
+        """The group on at most `most_lines` lines: every second, third, ... line, with held-out lines chosen anew."""
         stride = -(-len(self.frequency_hz) // most_lines)
-        part = self.of_lines(np.arange(len(self.frequency_hz)) % stride == 0)
-        return replace(part, held_out=_every_fourth_line(len(part.frequency_hz)))
+        thinned_group = self.select_lines(np.arange(len(self.frequency_hz)) % stride == 0)
+        return replace(thinned_group, held_out=_select_held_out_lines(len(thinned_group.frequency_hz)))
 
-    def of_lines(self, chosen: BoolArray) -> "LineGroup":
+    def select_lines(self, chosen: BoolArray) -> "LineGroup":
         """The group on the lines where the mask `chosen` (lines,) is true."""
         return LineGroup(
             self.frequency_hz[chosen], self.root[chosen], self.target[chosen], self.weight[chosen],
@@ -120,43 +137,46 @@ class LineGroup:
         )  # fmt: skip
 
 
-def line_groups(segments: Sequence[SegmentLines], floor: float) -> tuple[LineGroup, ...]:
+def build_line_groups(segments: Sequence[SegmentLines], floor: float) -> tuple[LineGroup, ...]:
     """Weighted groups of the segments; periodic segments with the same lines are compressed into a common group. floor:
     expected error of a linear model, relative to the response's magnitude."""
     groups: list[LineGroup] = []
     for segment in add_scatter_noise(segments):
-        weight = _line_weights(segment, floor)
+        weight = _compute_line_weights(segment, floor)
         root = weight[:, :, None, None] * segment.command[:, None, None, :]
         target = (weight * segment.response)[:, :, None]
-        held_out = _every_fourth_line(len(segment.frequency_hz))
+        held_out = _select_held_out_lines(len(segment.frequency_hz))
         group = LineGroup(
             segment.frequency_hz, root, target, weight, held_out, np.count_nonzero(weight, axis=1).astype(float),
             segment.transient, segment.rate_hz, segment.hold,
         )  # fmt: skip
-        matching = [i for i, existing in enumerate(groups) if not group.transient and _can_be_folded(group, existing)]
+        matching = [i for i, existing in enumerate(groups) if not group.transient and _can_merge(group, existing)]
         if matching:
-            groups[matching[0]] = _fold_groups(groups[matching[0]], group)
+            groups[matching[0]] = _merge_groups(groups[matching[0]], group)
         else:
             groups.append(group)
     return tuple(groups)
 
 
-def misfits(groups: Sequence[LineGroup], model: MechanicalModel) -> list[ComplexArray]:
-    """Residuals of each group, (lines, p, rows), after transients were fitted to the lines that are not held out."""
-    form, residuals = pole_form(model), []
+def compute_misfits(groups: Sequence[LineGroup], model: MechanicalModel) -> list[ComplexArray]:
+    """Weighted residuals of each group, (lines, p, rows), after transients were fitted to the lines not held out.
+    Raises numpy.linalg.LinAlgError where the state matrix cannot be diagonalised."""
+    form, misfits = compute_pole_form(model), []
     for group in groups:
-        response = sample_response(model, group.frequency_hz, group.rate_hz, group.hold, form)
+        response = compute_sampled_response(model, group.frequency_hz, group.rate_hz, group.hold, form)
         misfit = group.target - (group.root @ response[..., None])[..., 0]
-        residuals.append(
-            _subtract_transient(group, transient_basis(group, model, form), misfit) if group.transient else misfit
+        misfits.append(
+            _subtract_transient(group, compute_transient_basis(group, model, form), misfit)
+            if group.transient
+            else misfit
         )
-    return residuals
+    return misfits
 
 
-def transient_basis(group: LineGroup, model: MechanicalModel, form: PoleForm) -> ComplexArray:
+def compute_transient_basis(group: LineGroup, model: MechanicalModel, form: PoleForm) -> ComplexArray:
     """Weighted spectra of the free response to each state, (lines, p, columns). form: pole-residue form of the
     model."""
-    free = free_response(model, group.frequency_hz, group.rate_hz, form)
+    free = compute_free_response(model, group.frequency_hz, group.rate_hz, form)
     if model.quantity == "acceleration":  # the last command before the segment acts directly on the first response
         feedthrough = np.broadcast_to(np.eye(model.outputs), (len(free), model.outputs, model.outputs))
         free = np.concatenate([free, feedthrough], axis=2)
@@ -164,40 +184,45 @@ def transient_basis(group: LineGroup, model: MechanicalModel, form: PoleForm) ->
 
 
 def stack_real(parts: Sequence[ComplexArray]) -> FloatArray:
-    """Real parts, then imaginary parts, of all arrays as a vector: its sum of squares is the sum of |.|²."""
+    """Real parts, then imaginary parts, of all arrays as a real vector; the sum of squares is preserved."""
     flat = np.concatenate([part.ravel() for part in parts])
     return np.concatenate([flat.real, flat.imag])
 
 
-def numerical_jacobian(
-    residuals: Callable[[FloatArray], FloatArray], unknowns: FloatArray, base_residuals: FloatArray, high: FloatArray
+def compute_numerical_jacobian(
+    residuals: Callable[[FloatArray], FloatArray],
+    unknowns: FloatArray,
+    base_residuals: FloatArray,
+    upper_bounds: FloatArray,
 ) -> FloatArray:
-    """Jacobian (len(here), unknowns) by forward differences, backward where a step would exceed the bound `high`.
+    """Jacobian (residuals, unknowns) by forward differences, backward where a step would exceed `upper_bounds`.
     base_residuals: residuals at `unknowns`."""
     columns = np.empty((len(base_residuals), len(unknowns)))
     for k in range(len(unknowns)):
-        step = _STEP * max(1.0, abs(unknowns[k]))
-        step = -step if unknowns[k] + step > high[k] else step
+        step = _RELATIVE_STEP * max(1.0, abs(unknowns[k]))
+        step = -step if unknowns[k] + step > upper_bounds[k] else step
         shifted = unknowns.copy()
         shifted[k] += step
         columns[:, k] = (residuals(shifted) - base_residuals) / step
     return columns
 
 
-def _line_weights(segment: SegmentLines, floor: float) -> FloatArray:
+def _compute_line_weights(segment: SegmentLines, floor: float) -> FloatArray:
     """(lines, p): 1 / sqrt(noise + floor² |response near the line|²), 0 at lines that are not excited."""
     power = np.abs(segment.response) ** 2
-    size = smooth_over_lines(power, 5)
+    smoothed_power = smooth_over_lines(power, 5)
     noise = np.where(np.isfinite(segment.noise), segment.noise, 0.0)
     floor_power = 1e-12 * power.max(axis=0, initial=0.0) + 1e-300
-    return np.asarray(segment.excited[:, None] / np.sqrt(noise + floor**2 * size + floor_power))
+    return np.asarray(segment.excited[:, None] / np.sqrt(noise + floor**2 * smoothed_power + floor_power))
 
 
-def _every_fourth_line(lines: int) -> BoolArray:
+def _select_held_out_lines(lines: int) -> BoolArray:
+    """(lines,): mask of the lines held out for cross-validation, one in `HELD_OUT_EVERY`."""
     return np.asarray(np.arange(lines) % HELD_OUT_EVERY == HELD_OUT_EVERY // 2)
 
 
-def _can_be_folded(group: LineGroup, existing: LineGroup) -> bool:
+def _can_merge(group: LineGroup, existing: LineGroup) -> bool:
+    """Whether the existing group has no transient, and the same rate, hold and lines."""
     return (
         not existing.transient
         and (group.rate_hz, group.hold) == (existing.rate_hz, existing.hold)
@@ -206,15 +231,16 @@ def _can_be_folded(group: LineGroup, existing: LineGroup) -> bool:
     )
 
 
-def _fold_groups(group: LineGroup, added: LineGroup) -> LineGroup:
-    """Append the rows of `added`; more than m + 1 rows are reduced by QR, which keeps the sum of squares for any G."""
-    root = np.concatenate([group.root, added.root], axis=2)
-    target = np.concatenate([group.target, added.target], axis=2)
+def _merge_groups(group: LineGroup, added_group: LineGroup) -> LineGroup:
+    """Append the rows of `added_group`; more than m + 1 rows are reduced by QR, which keeps the sum of squares for any
+    G."""
+    root = np.concatenate([group.root, added_group.root], axis=2)
+    target = np.concatenate([group.target, added_group.target], axis=2)
     if root.shape[2] > root.shape[3] + 1:  # m + 1 rows contain all information for the least squares
         triangle = np.asarray(np.linalg.qr(np.concatenate([root, target[..., None]], axis=3), mode="r"))
         root, target = triangle[..., :-1], triangle[..., -1]
     return LineGroup(
-        group.frequency_hz, root, target, group.weight, group.held_out, group.count + added.count,
+        group.frequency_hz, root, target, group.weight, group.held_out, group.count + added_group.count,
         group.transient, group.rate_hz, group.hold,
     )  # fmt: skip
 
@@ -225,7 +251,9 @@ def _subtract_transient(group: LineGroup, basis: ComplexArray, misfit: ComplexAr
         return misfit  # the search may try an unstable model, whose free response overflows
     is_fitted = ~group.held_out
     columns, target = basis[is_fitted].reshape(-1, basis.shape[2]), misfit[is_fitted].reshape(-1)
-    real = np.concatenate([columns.real, columns.imag])
-    scale = np.maximum(np.linalg.norm(real, axis=0), 1e-300)
-    coefficients = np.linalg.lstsq(real / scale, np.concatenate([target.real, target.imag]), rcond=1e-10)[0] / scale
+    real_columns = np.concatenate([columns.real, columns.imag])
+    scale = np.maximum(np.linalg.norm(real_columns, axis=0), 1e-300)
+    coefficients = (
+        np.linalg.lstsq(real_columns / scale, np.concatenate([target.real, target.imag]), rcond=1e-10)[0] / scale
+    )
     return np.asarray(misfit - (basis @ coefficients)[:, :, None])

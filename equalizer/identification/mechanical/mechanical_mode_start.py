@@ -3,7 +3,7 @@
 An oscillator with frequency w, damping ratio d and participation vector L adds, at the driven axes, the dynamic
 stiffness L L' s² (2 d w s + w²) / (s² + 2 d w s + w²). To first order the response changes in proportion to L L', so
 that for each w and d on the grid linear least squares gives the residual power that a further oscillator explains, with
-all present unknowns re-adjusted (their tangent space is projected out).
+all present unknowns re-adjusted (their tangent space is projected out). Called by `mechanical_order`.
 """
 
 from collections.abc import Sequence
@@ -11,10 +11,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equalizer.identification.mechanical.mechanical_misfit import LineGroup, misfits, numerical_jacobian, stack_real
+from equalizer.identification.mechanical.mechanical_misfit import (
+    LineGroup,
+    compute_misfits,
+    compute_numerical_jacobian,
+    stack_real,
+)
 from equalizer.identification.mechanical.mechanical_refinement import RefinedFit
-from equalizer.identification.mechanical.mechanical_response import sample_response, sensor_response
-from equalizer.identification.mechanical.mechanical_start import solve_scaled, symmetric_matrix, triangle_pairs
+from equalizer.identification.mechanical.mechanical_response import compute_sampled_response, compute_sensor_response
+from equalizer.identification.mechanical.mechanical_start import (
+    build_symmetric_matrix,
+    list_triangle_pairs,
+    solve_scaled,
+)
 from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel
 from equalizer.signals.signal import ComplexArray, FloatArray
@@ -24,8 +33,8 @@ _GRID_FREQUENCIES = 60
 _DAMPING_RATIOS = (0.01, 0.05, 0.25)
 """Damping ratios on the grid. Heuristic."""
 _INTENDED_ROWS = 6000
-"""Intended number of rows of the regression, over all groups; more are thinned out to between this and twice as
-many."""
+"""Intended number of rows of the regression over all groups; a larger number is reduced to one between this and twice
+this."""
 _LEAST_ROOT_MASS = 0.02
 """Least starting value of the root of the mode's mass over the mass scale, as the linear estimate may be zero or
 negative. Heuristic."""
@@ -45,33 +54,35 @@ def estimate_mode_starts(
 ) -> tuple[ModeStart, ...]:
     """Starting values of a further oscillator, at the `most_starts` frequencies that explain most, best first;
     frequencies differ by more than 10 % (0.1 in the natural logarithm)."""
-    thinned_groups = [_thin_group(group.without_held_out(), len(groups)) for group in groups]
-    model = current.structure.model(current.unknowns)
-    misfit = stack_real(misfits(thinned_groups, model))
-    tangent = _tangent_basis(thinned_groups, current, misfit)
+    thinned_groups = [_thin_group(group.exclude_held_out(), len(groups)) for group in groups]
+    model = current.structure.build_model(current.unknowns)
+    misfit = stack_real(compute_misfits(thinned_groups, model))
+    tangent = _compute_tangent_basis(thinned_groups, current, misfit)
     misfit = misfit - tangent @ (tangent.T @ misfit)
-    motions = [_model_motion(group, model, current.structure) for group in thinned_groups]
+    motions = [_compute_model_motion(group, model, current.structure) for group in thinned_groups]
     candidates = []
     for frequency_hz in np.geomspace(band_hz[0] / 1.5, band_hz[1] * 1.5, _GRID_FREQUENCIES):
         for damping_ratio in _DAMPING_RATIOS:
-            columns = _mode_columns(motions, current.structure, 2 * np.pi * frequency_hz, damping_ratio)
+            columns = _compute_mode_columns(motions, current.structure, 2 * np.pi * frequency_hz, damping_ratio)
             columns = columns - tangent @ (tangent.T @ columns)
             coefficients = solve_scaled(columns, misfit)
             # Fall of the residual sum of squares by the mode, to first order in its mass.
             explained_squares = float(misfit @ misfit - np.sum((misfit - columns @ coefficients) ** 2))
             candidates.append((explained_squares, float(frequency_hz), damping_ratio, coefficients))
-    chosen: list[tuple[float, float, float, FloatArray]] = []
+    chosen_candidates: list[tuple[float, float, float, FloatArray]] = []
     for candidate in sorted(candidates, key=lambda item: -item[0]):
-        if all(abs(np.log(candidate[1] / accepted[1])) > 0.1 for accepted in chosen):
-            chosen.append(candidate)
-    return tuple(_make_start(current, *candidate[1:]) for candidate in chosen[:most_starts])
+        if all(abs(np.log(candidate[1] / accepted[1])) > 0.1 for accepted in chosen_candidates):
+            chosen_candidates.append(candidate)
+    return tuple(_make_start(current, *candidate[1:]) for candidate in chosen_candidates[:most_starts])
 
 
-def _tangent_basis(groups: Sequence[LineGroup], current: RefinedFit[Structure], misfit: FloatArray) -> FloatArray:
+def _compute_tangent_basis(
+    groups: Sequence[LineGroup], current: RefinedFit[Structure], misfit: FloatArray
+) -> FloatArray:
     """(rows, parameters): orthonormal basis of the changes of the residuals by the present unknowns, to first order."""
     upper_bounds = np.full(current.structure.parameters, np.inf)
-    jacobian = numerical_jacobian(
-        lambda unknowns: stack_real(misfits(groups, current.structure.model(unknowns))),
+    jacobian = compute_numerical_jacobian(
+        lambda unknowns: stack_real(compute_misfits(groups, current.structure.build_model(unknowns))),
         current.unknowns,
         misfit,
         upper_bounds,
@@ -79,13 +90,13 @@ def _tangent_basis(groups: Sequence[LineGroup], current: RefinedFit[Structure], 
     return np.asarray(np.linalg.qr(jacobian / np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300))[0])
 
 
-def _thin_group(group: LineGroup, groups: int) -> LineGroup:
-    """The group on every k-th line, with k such that groups of this size have fewer than twice `_INTENDED_ROWS` rows
-    together. groups: their number."""
+def _thin_group(group: LineGroup, group_count: int) -> LineGroup:
+    """The group on every k-th line, with k such that `group_count` groups of this size have fewer than twice
+    `_INTENDED_ROWS` rows together."""
     rows = 2 * group.target[0].size * len(group.frequency_hz)
-    chosen = np.zeros(len(group.frequency_hz), dtype=bool)
-    chosen[:: max(1, rows * groups // _INTENDED_ROWS)] = True
-    return group.of_lines(chosen)
+    is_chosen = np.zeros(len(group.frequency_hz), dtype=bool)
+    is_chosen[:: max(1, rows * group_count // _INTENDED_ROWS)] = True
+    return group.select_lines(is_chosen)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,20 +115,20 @@ class _ModelMotion:
     """(lines, m, m): positions of the driven axes per unit command."""
 
 
-def _model_motion(group: LineGroup, model: MechanicalModel, structure: Structure) -> _ModelMotion:
+def _compute_model_motion(group: LineGroup, model: MechanicalModel, structure: Structure) -> _ModelMotion:
     """Response and axis motion of the model at the lines of a group."""
     order = DERIVATIVE_OF_QUANTITY[structure.quantity]
     s = np.asarray(2j * np.pi * group.frequency_hz, dtype=np.complex128)
     z = np.exp(s / group.rate_hz)
-    response = sample_response(model, group.frequency_hz, group.rate_hz, group.hold)
+    response = compute_sampled_response(model, group.frequency_hz, group.rate_hz, group.hold)
     # A held force appears in an acceleration one sample later, in velocity and position half a sample later.
     delay_samples = (1.0 if order == 2 else 0.5) if group.hold.value == "zero-order" else 0.0
-    sensor = sensor_response(model.sensor.bandwidth_hz, z, group.rate_hz) * z ** (-delay_samples) * s**order
+    sensor = compute_sensor_response(model.sensor.bandwidth_hz, z, group.rate_hz) * z ** (-delay_samples) * s**order
     axis_motion = response[:, : structure.inputs] * np.array(structure.signs)[:, None] / sensor[:, None, None]
     return _ModelMotion(group, s, response, sensor, axis_motion)
 
 
-def _mode_columns(
+def _compute_mode_columns(
     motions: Sequence[_ModelMotion], structure: Structure, natural_rad_s: float, damping_ratio: float
 ) -> FloatArray:
     """Change of the weighted modelled response, (rows, columns): first per entry of L Lᵀ (lower triangle), then per
@@ -133,7 +144,7 @@ def _mode_columns(
             + (0 if row == column else 1)
             * -dynamic_stiffness[:, None, None]
             * np.einsum("lp,lm->lpm", response[:, :, column], axis_motion[:, row])
-            for row, column in triangle_pairs(inputs)
+            for row, column in list_triangle_pairs(inputs)
         ]
         for output in range(0 if structure.shared else inputs, outputs):
             for axis in range(inputs):
@@ -142,20 +153,24 @@ def _mode_columns(
                 changes.append(change)
         columns = [-np.einsum("lpem,lpm->lpe", motion.group.root, change) for change in changes]
         group_columns.append(columns)
-    flat = [stack_real([part[k] for part in group_columns]) for k in range(len(group_columns[0]))]
-    return -np.stack(flat, axis=1)
+    stacked_columns = [
+        stack_real([columns_of_group[k] for columns_of_group in group_columns]) for k in range(len(group_columns[0]))
+    ]
+    return -np.stack(stacked_columns, axis=1)
 
 
 def _make_start(
     current: RefinedFit[Structure], frequency_hz: float, damping_ratio: float, coefficients: FloatArray
 ) -> ModeStart:
+    """Starting values of the structure with a further oscillator. frequency_hz, damping_ratio: of the oscillator;
+    coefficients: of the columns of `_compute_mode_columns`."""
     structure, inputs = current.structure, current.structure.inputs
     extended = replace(structure, modes=structure.modes + 1)
-    unknowns = structure.transfer_unknowns(current.unknowns, extended)
-    entries = inputs * (inputs + 1) // 2
+    unknowns = structure.convert_unknowns(current.unknowns, extended)
+    pair_count = inputs * (inputs + 1) // 2
     mass_matrix, sensor_rows = (
-        symmetric_matrix(coefficients[:entries], inputs),
-        coefficients[entries:].reshape(-1, inputs),
+        build_symmetric_matrix(coefficients[:pair_count], inputs),
+        coefficients[pair_count:].reshape(-1, inputs),
     )
     root_mass = np.sqrt(structure.mass_scale)
     # A mode has a single participation vector: the dominant direction of the estimated matrices, to which further

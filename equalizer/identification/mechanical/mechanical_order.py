@@ -2,7 +2,8 @@
 
 Forward selection: from the driven axes alone, the first larger structure is adopted that lowers the squared error on
 held-out lines (every fourth line) enough, see `improves_enough`. Candidates are a further mode, sensors that measure
-the modes' motion too, a delay, and a rotated sensor. The band is widened in stages. Thresholds are heuristic.
+the modes' motion too, a delay, and a rotated sensor. The band is widened in stages. Thresholds are heuristic. Called by
+`mechanical_fit`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -20,16 +21,16 @@ LEAST_GAIN = 0.08
 """Smallest relative fall of the cross-validated squared error for which a larger structure is adopted; it limits the
 order where no linear model fits the device."""
 GAIN_PER_UNKNOWN = 4.0
-"""Smallest fall of the squared error per additional unknown, in units of that expected from noise alone."""
+"""Smallest fall of the squared error per additional unknown, in units of the fall expected from noise alone."""
 TARGET_ERROR = 1.1
 """Cross-validated rms error, in units of noise and floor (1: all that can be explained), below which growth ends."""
-FIRST_STAGE, LEAST_STAGE, STAGE_RATIO = 6.0, 0.05, 1.5
-"""FIRST_STAGE times the band's lower end, but at least LEAST_STAGE of its upper end, is the upper end of the first
-stage; STAGE_RATIO is the largest ratio of the upper ends of consecutive stages."""
+FIRST_STAGE_RATIO, LEAST_FIRST_STAGE_SHARE, STAGE_RATIO = 6.0, 0.05, 1.5
+"""Upper end of the first stage, relative to the band's lower end; its least value, relative to the band's upper end;
+and the largest ratio of the upper ends of consecutive stages."""
 DELAY_RATIO = 4.0
 """Ratio by which additional unknowns of the rigid body (a delay) must reduce the cross-validated squared error."""
 SIMPLER_RATIO = 1.02
-"""Largest ratio of the cross-validated squared errors without and with springs to the ground, for omitting these."""
+"""Springs to the ground are omitted up to this ratio of the cross-validated squared errors without and with them."""
 JOINT_FREE_SHARE = 0.5
 """Upper end of the band in which a model without the joint is fitted first, relative to that of the whole band."""
 TARGET_REACHED = (
@@ -38,7 +39,7 @@ TARGET_REACHED = (
 )
 """Reason for the end of growth where the error on held-out lines is below `TARGET_ERROR`."""
 JOINT_START_RATIOS = (1.1, 1.6)
-"""Starting frequencies of the joint's resonance, times the band's upper end."""
+"""Starting frequencies of the joint's resonance, relative to the band's upper end."""
 
 
 def grow_by_stages(
@@ -50,48 +51,55 @@ def grow_by_stages(
     extend_couplings: bool = True,
 ) -> tuple[RefinedFit[Structure], tuple[OrderCandidate, ...], str]:
     """Grow a structure while the band is widened upwards, so that lower modes are fitted before higher ones. Returns
-    the fit, all structures tried, and the reason for the end. extend_couplings: at the full band, a structure with
-    several inputs may also get a delay, a sensor rotation and shared sensors."""
+    the fit, all structures tried, and the reason for the end. extend_couplings: whether, in the last stage, a structure
+    with several inputs may also get a delay, a sensor rotation and shared sensors."""
     trials = [_record_trial("the driven axes alone", best, best.structure, True)]
-    ends = compute_stage_ends(band_hz)
-    for stage, end in enumerate(ends):
-        on_progress(0.9 * stage / len(ends))
-        band = (band_hz[0], end)
-        lower = [part for group in groups if len((part := group.of_lines(group.frequency_hz <= end)).frequency_hz)]
-        best = refine_unknowns(lower, best.structure, best.unknowns, band)
+    upper_ends_hz = compute_stage_ends(band_hz)
+    for stage, upper_hz in enumerate(upper_ends_hz):
+        on_progress(0.9 * stage / len(upper_ends_hz))
+        stage_band_hz = (band_hz[0], upper_hz)
+        lower_groups = [
+            part for group in groups if len((part := group.select_lines(group.frequency_hz <= upper_hz)).frequency_hz)
+        ]
+        best = refine_unknowns(lower_groups, best.structure, best.unknowns, stage_band_hz)
         if stage == 0 and best.structure.grounded:
-            best = _try_without_ground(lower, best, band, trials)
-        is_last = stage == len(ends) - 1
+            best = _try_without_ground(lower_groups, best, stage_band_hz, trials)
+        is_last = stage == len(upper_ends_hz) - 1
         best, reason = _grow_structure(
-            lower, best, band, _Limits(settings.most_modes, settings.fit_delay, extend_couplings and is_last), trials
+            lower_groups,
+            best,
+            stage_band_hz,
+            _Limits(settings.most_modes, settings.fit_delay, extend_couplings and is_last),
+            trials,
         )
     return best, tuple(trials), reason
 
 
 @dataclass(frozen=True, slots=True)
 class _Limits:
-    """Limits of the extensions that `_fit_extensions` may try. whole_band: the band is not widened further."""
+    """Limits of the extensions that `_fit_extensions` may try."""
 
     most_modes: int
     fit_delay: bool
-    whole_band: bool
+    extend_couplings: bool
+    """Whether a structure with several inputs may get a delay, a sensor rotation and shared sensors."""
 
 
 def compute_stage_ends(band_hz: tuple[float, float]) -> tuple[float, ...]:
     """Compute the upper ends (Hz) of the growing band, in equal ratios of at most `STAGE_RATIO`; the last is that of
     the band."""
-    low, high = band_hz
-    first_end = min(high, max(low * FIRST_STAGE, high * LEAST_STAGE))
-    count = int(np.ceil(np.log(high / first_end) / np.log(STAGE_RATIO))) + 1
-    return tuple(float(end) for end in np.geomspace(first_end, high, count))
+    lowest_hz, highest_hz = band_hz
+    first_end_hz = min(highest_hz, max(lowest_hz * FIRST_STAGE_RATIO, highest_hz * LEAST_FIRST_STAGE_SHARE))
+    count = int(np.ceil(np.log(highest_hz / first_end_hz) / np.log(STAGE_RATIO))) + 1
+    return tuple(float(end) for end in np.geomspace(first_end_hz, highest_hz, count))
 
 
 def _try_without_ground(
     groups: Sequence[LineGroup], best: RefinedFit[Structure], band_hz: tuple[float, float], trials: list[OrderCandidate]
 ) -> RefinedFit[Structure]:
-    """The fit without springs to the ground where the error hardly rises (`SIMPLER_RATIO`), else `best`."""
+    """The fit without springs to the ground if the error rises by `SIMPLER_RATIO` at most, else `best`."""
     structure = replace(best.structure, grounded=False)
-    ungrounded = refine_unknowns(groups, structure, best.structure.transfer_unknowns(best.unknowns, structure), band_hz)
+    ungrounded = refine_unknowns(groups, structure, best.structure.convert_unknowns(best.unknowns, structure), band_hz)
     is_simpler = ungrounded.held_out_squares <= SIMPLER_RATIO * best.held_out_squares
     trials.append(_record_trial("without springs to the ground", ungrounded, structure, is_simpler))
     return ungrounded if is_simpler else best
@@ -104,8 +112,8 @@ def _grow_structure(
     limits: "_Limits",
     trials: list[OrderCandidate],
 ) -> tuple[RefinedFit[Structure], str]:
-    """Adopt larger structures while they improve the fit enough in this band. Returns the fit and the reason for the
-    end."""
+    """Adopt larger structures while they improve the fit enough in this band, and record all trials in `trials`.
+    Returns the fit and the reason for the end."""
     while best.error >= TARGET_ERROR:
         for description, extended_fit in _fit_extensions(groups, best, band_hz, limits):
             is_accepted = improves_enough(best, extended_fit)
@@ -134,14 +142,14 @@ def grow_across_joint(
     settings: MechanicalFitSettings,
     on_progress: Callable[[float], None],
 ) -> tuple[RefinedFit[Structure], tuple[OrderCandidate, ...], str]:
-    """Grow a structure with an elastic joint. Oscillators are first found without the joint in the lower half of the
-    band, where it has little effect. Returns the fit, all structures tried, and the reason for the end."""
-    half_band_hz = max(JOINT_FREE_SHARE * band_hz[1], compute_stage_ends(band_hz)[0])
+    """Grow a structure with an elastic joint. Oscillators are first fitted without the joint in the lower part of the
+    band (`JOINT_FREE_SHARE`), where it has little effect. Returns as `grow_by_stages`."""
+    joint_free_hz = max(JOINT_FREE_SHARE * band_hz[1], compute_stage_ends(band_hz)[0])
     low_groups = [
-        part for group in groups if len((part := group.of_lines(group.frequency_hz <= half_band_hz)).frequency_hz)
+        part for group in groups if len((part := group.select_lines(group.frequency_hz <= joint_free_hz)).frequency_hz)
     ]
     without_joint, stage_trials, _ = grow_by_stages(
-        low_groups, best, (band_hz[0], half_band_hz), settings, lambda s: on_progress(0.5 * s), extend_couplings=False
+        low_groups, best, (band_hz[0], joint_free_hz), settings, lambda s: on_progress(0.5 * s), extend_couplings=False
     )
     structure = replace(without_joint.structure, joint=True)
     trials = list(stage_trials)
@@ -149,7 +157,7 @@ def grow_across_joint(
     for number, start_ratio in enumerate(JOINT_START_RATIOS):
         start = start_joint(
             structure,
-            without_joint.structure.transfer_unknowns(without_joint.unknowns, structure),
+            without_joint.structure.convert_unknowns(without_joint.unknowns, structure),
             start_ratio * band_hz[1],
         )
         fits.append(refine_unknowns(groups, structure, start, band_hz))
@@ -157,20 +165,24 @@ def grow_across_joint(
         trials.append(
             _record_trial(f"with a joint begun at {start_ratio * band_hz[1]:.3g} Hz", fits[-1], structure, True)
         )
-    with_joint = _drop_spare_modes(groups, min(fits, key=lambda fit: fit.held_out_squares), band_hz, trials)
+    with_joint = _remove_superfluous_modes(groups, min(fits, key=lambda fit: fit.held_out_squares), band_hz, trials)
     final, reason = _grow_structure(
-        groups, with_joint, band_hz, _Limits(settings.most_modes, fit_delay=False, whole_band=False), trials
+        groups,
+        with_joint,
+        band_hz,
+        _Limits(settings.most_modes, fit_delay=False, extend_couplings=False),
+        trials,
     )
     return final, tuple(trials), reason
 
 
-def _drop_spare_modes(
+def _remove_superfluous_modes(
     groups: Sequence[LineGroup],
     current: RefinedFit[Structure],
     band_hz: tuple[float, float],
     trials: list[OrderCandidate],
 ) -> RefinedFit[Structure]:
-    """Remove oscillators that became superfluous with the joint, the last first."""
+    """Remove, the last first, oscillators without which the fit with the joint is hardly worse."""
     for mode in reversed(range(current.structure.modes)):
         smaller, unknowns = remove_mode(current.structure, current.unknowns, mode)
         fit = refine_unknowns(groups, smaller, unknowns, band_hz)
@@ -211,7 +223,7 @@ def _fit_extensions(
         description = f"with a mode begun at {start.frequency_hz:.3g} Hz ({start.structure.modes} in all)"
         yield description, refine_unknowns(groups, start.structure, start.unknowns, band_hz)
     # Couplings between axes are identifiable only once all modes are included.
-    if structure.inputs > 1 and not limits.whole_band:
+    if structure.inputs > 1 and not limits.extend_couplings:
         return
     extensions: list[tuple[str, Structure]] = []
     if structure.modes and not structure.shared:
@@ -223,14 +235,15 @@ def _fit_extensions(
     for description, extended in extensions:
         yield (
             description,
-            refine_unknowns(groups, extended, structure.transfer_unknowns(current.unknowns, extended), band_hz),
+            refine_unknowns(groups, extended, structure.convert_unknowns(current.unknowns, extended), band_hz),
         )
     for start in () if structure.shared else starts[:1]:
         extended = replace(start.structure, shared=True)
-        unknowns = start.structure.transfer_unknowns(start.unknowns, extended)
+        unknowns = start.structure.convert_unknowns(start.unknowns, extended)
         description = f"with a mode begun at {start.frequency_hz:.3g} Hz that the sensors see ({extended.modes} in all)"
         yield description, refine_unknowns(groups, extended, unknowns, band_hz)
 
 
 def _record_trial(description: str, fit: RefinedFit[Structure], structure: Structure, accepted: bool) -> OrderCandidate:
+    """The trial as an entry of the result. accepted: whether the structure was adopted."""
     return OrderCandidate(description, structure.coordinates, structure.parameters, fit.error, accepted)

@@ -11,7 +11,12 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from equalizer.identification.mechanical.mechanical_misfit import LineGroup, misfits, numerical_jacobian, stack_real
+from equalizer.identification.mechanical.mechanical_misfit import (
+    LineGroup,
+    compute_misfits,
+    compute_numerical_jacobian,
+    stack_real,
+)
 from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.identification.mechanical.modal_structure import ModalStructure
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
@@ -53,15 +58,15 @@ def refine_unknowns(
     # Imported here: a diagnosis that fits no model does not need SciPy's optimiser.
     from scipy.optimize import least_squares
 
-    fitted = [group.without_held_out() for group in groups]
-    low, high = structure.bounds(band_hz)
+    fitted = [group.exclude_held_out() for group in groups]
+    low, high = structure.compute_bounds(band_hz)
 
     start = np.clip(start, low + 1e-9, high - 1e-9)
-    start_residuals = stack_real(misfits(fitted, structure.model(start)))
+    start_residuals = stack_real(compute_misfits(fitted, structure.build_model(start)))
 
     def residuals(unknowns: FloatArray) -> FloatArray:
         try:
-            stacked = stack_real(misfits(fitted, structure.model(unknowns)))
+            stacked = stack_real(compute_misfits(fitted, structure.build_model(unknowns)))
         except (np.linalg.LinAlgError, MechanicalModelError):
             return np.full_like(start_residuals, 1e6)  # large, so that the step to an invalid model is rejected
         return stacked if np.isfinite(stacked).all() else np.full_like(start_residuals, 1e6)
@@ -69,7 +74,7 @@ def refine_unknowns(
     solution = least_squares(
         residuals,
         start,
-        jac=lambda unknowns: numerical_jacobian(residuals, unknowns, residuals(unknowns), high),
+        jac=lambda unknowns: compute_numerical_jacobian(residuals, unknowns, residuals(unknowns), high),
         bounds=(low, high),
         method="trf",
         x_scale="jac",
@@ -77,12 +82,12 @@ def refine_unknowns(
         ftol=1e-6,
         xtol=1e-7,
     )
-    held_out, count = _held_out_squares(groups, structure.model(solution.x))
+    held_out, count = _held_out_squares(groups, structure.build_model(solution.x))
     return RefinedFit(structure, solution.x, 2 * float(solution.cost), held_out, count, solution.jac)
 
 
 def _held_out_squares(groups: Sequence[LineGroup], model: MechanicalModel) -> tuple[float, int]:
     """Sum of squares of the held-out lines' misfits, and number of misfits in it."""
-    pairs = list(zip(groups, misfits(groups, model), strict=True))
+    pairs = list(zip(groups, compute_misfits(groups, model), strict=True))
     squares = sum(np.sum(np.abs(misfit[group.held_out]) ** 2) for group, misfit in pairs)
     return float(squares), int(sum(group.count[group.held_out].sum() for group in groups))

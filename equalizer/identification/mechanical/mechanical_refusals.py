@@ -12,7 +12,7 @@ from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.identification.mechanical.modal_structure import ModalStructure
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.recording import Recording
-from equalizer.signals.recording_checks import channels_text, unusable_channels
+from equalizer.signals.recording_checks import find_unusable_channels, format_channels
 from equalizer.signals.signal import FloatArray
 
 LEAST_SAMPLES = 64
@@ -32,8 +32,8 @@ def refuse_unsuitable(recordings: Sequence[Recording]) -> None:
         for property_name, expected, actual in (
             ("sample rate", first.sample_rate_hz, recording.sample_rate_hz),
             ("hold", first.hold.value, recording.hold.value),
-            ("command", channels_text(first.command), channels_text(recording.command)),
-            ("response", channels_text(first.response), channels_text(recording.response)),
+            ("command", format_channels(first.command), format_channels(recording.command)),
+            ("response", format_channels(first.response), format_channels(recording.response)),
         ):
             if expected != actual:
                 raise MechanicalFitRefused(
@@ -58,7 +58,7 @@ def _refuse_samples(recordings: Sequence[Recording]) -> None:
     if (longest := max(len(recording) for recording in recordings)) < LEAST_SAMPLES:
         raise MechanicalFitRefused(f"{longest} samples are too short a recording; at least {LEAST_SAMPLES} are needed")
     for side in ("command", "response"):
-        for name, empty in unusable_channels([getattr(recording, side) for recording in recordings]):
+        for name, empty in find_unusable_channels([getattr(recording, side) for recording in recordings]):
             if empty:
                 raise MechanicalFitRefused(
                     f"{side} {name} contains only missing values; leave it out, or import it again"
@@ -83,9 +83,9 @@ def refuse_noise(error: FloatArray, channels: tuple[str, ...]) -> None:
 def refuse_unstable(final: RefinedFit[Structure] | RefinedFit[ModalStructure]) -> None:
     """Raises MechanicalFitRefused for a fit with a pole whose real part (1/s) exceeds a thousandth of the speed scale,
     which allows for rounding of poles at zero."""
-    from equalizer.identification.mechanical.mechanical_response import pole_form
+    from equalizer.identification.mechanical.mechanical_response import compute_pole_form
 
-    form = pole_form(final.structure.model(final.unknowns))
+    form = compute_pole_form(final.structure.build_model(final.unknowns))
     fastest = float(form.poles.real.max())
     if fastest > 1e-3 * final.structure.speed_scale:
         raise MechanicalFitRefused(

@@ -22,10 +22,10 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalM
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-_SMALL = 1e-9
-"""Magnitude of a pole times the step below which the pole counts as an integrator."""
-_FASTEST_GROWTH = 200.0
-"""Upper limit of the real part of a pole times the step: e to this power is still a finite number."""
+_LARGEST_INTEGRATOR_STEP = 1e-9
+"""Magnitude of a pole times the sample period below which the pole counts as an integrator (numerically zero)."""
+_LARGEST_GROWTH_EXPONENT = 200.0
+"""Upper limit of the real part of a pole times the sample period; its exponential is still a finite number."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,8 +45,9 @@ class PoleForm:
     """(states, states): modal amplitude of each pole (row) for a unit initial value of each state (column)."""
 
 
-def pole_form(model: MechanicalModel) -> PoleForm:
-    """Pole-residue form of a model. Raises numpy.linalg.LinAlgError where its state matrix cannot be diagonalised."""
+def compute_pole_form(model: MechanicalModel) -> PoleForm:
+    """Pole-residue form of a model, by diagonalisation of its state matrix. Raises numpy.linalg.LinAlgError where its
+    state matrix cannot be diagonalised."""
     n, m = model.coordinates, model.inputs
     weights = np.linalg.solve(model.mass, np.concatenate([model.stiffness, model.damping, model.input], axis=1))
     A = np.zeros((2 * n, 2 * n))
@@ -63,19 +64,19 @@ def pole_form(model: MechanicalModel) -> PoleForm:
     return PoleForm(poles.astype(complex), C @ vectors, inverse @ B, direct, inverse.astype(complex))
 
 
-def sample_response(
+def compute_sampled_response(
     model: MechanicalModel, frequency_hz: FloatArray, rate_hz: float, hold: Hold, form: PoleForm | None = None
 ) -> ComplexArray:
-    """Frequency response (lines, p, m), with sensor and delay, of commands that are held as `hold` says. frequency_hz:
+    """Frequency response (lines, p, m), with sensor and delay, of commands reconstructed by `hold`. frequency_hz:
     (lines,), above zero. form: the model's, if known."""
-    form = form or pole_form(model)
+    form = form or compute_pole_form(model)
     z = np.exp(2j * np.pi * np.asarray(frequency_hz) / rate_hz)
-    pole_terms, direct = pole_responses(form.poles, z, rate_hz, hold, model.actuator.delay_s)
+    pole_terms, direct = compute_pole_responses(form.poles, z, rate_hz, hold, model.actuator.delay_s)
     response = _sum_poles(pole_terms, form.outputs, form.inputs) + direct[:, None, None] * form.direct
-    return np.asarray(response * sensor_response(model.sensor.bandwidth_hz, z, rate_hz)[:, None, None])
+    return np.asarray(response * compute_sensor_response(model.sensor.bandwidth_hz, z, rate_hz)[:, None, None])
 
 
-def free_response(
+def compute_free_response(
     model: MechanicalModel, frequency_hz: FloatArray, rate_hz: float, form: PoleForm | None = None
 ) -> ComplexArray:
     """Spectra (lines, p, states) of the free response to each state, per difference between the state's values at the
@@ -83,13 +84,13 @@ def free_response(
 
     The spectrum of a segment is the response to its commands plus a real combination of these (transient, or leakage).
     """
-    form = form or pole_form(model)
+    form = form or compute_pole_form(model)
     z = np.exp(2j * np.pi * np.asarray(frequency_hz) / rate_hz)
     # A fit may try an unstable model: the growth per sample is limited, so that its response stays finite.
-    growth = np.minimum(form.poles.real / rate_hz, _FASTEST_GROWTH) + 1j * form.poles.imag / rate_hz
-    decays = z[:, None] / (z[:, None] - np.exp(growth))
-    spectra = _sum_poles(decays, form.outputs, form.states)
-    return np.asarray(spectra * sensor_response(model.sensor.bandwidth_hz, z, rate_hz)[:, None, None])
+    exponents = np.minimum(form.poles.real / rate_hz, _LARGEST_GROWTH_EXPONENT) + 1j * form.poles.imag / rate_hz
+    pole_terms = z[:, None] / (z[:, None] - np.exp(exponents))
+    spectra = _sum_poles(pole_terms, form.outputs, form.states)
+    return np.asarray(spectra * compute_sensor_response(model.sensor.bandwidth_hz, z, rate_hz)[:, None, None])
 
 
 def _sum_poles(pole_terms: ComplexArray, outputs: ComplexArray, inputs: ComplexArray) -> ComplexArray:
@@ -100,7 +101,7 @@ def _sum_poles(pole_terms: ComplexArray, outputs: ComplexArray, inputs: ComplexA
     return np.asarray(products.reshape(len(pole_terms), *residues.shape[1:]))
 
 
-def sensor_response(bandwidth_hz: float, z: ComplexArray, rate_hz: float) -> ComplexArray:
+def compute_sensor_response(bandwidth_hz: float, z: ComplexArray, rate_hz: float) -> ComplexArray:
     """(lines,): response of the sensor's first-order low-pass y += (1 - exp(-2 pi f / rate)) (x - y), f its bandwidth;
     1 where the bandwidth is 0, which means no low-pass."""
     if not bandwidth_hz:
@@ -110,51 +111,53 @@ def sensor_response(bandwidth_hz: float, z: ComplexArray, rate_hz: float) -> Com
 
 
 def _append_input_lag(
-    A: FloatArray, B: FloatArray, C: FloatArray, direct: FloatArray, rate: float
+    A: FloatArray, B: FloatArray, C: FloatArray, direct: FloatArray, lag_rate: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """State-space matrices A, B, C and D with a first-order lag in front of each input: u' = rate (command - u), rate
     in 1/s."""
     n, m = B.shape
-    lagged = np.block([[A, B], [np.zeros((m, n)), -rate * np.eye(m)]])
-    driven = np.concatenate([np.zeros((n, m)), rate * np.eye(m)])
-    return lagged, driven, np.concatenate([C, direct], axis=1), np.zeros_like(direct)
+    lagged_A = np.block([[A, B], [np.zeros((m, n)), -lag_rate * np.eye(m)]])
+    lagged_B = np.concatenate([np.zeros((n, m)), lag_rate * np.eye(m)])
+    return lagged_A, lagged_B, np.concatenate([C, direct], axis=1), np.zeros_like(direct)
 
 
-def pole_responses(
+def compute_pole_responses(
     poles: ComplexArray, z: ComplexArray, rate_hz: float, hold: Hold, delay_s: float
 ) -> tuple[ComplexArray, ComplexArray]:
     """Response to a held command of each pole, (lines, poles), and of the direct feedthrough, (lines,), by the formulas
     of the module docstring. z: (lines,), on the unit circle, none equal to 1."""
-    step, column = 1 / rate_hz, z[:, None]
+    step_s, z_column = 1 / rate_hz, z[:, None]
     # A fit may try an unstable model: the growth per sample is limited, so that its response stays finite.
-    poles = np.minimum(poles.real, _FASTEST_GROWTH * rate_hz) + 1j * poles.imag
+    poles = np.minimum(poles.real, _LARGEST_GROWTH_EXPONENT * rate_hz) + 1j * poles.imag
     if hold is Hold.ZERO_ORDER:
         whole_steps = np.floor(delay_s * rate_hz + 1e-9)
-        delay_rest = max(delay_s - whole_steps * step, 0.0)
-        step_rest = step - delay_rest
-        first = _integrate_exponential(poles, step_rest)
-        second = np.exp(poles * step_rest) * _integrate_exponential(poles, delay_rest)
-        factor = column ** (-whole_steps)
-        return factor * (first + second / column) / (column - np.exp(poles * step)), z ** (-whole_steps - 1)
-    delayed = np.exp(-np.log(z) * delay_s * rate_hz)
+        fractional_delay_s = max(delay_s - whole_steps * step_s, 0.0)
+        remaining_step_s = step_s - fractional_delay_s
+        new_part = _integrate_exponential(poles, remaining_step_s)
+        old_part = np.exp(poles * remaining_step_s) * _integrate_exponential(poles, fractional_delay_s)
+        shift = z_column ** (-whole_steps)
+        return shift * (new_part + old_part / z_column) / (z_column - np.exp(poles * step_s)), z ** (-whole_steps - 1)
+    delay_phase = np.exp(-np.log(z) * delay_s * rate_hz)
     if hold is Hold.LINEAR:
-        ramp = _integrate_ramp(poles, step)
-        factor = column - np.exp(poles * step)
-        return delayed[:, None] * (_integrate_exponential(poles, step) + ramp * (column - 1)) / factor, delayed
-    return delayed[:, None] / (np.log(column) * rate_hz - poles), delayed
+        ramp_terms = _integrate_ramp(poles, step_s)
+        denominator = z_column - np.exp(poles * step_s)
+        return delay_phase[:, None] * (
+            _integrate_exponential(poles, step_s) + ramp_terms * (z_column - 1)
+        ) / denominator, delay_phase
+    return delay_phase[:, None] / (np.log(z_column) * rate_hz - poles), delay_phase
 
 
-def _integrate_exponential(poles: ComplexArray, seconds: float) -> ComplexArray:
-    """(poles,): integral of e^(p t) over 0 < t < seconds."""
-    small = np.abs(poles) * seconds < _SMALL
-    safe = np.where(small, 1.0, poles)
-    return np.asarray(np.where(small, seconds, np.expm1(safe * seconds) / safe))
+def _integrate_exponential(poles: ComplexArray, duration_s: float) -> ComplexArray:
+    """(poles,): integral of e^(p t) over 0 < t < duration_s."""
+    is_small = np.abs(poles) * duration_s < _LARGEST_INTEGRATOR_STEP
+    safe_poles = np.where(is_small, 1.0, poles)
+    return np.asarray(np.where(is_small, duration_s, np.expm1(safe_poles * duration_s) / safe_poles))
 
 
-def _integrate_ramp(poles: ComplexArray, step: float) -> ComplexArray:
-    """(poles,): state after a step in which the command rises linearly from 0 to 1. For a small |p| T, where the exact
-    form would lose its digits, a Taylor series."""
-    small = np.abs(poles) * step < 1e-4
-    safe = np.where(small, 1.0, poles)
-    exact = (np.expm1(safe * step) - safe * step) / (safe**2 * step)
-    return np.asarray(np.where(small, step / 2 + poles * step**2 / 6, exact))
+def _integrate_ramp(poles: ComplexArray, step_s: float) -> ComplexArray:
+    """(poles,): state after a sample period in which the command rises linearly from 0 to 1. For a small |p| T, where
+    the exact form loses digits by cancellation, a Taylor series."""
+    is_small = np.abs(poles) * step_s < 1e-4
+    safe_poles = np.where(is_small, 1.0, poles)
+    exact = (np.expm1(safe_poles * step_s) - safe_poles * step_s) / (safe_poles**2 * step_s)
+    return np.asarray(np.where(is_small, step_s / 2 + poles * step_s**2 / 6, exact))

@@ -6,7 +6,7 @@ At each spectral line s = j w the command's force u and the motion x of the m dr
 
 which is linear in the entries of the symmetric matrices M (mass), D (damping) and K (stiffness). The sensor's low pass,
 the hold and a trial delay are removed from the measured motion first; the delay with the least residual is kept. The
-matrices are then made positive definite, as the nonlinear fit needs.
+matrices are then made positive definite, as the nonlinear fit needs. Called by `mechanical_fit`.
 """
 
 from collections.abc import Sequence
@@ -15,47 +15,49 @@ from dataclasses import replace
 import numpy as np
 
 from equalizer.identification.mechanical.mechanical_lines import SegmentLines
-from equalizer.identification.mechanical.mechanical_response import sensor_response
+from equalizer.identification.mechanical.mechanical_response import compute_sensor_response
 from equalizer.identification.mechanical.mechanical_structure import Structure, pack_mass, pack_square_root
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _LEAST_EIGENVALUE = 0.05
 """Least eigenvalue of the starting mass matrix, relative to the largest magnitude of an eigenvalue."""
-_DELAYS = 33
+_TRIAL_DELAYS = 33
 """Number of trial delays, evenly spaced from zero."""
 _MOST_DELAY_CYCLES = 8.0
 """Longest trial delay, in periods of the highest line."""
 
 
-def rigid_start(segments: Sequence[SegmentLines], structure: Structure, floor: float) -> tuple[Structure, FloatArray]:
-    """Structure without modes, with the sign and mass scale that the data require, and its unknowns. A single axis with
-    a negative mass has a sensor that counts the other way: its sign is reversed. floor: relative error of the response
-    that is allowed for besides the noise."""
+def estimate_rigid_start(
+    segments: Sequence[SegmentLines], structure: Structure, floor: float
+) -> tuple[Structure, FloatArray]:
+    """Structure without modes, with signs and mass scale estimated from the data, and its unknowns (parameters,). A
+    negative mass of a single axis means that its sensor is positive against the command: its sign is reversed. floor:
+    expected error of a linear model, relative to the response's magnitude."""
     m = structure.inputs
     if structure.delayed:
-        delays_s = np.linspace(0.0, _MOST_DELAY_CYCLES / float(segments[0].frequency_hz[-1]), _DELAYS)
+        delays_s = np.linspace(0.0, _MOST_DELAY_CYCLES / float(segments[0].frequency_hz[-1]), _TRIAL_DELAYS)
         trials = [_solve_matrices(segments, structure, floor, float(delay_s)) for delay_s in delays_s]
         delay_s = float(delays_s[int(np.argmin([residual for _, residual in trials]))])
     else:
         delay_s = structure.actuator.delay_s
     parts = _solve_matrices(segments, structure, floor, delay_s)[0].reshape(3, -1)
-    mass, damping, stiffness = (symmetric_matrix(part, m) for part in parts)
+    mass, damping, stiffness = (build_symmetric_matrix(part, m) for part in parts)
     if m == 1 and mass[0, 0] < 0 and structure.signs == (1.0,):
-        return rigid_start(segments, replace(structure, signs=(-1.0,)), floor)
-    values, vectors = np.linalg.eigh(mass)
-    largest = max(float(np.abs(values).max()), 1e-300)
-    mass = (vectors * np.maximum(values, _LEAST_EIGENVALUE * largest)) @ vectors.T
+        return estimate_rigid_start(segments, replace(structure, signs=(-1.0,)), floor)
+    eigenvalues, eigenvectors = np.linalg.eigh(mass)
+    largest_eigenvalue = max(float(np.abs(eigenvalues).max()), 1e-300)
+    mass = (eigenvectors * np.maximum(eigenvalues, _LEAST_EIGENVALUE * largest_eigenvalue)) @ eigenvectors.T
     structure = replace(structure, mass_scale=float(np.trace(mass) / m))
-    units = structure.units
+    unit_scales = structure.units
     unknowns = np.zeros(structure.parameters)
     unknowns[structure.slices["delay"]] = delay_s / structure.step_s
-    unknowns[structure.slices["mass"]] = pack_mass(mass / units[0])
-    unknowns[structure.slices["damping"]] = pack_square_root(_make_positive(damping) / units[1])
+    unknowns[structure.slices["mass"]] = pack_mass(mass / unit_scales[0])
+    unknowns[structure.slices["damping"]] = pack_square_root(_make_positive(damping) / unit_scales[1])
     if structure.grounded:
-        unknowns[structure.slices["stiffness"]] = pack_square_root(_make_positive(stiffness) / units[2])
+        unknowns[structure.slices["stiffness"]] = pack_square_root(_make_positive(stiffness) / unit_scales[2])
     if structure.outputs > m:
-        unknowns[structure.slices["rows"]] = _other_rows(segments, m).ravel()
+        unknowns[structure.slices["rows"]] = _fit_further_output_rows(segments, m).ravel()
     return structure, unknowns
 
 
@@ -64,42 +66,42 @@ def _solve_matrices(
 ) -> tuple[FloatArray, float]:
     """Entries of mass, damping and stiffness (lower triangles, row by row), and the weighted residual sum of
     squares."""
-    rows, target = _stiffness_rows(segments, structure, floor, delay_s)
+    rows, target = _build_regression(segments, structure, floor, delay_s)
     solution = solve_scaled(rows, target)
     m = structure.inputs
     return solution[: 3 * m * (m + 1) // 2], float(np.sum((target - rows @ solution) ** 2))
 
 
-def _stiffness_rows(
+def _build_regression(
     segments: Sequence[SegmentLines], structure: Structure, floor: float, delay_s: float
 ) -> tuple[FloatArray, FloatArray]:
     """Regressors (rows, k) and target (rows,) of u = M a + D v + K x plus each segment's transient: real, then
-    imaginary parts, divided by the expected error of the force."""
+    imaginary parts, divided by the expected error of the force. delay_s: delay of the command that is removed."""
     m, order = structure.inputs, DERIVATIVE_OF_QUANTITY[structure.quantity]
     # A held force shows in the acceleration one sample later, in velocity and position half a sample later.
-    delay_steps = 1.0 if order == 2 else 0.5
+    hold_delay = 1.0 if order == 2 else 0.5
     blocks, targets = [], []
-    transients = [i for i, segment in enumerate(segments) if segment.transient]
-    for number, lines in enumerate(segments):
+    transient_segments = [i for i, segment in enumerate(segments) if segment.transient]
+    for index, lines in enumerate(segments):
         s = 2j * np.pi * lines.frequency_hz
         z = np.exp(s / lines.rate_hz)
-        delay_samples = delay_steps if lines.hold.value == "zero-order" else 0.0
-        sensor = sensor_response(structure.sensor.bandwidth_hz, z, lines.rate_hz) * z ** (-delay_samples)
+        delay_samples = hold_delay if lines.hold.value == "zero-order" else 0.0
+        sensor = compute_sensor_response(structure.sensor.bandwidth_hz, z, lines.rate_hz) * z ** (-delay_samples)
         sensor = sensor * np.exp(-s * delay_s)
         motion = lines.response[:, :m] * np.array(structure.signs) / sensor[:, None]
-        size = np.linalg.norm(lines.response[:, :m], axis=1)
-        noise = np.sqrt(np.nan_to_num(lines.noise[:, :m]).sum(axis=1)) / np.maximum(size, 1e-300)
+        norm = np.linalg.norm(lines.response[:, :m], axis=1)
+        noise = np.sqrt(np.nan_to_num(lines.noise[:, :m]).sum(axis=1)) / np.maximum(norm, 1e-300)
         weight = lines.excited / (np.linalg.norm(lines.command, axis=1) * np.hypot(5 * floor, noise) + 1e-300)
         columns = [
-            _entry_force(motion * (s ** (power - order))[:, None], pair)
+            _compute_entry_force(motion * (s ** (power - order))[:, None], pair)
             for power in (2, 1, 0)
-            for pair in triangle_pairs(m)
+            for pair in list_triangle_pairs(m)
         ]
-        transient_columns = np.zeros((len(s), m, 3 * m * len(transients)), dtype=np.complex128)
+        transient_columns = np.zeros((len(s), m, 3 * m * len(transient_segments)), dtype=np.complex128)
         if lines.transient:
             # The states at the segment's ends add s, 1, 1 / s, over s^order, times unknown factors.
             for axis in range(m):
-                first = 3 * (m * transients.index(number) + axis)
+                first = 3 * (m * transient_segments.index(index) + axis)
                 transient_columns[:, axis, first : first + 3] = s[:, None] ** (np.array([1, 0, -1]) - order)
         block = np.concatenate([np.stack(columns, axis=2), transient_columns], axis=2) * weight[:, None, None]
         blocks.append(block.reshape(-1, block.shape[2]))
@@ -111,12 +113,12 @@ def _stiffness_rows(
     )
 
 
-def triangle_pairs(m: int) -> list[tuple[int, int]]:
+def list_triangle_pairs(m: int) -> list[tuple[int, int]]:
     """Row and column of the m (m + 1) / 2 entries of a lower triangle, row by row."""
-    return list(zip(*(part.tolist() for part in np.tril_indices(m)), strict=True))
+    return list(zip(*(indices.tolist() for indices in np.tril_indices(m)), strict=True))
 
 
-def _entry_force(motion: ComplexArray, pair: tuple[int, int]) -> ComplexArray:
+def _compute_entry_force(motion: ComplexArray, pair: tuple[int, int]) -> ComplexArray:
     """(lines, m): a symmetric matrix with this entry 1 and all others 0, times the motion (lines, m). pair: its row and
     column."""
     force = np.zeros_like(motion)
@@ -134,7 +136,7 @@ def solve_scaled(rows: FloatArray, target: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.lstsq(rows / scale, target, rcond=1e-12)[0] / scale)
 
 
-def symmetric_matrix(entries: FloatArray, m: int) -> FloatArray:
+def build_symmetric_matrix(entries: FloatArray, m: int) -> FloatArray:
     """(m, m): symmetric matrix from the m (m + 1) / 2 entries of its lower triangle, row by row."""
     lower = np.zeros((m, m))
     lower[np.tril_indices(m)] = entries
@@ -143,12 +145,15 @@ def symmetric_matrix(entries: FloatArray, m: int) -> FloatArray:
 
 def _make_positive(matrix: FloatArray) -> FloatArray:
     """The symmetric matrix with its eigenvalues raised to at least 0.001 of the largest magnitude."""
-    values, vectors = np.linalg.eigh(matrix)
-    return np.asarray((vectors * np.maximum(values, 1e-3 * max(np.abs(values).max(), 1e-300))) @ vectors.T)
+    eigenvalues, eigenvectors = np.linalg.eigh(matrix)
+    return np.asarray(
+        (eigenvectors * np.maximum(eigenvalues, 1e-3 * max(np.abs(eigenvalues).max(), 1e-300))) @ eigenvectors.T
+    )
 
 
-def _other_rows(segments: Sequence[SegmentLines], m: int) -> FloatArray:
-    """(p - m, m): output rows of the further responses: their least-squares weights on the driven axes' responses."""
+def _fit_further_output_rows(segments: Sequence[SegmentLines], m: int) -> FloatArray:
+    """Fit the output rows (p - m, m) of the further responses: their least-squares weights on the driven axes'
+    responses."""
     axis_responses = np.concatenate([segment.response[:, :m] for segment in segments])
     further_responses = np.concatenate([segment.response[:, m:] for segment in segments])
     return np.asarray(

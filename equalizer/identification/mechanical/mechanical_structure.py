@@ -16,7 +16,7 @@ from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Se
 from equalizer.signals.signal import FloatArray
 
 DRIVEN_SHARE = 0.5
-"""Share of the mass without oscillators that is assumed on the driven side of an elastic joint."""
+"""Fraction of the mass without oscillators that is assumed on the driven side of an elastic joint."""
 
 
 def insert_joint(model: MechanicalModel, m: int, stiffness: FloatArray, loss_s: float) -> MechanicalModel:
@@ -50,18 +50,18 @@ def insert_joint(model: MechanicalModel, m: int, stiffness: FloatArray, loss_s: 
     )
 
 
-_WIDEST_LOG = 12.0
-"""Bound of the logarithms on the diagonal of the mass's Cholesky factor."""
-_FARTHEST_MODE = 4.0
-"""Largest ratio of a mode's frequency to the nearer end of the band, outside it."""
-_LARGEST_TURN = 0.3
+_LARGEST_MASS_LOG = 12.0
+"""Largest magnitude of the logarithms on the diagonal of the mass's Cholesky factor."""
+_LARGEST_MODE_RATIO = 4.0
+"""Largest factor by which a mode's frequency may lie below or above the band."""
+_LARGEST_ROTATION_RAD = 0.3
 """Largest rotation of the sensor, rad."""
 _MOST_DELAY_SAMPLES = 200.0
 """Largest delay of the command, samples."""
-_WIDEST_JOINT_LOG = 2.5
+_LARGEST_JOINT_LOG = 2.5
 """Bound of the logarithms on the diagonal of the joint stiffness's Cholesky factor, about their value for a resonance
 at the band's upper end."""
-_JOINT_LOSS = 0.05
+_JOINT_LOSS_FACTOR = 0.05
 """Starting loss factor of the joint at its resonance. Heuristic."""
 
 
@@ -95,16 +95,16 @@ class Structure:
 
     @cached_property
     def slices(self) -> dict[str, slice]:
-        """Places in the vector of unknowns, in its order: Cholesky factors of mass, damping and stiffness, output rows
+        """Slices of the vector of unknowns, in its order: Cholesky factors of mass, damping and stiffness, output rows
         of the further sensors, rotation, joint, delay; then per mode the logarithms of frequency and damping ratio, the
-        participations, the sensor shape. Slices of what the structure lacks are empty."""
+        participations, the sensor shape. Slices of parts that the structure lacks are empty."""
         m, p = self.inputs, self.outputs
-        pairs = m * (m + 1) // 2
+        pair_count = m * (m + 1) // 2
         shape_entries = p if self.shared else p - m
         sizes = {
-            "mass": pairs, "damping": pairs, "stiffness": pairs if self.grounded else 0,
+            "mass": pair_count, "damping": pair_count, "stiffness": pair_count if self.grounded else 0,
             "rows": (p - m) * m, "turn": m * (m - 1) // 2 if self.turned else 0,
-            "joint": pairs + 1 if self.joint else 0, "delay": 1 if self.delayed else 0,
+            "joint": pair_count + 1 if self.joint else 0, "delay": 1 if self.delayed else 0,
             "modes": self.modes * (2 + m + shape_entries),
         }  # fmt: skip
         ends = np.cumsum(list(sizes.values()))
@@ -129,9 +129,9 @@ class Structure:
             self.mass_scale * self.speed_scale**2,
         )
 
-    def transfer_unknowns(self, unknowns: FloatArray, destination: "Structure") -> FloatArray:
-        """The unknowns converted to a larger structure, whose additional ones start at zero, or to a smaller
-        structure."""
+    def convert_unknowns(self, unknowns: FloatArray, destination: "Structure") -> FloatArray:
+        """The unknowns converted to the destination structure: parts that it adds start at zero, parts that it lacks
+        are dropped."""
         transferred = np.zeros(destination.parameters)
         for name, part in self.slices.items():
             target = destination.slices[name]
@@ -147,12 +147,12 @@ class Structure:
                 transferred[target] = unknowns[part]
         return transferred
 
-    def model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:
+    def build_model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:
         """The model in relative coordinates. Raises MechanicalModelError where the mass is not positive definite."""
         m, part = self.inputs, self.slices
         mass, damping, stiffness = self.find_grounded_parts(unknowns)
-        frequency, ratio, participation, sensor_shapes = self.oscillators(unknowns)
-        sensor_rotation = np.diag(self.signs) @ _cayley_rotation(unknowns[part["turn"]], m)
+        frequency, ratio, participation, sensor_shapes = self.unpack_oscillators(unknowns)
+        sensor_rotation = np.diag(self.signs) @ _compute_rotation(unknowns[part["turn"]], m)
         rows = np.concatenate([sensor_rotation, unknowns[part["rows"]].reshape(-1, m)])
         model = MechanicalModel(
             name=name,
@@ -163,61 +163,61 @@ class Structure:
             input=np.concatenate([np.eye(m), np.zeros((self.modes, m))]),
             output=np.concatenate([rows, sensor_shapes.T], axis=1),
             sensor=self.sensor,
-            actuator=replace(self.actuator, delay_s=self.delay_s(unknowns)),
+            actuator=replace(self.actuator, delay_s=self.unpack_delay_s(unknowns)),
             rotational=self.rotational,
         )
         if not self.joint:
             return model
         joint = unknowns[part["joint"]]
-        lower = _unpack_triangle(joint[:-1], m)
+        lower = _unpack_log_triangle(joint[:-1], m)
         return insert_joint(model, m, self.units[2] * lower @ lower.T, float(np.exp(joint[-1])) / self.speed_scale)
 
     def find_grounded_parts(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Mass (without the oscillators'), damping and stiffness at the driven axes, (m, m) each."""
         m, part, units = self.inputs, self.slices, self.units
-        lower = _unpack_triangle(unknowns[part["mass"]], m)
+        lower = _unpack_log_triangle(unknowns[part["mass"]], m)
         stiffness = units[2] * _unpack_square(unknowns[part["stiffness"]], m) if self.grounded else np.zeros((m, m))
         return units[0] * lower @ lower.T, units[1] * _unpack_square(unknowns[part["damping"]], m), stiffness
 
-    def bounds(self, band_hz: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    def compute_bounds(self, band_hz: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
         """Lower and upper bounds of the unknowns: no negative damper or spring, modes near the band."""
         low, high = np.full(self.parameters, -np.inf), np.full(self.parameters, np.inf)
-        part, diagonal = self.slices, diagonal_places(self.inputs)
+        part, diagonal = self.slices, find_diagonal_indices(self.inputs)
         for name in ("damping", "stiffness"):
             if part[name].stop > part[name].start:
                 low[part[name].start + diagonal] = 0.0
-        low[part["mass"].start + diagonal], high[part["mass"].start + diagonal] = -_WIDEST_LOG, _WIDEST_LOG
+        low[part["mass"].start + diagonal], high[part["mass"].start + diagonal] = -_LARGEST_MASS_LOG, _LARGEST_MASS_LOG
         if self.joint:
-            first = part["joint"].start + diagonal
+            first_index = part["joint"].start + diagonal
             joint_log = np.log(2 * np.pi * band_hz[1] / self.speed_scale)
-            low[first], high[first] = joint_log - _WIDEST_JOINT_LOG, joint_log + _WIDEST_JOINT_LOG
+            low[first_index], high[first_index] = joint_log - _LARGEST_JOINT_LOG, joint_log + _LARGEST_JOINT_LOG
             low[part["joint"].stop - 1], high[part["joint"].stop - 1] = np.log(1e-4), np.log(1.0)
-        low[part["turn"]], high[part["turn"]] = -_LARGEST_TURN, _LARGEST_TURN
+        low[part["turn"]], high[part["turn"]] = -_LARGEST_ROTATION_RAD, _LARGEST_ROTATION_RAD
         low[part["delay"]], high[part["delay"]] = 0.0, _MOST_DELAY_SAMPLES
         if self.modes:
-            size = (part["modes"].stop - part["modes"].start) // self.modes
-            first = part["modes"].start + size * np.arange(self.modes)
-            low[first] = np.log(2 * np.pi * band_hz[0] / _FARTHEST_MODE / self.speed_scale)
-            high[first] = np.log(2 * np.pi * band_hz[1] * _FARTHEST_MODE / self.speed_scale)
-            low[first + 1], high[first + 1] = np.log(1e-4), np.log(3.0)
+            mode_size = (part["modes"].stop - part["modes"].start) // self.modes
+            first_index = part["modes"].start + mode_size * np.arange(self.modes)
+            low[first_index] = np.log(2 * np.pi * band_hz[0] / _LARGEST_MODE_RATIO / self.speed_scale)
+            high[first_index] = np.log(2 * np.pi * band_hz[1] * _LARGEST_MODE_RATIO / self.speed_scale)
+            low[first_index + 1], high[first_index + 1] = np.log(1e-4), np.log(3.0)
         return low, high
 
-    def delay_s(self, unknowns: FloatArray) -> float:
+    def unpack_delay_s(self, unknowns: FloatArray) -> float:
         """Delay of the command (s), not negative: fitted where `delayed`, else that of `actuator`."""
         if not self.delayed:
             return self.actuator.delay_s
         return max(float(unknowns[self.slices["delay"]][0]) * self.step_s, 0.0)
 
-    def oscillators(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def unpack_oscillators(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Frequencies in rad/s (modes,), damping ratios (modes,), participations (modes, m), sensor shapes (modes,
         p)."""
         m, p = self.inputs, self.outputs
         rows = unknowns[self.slices["modes"]].reshape(self.modes, -1) if self.modes else np.zeros((0, 2 + m))
-        root = np.sqrt(self.mass_scale)
+        root_mass = np.sqrt(self.mass_scale)
         shapes = np.zeros((self.modes, p))
         if self.modes and rows.shape[1] > 2 + m:
-            shapes[:, p - (rows.shape[1] - 2 - m) :] = rows[:, 2 + m :] / root
-        return self.speed_scale * np.exp(rows[:, 0]), np.exp(rows[:, 1]), root * rows[:, 2 : 2 + m], shapes
+            shapes[:, p - (rows.shape[1] - 2 - m) :] = rows[:, 2 + m :] / root_mass
+        return self.speed_scale * np.exp(rows[:, 0]), np.exp(rows[:, 1]), root_mass * rows[:, 2 : 2 + m], shapes
 
 
 def pack_mass(mass: FloatArray) -> FloatArray:
@@ -225,60 +225,60 @@ def pack_mass(mass: FloatArray) -> FloatArray:
     of the diagonal."""
     lower = np.linalg.cholesky(mass)
     np.fill_diagonal(lower, np.log(np.diag(lower)))
-    return np.asarray(lower[_triangle_indices(len(mass))])
+    return np.asarray(lower[_list_triangle_indices(len(mass))])
 
 
 def pack_square_root(matrix: FloatArray) -> FloatArray:
     """Unknowns of a damping or stiffness (m, m), positive definite, in the structure's units: its Cholesky factor, so
     that the matrix stays positive semidefinite (passive)."""
-    return np.asarray(np.linalg.cholesky(matrix)[_triangle_indices(len(matrix))])
+    return np.asarray(np.linalg.cholesky(matrix)[_list_triangle_indices(len(matrix))])
 
 
 def start_joint(structure: Structure, unknowns: FloatArray, frequency_hz: float) -> FloatArray:
-    """The unknowns with an isotropic joint whose resonance, for the mean mass of the axes, is at frequency_hz."""
+    """Starting unknowns with an isotropic joint whose resonance, for the mean mass of the axes, is at frequency_hz."""
     mass = structure.find_grounded_parts(unknowns)[0]
-    m, part = structure.inputs, structure.slices["joint"]
+    m, joint_slice = structure.inputs, structure.slices["joint"]
     reduced_mass = float(np.trace(mass)) / m * DRIVEN_SHARE * (1 - DRIVEN_SHARE)
     started = unknowns.copy()
-    started[part] = 0.0
-    root = 2 * np.pi * frequency_hz * np.sqrt(reduced_mass / structure.units[2])
-    started[part.start + diagonal_places(m)] = np.log(root)
-    started[part.stop - 1] = np.log(_JOINT_LOSS * structure.speed_scale / (2 * np.pi * frequency_hz))
+    started[joint_slice] = 0.0
+    stiffness_root = 2 * np.pi * frequency_hz * np.sqrt(reduced_mass / structure.units[2])
+    started[joint_slice.start + find_diagonal_indices(m)] = np.log(stiffness_root)
+    started[joint_slice.stop - 1] = np.log(_JOINT_LOSS_FACTOR * structure.speed_scale / (2 * np.pi * frequency_hz))
     return started
 
 
-def remove_mode(structure: Structure, unknowns: FloatArray, number: int) -> tuple[Structure, FloatArray]:
-    """Structure and unknowns without the mode of that index, from 0."""
-    part = structure.slices["modes"]
-    rows = np.delete(unknowns[part].reshape(structure.modes, -1), number, axis=0)
-    return replace(structure, modes=structure.modes - 1), np.concatenate([unknowns[: part.start], rows.ravel()])
+def remove_mode(structure: Structure, unknowns: FloatArray, mode_index: int) -> tuple[Structure, FloatArray]:
+    """Structure and unknowns without the mode `mode_index`, from 0."""
+    mode_slice = structure.slices["modes"]
+    rows = np.delete(unknowns[mode_slice].reshape(structure.modes, -1), mode_index, axis=0)
+    return replace(structure, modes=structure.modes - 1), np.concatenate([unknowns[: mode_slice.start], rows.ravel()])
 
 
-def diagonal_places(m: int) -> npt.NDArray[np.intp]:
-    """Which of the unknowns of a symmetric matrix are on its diagonal."""
-    rows, columns = _triangle_indices(m)
+def find_diagonal_indices(m: int) -> npt.NDArray[np.intp]:
+    """(m,): indices of the diagonal entries in the row-by-row lower triangle of an m x m matrix."""
+    rows, columns = _list_triangle_indices(m)
     return np.flatnonzero(rows == columns)
 
 
 @cache
-def _triangle_indices(m: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+def _list_triangle_indices(m: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
     return np.tril_indices(m)  # cached: a fit calls this some ten thousand times
 
 
-def _unpack_triangle(unknowns: FloatArray, m: int) -> FloatArray:
+def _unpack_log_triangle(unknowns: FloatArray, m: int) -> FloatArray:
     lower = np.zeros((m, m))
-    lower[_triangle_indices(m)] = unknowns
+    lower[_list_triangle_indices(m)] = unknowns
     np.fill_diagonal(lower, np.exp(np.diag(lower)))
     return lower
 
 
 def _unpack_square(unknowns: FloatArray, m: int) -> FloatArray:
     lower = np.zeros((m, m))
-    lower[_triangle_indices(m)] = unknowns
+    lower[_list_triangle_indices(m)] = unknowns
     return np.asarray(lower @ lower.T)
 
 
-def _cayley_rotation(angles: FloatArray, m: int) -> FloatArray:
+def _compute_rotation(angles: FloatArray, m: int) -> FloatArray:
     """Rotation (m, m) as the Cayley transform of a skew-symmetric matrix of small angles."""
     if not len(angles):
         return np.eye(m)

@@ -4,7 +4,8 @@
 
 in continuous time; responses are sampled exactly for the commands' hold. Frequencies w and damping ratios d (and a
 delay) are searched by bounded nonlinear least squares; the shapes, which enter linearly, follow by linear least squares
-at each step (Golub and Pereyra 1973; Jacobian after Kaufman 1975, whose references are in `state_space.refinement`).
+at each step (Golub and Pereyra 1973; Jacobian after Kaufman 1975; references in `state_space.refinement`). Called by
+`modal_order`.
 """
 
 from collections.abc import Sequence
@@ -13,17 +14,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.identification.mechanical.mechanical_misfit import LineGroup
-from equalizer.identification.mechanical.mechanical_response import pole_responses, sensor_response
+from equalizer.identification.mechanical.mechanical_response import compute_pole_responses, compute_sensor_response
 from equalizer.identification.mechanical.mechanical_structure import Structure
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-_GRID = 80
-"""Number of frequencies that are tried, on a logarithmic grid."""
-_RATIOS = (0.01, 0.04, 0.16, 0.64, 4.0)
-"""Damping ratios that are tried; above 1 the mode is overdamped. Heuristic."""
-_STEP = 1e-6
-"""Step of finite differences, in logarithms."""
+_GRID_FREQUENCIES = 80
+"""Number of natural frequencies on the logarithmic search grid."""
+_GRID_DAMPING_RATIOS = (0.01, 0.04, 0.16, 0.64, 4.0)
+"""Damping ratios on the search grid; above 1 the mode is overdamped. Heuristic."""
+_LOG_STEP = 1e-6
+"""Step of finite differences: of logarithms, and of the delay in samples."""
 _MOST_DELAY_SAMPLES = 20.0
 """Largest delay of the command, samples."""
 
@@ -50,14 +51,15 @@ class _Solution:
     misfit: list[ComplexArray]
     """Residuals of each group, (lines, p, rows)."""
     bases: list[FloatArray]
-    """For each output, orthonormal columns that span what its shapes can explain, on the lines not held out: real, then
-    imaginary parts."""
+    """For each output, orthonormal basis of the span of its regressors, on the lines not held out: real, then imaginary
+    parts."""
     shapes: FloatArray
     """(modes, p, m)"""
 
 
 class ModalSearch:
-    """Adds modes one at a time to the model of groups of lines, none of which may contain a transient."""
+    """Adds modes one at a time to a modal model of line groups, none of which may contain a transient. structure: gives
+    numbers of axes and responses, quantity, sensor and actuator; fit_delay: whether the delay is estimated."""
 
     def __init__(
         self, groups: Sequence[LineGroup], structure: Structure, band_hz: tuple[float, float], fit_delay: bool
@@ -65,24 +67,27 @@ class ModalSearch:
         self._groups = tuple(groups)
         self._structure = structure
         self._order = DERIVATIVE_OF_QUANTITY[structure.quantity]
-        self._band = band_hz
+        self._band_hz = band_hz
         self._fit_delay = fit_delay
-        self._known_delay = structure.actuator.delay_s / structure.step_s
-        self._kept = [~group.held_out for group in groups]
+        self._nominal_delay_samples = structure.actuator.delay_s / structure.step_s
+        self._fitted_masks = [~group.held_out for group in groups]
 
     def add_mode(self, current: ModeEstimate | None) -> ModeEstimate:
         """Add a mode at the grid point that explains most, then refine all modes together. current: None for the first
         mode."""
         logs = np.empty(0) if current is None else current.logs
-        delay = self._known_delay if current is None else current.delay_s / self._structure.step_s
-        solution = self._solve(np.append(logs, delay))
-        low, high = np.log(2 * np.pi * np.array([self._band[0] / 2, self._band[1] * 2]))
-        best = max(
-            ((self._compute_explained_by_mode(solution, np.array([speed, np.log(ratio), delay])), speed, np.log(ratio))
-            for speed in np.linspace(low, high, _GRID) for ratio in _RATIOS),
+        delay_samples = self._nominal_delay_samples if current is None else current.delay_s / self._structure.step_s
+        solution = self._solve(np.append(logs, delay_samples))
+        low_log, high_log = np.log(2 * np.pi * np.array([self._band_hz[0] / 2, self._band_hz[1] * 2]))
+        best_point = max(
+            ((self._compute_explained_by_mode(solution, np.array([log_w, np.log(ratio), delay_samples])),
+              log_w, np.log(ratio))
+            for log_w in np.linspace(low_log, high_log, _GRID_FREQUENCIES) for ratio in _GRID_DAMPING_RATIOS),
         )  # fmt: skip
-        half = len(logs) // 2
-        return self._refine(np.concatenate([logs[:half], [best[1]], logs[half:], [best[2]], [delay]]))
+        modes = len(logs) // 2
+        return self._refine(
+            np.concatenate([logs[:modes], [best_point[1]], logs[modes:], [best_point[2]], [delay_samples]])
+        )
 
     def _refine(self, start: FloatArray) -> ModeEstimate:
         """Bounded least squares over the unknowns: logs of w (rad/s), logs of damping ratios, delay (samples). The
@@ -90,26 +95,28 @@ class ModalSearch:
         # Imported here: a diagnosis that fits no model does not need SciPy's optimiser.
         from scipy.optimize import least_squares
 
-        half, delay = len(start) // 2, start[-1]
+        modes, delay_samples = len(start) // 2, start[-1]
         low_delay, high_delay = (
-            (0.0, _MOST_DELAY_SAMPLES) if self._fit_delay and half > 1 else (delay - 1e-9, delay + 1e-9)
+            (0.0, _MOST_DELAY_SAMPLES)
+            if self._fit_delay and modes > 1
+            else (delay_samples - 1e-9, delay_samples + 1e-9)
         )
-        low = np.concatenate([np.full(half, np.log(2 * np.pi * self._band[0] / 10)), np.full(half, np.log(1e-3))])
-        high = np.concatenate([np.full(half, np.log(2 * np.pi * self._band[1] * 2)), np.full(half, np.log(30.0))])
+        low = np.concatenate([np.full(modes, np.log(2 * np.pi * self._band_hz[0] / 10)), np.full(modes, np.log(1e-3))])
+        high = np.concatenate([np.full(modes, np.log(2 * np.pi * self._band_hz[1] * 2)), np.full(modes, np.log(30.0))])
         low, high = np.append(low, low_delay), np.append(high, high_delay)
-        result = least_squares(
+        optimum = least_squares(
             lambda unknowns: self._stack_real(self._solve(unknowns).misfit),
             np.clip(start, low + 1e-10, high - 1e-10),
-            jac=self._jacobian,
+            jac=self._compute_jacobian,
             bounds=(low, high),
             max_nfev=40,
             ftol=1e-5,
         )
-        solution = self._solve(result.x)
+        solution = self._solve(optimum.x)
         pairs = list(zip(self._groups, solution.misfit, strict=True))
         return ModeEstimate(
-            result.x[:-1],
-            float(result.x[-1]) * self._structure.step_s,
+            optimum.x[:-1],
+            float(optimum.x[-1]) * self._structure.step_s,
             solution.shapes,
             float(sum(np.sum(np.abs(part[group.held_out]) ** 2) for group, part in pairs)),
             int(sum(group.count[group.held_out].sum() for group in self._groups)),
@@ -118,7 +125,7 @@ class ModalSearch:
     def _solve(self, unknowns: FloatArray) -> _Solution:
         """Shapes by linear least squares on the lines not held out, output by output, and residuals on all lines."""
         m, p, modes = self._structure.inputs, self._structure.outputs, len(unknowns) // 2
-        basis = [self._mode_responses(group, unknowns) for group in self._groups]
+        basis = [self._compute_mode_responses(group, unknowns) for group in self._groups]
         shapes = np.zeros((modes, p, m))
         bases = []
         for output in range(p):
@@ -126,13 +133,16 @@ class ModalSearch:
                 (group.root[is_fitted, output][..., None, :] * responses[is_fitted, None, :, None]).reshape(
                     group.target[is_fitted, output].size, modes * m
                 )
-                for group, responses, is_fitted in zip(self._groups, basis, self._kept, strict=True)
+                for group, responses, is_fitted in zip(self._groups, basis, self._fitted_masks, strict=True)
             ]
             targets = [
                 group.target[is_fitted, output].ravel()
-                for group, is_fitted in zip(self._groups, self._kept, strict=True)
+                for group, is_fitted in zip(self._groups, self._fitted_masks, strict=True)
             ]
-            design, target = _real_and_imaginary(np.concatenate(rows)), _real_and_imaginary(np.concatenate(targets))
+            design, target = (
+                _concatenate_real_imaginary(np.concatenate(rows)),
+                _concatenate_real_imaginary(np.concatenate(targets)),
+            )
             scale = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
             q, r = np.linalg.qr(design / scale) if modes else (design, design)
             bases.append(q)
@@ -145,63 +155,69 @@ class ModalSearch:
         ]
         return _Solution(misfit, bases, shapes)
 
-    def _jacobian(self, unknowns: FloatArray) -> FloatArray:
+    def _compute_jacobian(self, unknowns: FloatArray) -> FloatArray:
         """Kaufman's approximation: derivative at fixed shapes, by finite differences, with the shapes' span projected
         out."""
         solution = self._solve(unknowns)
-        half = len(unknowns) // 2
+        mode_count = len(unknowns) // 2
         columns = []
         for k in range(len(unknowns)):
             # A mode's own parameters change its response alone, the delay changes all of them.
-            modes = np.arange(half) if k == 2 * half else np.array([k % half])
-            chosen = np.concatenate([modes, half + modes, [2 * half]])
+            modes = np.arange(mode_count) if k == 2 * mode_count else np.array([k % mode_count])
+            chosen_unknowns = np.concatenate([modes, mode_count + modes, [2 * mode_count]])
             shifted = unknowns.copy()
-            shifted[k] += _STEP
-            change = [
+            shifted[k] += _LOG_STEP
+            residual_change = [
                 -np.einsum(
                     "lpem,lk,kpm->lpe",
                     group.root,
-                    (self._mode_responses(group, shifted[chosen]) - self._mode_responses(group, unknowns[chosen]))
-                    / _STEP,
+                    (
+                        self._compute_mode_responses(group, shifted[chosen_unknowns])
+                        - self._compute_mode_responses(group, unknowns[chosen_unknowns])
+                    )
+                    / _LOG_STEP,
                     solution.shapes[modes],
                     optimize=True,
                 )
                 for group in self._groups
             ]
-            columns.append(self._project_out(change, solution.bases))
+            columns.append(self._project_out(residual_change, solution.bases))
         return np.stack(columns, axis=1)
 
     def _compute_explained_by_mode(self, solution: _Solution, unknowns: FloatArray) -> float:
         """Fall of the residual sum of squares by a further mode, all shapes free. unknowns: its three, as in
         `_refine`."""
-        responses = [self._mode_responses(group, unknowns)[:, 0] for group in self._groups]
-        total = 0.0
+        responses = [self._compute_mode_responses(group, unknowns)[:, 0] for group in self._groups]
+        explained_squares = 0.0
         for output, basis in enumerate(solution.bases):
             rows = [
                 (group.root[is_fitted, output] * response[is_fitted, None, None]).reshape(-1, self._structure.inputs)
-                for group, response, is_fitted in zip(self._groups, responses, self._kept, strict=True)
+                for group, response, is_fitted in zip(self._groups, responses, self._fitted_masks, strict=True)
             ]
-            design = _real_and_imaginary(np.concatenate(rows))
-            target = _real_and_imaginary(
+            design = _concatenate_real_imaginary(np.concatenate(rows))
+            target = _concatenate_real_imaginary(
                 np.concatenate(
                     [
                         part[is_fitted, output].ravel()
-                        for part, is_fitted in zip(solution.misfit, self._kept, strict=True)
+                        for part, is_fitted in zip(solution.misfit, self._fitted_masks, strict=True)
                     ]
                 )
             )
             design = design - basis @ (basis.T @ design)
             q, _ = np.linalg.qr(design / np.maximum(np.linalg.norm(design, axis=0), 1e-300))
-            total += float(np.sum((q.T @ target) ** 2))
-        return total
+            explained_squares += float(np.sum((q.T @ target) ** 2))
+        return explained_squares
 
     def _project_out(self, change: Sequence[ComplexArray], bases: Sequence[FloatArray]) -> FloatArray:
         """Component of a change of the residuals that no change of the shapes can compensate, output by output."""
         parts = []
         for output, basis in enumerate(bases):
-            column = _real_and_imaginary(
+            column = _concatenate_real_imaginary(
                 np.concatenate(
-                    [part[is_fitted, output].ravel() for part, is_fitted in zip(change, self._kept, strict=True)]
+                    [
+                        part[is_fitted, output].ravel()
+                        for part, is_fitted in zip(change, self._fitted_masks, strict=True)
+                    ]
                 )
             )
             parts.append(column - basis @ (basis.T @ column))
@@ -211,32 +227,36 @@ class ModalSearch:
         """Residuals on the lines not held out as a real vector, output by output, in the rows' order of the bases."""
         return np.concatenate(
             [
-                _real_and_imaginary(
+                _concatenate_real_imaginary(
                     np.concatenate(
-                        [part[is_fitted, output].ravel() for part, is_fitted in zip(misfit, self._kept, strict=True)]
+                        [
+                            part[is_fitted, output].ravel()
+                            for part, is_fitted in zip(misfit, self._fitted_masks, strict=True)
+                        ]
                     )
                 )
                 for output in range(self._structure.outputs)
             ]
         )
 
-    def _mode_responses(self, group: LineGroup, unknowns: FloatArray) -> ComplexArray:
+    def _compute_mode_responses(self, group: LineGroup, unknowns: FloatArray) -> ComplexArray:
         """(lines, modes): responses of modes of unit mass by partial fractions, sampled exactly, with delay and sensor.
         A damping ratio of 1 is shifted by 1e-6, because the two poles must differ."""
-        half = len(unknowns) // 2
-        speed, ratio = np.exp(unknowns[:half]), np.exp(unknowns[half : 2 * half])
+        modes = len(unknowns) // 2
+        natural_rad_s, ratio = np.exp(unknowns[:modes]), np.exp(unknowns[modes : 2 * modes])
         delay_s = max(float(unknowns[-1]), 0.0) / group.rate_hz
         ratio = np.where(np.abs(ratio - 1) < 1e-6, 1 + 1e-6, ratio)
         root = np.sqrt(ratio.astype(np.complex128) ** 2 - 1)
-        poles = np.concatenate([speed * (-ratio + root), speed * (-ratio - root)])
-        paired = np.concatenate([poles[half:], poles[:half]])
+        poles = np.concatenate([natural_rad_s * (-ratio + root), natural_rad_s * (-ratio - root)])
+        conjugate_poles = np.concatenate([poles[modes:], poles[:modes]])
         z = np.exp(2j * np.pi * group.frequency_hz / group.rate_hz)
-        responses, direct = pole_responses(poles, z, group.rate_hz, group.hold, delay_s)
-        weighted = responses * (poles**self._order / (poles - paired))
+        responses, direct = compute_pole_responses(poles, z, group.rate_hz, group.hold, delay_s)
+        pole_terms = responses * (poles**self._order / (poles - conjugate_poles))
         feedthrough = direct[:, None] if self._order == 2 else 0.0
-        sensor = sensor_response(self._structure.sensor.bandwidth_hz, z, group.rate_hz)
-        return np.asarray((weighted[:, :half] + weighted[:, half:] + feedthrough) * sensor[:, None])
+        sensor = compute_sensor_response(self._structure.sensor.bandwidth_hz, z, group.rate_hz)
+        return np.asarray((pole_terms[:, :modes] + pole_terms[:, modes:] + feedthrough) * sensor[:, None])
 
 
-def _real_and_imaginary(values: ComplexArray) -> FloatArray:
+def _concatenate_real_imaginary(values: ComplexArray) -> FloatArray:
+    """Real parts, then imaginary parts, along the first dimension."""
     return np.concatenate([values.real, values.imag])

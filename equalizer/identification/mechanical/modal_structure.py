@@ -1,5 +1,5 @@
 """Modal parametrisation of a mechanical model: each mode has its own shape at the commands and at the sensors, for
-devices whose sensors are not collocated with the commands."""
+devices whose sensors are not collocated with the commands. Fitted by `modal_order`."""
 
 from dataclasses import dataclass, replace
 
@@ -9,15 +9,15 @@ from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Se
 from equalizer.signals.signal import FloatArray
 
 _BAND_MARGIN = 10.0
-"""Factor by which a mode's frequency may lie outside the band of the fit. By hand."""
-_LEAST_RATIO, _LARGEST_RATIO = 1e-4, 100.0
-"""Least and largest damping ratio of a mode; a rigid body on weak springs has the largest. By hand."""
+"""Factor by which a mode's frequency may lie outside the band of the fit. Heuristic."""
+_LEAST_DAMPING_RATIO, _LARGEST_DAMPING_RATIO = 1e-4, 100.0
+"""Least and largest damping ratio of a mode; a rigid body on weak springs has the largest. Heuristic."""
 _RANK_TOLERANCE = 1e-9
 """Least singular value of the input matrix, relative to the largest: below it, an axis counts as not driven."""
-_FLEXIBLE_SHARE = 0.5
-"""Largest norm of the input shape of a flexible mode, relative to the largest of the rigid-body modes. By hand."""
-_RIGID_RATIO = 1.5
-"""Modes count as rigid-body modes where their frequency is at most this factor above the lowest one."""
+_LARGEST_FLEXIBLE_SHARE = 0.5
+"""Largest norm of the input shape of a flexible mode, relative to the largest of the rigid-body modes. Heuristic."""
+_RIGID_FREQUENCY_RATIO = 1.5
+"""Modes count as rigid-body modes where their frequency is at most this factor above the lowest one. Heuristic."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,16 +54,16 @@ class ModalStructure:
         """Number of coordinates of the model: one per mode."""
         return self.modes
 
-    def model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:
+    def build_model(self, unknowns: FloatArray, name: str = "fitted") -> MechanicalModel:
         """The model in modal coordinates normalised to unit modal mass. unknowns: (parameters,), mode by mode."""
         mode_rows = unknowns.reshape(self.modes, -1)
-        speed, ratio = self.speed_scale * np.exp(mode_rows[:, 0]), np.exp(mode_rows[:, 1])
+        natural_rad_s, damping_ratio = self.speed_scale * np.exp(mode_rows[:, 0]), np.exp(mode_rows[:, 1])
         return MechanicalModel(
             name=name,
             quantity=self.quantity,
             mass=np.eye(self.modes),
-            damping=np.diag(2 * ratio * speed),
-            stiffness=np.diag(speed**2),
+            damping=np.diag(2 * damping_ratio * natural_rad_s),
+            stiffness=np.diag(natural_rad_s**2),
             input=mode_rows[:, 2 : 2 + self.inputs] / np.sqrt(self.mass_scale),
             output=(mode_rows[:, 2 + self.inputs :] / np.sqrt(self.mass_scale)).T,
             sensor=self.sensor,
@@ -71,52 +71,55 @@ class ModalStructure:
             rotational=self.rotational,
         )
 
-    def bounds(self, band_hz: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
+    def compute_bounds(self, band_hz: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
         """Lower and upper bounds (parameters,) of the unknowns, for a fit in this band; shapes are unbounded."""
         low = np.full((self.modes, 2 + self.inputs + self.outputs), -np.inf)
         high = -low
         low[:, 0] = np.log(2 * np.pi * band_hz[0] / _BAND_MARGIN / self.speed_scale)
         high[:, 0] = np.log(2 * np.pi * band_hz[1] * _BAND_MARGIN / self.speed_scale)
-        low[:, 1], high[:, 1] = np.log(_LEAST_RATIO), np.log(_LARGEST_RATIO)
+        low[:, 1], high[:, 1] = np.log(_LEAST_DAMPING_RATIO), np.log(_LARGEST_DAMPING_RATIO)
         return low.ravel(), high.ravel()
 
 
 def find_balancing_factors(structure: ModalStructure, unknowns: FloatArray) -> FloatArray:
-    """(parameters,): factors on the unknowns that limit the norm of each flexible mode's input shape to
-    `_FLEXIBLE_SHARE` of the largest of the rigid-body modes, and scale its output shape up by the reciprocal, so that
-    no response changes. Sensors that are not collocated do not determine this scale; the limit keeps the mass at the
-    commands realistic."""
+    """Find factors (parameters,) on the unknowns that limit the norm of each flexible mode's input shape to
+    `_LARGEST_FLEXIBLE_SHARE` of the largest of the rigid-body modes, and scale its output shape up by the reciprocal,
+    so that no response changes. Sensors that are not collocated do not determine this scale; the limit keeps the mass
+    at the commands realistic."""
     mode_rows = unknowns.reshape(structure.modes, -1)
     input_columns = slice(2, 2 + structure.inputs)
-    size = np.maximum(np.linalg.norm(mode_rows[:, input_columns], axis=1), 1e-300)
-    is_rigid = mode_rows[:, 0] <= mode_rows[:, 0].min() + np.log(_RIGID_RATIO)
-    largest_norm = _FLEXIBLE_SHARE * size[is_rigid].max()
-    share = np.where(is_rigid, 1.0, np.minimum(1.0, largest_norm / size))
+    input_norm = np.maximum(np.linalg.norm(mode_rows[:, input_columns], axis=1), 1e-300)
+    is_rigid = mode_rows[:, 0] <= mode_rows[:, 0].min() + np.log(_RIGID_FREQUENCY_RATIO)
+    largest_norm = _LARGEST_FLEXIBLE_SHARE * input_norm[is_rigid].max()
+    input_factor = np.where(is_rigid, 1.0, np.minimum(1.0, largest_norm / input_norm))
     factors = np.ones_like(mode_rows)
-    factors[:, input_columns] = share[:, None]
-    factors[:, 2 + structure.inputs :] = 1 / share[:, None]
+    factors[:, input_columns] = input_factor[:, None]
+    factors[:, 2 + structure.inputs :] = 1 / input_factor[:, None]
     return np.asarray(factors.ravel())
 
 
 def to_driven_axes(model: MechanicalModel) -> MechanicalModel:
-    """The model in other coordinates: first the driven axes, then the remaining modes with those axes held (Craig and
-    Bampton). Raises numpy.linalg.LinAlgError where the modes do not move each command's axis independently."""
+    """The model in coordinates of component-mode synthesis: first the driven axes, then the remaining modes with those
+    axes held (Craig and Bampton). Raises numpy.linalg.LinAlgError where the modes do not move each command's axis
+    independently."""
     B = model.input
     m, n = B.shape[1], model.coordinates
-    left_vectors, strengths, right_vectors = np.linalg.svd(B)
-    if strengths[-1] < _RANK_TOLERANCE * strengths[0]:
+    left_vectors, singular_values, right_vectors = np.linalg.svd(B)
+    if singular_values[-1] < _RANK_TOLERANCE * singular_values[0]:
         raise np.linalg.LinAlgError("an axis that no mode moves")
-    axis_shapes = left_vectors[:, :m] / strengths @ right_vectors
+    axis_shapes = left_vectors[:, :m] / singular_values @ right_vectors
     internal_modes = left_vectors[:, m:]
     if n > m:  # fixed-interface modes: those with the driven axes held
         internal_modes = internal_modes @ np.linalg.eigh(internal_modes.T @ model.stiffness @ internal_modes)[1]
-    change = np.concatenate([axis_shapes, internal_modes], axis=1)
-    mass, damping, stiffness = (change.T @ part @ change for part in (model.mass, model.damping, model.stiffness))
+    transformation = np.concatenate([axis_shapes, internal_modes], axis=1)
+    mass, damping, stiffness = (
+        transformation.T @ matrix @ transformation for matrix in (model.mass, model.damping, model.stiffness)
+    )
     return replace(
         model,
         mass=(mass + mass.T) / 2,
         damping=(damping + damping.T) / 2,
         stiffness=(stiffness + stiffness.T) / 2,
         input=np.concatenate([np.eye(m), np.zeros((n - m, m))]),
-        output=model.output @ change,
+        output=model.output @ transformation,
     )

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 
 MASS, DAMPING, STIFFNESS, MODES = 0.1, 0.5, 0.2, 0.03
@@ -20,7 +20,7 @@ and of the modes' frequencies and masses, relative. Heuristic."""
 def widen_tolerance(model: MechanicalModel) -> MechanicalModel:
     """The model with its own tolerance, widened to at least the constants above times its largest mass, damping and
     stiffness at any driven axis."""
-    axes = driven_axes(model)
+    axes = compute_driven_axes(model)
     mass, damping, stiffness = (
         float(np.einsum("ni,nk,ki->i", axes, part, axes).max()) for part in (model.mass, model.damping, model.stiffness)
     )

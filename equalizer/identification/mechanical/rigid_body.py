@@ -20,7 +20,7 @@ import numpy as np
 
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFit, MechanicalFitSettings
-from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -93,7 +93,7 @@ def fit_rigid_body(
 
 def remove_friction_damping(model: MechanicalModel, of_friction: FloatArray) -> MechanicalModel:
     """The model without friction's equivalent damping. of_friction: (m,), N s/m at each driven axis."""
-    axes = driven_axes(model)
+    axes = compute_driven_axes(model)
     return replace(model, damping=model.damping - (axes * of_friction) @ axes.T)
 
 

@@ -2,6 +2,6 @@
 
 Order of the data: `weighted_lines` (data) -> `warped_subspace`, `canonical_variate` (starting models) -> `refinement`
 (maximum likelihood) -> `candidates` (choice) -> `relaxed_poles`, `settled_recordings` (long decays) -> `bootstrap`
-(uncertainty) -> `misfit`, `held_out` (validation). `order_report` compares orders; `refusals` holds the conditions
+(uncertainty) -> `misfit`, `held_out_validation`. `order_report` compares orders; `refusals` holds the conditions
 under which no model is fitted. Begin at `identify.py`.
 """

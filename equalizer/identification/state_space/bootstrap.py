@@ -36,7 +36,7 @@ def parameter_draws(
     models. Refitting keeps every draw within the decay bound.
     """
     random = np.random.default_rng(seed)
-    modelled = fitted.response(lines.z)
+    modelled = fitted.compute_response(lines.z)
     deviation = noise_factor / lines.weight / np.sqrt(2)
     rows = []
     for _ in range(draws):

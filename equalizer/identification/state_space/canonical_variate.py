@@ -5,7 +5,7 @@ The state is the part of the past (commands and responses) that best predicts th
 future commands is removed: canonical correlations between past and future. Each row of the data matrix [future
 commands, past, future responses] belongs to a sampling instant. Each record is reduced to the triangular factor of the
 QR decomposition of its data matrix, and the factors are stacked and reduced again: no row mixes samples of two records,
-and the cost is proportional to the number of records.
+and the cost is proportional to the number of records. Called by `candidates`.
 """
 
 from collections.abc import Sequence
@@ -18,66 +18,71 @@ from equalizer.identification.state_space.stable_poles import stabilise_poles
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-RATE_OVER_BAND = 3.5
+LEAST_RATE_OVER_BAND = 3.5
 """Records are decimated to at least this many samples per period of the band's upper end, and to hardly more."""
-LEAST_SAMPLES = 4
-"""Least length of a record that is used, in samples times the number of records, per column of past and future."""
-_SILENT_KINDS = ("rest", "free")
-"""Kinds of segments without a command."""
+LEAST_SAMPLES_PER_COLUMN = 4
+"""Least length of a record that is used, in samples times the number of records, per column of the data matrix."""
+_UNDRIVEN_SEGMENT_KINDS = ("rest", "free")
+"""Kinds of segments without a command: rest and free decay."""
 
 
-def decimation_factor(sample_rate_hz: float, high_hz: float) -> int:
+def choose_decimation_factor(sample_rate_hz: float, high_hz: float) -> int:
     """Largest decimation factor that leaves RATE_OVER_BAND samples or more per period of high_hz, at least 1."""
-    return max(1, int(sample_rate_hz / (RATE_OVER_BAND * high_hz)))
+    return max(1, int(sample_rate_hz / (LEAST_RATE_OVER_BAND * high_hz)))
 
 
-def driven_records(recordings: Sequence[Recording], factor: int) -> list[FloatArray]:
-    """Commands and responses side by side, (n, m + p) each: every driven segment that is not held out for a test, with
-    its mean removed, then low-pass filtered and decimated by `factor`. Segments with missing samples are left out."""
+def collect_driven_records(recordings: Sequence[Recording], factor: int) -> list[FloatArray]:
+    """Collect commands and responses side by side, (n, m + p) each: every driven segment that is not held out for a
+    test, with its mean removed, then low-pass filtered and decimated by `factor`. Segments with missing samples are
+    left out."""
     records = []
     for recording in recordings:
         signals = np.hstack([recording.command.samples, recording.response.samples])
         for segment in recording.segments:
-            part = signals[segment.start : segment.stop]
-            if segment.kind in _SILENT_KINDS or segment.role == "test" or not np.isfinite(part).all():
+            samples = signals[segment.start : segment.stop]
+            if segment.kind in _UNDRIVEN_SEGMENT_KINDS or segment.role == "test" or not np.isfinite(samples).all():
                 continue
-            centred = part - part.mean(axis=0)
+            centred = samples - samples.mean(axis=0)
             records.append(resample_poly(centred, 1, factor, axis=0) if factor > 1 else centred)
     return records
 
 
-def canonical_variate(records: Sequence[FloatArray], inputs: int, horizon: int) -> FloatArray | None:
-    """Extended observability matrix (horizon p, horizon p), strongest canonical correlation first; None with too few
-    samples.
+def estimate_observability(records: Sequence[FloatArray], inputs: int, horizon: int) -> FloatArray | None:
+    """Estimate the extended observability matrix (horizon p, horizon p), largest canonical correlation first; None
+    where no record has enough samples.
 
     records: (n, m + p) each, commands first; inputs: m; horizon: number of past samples, and of future samples.
     """
-    rows = 2 * horizon * records[0].shape[1] if records else 0
+    column_count = 2 * horizon * records[0].shape[1] if records else 0
     long_records = [
-        record for record in records if len(record) > LEAST_SAMPLES * rows / max(len(records), 1) + 2 * horizon
+        record
+        for record in records
+        if len(record) > LEAST_SAMPLES_PER_COLUMN * column_count / max(len(records), 1) + 2 * horizon
     ]
     if not long_records:
         return None
-    triangle = np.vstack([_qr_triangle(_past_and_future(record, inputs, horizon)) for record in long_records])
-    triangle = _qr_triangle(triangle)
+    triangle = np.vstack(
+        [_compute_qr_triangle(_stack_past_and_future(record, inputs, horizon)) for record in long_records]
+    )
+    triangle = _compute_qr_triangle(triangle)
     p = records[0].shape[1] - inputs
     command_columns, future = horizon * inputs, triangle.shape[1] - horizon * p
-    by_past, by_chance = triangle[command_columns:future, future:], triangle[future:, future:]
-    # Covariance L L' of the future responses, given the future commands: the part that the past predicts, and the rest.
-    spread = by_past.T @ by_past + by_chance.T @ by_chance
-    spread[np.diag_indices_from(spread)] += 1e-13 * np.trace(spread)
-    root = np.linalg.cholesky(spread)
+    predicted_part, innovation_part = triangle[command_columns:future, future:], triangle[future:, future:]
+    # Covariance L L' of the future responses, given the future commands: part predicted by the past, and innovation.
+    covariance = predicted_part.T @ predicted_part + innovation_part.T @ innovation_part
+    covariance[np.diag_indices_from(covariance)] += 1e-13 * np.trace(covariance)
+    covariance_root = np.linalg.cholesky(covariance)
     # Canonical correlations are the singular values of L^-1 by_past', because the past is orthonormal in the QR basis.
-    vectors, correlations, _ = np.linalg.svd(np.linalg.solve(root, by_past.T), full_matrices=False)
-    return np.asarray(root @ (vectors * np.sqrt(correlations)), dtype=np.float64)
+    vectors, correlations, _ = np.linalg.svd(np.linalg.solve(covariance_root, predicted_part.T), full_matrices=False)
+    return np.asarray(covariance_root @ (vectors * np.sqrt(correlations)), dtype=np.float64)
 
 
-def _qr_triangle(rows: FloatArray) -> FloatArray:
+def _compute_qr_triangle(rows: FloatArray) -> FloatArray:
     """Triangular factor R of the QR decomposition; R'R equals the products of the rows."""
     return np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
 
 
-def _past_and_future(record: FloatArray, inputs: int, horizon: int) -> FloatArray:
+def _stack_past_and_future(record: FloatArray, inputs: int, horizon: int) -> FloatArray:
     """(instants, 2 horizon m + 2 horizon p): future commands, then past commands and responses, then future responses,
     with one row per sampling instant."""
     windows = np.lib.stride_tricks.sliding_window_view(record, 2 * horizon, axis=0).transpose(0, 2, 1)
@@ -92,13 +97,17 @@ def _past_and_future(record: FloatArray, inputs: int, horizon: int) -> FloatArra
     )
 
 
-def poles_and_shapes(observed: FloatArray, outputs: int, order: int, factor: int, radius: float) -> ModalForm:
+def estimate_poles_and_shapes(observed: FloatArray, outputs: int, order: int, factor: int, radius: float) -> ModalForm:
     """Modal form of a model of this order at the full rate. The poles are the eigenvalues of the matrix A that shifts
     the observability matrix by one sample, in least squares. A pole of the decimated records becomes its factor-th
-    root. observed: result of `canonical_variate`; radius: largest magnitude of a pole at the full rate."""
+    root. observed: result of `estimate_observability`; radius: largest magnitude of a pole at the full rate."""
     observability = observed[:, :order]
-    values, vectors = np.linalg.eig(np.linalg.lstsq(observability[:-outputs], observability[outputs:], rcond=None)[0])
-    slow: ComplexArray = stabilise_poles(values, radius**factor)
+    eigenvalues, eigenvectors = np.linalg.eig(
+        np.linalg.lstsq(observability[:-outputs], observability[outputs:], rcond=None)[0]
+    )
+    decimated_poles: ComplexArray = stabilise_poles(eigenvalues, radius**factor)
     # A negative real pole may have no real factor-th root; the positive pole with the same decay is used.
-    positive = np.where((slow.imag == 0) & (slow.real < 0), -slow, slow)
-    return from_poles(stabilise_poles(positive ** (1 / factor), radius), observability[:outputs] @ vectors)
+    rootable_poles = np.where(
+        (decimated_poles.imag == 0) & (decimated_poles.real < 0), -decimated_poles, decimated_poles
+    )
+    return from_poles(stabilise_poles(rootable_poles ** (1 / factor), radius), observability[:outputs] @ eigenvectors)

@@ -1,4 +1,5 @@
 """Identification of a state-space model from measured frequency responses: starts, refinement, choice, uncertainty.
+Called by `identify_recordings`.
 
 Theory of operation. The measured response G(f) of each line f has noise of known variance s(f)² per entry. The model
 
@@ -28,32 +29,39 @@ from equalizer.identification.state_space.bootstrap import parameter_draws, scat
 from equalizer.identification.state_space.candidates import (
     Candidate,
     Start,
-    bins_about,
+    average_about_model,
     choose_best,
-    record_starts,
+    estimate_record_starts,
+    estimate_subspace_start,
+    estimate_subspace_starts,
     refine_start,
-    subspace_start,
-    subspace_starts,
 )
 from equalizer.identification.state_space.misfit import Misfit, count_unknowns, misfit_of
 from equalizer.identification.state_space.misfit_causes import UNEXPLAINED, fit_remarks
 from equalizer.identification.state_space.refusals import IdentificationRefused, require_lines
-from equalizer.identification.state_space.relaxed_poles import RelaxedFit, SlowPole, relax_poles, retighten, slow_poles
+from equalizer.identification.state_space.relaxed_poles import (
+    RelaxedFit,
+    SlowPole,
+    list_slow_poles,
+    refine_and_tighten,
+    relax_poles,
+)
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.recording import Recording
-from equalizer.signals.summary import Summarised, Summary
+from equalizer.signals.summary import Summary, SummaryDisplay
 
-FIRST_SEARCH = 0.8
-"""Share of the progress that is reported for the first search; poles are relaxed in the rest."""
-SAMPLED_BEFORE_WRITTEN = 1.0
-"""Delay of one sample: a response is read just before its row's command is written."""
+FIRST_SEARCH_PROGRESS = 0.8
+"""Fraction of the reported progress that the first search takes; the relaxation of poles takes the rest."""
+DELAY_SAMPLES = 1.0
+"""Delay of the response to a command, samples: each response is sampled just before the command of the same row is
+written."""
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
-class Identified(Summarised):
-    """A model and how well it fits what was measured."""
+class Identified(SummaryDisplay):
+    """An identified model with its goodness of fit; result of `identify`."""
 
     model: IdentifiedModel
     cost: float
@@ -75,13 +83,13 @@ class Identified(Summarised):
     relaxed: tuple[SlowPole, ...]
     """Poles with a longer decay than the ordinary bound, which the data require; slowest first."""
     bound_costs: bool
-    """Whether the decay bound that was asked for prevents a fit of the data."""
+    """Whether the requested bound on the decay prevents a fit of the data."""
     remarks: tuple[str, ...]
     """Remarks for the user, as sentences; `misfit_causes` has likely causes of a misfit."""
 
     @property
     def slowest_decay_s(self) -> float:
-        """Time constant in seconds."""
+        """Longest time constant (s) of a pole; 0 where all poles are zero."""
         radius = self.model.spectral_radius
         return float(-1 / (np.log(radius) * self.model.sample_rate_hz)) if radius > 0 else 0.0
 
@@ -115,12 +123,12 @@ def identify(
     report = on_progress or (lambda _: None)
     responses = (response,) if isinstance(response, FrequencyResponse) else tuple(response)
     lines = require_lines(responses, settings)
-    _refuse_foreign(records, responses[0])
+    _refuse_foreign_records(records, responses[0])
 
     if initial is not None:
-        refit = RelaxedFit(retighten(initial, lines, settings), bound_costs=False)
+        refit = RelaxedFit(refine_and_tighten(initial, lines, settings), bound_costs=False)
         return _assess_model((refit.candidate,), refit, lines, responses[0], settings)
-    candidates = _search(lines, settings, records, lambda share: report(FIRST_SEARCH * share))
+    candidates = _search(lines, settings, records, lambda share: report(FIRST_SEARCH_PROGRESS * share))
     relaxed_fit = relax_poles(
         choose_best(candidates),
         lambda relaxed_settings: _search(lines, relaxed_settings, records, lambda _: None),
@@ -139,12 +147,13 @@ def _search(
     records: tuple[Recording, ...],
     report: Callable[[float], None],
 ) -> list[Candidate]:
+    """Refine all starting models. report: takes the share done, 0 to 1. Raises IdentificationRefused."""
     starts = _make_starts(lines, settings, records)
     candidates = []
-    for number, start in enumerate(starts):
-        report(number / len(starts))
+    for start_index, start in enumerate(starts):
+        report(start_index / len(starts))
         candidates.append(refine_start(start, lines, settings))
-    candidates += _spare_candidates(choose_best(candidates), lines, settings)
+    candidates += _search_spare_horizons(choose_best(candidates), lines, settings)
     report(1.0)
     return candidates
 
@@ -152,8 +161,10 @@ def _search(
 def _make_starts(
     lines: WeightedLines, settings: IdentificationSettings, records: tuple[Recording, ...]
 ) -> tuple[Start, ...]:
+    """Starting models from the lines and from the time records. Raises IdentificationRefused for an order with more
+    parameters than the lines determine."""
     try:
-        return (*subspace_starts(lines, settings), *record_starts(records, lines, settings))
+        return (*estimate_subspace_starts(lines, settings), *estimate_record_starts(records, lines, settings))
     except np.linalg.LinAlgError as problem:
         order = settings.order
         raise IdentificationRefused(
@@ -162,15 +173,16 @@ def _make_starts(
         ) from problem
 
 
-def _spare_candidates(
+def _search_spare_horizons(
     best_so_far: Candidate, lines: WeightedLines, settings: IdentificationSettings
 ) -> list[Candidate]:
-    """Further candidates of a wide band, until one leaves no more than noise."""
+    """Further candidates of a wide band, one per entry of `spare_horizons`, until the residual of one is within
+    noise."""
     candidates: list[Candidate] = []
     for extra_rows in settings.spare_horizons if settings.wide else ():
         if choose_best([best_so_far, *candidates]).cost <= UNEXPLAINED:
             break
-        candidates.append(refine_start(subspace_start(lines, settings, extra_rows), lines, settings))
+        candidates.append(refine_start(estimate_subspace_start(lines, settings, extra_rows), lines, settings))
     return candidates
 
 
@@ -181,48 +193,54 @@ def _assess_model(
     response: FrequencyResponse,
     settings: IdentificationSettings,
 ) -> Identified:
+    """Result for the fitted model: cost, errors in the band, misfit, scatter of the bootstrap draws, and remarks."""
     chosen = relaxed_fit.candidate
     low, high = settings.band_hz
     p, m = lines.response.shape[1:]
     unknowns = count_unknowns(settings.order, p, m)
     cost = chosen.cost * lines.response.size / max(lines.response.size - unknowns / 2, 1.0)
     in_band = (lines.frequency_hz >= low) & (lines.frequency_hz <= high)
-    modelled = chosen.fitted.response(lines.z)
-    error = lines.relative_error(modelled)[in_band]
-    slow = () if settings.longest_decay_s else slow_poles(chosen, settings.decay_s, lines.sample_rate_hz)
+    modelled = chosen.fitted.compute_response(lines.z)
+    relative_error = lines.compute_relative_error(modelled)[in_band]
+    relaxed_poles = () if settings.longest_decay_s else list_slow_poles(chosen, settings.decay_s, lines.sample_rate_hz)
     misfit = misfit_of(lines, modelled, in_band, unknowns)
-    model = _make_model(chosen, lines, cost, response, settings, slow)
+    model = _make_model(chosen, lines, cost, response, settings, relaxed_poles)
     return Identified(
         model=model,
         cost=cost,
-        rms_relative_error=float(np.sqrt((error**2).mean())),
-        worst_relative_error=float(error.max()),
-        scatter=(scatter := scatter_of_draws(model, lines.frequency_hz[in_band], slow)),
+        rms_relative_error=float(np.sqrt((relative_error**2).mean())),
+        worst_relative_error=float(relative_error.max()),
+        scatter=(scatter := scatter_of_draws(model, lines.frequency_hz[in_band], relaxed_poles)),
         misfit=misfit,
         expected_error=None if scatter is None else float(np.hypot(scatter, misfit.upper_bound)),
         lines=int(in_band.sum()),
         candidates=candidates,
         chosen=chosen,
-        relaxed=slow,
+        relaxed=relaxed_poles,
         bound_costs=relaxed_fit.bound_costs,
-        remarks=(*fit_remarks(cost, misfit, slow, relaxed_fit.bound_costs, settings), *outside_remark(chosen)),
+        remarks=(
+            *fit_remarks(cost, misfit, relaxed_poles, relaxed_fit.bound_costs, settings),
+            *write_outside_gain_remark(chosen),
+        ),
     )
 
 
-def _refuse_foreign(records: tuple[Recording, ...], response: FrequencyResponse) -> None:
+def _refuse_foreign_records(records: tuple[Recording, ...], response: FrequencyResponse) -> None:
+    """Raises IdentificationRefused for a record whose sample rate or channels differ from those of the response."""
     for record in records:
-        form = (record.sample_rate_hz, record.command.channels, record.response.channels)
-        if form != (response.sample_rate_hz, response.input_channels, response.output_channels):
+        record_format = (record.sample_rate_hz, record.command.channels, record.response.channels)
+        if record_format != (response.sample_rate_hz, response.input_channels, response.output_channels):
             raise IdentificationRefused(
-                f"a record of {', '.join(form[2])} per {', '.join(form[1])} at {form[0]:g} Hz does not belong to a "
-                f"response of {', '.join(response.output_channels)} per {', '.join(response.input_channels)} at "
+                f"a record of {', '.join(record_format[2])} per {', '.join(record_format[1])} at {record_format[0]:g}"
+                f" Hz does not belong to a response of {', '.join(response.output_channels)} per "
+                f"{', '.join(response.input_channels)} at "
                 f"{response.sample_rate_hz:g} Hz; give the records that the response was estimated from"
             )
 
 
-def outside_remark(chosen: Candidate) -> list[str]:
+def write_outside_gain_remark(chosen: Candidate) -> list[str]:
     """Remark on a large gain outside the band; empty where the gain is acceptable."""
-    if chosen.sane:
+    if chosen.has_acceptable_gain:
         return []
     return [
         f"outside the band the model's gain is {chosen.outside_gain:.0f} times that inside: "
@@ -236,13 +254,14 @@ def _make_model(
     cost: float,
     response: FrequencyResponse,
     settings: IdentificationSettings,
-    slow: tuple[SlowPole, ...],
+    relaxed_poles: tuple[SlowPole, ...],
 ) -> IdentifiedModel:
+    """The model to store, with bootstrap draws of its parameters (if requested) and its provenance."""
     fitted = chosen.fitted
     samples = None
     if settings.draws:
         noise_factor = float(np.sqrt(max(cost, 1.0)))
-        bins = bins_about(fitted, lines, settings)
+        bins = average_about_model(fitted, lines, settings)
         samples = parameter_draws(fitted, bins, chosen.radius, noise_factor, settings.draws, settings.seed)
     return IdentifiedModel(
         A=fitted.form.state_matrix,
@@ -255,13 +274,13 @@ def _make_model(
         output_unit=response.output_unit,
         input_channels=response.input_channels,
         output_channels=response.output_channels,
-        delay_samples=SAMPLED_BEFORE_WRITTEN,
+        delay_samples=DELAY_SAMPLES,
         samples=samples,
         provenance={
             "method": "subspace identification, refined by maximum likelihood on the lines of the response",
             "start": chosen.name,
             "residual_over_noise": float(np.sqrt(cost)),
             "longest_decay_s": settings.decay_s,
-            "relaxed_poles": [[pole.frequency_hz, pole.decay_s] for pole in slow],
+            "relaxed_poles": [[pole.frequency_hz, pole.decay_s] for pole in relaxed_poles],
         },
     )

@@ -8,12 +8,12 @@ from equalizer.identification.frequency_response.experiments import periodic_exp
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.local_polynomial import smooth_response
 from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
-from equalizer.identification.state_space.identify import Identified, identify, outside_remark
+from equalizer.identification.state_space.identify import Identified, identify, write_outside_gain_remark
 from equalizer.identification.state_space.misfit import misfit_of_estimate
 from equalizer.identification.state_space.misfit_causes import UNEXPLAINED, fit_remarks
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.identification.state_space.settled_recordings import slow_part, subtract_free_decay
-from equalizer.identification.state_space.stable_poles import largest_radius
+from equalizer.identification.state_space.stable_poles import compute_pole_radius
 from equalizer.plant.model_response import model_response
 from equalizer.signals.recording import Recording
 
@@ -90,7 +90,7 @@ def _add_causes(
     misfit = misfit if has_repeats else replace(misfit, smooth=None)
     cost = misfit.cost if averaged else identified.cost
     causes = fit_remarks(cost, misfit, identified.relaxed, identified.bound_costs, settings)
-    remarks = (*([SMOOTHED] if averaged else []), *causes, *outside_remark(identified.chosen))
+    remarks = (*([SMOOTHED] if averaged else []), *causes, *write_outside_gain_remark(identified.chosen))
     return replace(result, identified=replace(identified, misfit=misfit, remarks=remarks))
 
 
@@ -112,7 +112,7 @@ def _remove_transients(
     settings: IdentificationSettings,
 ) -> tuple[FrequencyResponse, Identified]:
     """Subtract the free decay of slow poles from the recordings, and identify again, until the decay settles."""
-    radius, without_draws = largest_radius(DISTURBING_DECAY_S, estimate.sample_rate_hz), replace(settings, draws=0)
+    radius, without_draws = compute_pole_radius(DISTURBING_DECAY_S, estimate.sample_rate_hz), replace(settings, draws=0)
     rounds = 0
     while (slow := slow_part(identified, radius)) is not None and rounds < MOST_ROUNDS:
         previous_decay_s, rounds = identified.slowest_decay_s, rounds + 1

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from equalizer.identification.state_space.held_out import HeldOut
+from equalizer.identification.state_space.held_out_validation import HeldOutValidation
 from equalizer.identification.state_space.misfit import Misfit
 from equalizer.identification.state_space.relaxed_poles import SlowPole
 from equalizer.identification.state_space.settings import IdentificationSettings
@@ -67,7 +67,7 @@ def fit_remarks(
 
 
 def held_out_remarks(
-    tested: HeldOut | None, cost: float, misfit: Misfit, recordings: Sequence[Recording]
+    tested: HeldOutValidation | None, cost: float, misfit: Misfit, recordings: Sequence[Recording]
 ) -> tuple[str, ...]:
     """Remarks, as whole sentences, on clipped sensors and on a test error that neither noise nor the fit's misfit
     explains."""

@@ -1,7 +1,8 @@
 """Modal form of a discrete state-space model: A is block-diagonal, with blocks [[a, 1], [b, a]] and poles a ± sqrt(b).
 
 A complex pair (b < 0) becomes two real poles (b > 0) continuously, so that a gradient-based fit can pass from a pair to
-two real poles. The order is even, because a block has two poles.
+two real poles. The order is even, because a block has two poles. Used by the starting models (`canonical_variate`,
+`warped_subspace`) and by `refinement`.
 """
 
 from dataclasses import dataclass
@@ -38,7 +39,7 @@ class ModalForm:
         root = np.sqrt(self.b.astype(np.complex128))
         return np.concatenate([self.a + root, self.a - root])
 
-    def from_states(self, z: ComplexArray) -> ComplexArray:
+    def compute_state_outputs(self, z: ComplexArray) -> ComplexArray:
         """C (zI - A)^-1, shape (lines, p, n). z: (lines,)."""
         offset = z[:, None] - self.a
         scale = 1 / (offset**2 - self.b)
@@ -48,7 +49,7 @@ class ModalForm:
         states[:, :, 1::2] = (first + second * offset[:, None]) * scale[:, None]
         return states
 
-    def to_states(self, z: ComplexArray, B: FloatArray) -> ComplexArray:
+    def compute_state_responses(self, z: ComplexArray, B: FloatArray) -> ComplexArray:
         """(zI - A)^-1 B, shape (lines, n, m). z: (lines,), B: (n, m)."""
         offset = (z[:, None] - self.a)[:, :, None]
         scale = 1 / (offset**2 - self.b[:, None])
@@ -58,28 +59,32 @@ class ModalForm:
         return states
 
 
-def modal_form(A: FloatArray, C: FloatArray) -> ModalForm:
-    """Modal form of A (n, n) and C (p, n). Raises ValueError where the number of real poles is odd."""
-    values, vectors = np.linalg.eig(A)
-    return from_poles(values, C @ vectors)
+def compute_modal_form(A: FloatArray, C: FloatArray) -> ModalForm:
+    """Convert A (n, n) and C (p, n) to modal form, by eigenvalue decomposition. Raises ValueError where the number of
+    real poles is odd."""
+    eigenvalues, eigenvectors = np.linalg.eig(A)
+    return from_poles(eigenvalues, C @ eigenvectors)
 
 
 def from_poles(poles: ComplexArray, shapes: ComplexArray) -> ModalForm:
     """The real modal form of given poles and output shapes. poles: (n,), conjugates included; shapes: (p, n), output of
     each pole's mode. Raises ValueError where the number of real poles is odd or a conjugate is missing."""
-    upper = np.flatnonzero(poles.imag > 0)
-    real = np.flatnonzero(poles.imag == 0)
-    real = real[np.argsort(poles[real].real)]
-    if len(real) % 2 or 2 * len(upper) + len(real) != len(poles):
-        raise ValueError(f"{len(poles)} poles, {len(real)} of them real, do not form pairs; choose an even order")
+    upper_poles = np.flatnonzero(poles.imag > 0)
+    real_poles = np.flatnonzero(poles.imag == 0)
+    real_poles = real_poles[np.argsort(poles[real_poles].real)]
+    if len(real_poles) % 2 or 2 * len(upper_poles) + len(real_poles) != len(poles):
+        raise ValueError(f"{len(poles)} poles, {len(real_poles)} of them real, do not form pairs; choose an even order")
     blocks = len(poles) // 2
     a, b, C = np.empty(blocks), np.empty(blocks), np.empty((len(shapes), len(poles)))
-    k = len(upper)
-    a[:k], b[:k] = poles[upper].real, -(poles[upper].imag ** 2)
-    C[:, 0 : 2 * k : 2], C[:, 1 : 2 * k : 2] = poles[upper].imag * shapes[:, upper].real, shapes[:, upper].imag
-    first, second = real[::2], real[1::2]
-    half = (poles[first].real - poles[second].real) / 2
-    a[k:], b[k:] = (poles[first].real + poles[second].real) / 2, half**2
-    C[:, 2 * k :: 2] = half * (shapes[:, first] - shapes[:, second]).real
-    C[:, 2 * k + 1 :: 2] = (shapes[:, first] + shapes[:, second]).real
+    pairs = len(upper_poles)
+    a[:pairs], b[:pairs] = poles[upper_poles].real, -(poles[upper_poles].imag ** 2)
+    C[:, 0 : 2 * pairs : 2], C[:, 1 : 2 * pairs : 2] = (
+        poles[upper_poles].imag * shapes[:, upper_poles].real,
+        shapes[:, upper_poles].imag,
+    )
+    first, second = real_poles[::2], real_poles[1::2]
+    half_difference = (poles[first].real - poles[second].real) / 2
+    a[pairs:], b[pairs:] = (poles[first].real + poles[second].real) / 2, half_difference**2
+    C[:, 2 * pairs :: 2] = half_difference * (shapes[:, first] - shapes[:, second]).real
+    C[:, 2 * pairs + 1 :: 2] = (shapes[:, first] + shapes[:, second]).real
     return ModalForm(a, b, C)

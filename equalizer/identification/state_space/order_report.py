@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
-from equalizer.identification.state_space.candidates import choose_best, refine_start, subspace_starts
+from equalizer.identification.state_space.candidates import choose_best, estimate_subspace_starts, refine_start
 from equalizer.identification.state_space.refusals import require_lines
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.identification.state_space.warped_subspace import default_horizon, estimate_subspace
@@ -66,7 +66,7 @@ def compare_orders(
     responses = (response,) if isinstance(response, FrequencyResponse) else tuple(response)
     highest = replace(settings, order=max(orders))
     fit, test = (
-        require_lines([estimate.of_lines(_alternate_lines(estimate, k)) for estimate in responses], highest)
+        require_lines([estimate.select_lines(_alternate_lines(estimate, k)) for estimate in responses], highest)
         for k in (0, 1)
     )
     per_line = []
@@ -74,11 +74,11 @@ def compare_orders(
     for number, order in enumerate(sorted(orders)):
         report(number / len(orders))
         at_order = replace(settings, order=order)
-        best = choose_best([refine_start(start, fit, at_order) for start in subspace_starts(fit, at_order)])
-        modelled = best.fitted.response(test.z)
+        best = choose_best([refine_start(start, fit, at_order) for start in estimate_subspace_starts(fit, at_order)])
+        modelled = best.fitted.compute_response(test.z)
         squared = (np.abs(test.weight * (modelled - test.response)) ** 2).mean(axis=(1, 2))
         per_line.append(squared)
-        error = float(np.sqrt((test.relative_error(modelled) ** 2).mean()))
+        error = float(np.sqrt((test.compute_relative_error(modelled) ** 2).mean()))
         p, m = test.response.shape[1:]
         rows.append(
             OrderRow(order, float(squared.mean()), error, multiply_adds(order, p, m), dense_multiply_adds(order, p, m))

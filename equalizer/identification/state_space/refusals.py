@@ -60,7 +60,9 @@ def _refuse_mixed_responses(responses: Sequence[FrequencyResponse]) -> None:
 
 
 def _refuse_unexcited_inputs(responses: Sequence[FrequencyResponse], settings: IdentificationSettings) -> None:
-    determined = [np.isfinite(estimate.within(*settings.band_hz).response).any(axis=(0, 1)) for estimate in responses]
+    determined = [
+        np.isfinite(estimate.select_band(*settings.band_hz).response).any(axis=(0, 1)) for estimate in responses
+    ]
     missing = ~np.any(determined, axis=0)
     names = ", ".join(name for name, is_missing in zip(responses[0].input_channels, missing, strict=True) if is_missing)
     if names and not missing.all():
@@ -71,7 +73,7 @@ def _refuse_unexcited_inputs(responses: Sequence[FrequencyResponse], settings: I
 
 
 def _refuse_zero_outputs(responses: Sequence[FrequencyResponse], settings: IdentificationSettings) -> None:
-    in_band = [np.nan_to_num(estimate.within(*settings.band_hz).response) for estimate in responses]
+    in_band = [np.nan_to_num(estimate.select_band(*settings.band_hz).response) for estimate in responses]
     zero_outputs = ~np.any([(response != 0).any(axis=(0, 2)) for response in in_band], axis=0)
     names = ", ".join(name for name, is_zero in zip(responses[0].output_channels, zero_outputs, strict=True) if is_zero)
     if names and any(len(response) for response in in_band):
@@ -84,7 +86,7 @@ def _refuse_empty_band(
     responses: Sequence[FrequencyResponse], lines: WeightedLines, settings: IdentificationSettings
 ) -> None:
     low, high = settings.band_hz
-    measured = sum(len(estimate.within(low, high)) for estimate in responses)
+    measured = sum(len(estimate.select_band(low, high)) for estimate in responses)
     if not len(lines):
         reasons = "; ".join(dict.fromkeys(remark for estimate in responses for remark in estimate.remarks))
         finding = "none of its lines is reliable" if measured else "no line was excited there"

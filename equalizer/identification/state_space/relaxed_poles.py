@@ -1,9 +1,9 @@
-"""Relaxation of the decay bound for poles whose data demand it, by a likelihood-ratio test.
+"""Relaxation of the bound on the decay for the poles that need a longer decay, by a likelihood-ratio test.
 
 A pole at the bound of the decay is either superfluous, because the order is higher than needed, and then the bound does
 not raise the cost; or it represents a resonance with a longer decay. A likelihood-ratio test decides: twice the fall of
 the cost J (negative log-likelihood) when the bound is lifted, compared with the chi-squared distribution, with a
-Bonferroni correction for the number of lines at which noise could imitate a resonance.
+Bonferroni correction for the number of lines at which noise could imitate a resonance. Called by `identify`.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,25 +13,25 @@ import numpy as np
 from scipy.stats import chi2
 
 from equalizer.identification.state_space.candidates import (
-    MOST_STEPS,
+    MOST_BIN_STEPS,
     Candidate,
-    bins_about,
+    average_about_model,
     choose_best,
     refine_candidate,
 )
 from equalizer.identification.state_space.refinement import FittedForm, complete_form, refine
 from equalizer.identification.state_space.settings import IdentificationSettings
-from equalizer.identification.state_space.stable_poles import Radius, largest_radius, stabilise_blocks
+from equalizer.identification.state_space.stable_poles import Radius, compute_pole_radius, stabilise_blocks
 from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.signals.signal import FloatArray
 
 RESOLVED_PERIODS = 4.0
 """Longest resolvable time constant, in periods (1 / line spacing). The flanks of a resonance that is narrower than the
 line spacing still determine its decay, up to the point where they equal those of an undamped mode. Heuristic."""
-FALSE_ALARM = 1e-3
-"""Significance level: probability that noise alone relaxes a pole."""
-RELAXED = ", poles relaxed"
-"""Suffix of a candidate's name."""
+SIGNIFICANCE_LEVEL = 1e-3
+"""Significance level of the test: probability that noise alone relaxes a pole."""
+RELAXED_SUFFIX = ", poles relaxed"
+"""Suffix of the name of a candidate whose poles were relaxed."""
 
 Search = Callable[[IdentificationSettings], Sequence[Candidate]]
 """Search for candidates from new starting models, under the given settings."""
@@ -61,105 +61,119 @@ class RelaxedFit:
 def relax_poles(
     chosen: Candidate, search: Search, lines: WeightedLines, settings: IdentificationSettings
 ) -> RelaxedFit:
-    """Relax the decay bound for the poles of a candidate that need it, up to `longest_resolved_decay_s`. Where the
-    settings state `longest_decay_s`, the candidate is returned unchanged. search: finds candidates under the relaxed
-    bound."""
-    limit_s = longest_resolved_decay_s(lines)
+    """Relax the decay bound for the poles of a candidate that need it, up to `compute_longest_resolved_decay_s`. Where
+    the settings state `longest_decay_s`, the candidate is returned unchanged. search: finds candidates under the
+    relaxed bound."""
+    limit_s = compute_longest_resolved_decay_s(lines)
     if limit_s <= settings.decay_s:
         return RelaxedFit(chosen, bound_costs=False)
-    limit = largest_radius(limit_s, lines.sample_rate_hz)
-    bound_costs = _bound_costs(chosen, limit, lines, settings)
+    limit_radius = compute_pole_radius(limit_s, lines.sample_rate_hz)
+    bound_costs = _is_bound_costly(chosen, limit_radius, lines, settings)
     if settings.longest_decay_s is not None or not (bound_costs or _has_outlying_line(chosen, lines)):
         return RelaxedFit(chosen, bound_costs)
     relaxed_settings = replace(settings, longest_decay_s=limit_s)
-    relaxed = choose_best(
-        [*search(relaxed_settings), refine_candidate(chosen.name, chosen.fitted, lines, settings, limit)]
+    relaxed_candidate = choose_best(
+        [*search(relaxed_settings), refine_candidate(chosen.name, chosen.fitted, lines, settings, limit_radius)]
     )
-    tightened = _tighten_poles(relaxed, lines, settings, limit)
-    is_accepted = tightened.sane >= chosen.sane and _lowers_cost(tightened, chosen, lines)
-    return RelaxedFit(tightened, bound_costs=False) if is_accepted else RelaxedFit(chosen, bound_costs)
+    tightened_candidate = _tighten_poles(relaxed_candidate, lines, settings, limit_radius)
+    is_accepted = tightened_candidate.has_acceptable_gain >= chosen.has_acceptable_gain and _lowers_cost(
+        tightened_candidate, chosen, lines
+    )
+    return RelaxedFit(tightened_candidate, bound_costs=False) if is_accepted else RelaxedFit(chosen, bound_costs)
 
 
-def retighten(candidate: Candidate, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
+def refine_and_tighten(candidate: Candidate, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
     """Refine a candidate from another estimate of the same device on these lines; of its relaxed poles, those that are
-    no longer needed return to the ordinary bound."""
+    no longer needed return to the ordinary bound. Called by `identify` for the argument `initial`."""
     refined = refine_candidate(candidate.name, candidate.fitted, lines, settings, candidate.radius)
     return _tighten_poles(refined, lines, settings, float(np.max(candidate.radius)))
 
 
-def slow_poles(chosen: Candidate, bound_s: float, sample_rate_hz: float) -> tuple[SlowPole, ...]:
+def list_slow_poles(chosen: Candidate, bound_s: float, sample_rate_hz: float) -> tuple[SlowPole, ...]:
     """Poles of a candidate with a time constant above bound_s, slowest first."""
     form = chosen.fitted.form
-    first, second = form.poles.reshape(2, -1)
-    slower = np.where(np.abs(first) >= np.abs(second), first, second)
-    slow = slower[np.abs(slower) > largest_radius(bound_s, sample_rate_hz) * (1 + 1e-9)]
-    continuous = np.log(slow) * sample_rate_hz
-    natural_rad_s = np.abs(continuous)
+    first_poles, second_poles = form.poles.reshape(2, -1)
+    slower_poles = np.where(np.abs(first_poles) >= np.abs(second_poles), first_poles, second_poles)
+    slow_poles = slower_poles[np.abs(slower_poles) > compute_pole_radius(bound_s, sample_rate_hz) * (1 + 1e-9)]
+    continuous_poles = np.log(slow_poles) * sample_rate_hz
+    natural_rad_s = np.abs(continuous_poles)
     poles = [
         SlowPole(float(rad_s / (2 * np.pi)), float(-1 / pole.real), float(-pole.real / rad_s))
-        for pole, rad_s in zip(continuous, natural_rad_s, strict=True)
+        for pole, rad_s in zip(continuous_poles, natural_rad_s, strict=True)
     ]
     return tuple(sorted(poles, key=lambda pole: -pole.decay_s))
 
 
-def longest_resolved_decay_s(lines: WeightedLines) -> float:
-    """Time constant (s) above which these lines do not distinguish a decay from an undamped mode; 0 for a single
-    line."""
-    steps = np.diff(np.unique(lines.frequency_hz))
-    return RESOLVED_PERIODS / float(np.median(steps)) if len(steps) else 0.0
+def compute_longest_resolved_decay_s(lines: WeightedLines) -> float:
+    """Time constant (s) above which these lines do not distinguish a decay from an undamped mode: `RESOLVED_PERIODS`
+    over the median line spacing; 0 for a single line."""
+    spacings_hz = np.diff(np.unique(lines.frequency_hz))
+    return RESOLVED_PERIODS / float(np.median(spacings_hz)) if len(spacings_hz) else 0.0
 
 
 def is_at_bound(fitted: FittedForm, radius: Radius) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """(blocks,): whether the larger pole of a block lies on the radius, to within 1e-7 of it."""
-    return np.asarray(_pole_radii(fitted) >= radius * (1 - 1e-7))
+    return np.asarray(_compute_pole_radii(fitted) >= radius * (1 - 1e-7))
 
 
-def _pole_radii(fitted: FittedForm) -> FloatArray:
+def _compute_pole_radii(fitted: FittedForm) -> FloatArray:
     """(blocks,): magnitude of the larger pole."""
     poles = np.abs(fitted.form.poles).reshape(2, -1)
     return np.asarray(poles.max(axis=0))
 
 
-def _bound_costs(chosen: Candidate, limit: float, lines: WeightedLines, settings: IdentificationSettings) -> bool:
+def _is_bound_costly(
+    chosen: Candidate, limit_radius: float, lines: WeightedLines, settings: IdentificationSettings
+) -> bool:
     """Whether lifting the bound for the poles at it lowers the cost by more than noise does, judged from a limited
     number of refinement steps."""
     at_bound = is_at_bound(chosen.fitted, chosen.radius)
     if not at_bound.any():
         return False
-    bins = bins_about(chosen.fitted, lines, settings)
-    radii = np.where(at_bound, limit, chosen.radius)
-    relaxed_cost = bins.cost(refine(chosen.fitted.form, bins, radii, MOST_STEPS[-1]).response(bins.z))
-    if not _exceeds_noise(bins.cost(chosen.fitted.response(bins.z)) - relaxed_cost, relaxed_cost, bins, len(lines)):
+    bins = average_about_model(chosen.fitted, lines, settings)
+    radii = np.where(at_bound, limit_radius, chosen.radius)
+    relaxed_cost = bins.compute_cost(
+        refine(chosen.fitted.form, bins, radii, MOST_BIN_STEPS[-1]).compute_response(bins.z)
+    )
+    if not _exceeds_noise(
+        bins.compute_cost(chosen.fitted.compute_response(bins.z)) - relaxed_cost, relaxed_cost, bins, len(lines)
+    ):
         return False
     # A fall of the cost that further steps achieve with the bound, too, is not counted.
-    bounded_cost = bins.cost(refine(chosen.fitted.form, bins, chosen.radius, MOST_STEPS[-1]).response(bins.z))
+    bounded_cost = bins.compute_cost(
+        refine(chosen.fitted.form, bins, chosen.radius, MOST_BIN_STEPS[-1]).compute_response(bins.z)
+    )
     return _exceeds_noise(bounded_cost - relaxed_cost, relaxed_cost, bins, len(lines))
 
 
 def _has_outlying_line(chosen: Candidate, lines: WeightedLines) -> bool:
     """Whether the residual of a line is an outlier, as from a resonance so narrow that no pole moved there in the
     search."""
-    line_costs = (np.abs(lines.weight * (chosen.fitted.response(lines.z) - lines.response)) ** 2).sum(axis=(1, 2))
+    line_costs = (np.abs(lines.weight * (chosen.fitted.compute_response(lines.z) - lines.response)) ** 2).sum(
+        axis=(1, 2)
+    )
     entries = lines.response[0].size
-    return bool(2 * line_costs.max() / max(chosen.cost, 1.0) > chi2.isf(FALSE_ALARM / len(lines), 2 * entries))
+    return bool(2 * line_costs.max() / max(chosen.cost, 1.0) > chi2.isf(SIGNIFICANCE_LEVEL / len(lines), 2 * entries))
 
 
 def _tighten_poles(
-    relaxed: Candidate, lines: WeightedLines, settings: IdentificationSettings, limit: float
+    relaxed: Candidate, lines: WeightedLines, settings: IdentificationSettings, limit_radius: float
 ) -> Candidate:
     """Return poles to the ordinary bound, slowest first, where that raises the cost by no more than noise would."""
-    ordinary = largest_radius(settings.decay_s, lines.sample_rate_hz)
-    sizes, entries = _pole_radii(relaxed.fitted), lines.response.size
-    name = f"{relaxed.name.removesuffix(RELAXED)}{RELAXED}"
-    tightened = replace(relaxed, name=name, radius=np.where(sizes > ordinary, limit, ordinary))
-    for block in [int(k) for k in np.argsort(-sizes) if sizes[k] > ordinary]:
+    ordinary_radius = compute_pole_radius(settings.decay_s, lines.sample_rate_hz)
+    pole_radii, entries = _compute_pole_radii(relaxed.fitted), lines.response.size
+    name = f"{relaxed.name.removesuffix(RELAXED_SUFFIX)}{RELAXED_SUFFIX}"
+    tightened = replace(
+        relaxed, name=name, radius=np.where(pole_radii > ordinary_radius, limit_radius, ordinary_radius)
+    )
+    for block in [int(k) for k in np.argsort(-pole_radii) if pole_radii[k] > ordinary_radius]:
         radii = np.array(tightened.radius)
-        radii[block] = ordinary
+        radii[block] = ordinary_radius
         form = tightened.fitted.form
         a, b = stabilise_blocks(form.a, form.b, radii)
         trial = refine_candidate(name, complete_form(replace(form, a=a, b=b), lines), lines, settings, radii)
         increase = entries * (trial.cost - relaxed.cost)
-        if trial.sane and not _exceeds_noise(increase, entries * relaxed.cost, lines, len(lines)):
+        if trial.has_acceptable_gain and not _exceeds_noise(increase, entries * relaxed.cost, lines, len(lines)):
             tightened = trial
     return tightened
 
@@ -178,5 +192,5 @@ def _exceeds_noise(decrease: float, remaining: float, lines: WeightedLines, test
     of `tested_lines` lines: chi-squared with 2 (p + m + 1) degrees of freedom. Residuals larger than the noise count as
     the noise."""
     p, m = lines.response.shape[1:]
-    scale = max(remaining / lines.response.size, 1.0)
-    return bool(2 * decrease / scale > chi2.isf(FALSE_ALARM / tested_lines, 2 * (p + m + 1)))
+    noise_scale = max(remaining / lines.response.size, 1.0)
+    return bool(2 * decrease / noise_scale > chi2.isf(SIGNIFICANCE_LEVEL / tested_lines, 2 * (p + m + 1)))

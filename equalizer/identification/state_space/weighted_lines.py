@@ -1,7 +1,8 @@
 """Lines that a model is fitted to: measured responses with the inverse of their standard errors as weights.
 
 With circular complex Gaussian noise of variance E|error|² = 1 / weight², the weighted sum of squares is the negative
-log-likelihood, up to a constant.
+log-likelihood, up to a constant. `weight_lines` makes the data of `identify`; `average_bins` reduces them for
+`candidates`.
 """
 
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ import numpy as np
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-LEAST_NOISE = 1e-9
+LEAST_RELATIVE_NOISE = 1e-9
 """Least standard error, relative to the largest magnitude of all entries, so that noise-free data have finite
 weights."""
 
@@ -23,7 +24,7 @@ class WeightedLines:
     """Measured responses, each with the inverse of its standard error as weight."""
 
     frequency_hz: FloatArray
-    """(lines,), rising; a frequency that was measured twice occurs twice."""
+    """(lines,), Hz, in ascending order; a frequency that was measured twice occurs twice."""
     response: ComplexArray
     """(lines, outputs, inputs)"""
     weight: FloatArray
@@ -38,80 +39,87 @@ class WeightedLines:
     def __len__(self) -> int:
         return len(self.frequency_hz)
 
-    def cost(self, modelled: ComplexArray) -> float:
+    def compute_cost(self, modelled: ComplexArray) -> float:
         """Weighted sum of squares of a model's responses (lines, outputs, inputs): the negative log-likelihood up to a
         constant, for noise whose E|error|² is 1 / weight²."""
         return float((np.abs(self.weight * (modelled - self.response)) ** 2).sum())
 
-    def relative_error(self, modelled: ComplexArray) -> FloatArray:
+    def compute_relative_error(self, modelled: ComplexArray) -> FloatArray:
         """(lines,): Frobenius norm of modelled minus measured response, over the rms norm of the measured responses."""
-        size = np.sqrt((np.abs(self.response) ** 2).sum(axis=(1, 2)).mean())
-        return np.asarray(np.linalg.norm(modelled - self.response, axis=(1, 2)) / size, dtype=np.float64)
+        rms_norm = np.sqrt((np.abs(self.response) ** 2).sum(axis=(1, 2)).mean())
+        return np.asarray(np.linalg.norm(modelled - self.response, axis=(1, 2)) / rms_norm, dtype=np.float64)
 
 
 def weight_lines(responses: Sequence[FrequencyResponse], band_hz: tuple[float, float]) -> WeightedLines:
     """All reliable lines of the band (Hz, ends included) of all estimates, in ascending order. Where the noise of an
-    entry is not known, it is estimated from differences between neighbouring lines (`scatter_variance`)."""
-    in_band = [estimate.within(*band_hz) for estimate in responses]
-    chosen = [
-        estimate.of_lines(estimate.reliable & np.isfinite(estimate.response).all(axis=(1, 2))) for estimate in in_band
+    entry is not known, it is estimated from differences between neighbouring lines (`estimate_scatter_variance`)."""
+    in_band = [estimate.select_band(*band_hz) for estimate in responses]
+    reliable_estimates = [
+        estimate.select_lines(estimate.reliable & np.isfinite(estimate.response).all(axis=(1, 2)))
+        for estimate in in_band
     ]
-    chosen = [estimate for estimate in chosen if len(estimate)]
-    if not chosen:
+    reliable_estimates = [estimate for estimate in reliable_estimates if len(estimate)]
+    if not reliable_estimates:
         p, m = len(responses[0].output_channels), len(responses[0].input_channels)
         return WeightedLines(
             np.empty(0), np.empty((0, p, m), complex), np.empty((0, p, m)), responses[0].sample_rate_hz
         )
-    frequency = np.concatenate([estimate.frequency_hz for estimate in chosen])
-    rising = np.argsort(frequency, kind="stable")
-    response = np.concatenate([estimate.response for estimate in chosen])[rising]
-    variance = np.concatenate([_noise_variance(estimate) for estimate in chosen])[rising]
-    floor = LEAST_NOISE * float(np.abs(response).max())
-    weight = 1 / np.sqrt(np.maximum(variance, floor**2))
-    return WeightedLines(frequency[rising], response, weight, chosen[0].sample_rate_hz)
+    frequency_hz = np.concatenate([estimate.frequency_hz for estimate in reliable_estimates])
+    ascending = np.argsort(frequency_hz, kind="stable")
+    response = np.concatenate([estimate.response for estimate in reliable_estimates])[ascending]
+    variance = np.concatenate([_complete_noise_variance(estimate) for estimate in reliable_estimates])[ascending]
+    least_error = LEAST_RELATIVE_NOISE * float(np.abs(response).max())
+    weight = 1 / np.sqrt(np.maximum(variance, least_error**2))
+    return WeightedLines(frequency_hz[ascending], response, weight, reliable_estimates[0].sample_rate_hz)
 
 
-def _noise_variance(estimate: FrequencyResponse) -> FloatArray:
+def _complete_noise_variance(estimate: FrequencyResponse) -> FloatArray:
+    """(lines, p, m): noise variance; where it is not known, that of `estimate_scatter_variance`."""
     variance = estimate.noise_variance
-    return np.where(np.isfinite(variance), variance, scatter_variance(estimate.response))
+    return np.where(np.isfinite(variance), variance, estimate_scatter_variance(estimate.response))
 
 
-def scatter_variance(response: ComplexArray) -> FloatArray:
-    """Noise variance (lines, p, m), the same at all lines, from the median over the lines of squared second differences
-    of each entry; for fewer than three lines |response|²."""
+def estimate_scatter_variance(response: ComplexArray) -> FloatArray:
+    """Estimate the noise variance (lines, p, m), the same at all lines, from the median over the lines of squared
+    second differences of each entry; for fewer than three lines |response|²."""
     if len(response) < 3:
         return np.abs(response) ** 2
-    second = np.diff(response, n=2, axis=0)
+    second_differences = np.diff(response, n=2, axis=0)
     # The median, because a sharp resonance hardly changes it. A second difference has 1 + 4 + 1 = 6 times the variance;
     # |.|² of circular noise is exponentially distributed, with the median ln 2 times its mean.
-    median_variance = np.median(np.abs(second) ** 2, axis=0) / (6 * np.log(2))
+    median_variance = np.median(np.abs(second_differences) ** 2, axis=0) / (6 * np.log(2))
     return np.asarray(np.broadcast_to(median_variance, response.shape), dtype=np.float64)
 
 
 def average_bins(
-    lines: WeightedLines, bins: Sequence[slice], about: ComplexArray, centres: ComplexArray
+    lines: WeightedLines, bins: Sequence[slice], modelled: ComplexArray, modelled_at_centres: ComplexArray
 ) -> WeightedLines:
     """Weighted average of the lines of each bin, at its mean frequency. The difference from an approximate model is
-    averaged, so that resonances within a bin keep their height. about, centres: the model's responses on `lines` and at
-    the bins' centres."""
-    power = lines.weight**2
-    difference = power * (lines.response - about)
-    weight = np.array([power[part].sum(axis=0) for part in bins])
-    mean = np.array([difference[part].sum(axis=0) for part in bins]) / weight
-    return replace(lines, frequency_hz=bin_centres_hz(lines, bins), response=centres + mean, weight=np.sqrt(weight))
+    averaged, so that averaging does not flatten resonances within a bin. modelled, modelled_at_centres: the model's
+    responses on `lines` and at the bins' mean frequencies."""
+    squared_weight = lines.weight**2
+    difference = squared_weight * (lines.response - modelled)
+    weight = np.array([squared_weight[bin_lines].sum(axis=0) for bin_lines in bins])
+    mean = np.array([difference[bin_lines].sum(axis=0) for bin_lines in bins]) / weight
+    return replace(
+        lines,
+        frequency_hz=compute_bin_centres_hz(lines, bins),
+        response=modelled_at_centres + mean,
+        weight=np.sqrt(weight),
+    )
 
 
-def bin_centres_hz(lines: WeightedLines, bins: Sequence[slice]) -> FloatArray:
+def compute_bin_centres_hz(lines: WeightedLines, bins: Sequence[slice]) -> FloatArray:
     """(bins,): mean frequency of the lines of each bin."""
-    return np.array([lines.frequency_hz[part].mean() for part in bins])
+    return np.array([lines.frequency_hz[bin_lines].mean() for bin_lines in bins])
 
 
-def group_lines(lines: WeightedLines, smallest: int, octave_share: float) -> tuple[slice, ...]:
-    """Slices of neighbouring lines: at least `smallest` lines each, the last slice excepted, and all lines within
+def group_lines(lines: WeightedLines, least_lines: int, octave_share: float) -> tuple[slice, ...]:
+    """Slices of neighbouring lines: at least `least_lines` lines each, the last slice excepted, and all lines within
     `octave_share` octaves of its first line."""
-    edges, frequency = [0], lines.frequency_hz
+    edges, frequency_hz = [0], lines.frequency_hz
     while edges[-1] < len(lines):
         start = edges[-1]
-        wide = int(np.searchsorted(frequency, frequency[start] * 2**octave_share))
-        edges.append(min(max(start + smallest, wide), len(lines)))
+        octave_end = int(np.searchsorted(frequency_hz, frequency_hz[start] * 2**octave_share))
+        edges.append(min(max(start + least_lines, octave_end), len(lines)))
     return tuple(slice(start, stop) for start, stop in pairwise(edges))

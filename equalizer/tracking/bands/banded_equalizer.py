@@ -1,9 +1,10 @@
-"""Equalizer for arbitrary accelerations, with a method for each of three frequency bands, because an identified model
-is valid in a limited band only.
+"""Feedforward equalizer: forces that make a device follow a reference acceleration, solved in three frequency bands.
 
-Low: inverse dynamics of a rigid model along a planned motion (`low_band`). Middle: linear-quadratic tracking with the
-identified model (`lqr`). High: one degree of freedom along the direction of least force (`high_band`). The forces are
-added. Without edges in the split, the identified model plays the whole band.
+An identified model is valid in a limited band only. Low band: inverse dynamics of a rigid model along a planned motion
+(`low_band`). Middle: linear-quadratic tracking with the identified model (`lqr`). High: one degree of freedom along the
+direction of least force (`high_band`). The forces are added. Without edges in the split, all is middle band.
+
+Shapes: n rows of the reference, N rows with delays and padding, m axes of force (N), p axes of acceleration (m/s²).
 """
 
 from dataclasses import dataclass, field, replace
@@ -18,7 +19,7 @@ from equalizer.tracking.bands.high_band import (
     HighBandForces,
     HighBandSettings,
     ResponseSource,
-    high_band_forces,
+    compute_high_band_forces,
     predict_acceleration,
     project_to_one_dof,
     reduce_to_one_dof,
@@ -33,14 +34,15 @@ from equalizer.tracking.lqr.limits import require_under_cap
 from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 
-PADDING_S = 0.3
-"""Least duration of the zeros added before and after. The inverse is non-causal: a constant force causes no lasting
-acceleration, so that forces begin before and end after the wanted acceleration."""
-LOW_BAND_DECAYS = 6.0
-"""Duration of the padding, in time constants of the low band's return to rest. An earlier end would cause a jolt."""
-SMALLEST_WEIGHT, LARGEST_WEIGHT = 1e-3, 1e-2
-"""Allowed range of the force weight, (m/s² per N)². Below it, forces drift at frequencies where no model was
-identified; above it, the delivered level is too low."""
+LEAST_PADDING_S = 0.3
+"""Least duration (s) of the zeros added before and after the reference. The inverse is non-causal: a constant force
+causes no lasting acceleration, so that forces begin before and end after the reference acceleration."""
+PADDING_DECAYS = 6.0
+"""Duration of the padding, in time constants of the low band's return to rest. A shorter padding would cut off a force
+that has not decayed, which excites the device."""
+MIN_FORCE_WEIGHT, MAX_FORCE_WEIGHT = 1e-3, 1e-2
+"""Allowed range of the force weight R (`TrackingWeights.weight`), (m/s² per N)². Below it, forces drift at frequencies
+outside the identified band; above it, the delivered level is too low. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,10 +55,10 @@ class LowBand:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HighBand:
-    """High band, played with one degree of freedom; a stylus actuator, if present, plays its upper part."""
+    """High band, rendered with one degree of freedom; a stylus actuator, if present, renders its upper part."""
 
     source: ResponseSource
-    """Response of the device over the whole high band."""
+    """Frequency response of the device over the whole high band."""
     settings: HighBandSettings = field(default_factory=HighBandSettings)
     """Its `causal` is replaced by that of the split."""
     stylus: StylusActuator | None = None
@@ -64,7 +66,7 @@ class HighBand:
 
 @dataclass(frozen=True, slots=True)
 class CapPolicy:
-    """Cap (N) on the norm of the total force vector of all bands, and the action where forces exceed it."""
+    """Cap (N) on the norm of the total force vector of all bands, and what happens if forces exceed it."""
 
     cap_n: float
     constrain: bool = False
@@ -74,13 +76,14 @@ class CapPolicy:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandedEqualizer:
-    """The equalizer of one device. Raises ValueError where the split and the models disagree on bands or sample rate,
-    for a force weight outside 1e-3 to 1e-2, and for a stylus actuator with a causal split."""
+    """The equalizer of a device. Raises ValueError if the split and the models disagree on bands or sample rate, for a
+    force weight outside 1e-3 to 1e-2, and for a stylus actuator with a causal split."""
 
     middle: IdentifiedModel
-    """Identified model, which plays the middle band."""
+    """Identified model, used for the middle band."""
     split: LinearPhaseSplit | CausalSplit
-    """With a causal split all forces are causal: they begin with the first wanted row, as at a contact."""
+    """Filters that split the reference into bands. With a causal split all forces are causal: they begin with the first
+    row of the reference, as at a contact."""
     low: LowBand | None = None
     high: HighBand | None = None
     weights: TrackingWeights = field(default_factory=TrackingWeights)
@@ -88,22 +91,22 @@ class BandedEqualizer:
     """Spring of the device's control loop, whose force is subtracted from the commands."""
 
     def __post_init__(self) -> None:
-        for name, edge, band in (
+        for name, edge_hz, band_model in (
             ("low", self.split.edges.low_hz, self.low),
             ("high", self.split.edges.high_hz, self.high),
         ):
-            if edge is not None and band is None:
-                raise ValueError(f"the split has a {name} band beyond {edge:g} Hz, but there is no model to play it")
-            if edge is None and band is not None:
+            if edge_hz is not None and band_model is None:
+                raise ValueError(f"the split has a {name} band beyond {edge_hz:g} Hz, but there is no model to play it")
+            if edge_hz is None and band_model is not None:
                 raise ValueError(f"there is a model for a {name} band, but the split has none")
         if self.causal and self.high is not None and self.high.stylus is not None:
             raise ValueError(
                 "the share of a stylus actuator has no causal form: it would begin before the contact; use a "
                 "linear-phase split, or leave the stylus out"
             )
-        if not SMALLEST_WEIGHT <= self.weights.weight <= LARGEST_WEIGHT:
+        if not MIN_FORCE_WEIGHT <= self.weights.weight <= MAX_FORCE_WEIGHT:
             raise ValueError(
-                f"weight is {self.weights.weight}; it must be within {SMALLEST_WEIGHT:g} and {LARGEST_WEIGHT:g}"
+                f"weight is {self.weights.weight}; it must be within {MIN_FORCE_WEIGHT:g} and {MAX_FORCE_WEIGHT:g}"
             )
         if self.split.sample_rate_hz != self.middle.sample_rate_hz:
             raise ValueError(
@@ -112,29 +115,29 @@ class BandedEqualizer:
 
     @property
     def causal(self) -> bool:
-        """Whether the split is causal: forces then begin with the first wanted row."""
+        """Whether the split is causal: forces then begin with the first row of the reference."""
         return isinstance(self.split, CausalSplit)
 
     @property
     def latency_samples(self) -> int:
-        """Number of rows of the forces before the row of the first wanted sample: delay of the filters, and padding
-        unless causal."""
-        return self.split.latency_samples + (0 if self.causal else self._padding)
+        """Number of rows of the forces before the first row of the reference: delay of the filters, and padding unless
+        causal."""
+        return self.split.latency_samples + (0 if self.causal else self._padding_rows)
 
     @property
     def latency_ms(self) -> float:
         """`latency_samples` in ms."""
         return 1e3 * self.latency_samples / self.middle.sample_rate_hz
 
-    def play(self, reference: FloatArray, cap: CapPolicy | None = None) -> BandedForces:
-        """Forces of all three bands for a wanted acceleration. reference: (n, p), m/s²; cap: None = no limit. Raises
-        ForceLimitError for forces above the cap, TrackingError where no forces under it are found."""
+    def compute_forces(self, reference: FloatArray, cap: CapPolicy | None = None) -> BandedForces:
+        """Compute the forces of all three bands for a reference acceleration. reference: (n, p), m/s²; cap: None = no
+        limit. Raises ForceLimitError for forces above the cap, TrackingError if no forces under it are found."""
         bands = self.split.split(self._pad(reference))
-        low, motion = self._low_forces(bands.low)
+        low, motion = self._compute_low_forces(bands.low)
         problem = make_tracking_problem(self.middle, self.weights)
         middle_track = track(stored_gains(problem, len(low)), bands.middle)
         middle, middle_response, loss = middle_track.forces, middle_track.predicted, None
-        high, stylus_share = self._high_forces(bands.high, low + middle)
+        high, stylus_share = self._compute_high_forces(bands.high, low + middle)
         other_forces = low if high is None else low + high.forces
         if cap is not None and cap.constrain:
             capped = track_under_cap(problem, bands.middle, cap.cap_n, other_forces)
@@ -142,7 +145,7 @@ class BandedEqualizer:
         total_forces = middle + other_forces
         by_band = (low, middle, other_forces - low)
         return BandedForces(
-            commands=total_forces - self._spring_force(motion, middle_response),
+            commands=total_forces - self._compute_spring_force(motion, middle_response),
             entering=total_forces,
             by_band=by_band,
             predicted=self._predict_bands(by_band, motion, middle_response),
@@ -160,17 +163,17 @@ class BandedEqualizer:
         return self.middle.sample_rate_hz
 
     @property
-    def _padding(self) -> int:
-        """Rows of zeros before and after the wanted acceleration."""
-        decay_s = 0.0 if self.low is None else LOW_BAND_DECAYS / (2 * np.pi * self.low.corner_hz)
-        return int(np.ceil(max(PADDING_S, decay_s) * self._rate_hz))
+    def _padding_rows(self) -> int:
+        """Number of rows of zeros before and after the reference."""
+        padding_decay_s = 0.0 if self.low is None else PADDING_DECAYS / (2 * np.pi * self.low.corner_hz)
+        return int(np.ceil(max(LEAST_PADDING_S, padding_decay_s) * self._rate_hz))
 
     def _pad(self, reference: FloatArray) -> FloatArray:
-        """Pad reference (n, p) with zeros, to a length for which the FFT is fast; causal: only after it."""
-        rows_before = 0 if self.causal else self._padding
+        """Pad reference (n, p) with zeros, to a length for which the FFT is fast; if causal, only at the end."""
+        rows_before = 0 if self.causal else self._padding_rows
         filter_rows = 2 * self.split.latency_samples
         rows_after = (
-            next_fast_len(len(reference) + rows_before + self._padding + filter_rows)
+            next_fast_len(len(reference) + rows_before + self._padding_rows + filter_rows)
             - len(reference)
             - rows_before
             - filter_rows
@@ -178,18 +181,19 @@ class BandedEqualizer:
         return np.pad(np.asarray(reference, dtype=np.float64), ((rows_before, rows_after), (0, 0)))
 
     def _plan_motion(self, acceleration: FloatArray, corner_hz: float) -> SlowMotion:
-        """Motion of an acceleration (N, m) above a corner, causal or with zero phase as the split is."""
-        plan = plan_motion_causally if self.causal else plan_motion
-        return plan(acceleration, self._rate_hz, corner_hz)
+        """Motion whose acceleration is `acceleration` (N, p) above a corner frequency: causal or with zero phase, as
+        the split is."""
+        plan_for_split = plan_motion_causally if self.causal else plan_motion
+        return plan_for_split(acceleration, self._rate_hz, corner_hz)
 
-    def _low_forces(self, reference: FloatArray) -> tuple[FloatArray, SlowMotion | None]:
+    def _compute_low_forces(self, reference: FloatArray) -> tuple[FloatArray, SlowMotion | None]:
         """Forces (N, m) of the low band and its planned motion; zeros and None without a low band."""
         if self.low is None:
             return np.zeros((len(reference), self.middle.B.shape[1])), None
         motion = self._plan_motion(reference, self.low.corner_hz)
         return low_band_forces(motion, self.low.rigid, self._rate_hz), motion
 
-    def _high_forces(
+    def _compute_high_forces(
         self, reference: FloatArray, other_forces: FloatArray
     ) -> tuple[HighBandForces | None, StylusShare | None]:
         """Forces of the high band, and the share of the stylus. other_forces: (N, m), the forces of the other bands."""
@@ -201,17 +205,17 @@ class BandedEqualizer:
             stylus_share = share_with_stylus(one_dof_reference, self._rate_hz, self.high.stylus)
             one_dof_reference = stylus_share.motors
         settings = replace(self.high.settings, causal=self.causal)
-        return high_band_forces(
+        return compute_high_band_forces(
             one_dof_reference, self._rate_hz, self.high.source, other_forces, settings
         ), stylus_share
 
-    def _spring_force(self, motion: SlowMotion | None, middle: FloatArray) -> FloatArray:
-        """(N, m), N: force -(k x + b v) of the virtual spring along the motion of the low and the middle band; the
-        motion of the high band is too small to count. middle: (N, p), m/s², predicted acceleration there."""
+    def _compute_spring_force(self, motion: SlowMotion | None, middle_response: FloatArray) -> FloatArray:
+        """(N, m), N: force -(k x + b v) of the virtual spring along the motion of the low and the middle band; that of
+        the high band is negligible. middle_response: (N, p), m/s², predicted acceleration of the middle band."""
         k, b = self.spring.stiffness_n_per_m, self.spring.damping_n_s_per_m
         if k == b == 0:
-            return np.zeros_like(middle)
-        motions = [self._plan_motion(middle, CORNER_HZ)] + ([] if motion is None else [motion])
+            return np.zeros_like(middle_response)
+        motions = [self._plan_motion(middle_response, CORNER_HZ)] + ([] if motion is None else [motion])
         force: FloatArray = -sum(
             (k * planned.position_m + b * planned.velocity_m_s for planned in motions), np.zeros(())
         )
@@ -220,8 +224,8 @@ class BandedEqualizer:
     def _predict_bands(
         self, by_band: tuple[FloatArray, FloatArray, FloatArray], motion: SlowMotion | None, middle_response: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Predicted acceleration (N, p) of each band: by the high band's response where there is a high band, because
-        it covers all frequencies; else by each band's own model. middle_response: (N, p), the middle model's."""
+        """Predicted acceleration (N, p) of each band: by the high band's frequency response if there is a high band,
+        because it covers all frequencies; else by each band's own model. middle_response: that of the middle model."""
         if self.high is not None:
             low, middle, high = (predict_acceleration(forces, self._rate_hz, self.high.source) for forces in by_band)
             return low, middle, high

@@ -1,4 +1,4 @@
-"""Result of the banded equalizer (`BandedEqualizer.play`): forces, predicted accelerations, and cost of the force cap.
+"""Result of the banded equalizer (`BandedEqualizer.compute_forces`): forces, predicted accelerations, loss by the cap.
 
 N: rows, m: axes of force, p: axes of acceleration. Forces in N, accelerations in m/s², one row per sample.
 """
@@ -11,7 +11,7 @@ from equalizer.tracking.bands.low_band import SlowMotion
 from equalizer.tracking.bands.stylus import StylusShare
 from equalizer.tracking.feedforward.band_split import Bands
 from equalizer.tracking.lqr.constrained import TrackingLoss
-from equalizer.tracking.lqr.limits import Peaks
+from equalizer.tracking.lqr.limits import ForcePeaks
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +32,7 @@ class BandedForces:
     """The wanted acceleration, split into bands."""
     latency_samples: int
     """Rows before that of the first wanted sample: the delay of the band split and, unless it is causal, the run-in."""
-    peaks: Peaks | None
+    peaks: ForcePeaks | None
     """Largest norms of `entering`, against the cap; None without a cap."""
     loss: TrackingLoss | None
     """Loss of tracking in the middle band due to the force cap; None where no cap constrained it."""

@@ -1,10 +1,10 @@
 """The high band: acceleration matching with one degree of freedom, along the direction that needs the least force.
 
-Above the limit of direction perception a person feels the strength of a vibration but hardly its direction. The wanted
-acceleration is therefore reduced to a single signal of the same spectral energy and played along a single direction d
-of force. With g the norm of the device's response G d at a spectral line and w the force weight, the magnitude of the
-force is that of the wanted signal times g / (g² + w). The direction is free: of those tried, that of the smallest peak
-force is chosen.
+Above the limit of direction perception a person perceives the strength of a vibration but hardly its direction. The
+reference acceleration is therefore reduced to a single signal of the same spectral energy and played along a single
+direction d of force. With g the norm of the device's response G d at a spectral line and w the force weight, the
+magnitude of the force is that of the reduced reference times g / (g² + w). The direction is free: of those tried, that
+of the smallest peak force is chosen. Called by `banded_equalizer`.
 """
 
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 SMALLEST_WEIGHT, LARGEST_WEIGHT = 1e-3, 1e-2
 """Allowed range of the weight of |force|², to be compared with |G|², (m/s² per N)². A smaller weight amplifies noise at
 antiresonances; with a larger weight the level at weak lines is too low."""
-WEIGHT = 1e-3
+DEFAULT_WEIGHT = 1e-3
 """Default weight of the force against the error, (m/s² per N)²."""
-DIRECTIONS = 64
+SPIRAL_DIRECTIONS = 64
 """Number of force directions over the half sphere that are tried in addition to the three axes."""
 
 
@@ -68,7 +68,7 @@ class MeasuredResponse:
 class HighBandSettings:
     """Settings of the high band. Raises ValueError for a weight outside 1e-3 to 1e-2."""
 
-    weight: float = WEIGHT
+    weight: float = DEFAULT_WEIGHT
     """Weight of |force|², (m/s² per N)²."""
     shared: bool = True
     """Whether directions between the axes are tried (three axes only); False = the axes alone."""
@@ -82,7 +82,7 @@ class HighBandSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HighBandForces:
-    """Forces along the tried direction with the smallest peak; result of `high_band_forces`."""
+    """Forces along the tried direction with the smallest peak; result of `compute_high_band_forces`."""
 
     forces: FloatArray
     """(N, m), N."""
@@ -101,9 +101,9 @@ def reduce_to_one_dof(reference: FloatArray) -> FloatArray:
     spectrum = np.fft.rfft(reference, axis=0)
     magnitude = np.linalg.norm(spectrum, axis=1)
     # The sum over axes vanishes where axes cancel each other; the phase is then that of the strongest axis.
-    total = spectrum.sum(axis=1)
-    strongest = np.take_along_axis(spectrum, np.abs(spectrum).argmax(axis=1)[:, None], axis=1)[:, 0]
-    phase = np.angle(np.where(np.abs(total) > 1e-9 * magnitude, total, strongest))
+    spectrum_sum = spectrum.sum(axis=1)
+    strongest_spectrum = np.take_along_axis(spectrum, np.abs(spectrum).argmax(axis=1)[:, None], axis=1)[:, 0]
+    phase = np.angle(np.where(np.abs(spectrum_sum) > 1e-9 * magnitude, spectrum_sum, strongest_spectrum))
     return np.asarray(np.fft.irfft(magnitude * np.exp(1j * phase), len(reference)))
 
 
@@ -113,11 +113,11 @@ def project_to_one_dof(reference: FloatArray) -> FloatArray:
     scale."""
     direction = np.linalg.svd(reference, full_matrices=False)[2][0]
     projected = reference @ direction
-    size = float(np.linalg.norm(projected))
-    return np.asarray(projected * (np.linalg.norm(reference) / size) if size > 0 else projected)
+    projected_norm = float(np.linalg.norm(projected))
+    return np.asarray(projected * (np.linalg.norm(reference) / projected_norm) if projected_norm > 0 else projected)
 
 
-def high_band_forces(
+def compute_high_band_forces(
     reference: FloatArray,
     sample_rate_hz: float,
     source: ResponseSource,
@@ -129,53 +129,57 @@ def high_band_forces(
     in the peak."""
     settings = settings or HighBandSettings()
     n = 2 * len(reference) if settings.causal else len(reference)
-    response = source.at(lines_hz(n, sample_rate_hz))
+    response = source.at(compute_lines_hz(n, sample_rate_hz))
     other_forces = (
         np.zeros((len(reference), response.shape[2]))
         if added_forces is None
         else np.asarray(added_forces, dtype=np.float64)
     )
     spectrum = np.fft.rfft(reference, n)
-    candidates = _candidate_directions(response.shape[2], settings.shared)
+    candidates = _list_candidate_directions(response.shape[2], settings.shared)
     force_signals = [_invert_along(spectrum, n, response @ direction, settings) for direction in candidates]
-    # The sign of the direction is not felt, but it changes the peak of the sum with the other forces.
+    # The sign of the direction is not perceived, but it changes the peak of the sum with the other forces.
     candidate_forces = [
-        sign * signal[:, None] * d for signal, d in zip(force_signals, candidates, strict=True) for sign in (1.0, -1.0)
+        sign * signal[:, None] * unit_vector
+        for signal, unit_vector in zip(force_signals, candidates, strict=True)
+        for sign in (1.0, -1.0)
     ]
-    peaks = np.array([np.linalg.norm(forces + other_forces, axis=1).max(initial=0.0) for forces in candidate_forces])
-    best = int(peaks.argmin())
-    by_axis = peaks.reshape(-1, 2).min(axis=1)[: response.shape[2]]
-    return HighBandForces(candidate_forces[best], candidates[best // 2], float(peaks[best]), by_axis)
+    peaks_n = np.array([np.linalg.norm(forces + other_forces, axis=1).max(initial=0.0) for forces in candidate_forces])
+    best_index = int(peaks_n.argmin())
+    peak_by_axis_n = peaks_n.reshape(-1, 2).min(axis=1)[: response.shape[2]]
+    return HighBandForces(
+        candidate_forces[best_index], candidates[best_index // 2], float(peaks_n[best_index]), peak_by_axis_n
+    )
 
 
 def predict_acceleration(forces: FloatArray, sample_rate_hz: float, source: ResponseSource) -> FloatArray:
     """(N, p), m/s²: response of the source to forces (N, m), in N, from rest; zero-padded to twice the length."""
     n = 2 * len(forces)
     spectrum = np.fft.rfft(forces, n, axis=0)[:, :, None]
-    response = (source.at(lines_hz(n, sample_rate_hz)) @ spectrum)[:, :, 0]
+    response = (source.at(compute_lines_hz(n, sample_rate_hz)) @ spectrum)[:, :, 0]
     return np.asarray(np.fft.irfft(response, n, axis=0)[: len(forces)])
 
 
-def lines_hz(samples: int, sample_rate_hz: float) -> FloatArray:
+def compute_lines_hz(samples: int, sample_rate_hz: float) -> FloatArray:
     """(samples // 2 + 1,): frequencies (Hz) of the lines of a real FFT of `samples` samples."""
     return np.asarray(np.fft.rfftfreq(samples, 1 / sample_rate_hz), dtype=np.float64)
 
 
 def _invert_along(spectrum: ComplexArray, n: int, response: ComplexArray, settings: HighBandSettings) -> FloatArray:
-    """Force along a direction, (N,), N. spectrum: wanted signal, n samples; response: (lines, p), response to a unit
-    force along the direction, m/s² per N."""
+    """Force along a direction, (N,), N. spectrum: reduced reference, n samples; response: (lines, p), response to a
+    unit force along the direction, m/s² per N."""
     magnitude = np.linalg.norm(response, axis=1)
     inverse = (magnitude / (magnitude**2 + settings.weight)).astype(np.complex128)
     if settings.causal:
         # At twice the length, so that the filter's decay does not wrap around to the start.
-        return np.asarray(np.fft.irfft(spectrum * minimum_phase(inverse.real), n)[: n // 2])
-    strongest = np.take_along_axis(response, np.abs(response).argmax(axis=1)[:, None], axis=1)[:, 0]
-    # The strongest axis is in phase with the wanted signal.
-    return np.asarray(np.fft.irfft(spectrum * inverse * np.exp(-1j * np.angle(strongest)), n))
+        return np.asarray(np.fft.irfft(spectrum * compute_minimum_phase(inverse.real), n)[: n // 2])
+    strongest_response = np.take_along_axis(response, np.abs(response).argmax(axis=1)[:, None], axis=1)[:, 0]
+    # The strongest axis is in phase with the reduced reference.
+    return np.asarray(np.fft.irfft(spectrum * inverse * np.exp(-1j * np.angle(strongest_response)), n))
 
 
-def minimum_phase(gain: FloatArray) -> ComplexArray:
-    """(lines,): minimum-phase response with the given gain, (lines,) of a real FFT of even length, all above zero.
+def compute_minimum_phase(gain: FloatArray) -> ComplexArray:
+    """Minimum-phase response (lines,) with the given gain, (lines,) of a real FFT of even length, all above zero.
 
     By folding the real cepstrum (Oppenheim and Schafer, Discrete-Time Signal Processing).
     """
@@ -188,13 +192,13 @@ def minimum_phase(gain: FloatArray) -> ComplexArray:
     return np.asarray(np.exp(np.fft.rfft(cepstrum)))
 
 
-def _candidate_directions(inputs: int, shared: bool) -> list[FloatArray]:
+def _list_candidate_directions(inputs: int, shared: bool) -> list[FloatArray]:
     """Unit vectors (inputs,) that are tried: the axes; with three inputs, if `shared`, also a golden-angle spiral over
     the half sphere."""
     axes = list(np.eye(inputs))
     if not shared or inputs != 3:
         return axes
-    z = 1 - (2 * np.arange(DIRECTIONS) + 1) / (2 * DIRECTIONS)
-    azimuth = np.pi * (1 + np.sqrt(5)) * np.arange(DIRECTIONS)
+    z = 1 - (2 * np.arange(SPIRAL_DIRECTIONS) + 1) / (2 * SPIRAL_DIRECTIONS)
+    azimuth = np.pi * (1 + np.sqrt(5)) * np.arange(SPIRAL_DIRECTIONS)
     radius = np.sqrt(1 - z**2)
     return axes + list(np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), z], axis=1))

@@ -100,7 +100,7 @@ def solve_banded_feedforward(models: TwoModels, reference: Signal, settings: Fee
     check_reference(models.wide, reference)
     equalizer, rate_hz = make_banded_equalizer(models, settings.weight), reference.sample_rate_hz
     in_band_reference = _remove_above_band(reference.samples, models.wide)
-    banded_forces = equalizer.play(in_band_reference)
+    banded_forces = equalizer.compute_forces(in_band_reference)
     rows = banded_forces.rows_of_wanted(len(reference))
     if not np.linalg.norm(banded_forces.bands.middle[rows]) > LEAKAGE_SHARE * np.linalg.norm(reference.samples):
         low, high = models.narrow.band_hz

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.signals.signal import ComplexArray, FloatArray
-from equalizer.tracking.bands.high_band import WEIGHT
+from equalizer.tracking.bands.high_band import DEFAULT_WEIGHT
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,7 +47,7 @@ class StylusShare:
     predicted: FloatArray
     """(N,), m/s²: predicted acceleration due to the command."""
     motors: FloatArray
-    """(N,), m/s²: the motors' share; the sum with `taken` is the wanted acceleration."""
+    """(N,), m/s²: the motors' share; the sum with `actuator_share` is the wanted acceleration."""
     actuator_share: FloatArray
     """(N,), m/s²: the actuator's share."""
 
@@ -62,7 +62,7 @@ def share_with_stylus(reference: FloatArray, sample_rate_hz: float, stylus: Styl
     stylus_spectrum = np.fft.rfft(reference) * np.sin(np.pi / 2 * crossover) ** 2 * has_response
     magnitude = np.interp(lines, stylus.frequency_hz, np.abs(stylus.response))
     response = magnitude * np.exp(1j * np.interp(lines, stylus.frequency_hz, np.unwrap(np.angle(stylus.response))))
-    command = stylus_spectrum * response.conj() / (np.abs(response) ** 2 + WEIGHT)
+    command = stylus_spectrum * response.conj() / (np.abs(response) ** 2 + DEFAULT_WEIGHT)
     peak = float(np.abs(np.fft.irfft(command, n)).max(initial=0.0))
     scale = min(1.0, stylus.limit / peak) if peak > 0 else 1.0
     stylus_acceleration = scale * np.fft.irfft(stylus_spectrum, n)

@@ -9,7 +9,7 @@ from equalizer.effects.discovered_law import axis_names
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.tracking.compensation.known_forces import LAWS
-from equalizer.tracking.compensation.law_compensation import reason_law_not_compensated
+from equalizer.tracking.compensation.law_compensation import explain_law_not_compensated
 
 IN_MODEL = "it is linear, so the identified model has it; compensating it again would count it twice"
 """Reason for linear effects."""
@@ -49,7 +49,7 @@ def reason_not_compensated(effect: ModelEffect, inputs: tuple[str, ...] = ("fx",
     """Why an effect is not compensated; empty for an effect that is. inputs: channels of the commands."""
     kind = effect.kind
     if effect.law is not None:
-        return reason_law_not_compensated(effect.law, axis_names(inputs))
+        return explain_law_not_compensated(effect.law, axis_names(inputs))
     if kind in LAWS or kind == "force_deadband":
         return ""
     if kind in SCALING:

@@ -3,8 +3,8 @@
 Each law F(parameters, x, v, slip) takes the position x (m), the velocity v (m/s), (N,) each, and the speed (m/s) below
 which a change of sign is smoothed: sign(v) becomes tanh(v / slip), with slip above zero. It returns the force (N) that
 must be added to the command: the effect's own force with the opposite sign. For rotations the units are rad, rad/s and
-N m. Reference for describing functions: Gelb and Vander Velde, Multiple-Input Describing Functions and Nonlinear
-System Design (1968).
+N m. Called by `effect_compensation` (feedforward) and `subtract_effects`. Reference for describing functions: Gelb and
+Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design (1968).
 """
 
 from collections.abc import Callable, Mapping
@@ -15,28 +15,30 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 Law = Callable[[Mapping[str, float], FloatArray, FloatArray, float], FloatArray]
 
-CYCLE = 256
+SAMPLES_PER_CYCLE = 256
 """Samples per cycle of the sinusoid for which a describing function is evaluated."""
-AMPLITUDES = 48
+MOST_EVALUATED_LINES = 48
 """Largest number of lines at which a describing function is evaluated; it is interpolated linearly between them."""
 
 
 def _smooth_sign(velocity: FloatArray, slip: float) -> FloatArray:
-    """tanh(v / slip), because a force that jumps cannot be played."""
+    """tanh(v / slip) in place of sign(v), because a discontinuous force cannot be played."""
     return np.asarray(np.tanh(velocity / slip))
 
 
-def _coulomb(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+def _compute_coulomb_friction(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
     """Coulomb friction, F = level sign(v)."""
     return parameters["level"] * _smooth_sign(v, slip)
 
 
-def _asymmetric_friction(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+def _compute_asymmetric_friction(
+    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
+) -> FloatArray:
     """Coulomb friction with a level for each direction of motion."""
     return np.where(v > 0, parameters["level_positive"], parameters["level_negative"]) * _smooth_sign(v, slip)
 
 
-def _position_dependent_friction(
+def _compute_position_dependent_friction(
     parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
 ) -> FloatArray:
     """Coulomb friction with the level max(0, level (1 + slope x + bend x²))."""
@@ -44,7 +46,9 @@ def _position_dependent_friction(
     return np.asarray(np.maximum(level, 0.0) * _smooth_sign(v, slip))
 
 
-def _stribeck(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+def _compute_stribeck_friction(
+    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
+) -> FloatArray:
     """Stribeck friction, F = (coulomb + (static - coulomb) exp(-(v / speed)²)) sign(v)."""
     level = parameters["coulomb"] + (parameters["static"] - parameters["coulomb"]) * np.exp(
         -((v / parameters["speed"]) ** 2)
@@ -64,52 +68,58 @@ def _compute_presliding_hysteresis(
     return np.asarray(parameters["stiffness"] * deflections)
 
 
-def _quadratic_damping(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
-    """F = coefficient v |v|."""
+def _compute_quadratic_damping(
+    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
+) -> FloatArray:
+    """Quadratic damping, F = coefficient v |v|."""
     return parameters["coefficient"] * v * np.abs(v)
 
 
-def _compute_hardening_force(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+def _compute_hardening_stiffness(
+    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
+) -> FloatArray:
     """Cubic (Duffing) stiffness, F = k3 x³."""
     return np.asarray(parameters["k3"] * x**3)
 
 
-def _asymmetric_stiffness(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+def _compute_asymmetric_stiffness(
+    parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
+) -> FloatArray:
     """Quadratic stiffness, F = k2 x²."""
     return np.asarray(parameters["k2"] * x**2)
 
 
 LAWS: dict[str, Law] = {
-    "coulomb_friction": _coulomb,
-    "asymmetric_friction": _asymmetric_friction,
-    "position_dependent_friction": _position_dependent_friction,
-    "stribeck_friction": _stribeck,
+    "coulomb_friction": _compute_coulomb_friction,
+    "asymmetric_friction": _compute_asymmetric_friction,
+    "position_dependent_friction": _compute_position_dependent_friction,
+    "stribeck_friction": _compute_stribeck_friction,
     "presliding_hysteresis": _compute_presliding_hysteresis,
-    "quadratic_damping": _quadratic_damping,
-    "hardening_stiffness": _compute_hardening_force,
-    "asymmetric_stiffness": _asymmetric_stiffness,
+    "quadratic_damping": _compute_quadratic_damping,
+    "hardening_stiffness": _compute_hardening_stiffness,
+    "asymmetric_stiffness": _compute_asymmetric_stiffness,
 }
 """Laws by name of the effect."""
 
 
-def equivalent_impedance(
-    law: Law, parameters: Mapping[str, float], frequency_hz: FloatArray, speed: FloatArray, slip_share: float
+def compute_equivalent_impedance(
+    law: Law, parameters: Mapping[str, float], frequency_hz: FloatArray, speed_m_s: FloatArray, slip_share: float
 ) -> ComplexArray:
     """Sinusoidal describing function (lines,), N s/m: complex ratio of force to velocity at the fundamental, for
-    velocity amplitudes `speed` (lines,), m/s, above zero. From the second of two cycles, in which a bristle has
-    settled. slip_share: slip speed over velocity amplitude.
+    velocity amplitudes `speed_m_s` (lines,), above zero. From the second of two cycles, in which the presliding
+    deflection is periodic. slip_share: slip speed over velocity amplitude.
     """
     line_indices = np.unique(
-        np.linspace(0, len(frequency_hz) - 1, min(AMPLITUDES, len(frequency_hz))).round().astype(int)
+        np.linspace(0, len(frequency_hz) - 1, min(MOST_EVALUATED_LINES, len(frequency_hz))).round().astype(int)
     )
-    angle = 2 * np.pi * np.arange(2 * CYCLE) / CYCLE
+    angle = 2 * np.pi * np.arange(2 * SAMPLES_PER_CYCLE) / SAMPLES_PER_CYCLE
     impedance = np.empty(len(line_indices), dtype=np.complex128)
     for index, line in enumerate(line_indices):
-        v = speed[line] * np.sin(angle)
-        x = -speed[line] / (2 * np.pi * frequency_hz[line]) * np.cos(angle)
-        force = law(parameters, x, v, slip_share * speed[line])[CYCLE:]
+        v = speed_m_s[line] * np.sin(angle)
+        x = -speed_m_s[line] / (2 * np.pi * frequency_hz[line]) * np.cos(angle)
+        force = law(parameters, x, v, slip_share * speed_m_s[line])[SAMPLES_PER_CYCLE:]
         # sin is -i / 2 of the positive line, so that a force along the velocity gives a positive real part.
-        impedance[index] = 2j * np.mean(force * np.exp(-1j * angle[CYCLE:])) / speed[line]
+        impedance[index] = 2j * np.mean(force * np.exp(-1j * angle[SAMPLES_PER_CYCLE:])) / speed_m_s[line]
     chosen_hz = frequency_hz[line_indices]
     return np.asarray(
         np.interp(frequency_hz, chosen_hz, impedance.real) + 1j * np.interp(frequency_hz, chosen_hz, impedance.imag),
@@ -117,14 +127,15 @@ def equivalent_impedance(
     )
 
 
-def pass_deadband(parameters: Mapping[str, float], command: FloatArray) -> FloatArray:
-    """The force behind a dead band: 0 where |u| <= width, else u - (1 - jump) width sgn(u)."""
+def apply_deadband(parameters: Mapping[str, float], command: FloatArray) -> FloatArray:
+    """Force (N) at the output of a dead band for a command u (N): 0 where |u| <= width, else u - (1 - jump) width
+    sgn(u)."""
     width, jump = parameters["width"], parameters.get("jump", 0.0)
     is_outside = np.abs(command) > width
     return np.asarray(np.where(is_outside, command - (1.0 - jump) * width * np.sign(command), 0.0))
 
 
-def deadband_share(parameters: Mapping[str, float], amplitude: float) -> float:
+def compute_deadband_share(parameters: Mapping[str, float], amplitude: float) -> float:
     """Describing function of a dead band: share of a sinusoid's fundamental that passes. With s = width / amplitude it
     is 1 - 2/pi (arcsin s + s sqrt(1 - s^2)) of the dead zone, and 4/pi jump s sqrt(1 - s^2) of the jump (relay with
     dead zone; Gelb and Vander Velde, 1968, chapter 2)."""
@@ -132,5 +143,5 @@ def deadband_share(parameters: Mapping[str, float], amplitude: float) -> float:
     if relative_width >= 1.0:
         return 0.0
     root = np.sqrt(1 - relative_width**2)
-    jump = 4 / np.pi * parameters.get("jump", 0.0) * relative_width * root
-    return float(1 - 2 / np.pi * (np.arcsin(relative_width) + relative_width * root) + jump)
+    jump_share = 4 / np.pi * parameters.get("jump", 0.0) * relative_width * root
+    return float(1 - 2 / np.pi * (np.arcsin(relative_width) + relative_width * root) + jump_share)

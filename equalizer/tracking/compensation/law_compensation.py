@@ -3,7 +3,7 @@
 A discovered law is a formula that a diagnosis found because no effect of the catalogue explains the recordings. A law
 of the force is cancelled along the planned motion: -law(x, v, a) is added to the command. A law of the command (a
 static map g of a single command) is inverted: the command u with g(u) = intended force is sent. Laws of a sensor, and
-laws with memory of the command, are not compensated; `reason_law_not_compensated` gives the reason.
+laws with memory of the command, are not compensated; `explain_law_not_compensated` gives the reason.
 """
 
 from collections.abc import Mapping
@@ -13,26 +13,27 @@ import numpy as np
 
 from equalizer.laws.evaluate import evaluate
 from equalizer.laws.law import Law
-from equalizer.laws.parse import MEMORY
+from equalizer.laws.parse import MEMORY_OPERATORS
 from equalizer.laws.tree import Apply, Node, Number, Variable, format_formula, iterate_nodes
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.compensation.known_forces import Law as ForceLaw
 from equalizer.tracking.feedforward.planned_motion import PlannedMotion
 
-MOTION = ("", "v", "a")
+MOTION_PREFIXES = ("", "v", "a")
 """Prefixes of the signals of a motion, before the letter of the axis: position, velocity, acceleration."""
 TABLE_SIZE = 2001
-"""Number of commands in the table by which a command map is inverted; also samples of the cycle in `linear_share`."""
-REACH = 2.0
+"""Number of commands in the table by which a command map is inverted; also samples of the cycle in
+`compute_linear_share`."""
+FIRST_RANGE_RATIO = 2.0
 """First range of that table, as a multiple of the largest intended force: enough for gains of 0.5 or more."""
 _MOST_DOUBLINGS = 3
 """Largest number of times that the range is doubled where the map does not reach the intended force: enough for gains
-down to 1/16. A map that needs more is near saturation, where commands would use up the cap, and with it the
-compensation of all other effects."""
-_FLAT = 1e-9
+down to 1/16. A map that needs more is near saturation, where its commands would reach the force cap and leave no
+force for the compensation of other effects."""
+_DEADBAND_TOLERANCE = 1e-9
 """Force, relative to the largest force of the table, below which a command counts as within a dead band."""
-_SPANS = tuple(10.0**decade for decade in range(-6, 5))
-"""Ranges of commands, in the command's unit, within which a map is tested for rising."""
+_TESTED_RANGES = tuple(10.0**decade for decade in range(-6, 5))
+"""Ranges ± of commands, in the command's unit, within which a map is tested for monotonicity."""
 EVALUATION_RATE_HZ = 1000.0
 """Sample rate (Hz) at which a law without memory is evaluated; the result does not depend on it."""
 DEPENDS_ON_COMMAND = "it depends on the command, which its compensation would change, or on the time"
@@ -42,19 +43,19 @@ NOT_INVERTIBLE = "the force does not rise with the command, so the map has no in
 SENSOR_ERROR = "it is an error of the sensor: a force against it would turn that error into a real motion of the handle"
 
 
-def reason_law_not_compensated(law: Law, letters: tuple[str, ...]) -> str:
-    """Why a law is not compensated, as a clause after "because"; empty for a law that is compensated. letters: letters
-    of the axes, in the order of the commands."""
-    motion_signals = {prefix + letter for letter in letters for prefix in MOTION}
+def explain_law_not_compensated(law: Law, letters: tuple[str, ...]) -> str:
+    """Explain why a law is not compensated, as a clause after "because"; empty for a law that is compensated. letters:
+    letters of the axes, in the order of the commands."""
+    motion_signals = {prefix + letter for letter in letters for prefix in MOTION_PREFIXES}
     if law.acts_on == "response":
         return SENSOR_ERROR
     if law.acts_on == "force":
         return "" if set(law.variables) <= motion_signals else DEPENDS_ON_COMMAND
-    if any(isinstance(node, Apply) and node.name in MEMORY for node in iterate_nodes(law.tree)):
+    if any(isinstance(node, Apply) and node.name in MEMORY_OPERATORS for node in iterate_nodes(law.tree)):
         return HAS_MEMORY
     if len(law.variables) != 1 or law.variables[0] not in (f"f{law.axis[-1:]}", law.axis):
         return SEVERAL_SIGNALS
-    tables = (_tabulate(law, span)[1] for span in _SPANS)
+    tables = (_tabulate(law, command_range)[1] for command_range in _TESTED_RANGES)
     return "" if any(_is_rising(forces) and (np.diff(forces) > 0).any() for forces in tables) else NOT_INVERTIBLE
 
 
@@ -67,28 +68,31 @@ def compute_compensating_force(
     columns = {
         prefix + letter: column[:, axis]
         for axis, letter in enumerate(letters)
-        for prefix, column in zip(MOTION, (motion.position, motion.velocity, motion.acceleration), strict=True)
+        for prefix, column in zip(MOTION_PREFIXES, (motion.position, motion.velocity, motion.acceleration), strict=True)
     }
     return -evaluate(_smooth_signs(law, slip), columns, rate_hz)
 
 
-def single_axis_law(law: Law, letters: tuple[str, ...], axis: int) -> ForceLaw:
-    """The law along a sinusoid of a single axis while the other axes rest, in the form that `equivalent_impedance`
-    takes. axis: index of the axis in `letters`. The parameters are ignored: the law contains its own."""
+def make_single_axis_law(law: Law, letters: tuple[str, ...], axis: int) -> ForceLaw:
+    """Make a function of a sinusoid along a single axis, with the other axes at rest, from a law, for
+    `compute_equivalent_impedance`. axis: index of the axis in `letters`. The parameters are ignored: the law contains
+    its own."""
 
-    def force_against_law(parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float) -> FloatArray:
+    def compute_opposing_force(
+        parameters: Mapping[str, float], x: FloatArray, v: FloatArray, slip: float
+    ) -> FloatArray:
         # For a sinusoid, rms velocity over rms position is the angular frequency (rad/s).
-        omega = float(np.sqrt(np.mean(v**2) / np.mean(x**2)))
+        omega_rad_s = float(np.sqrt(np.mean(v**2) / np.mean(x**2)))
         at_rest = np.zeros((len(x), len(letters)))
         motion = PlannedMotion(at_rest, at_rest.copy(), at_rest.copy())
-        motion.position[:, axis], motion.velocity[:, axis], motion.acceleration[:, axis] = x, v, -(omega**2) * x
+        motion.position[:, axis], motion.velocity[:, axis], motion.acceleration[:, axis] = x, v, -(omega_rad_s**2) * x
         # The samples are two cycles: their number over the duration 2 (2 pi / omega) is the sample rate (Hz).
-        return compute_compensating_force(law, letters, motion, len(x) / 2 * omega / (2 * np.pi), slip)
+        return compute_compensating_force(law, letters, motion, len(x) / 2 * omega_rad_s / (2 * np.pi), slip)
 
-    return force_against_law
+    return compute_opposing_force
 
 
-def linear_share(law: Law, amplitude: float) -> float:
+def compute_linear_share(law: Law, amplitude: float) -> float:
     """Describing function N(A) of a command map g for the command A sin(p): the gain of the fundamental,
 
         N(A) = 1 / (pi A) integral over 0 to 2 pi of g(A sin p) sin p dp
@@ -110,42 +114,45 @@ def invert_command_map(law: Law, intended: FloatArray, slip_n: float) -> FloatAr
     where the map decreases somewhere in the first range.
     """
     commands, forces = _tabulate_to(law, intended)
-    inverse = np.interp(intended, forces, commands)
-    deadband = commands[np.abs(forces) <= _FLAT * np.abs(forces).max()]
+    table_commands = np.interp(intended, forces, commands)
+    deadband = commands[np.abs(forces) <= _DEADBAND_TOLERANCE * np.abs(forces).max()]
     if len(deadband) < 2 or slip_n <= 0:
-        return np.asarray(inverse)
+        return np.asarray(table_commands)
     # At zero force, the command is the value in the dead band nearest to zero; with rising force it approaches the edge
     # of the dead band.
     rest_command = float(np.clip(0.0, deadband[0], deadband[-1]))
-    edge = np.where(intended > 0, deadband[-1], deadband[0])
-    outside_deadband = np.where(intended == 0, 0.0, inverse - edge)
-    return np.asarray(rest_command + np.abs(edge - rest_command) * np.tanh(intended / slip_n) + outside_deadband)
+    deadband_edge = np.where(intended > 0, deadband[-1], deadband[0])
+    outside_deadband = np.where(intended == 0, 0.0, table_commands - deadband_edge)
+    return np.asarray(
+        rest_command + np.abs(deadband_edge - rest_command) * np.tanh(intended / slip_n) + outside_deadband
+    )
 
 
 def _tabulate_to(law: Law, intended: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Commands and forces, (TABLE,) each, over the smallest range in which the map reaches the intended forces; over
-    the first range where it never does. Raises ValueError where the map decreases in the first range."""
-    span = REACH * max(float(np.abs(intended).max()), np.finfo(np.float64).tiny)
-    tables = (_tabulate(law, span * 2**doubling) for doubling in range(_MOST_DOUBLINGS + 1))
-    first = next(tables)
-    if not _is_rising(first[1]):
+    """Commands and forces, (TABLE_SIZE,) each, over the smallest range in which the map reaches the intended forces;
+    over the first range where it never does. Raises ValueError where the map decreases in the first range."""
+    first_range = FIRST_RANGE_RATIO * max(float(np.abs(intended).max()), np.finfo(np.float64).tiny)
+    tables = (_tabulate(law, first_range * 2**doubling) for doubling in range(_MOST_DOUBLINGS + 1))
+    first_table = next(tables)
+    if not _is_rising(first_table[1]):
         raise ValueError(
             f"the command map {law.text} decreases somewhere, so it has no inverse; leave it out of what is compensated"
         )
-    for commands, forces in takewhile(lambda table: _is_rising(table[1]), chain((first,), tables)):
+    for commands, forces in takewhile(lambda table: _is_rising(table[1]), chain((first_table,), tables)):
         if forces[0] <= intended.min() and intended.max() <= forces[-1]:
             return commands, forces
-    return first
+    return first_table
 
 
-def _tabulate(law: Law, span: float) -> tuple[FloatArray, FloatArray]:
-    """(TABLE,) each: commands from -span to span, and the forces into which the map turns them."""
-    commands = np.linspace(-span, span, TABLE_SIZE)
+def _tabulate(law: Law, command_range: float) -> tuple[FloatArray, FloatArray]:
+    """(TABLE_SIZE,) each: commands from -command_range to command_range, and the forces into which the map turns
+    them."""
+    commands = np.linspace(-command_range, command_range, TABLE_SIZE)
     return commands, evaluate(law, {law.variables[0]: commands}, EVALUATION_RATE_HZ)
 
 
 def _is_rising(forces: FloatArray) -> bool:
-    """Whether forces (TABLE,) are finite and never decrease."""
+    """Whether forces (TABLE_SIZE,) are finite and never decrease."""
     return bool(np.isfinite(forces).all() and (np.diff(forces) >= 0).all())
 
 

@@ -14,14 +14,14 @@ from equalizer.laws.evaluate import evaluate
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.tracking.compensation.effect_compensation import (
-    axis_gains,
-    effect_axes,
-    force_law,
-    motion_along_axes,
-    slip_speed,
+    compute_axis_gains,
+    compute_slip_speed,
+    convert_motion_to_axes,
+    evaluate_force_law,
+    find_effect_axes,
 )
 from equalizer.tracking.compensation.effect_roles import lead_s, reason_not_compensated
-from equalizer.tracking.compensation.known_forces import pass_deadband
+from equalizer.tracking.compensation.known_forces import apply_deadband
 from equalizer.tracking.feedforward.planned_motion import integrate_motion
 
 HIGHEST_SHARE = 3.0
@@ -53,10 +53,10 @@ def subtract_effects(recording: Recording, physics: MechanicalModel, excited_hz:
     rate_hz = recording.sample_rate_hz
     band_hz = (LOWEST_SHARE * excited_hz[0], min(HIGHEST_SHARE * excited_hz[1], NYQUIST_SHARE * rate_hz))
     planned = integrate_motion(recording.response.samples, rate_hz, band_hz, lead_s(physics, rate_hz))
-    motion = motion_along_axes(planned, physics)
-    gain, commands = axis_gains(physics, inputs, outputs), recording.command.samples.copy()
+    motion = convert_motion_to_axes(planned, physics)
+    gain, commands = compute_axis_gains(physics, inputs, outputs), recording.command.samples.copy()
     for effect in physics.effects:
-        for axis in effect_axes(effect, inputs, outputs):
+        for axis in find_effect_axes(effect, inputs, outputs):
             if (
                 effect.law is not None
                 and effect.law.acts_on == "command"
@@ -64,11 +64,11 @@ def subtract_effects(recording: Recording, physics: MechanicalModel, excited_hz:
             ):
                 commands[:, axis] = evaluate(effect.law, {effect.law.variables[0]: commands[:, axis]}, rate_hz)
             if effect.kind == "force_deadband":
-                commands[:, axis] = pass_deadband(effect.parameters, commands[:, axis])
+                commands[:, axis] = apply_deadband(effect.parameters, commands[:, axis])
     for effect in physics.effects:
         law_place = "force" if effect.law is None else effect.law.acts_on
         if law_place == "force" and effect.kind != "force_deadband" and not reason_not_compensated(effect, inputs):
-            for axis in effect_axes(effect, inputs, outputs):
-                slip = max(slip_speed(motion.velocity[:, axis]), np.finfo(np.float64).tiny)
-                commands[:, axis] -= force_law(effect, axis, motion, (inputs, rate_hz), slip)[1] / gain[axis]
+            for axis in find_effect_axes(effect, inputs, outputs):
+                slip = max(compute_slip_speed(motion.velocity[:, axis]), np.finfo(np.float64).tiny)
+                commands[:, axis] -= evaluate_force_law(effect, axis, motion, (inputs, rate_hz), slip)[1] / gain[axis]
     return replace(recording, command=replace(recording.command, samples=commands))

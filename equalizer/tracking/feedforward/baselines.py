@@ -87,7 +87,7 @@ def rigid_body(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
 def raw_estimate(measured: FrequencyResponse, frequency_hz: FloatArray, weight: float = WEIGHT) -> Inverse:
     """Regularised inverse of the measured response, interpolated linearly between its reliable lines. Cost: FIR filters
     as long as the inverse of the smallest line spacing. Raises ValueError for frequencies outside the lines."""
-    lines = measured.of_lines(measured.reliable)
+    lines = measured.select_lines(measured.reliable)
     low, high = (lines.frequency_hz[0], lines.frequency_hz[-1]) if len(lines) else (np.inf, -np.inf)
     if not len(lines) or frequency_hz.min() < low or frequency_hz.max() > high:
         raise ValueError(

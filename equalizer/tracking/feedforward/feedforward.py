@@ -11,11 +11,11 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.signals.summary import Summarised, Summary
+from equalizer.signals.summary import Summary, SummaryDisplay
 from equalizer.tracking.feedforward.band_split import BandEdges, LinearPhaseSplit
 from equalizer.tracking.feedforward.periodic_inverse import check_reference
 from equalizer.tracking.lqr.constrained import CapSettings, TrackingLoss, track_under_cap
-from equalizer.tracking.lqr.limits import Peaks, force_peaks, require_under_cap
+from equalizer.tracking.lqr.limits import ForcePeaks, find_force_peaks, require_under_cap
 from equalizer.tracking.lqr.padding import CAUSAL, band_error, simulate_from_rest, track_padded
 from equalizer.tracking.lqr.tracking_problem import (
     TrackingError,
@@ -48,7 +48,7 @@ class FeedforwardSettings:
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
-class Feedforward(Summarised):
+class Feedforward(SummaryDisplay):
     """Forces for a wanted acceleration, and the model's prediction of what they achieve."""
 
     forces: Signal
@@ -61,7 +61,7 @@ class Feedforward(Summarised):
     """Relative rms error of predicted against wanted acceleration, in the band."""
     out_of_band_share: float
     """Rms of the part outside the band over rms of the wanted acceleration."""
-    peaks: Peaks
+    peaks: ForcePeaks
     loss: TrackingLoss | None = None
     """Tracking loss due to the cap; None where forces did not have to be constrained."""
 
@@ -139,7 +139,7 @@ def solve_causally(
     the sum of the forces with other_forces (N, m) is under the cap."""
     unconstrained = track_padded(problem, reference, CAUSAL).forces
     total = unconstrained if other_forces is None else unconstrained + other_forces
-    if not settings.constrain or force_peaks(total, settings.cap_n).fits:
+    if not settings.constrain or find_force_peaks(total, settings.cap_n).is_under_cap:
         return unconstrained, None
     padding = (0, CAUSAL.samples(problem.sample_rate_hz)[1]), (0, 0)
     padded_others = None if other_forces is None else np.pad(other_forces, padding)

@@ -32,11 +32,11 @@ def measure_quality(delivered: ComplexArray) -> Quality:
     with np.errstate(divide="ignore"):
         flatness_db = float(np.abs(20 * np.log10(direct_gain)).max())
         coupling_db = float(20 * np.log10((off_axis.max(axis=1) / direct_gain).max()))
-    errors_deg = (_axis_error_deg(delivered[:, :, axis], axis) for axis in range(delivered.shape[1]))
+    errors_deg = (_compute_axis_error_deg(delivered[:, :, axis], axis) for axis in range(delivered.shape[1]))
     return Quality(flatness_db, coupling_db, max(errors_deg))
 
 
-def _axis_error_deg(phasors: ComplexArray, axis: int) -> float:
+def _compute_axis_error_deg(phasors: ComplexArray, axis: int) -> float:
     """Largest angle between `axis` and the major axis of the ellipse. phasors: (lines, p), T[:, axis] of each line."""
     ellipses = np.stack([phasors.real, phasors.imag], axis=-1)
     major_axes = np.linalg.svd(ellipses)[0][:, :, 0]

@@ -1,7 +1,8 @@
-"""The virtual spring and damper by which the device's control loop holds the handle at its place.
+"""The virtual spring and damper by which the device's control loop keeps the handle at its centre position.
 
-The input of a model is the total force f that enters the plant. Where the loop adds the force f_s of a spring to the
-commands, that force along the planned motion is subtracted from them: u = f - f_s, with f_s = -(k x + b v).
+The input of an identified model is the total force f on the plant. Where the control loop adds the force f_s of the
+spring to the command u, the command is u = f - f_s with f_s = -(k x + b v), where x and v are the planned displacement
+and velocity of the handle, k is the stiffness and b the damping.
 """
 
 import math
@@ -14,7 +15,7 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 @dataclass(frozen=True, slots=True)
 class VirtualSpring:
-    """Stiffness and damping of the virtual spring, both zero without a spring. Raises ValueError for negative or
+    """Stiffness k and damping b of the virtual spring, both zero without a spring. Raises ValueError for negative or
     non-finite values."""
 
     stiffness_n_per_m: float = 0.0
@@ -27,11 +28,11 @@ class VirtualSpring:
                 raise ValueError(f"{name} is {value}; it must be a number that is not negative")
 
     def force_per_acceleration(self, frequency_hz: FloatArray) -> ComplexArray:
-        """(lines,), N per m/s²: force of the spring over acceleration of the handle, -(k + b s) / s² with s = 2 pi i f.
-        frequency_hz: (lines,), above zero."""
+        """Transfer function (lines,) from the handle's acceleration to the spring's force, N per m/s²: -(k + b s) / s²
+        with s = 2 pi i f. frequency_hz: (lines,), above zero."""
         s = 2j * np.pi * np.asarray(frequency_hz, dtype=np.float64)
         return np.asarray(-(self.stiffness_n_per_m + self.damping_n_s_per_m * s) / s**2)
 
 
 NO_SPRING = VirtualSpring()
-"""Zero stiffness and damping."""
+"""No virtual spring: zero stiffness and damping."""

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.lqr.limits import force_peaks, project_to_cap, require_cap
+from equalizer.tracking.lqr.limits import find_force_peaks, project_to_cap, require_cap
 from equalizer.tracking.lqr.lqr import StoredGains, stored_gains, track
 from equalizer.tracking.lqr.lqr_kernel import simulate
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, require_trajectory
@@ -114,15 +114,15 @@ def track_under_cap(
     fixed_forces = np.zeros((len(r), problem.inputs)) if already is None else np.asarray(already, dtype=np.float64)
     if fixed_forces.shape != (len(r), problem.inputs):
         raise TrackingError(f"already has shape {fixed_forces.shape}; these forces have ({len(r)}, {problem.inputs})")
-    peaks = force_peaks(fixed_forces, require_cap(cap_n))
-    if not peaks.fits:
+    peaks = find_force_peaks(fixed_forces, require_cap(cap_n))
+    if not peaks.is_under_cap:
         raise TrackingError(
-            f"the other forces alone reach {peaks.peak_n:.3g} N at row {peaks.at_sample}, above the cap of {cap_n:g} "
+            f"the other forces alone reach {peaks.peak_n:.3g} N at row {peaks.peak_row}, above the cap of {cap_n:g} "
             "N; lower them, or raise the cap"
         )
     task = _CappedTask(problem, r, fixed_forces, cap_n)
     unconstrained = track(stored_gains(problem, len(r)), r)
-    if force_peaks(unconstrained.forces + fixed_forces, cap_n).fits:
+    if find_force_peaks(unconstrained.forces + fixed_forces, cap_n).is_under_cap:
         return _state_loss(task, unconstrained.forces, unconstrained.forces, 0.0, 0)
     return _state_loss(
         task, unconstrained.forces, *_alternate_directions(task, unconstrained.forces, settings or CapSettings())

@@ -1,7 +1,8 @@
 """Reference cases to verify a translation of a controller into another language: inputs and forces of T ticks.
 
-The forces are computed by this package, for both parts of the controller (`realtime_controller`): the transient, with
-directions that change at each tick, and the stream, with noise as wanted acceleration. All forces are below the cap.
+The forces are computed by this package, for both parts of the controller (`make_realtime_controller`): the transient,
+with directions that change at each tick, and the stream, with noise as wanted acceleration. All forces are below the
+cap.
 """
 
 from dataclasses import dataclass

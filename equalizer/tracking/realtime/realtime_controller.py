@@ -1,9 +1,9 @@
-"""Real-time form of the linear-quadratic tracker of a model: arrays for a control loop in another language.
+"""Real-time feedforward controllers of an identified model, as arrays of gains that `export_controller` writes as C.
 
-There are two controllers, each with one force vector per tick. Transient: a table of accelerations that is known
+Both are linear-quadratic trackers that give a force vector per tick. Transient: a table of accelerations that is known
 beforehand, rotated into any direction while it is played (`changing_direction`). Stream: accelerations that arrive
 while they are played, split into bands by causal filters; the model's band is tracked with limited preview (`preview`).
-Neither feeds back a measured signal.
+Neither uses a measured signal as feedback.
 """
 
 from dataclasses import dataclass
@@ -25,20 +25,20 @@ from equalizer.tracking.lqr.tracking_problem import (
     make_tracking_problem,
 )
 
-TAP_S, TAP_DECAY_S = 0.2, 0.04
-"""Length and decay time constant of the default transient, a decaying oscillation as after contact with a stiff
-surface; the length is five time constants."""
+TRANSIENT_S, TRANSIENT_DECAY_S = 0.2, 0.04
+"""Duration and decay time constant (s) of the default transient, a decaying oscillation as after contact with a stiff
+surface; the duration is five time constants."""
 
 
 @dataclass(frozen=True, slots=True)
 class RealtimeSettings:
-    """Settings of both controllers. Raises TrackingError for a negative preview, and for a cap that is not above
-    zero."""
+    """Settings of both controllers. Raises TrackingError for a negative preview, and for a force limit that is not
+    above zero."""
 
     weight: float = 1e-3
-    """Weight of |force|² against |error|², (m/s² per N)²."""
+    """Weight of |force|² against |acceleration error|² in the quadratic cost, (m/s² per N)²."""
     preview_s: float = 0.2
-    """Duration for which a stream is known in advance: it is played with a delay of the preview, less one sample."""
+    """Preview (s): how far ahead of its playback a stream is known. Its delay is the preview, less one sample."""
     cap_n: float = 3.0
     """Limit of the norm of the force vector, N."""
 
@@ -51,13 +51,13 @@ class RealtimeSettings:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RealtimeController:
-    """Both controllers of a model: `transient`, and `tracker` with `split` for streams."""
+    """Both controllers of a model: `transient`, and `tracker` with the filters `split` for streams."""
 
     tracker: PreviewTracker
     split: CausalSplit
     transient: TurningTransient
     loss: PreviewLoss
-    """Tracking loss of the stream by limited preview, predicted by the model; without the loss of the causal split."""
+    """Tracking loss of a stream by limited preview, predicted by the model; without the loss by the causal filters."""
     cap_n: float
 
     @property
@@ -66,10 +66,10 @@ class RealtimeController:
         return self.tracker.problem
 
     def simulate_stream(self, reference: FloatArray) -> tuple[Bands, TrackResult]:
-        """Simulate a stream of reference (N, p), m/s², from rest: its bands, and the forces for the middle band.
+        """Simulate the tracking of a stream from rest: the bands of the stream, and the forces for the middle band.
 
-        Row k of the forces belongs to the tick at which row k of `reference` arrives; the acceleration played at this
-        tick is that of an earlier row, by the preview less one sample. The cap is not applied here.
+        reference: (N, p), m/s². Row k of the forces is played at the tick at which row k of `reference` arrives; it
+        tracks an earlier row, by the preview less one sample. The force limit `cap_n` is not applied.
         """
         bands = self.split.split(reference)
         delay_rows = len(self.tracker) - 1
@@ -77,38 +77,38 @@ class RealtimeController:
         return bands, TrackResult(track.forces[: len(reference)], track.predicted[: len(reference)], track.final_state)
 
 
-def realtime_controller(
+def make_realtime_controller(
     model: IdentifiedModel, transient: FloatArray | None = None, settings: RealtimeSettings | None = None
 ) -> RealtimeController:
-    """Make both controllers. transient: (N, p), m/s², before rotation; None = `tap`. Zeros are appended to it, in which
-    the device comes to rest.
+    """Make both controllers of a model. transient: accelerations (N, p), m/s², before rotation; None =
+    `make_default_transient`. Rows of zeros are appended to it, during which the device comes to rest.
 
-    Raises TrackingError for a model without states or without stationary gains, a negative weight, and a transient with
-    another number of columns than the model has outputs.
+    Raises TrackingError for a model without states or without stationary gains, a negative weight, and a transient
+    whose number of columns is not the number of the model's outputs.
     """
     settings = settings or RealtimeSettings()
     if not model.order:
         raise TrackingError("the model has no states: its answer is a constant gain, which needs no controller")
     problem = make_tracking_problem(model, TrackingWeights(settings.weight))
-    reference = tap(model) if transient is None else transient
-    _, rows_after = CAUSAL.samples(model.sample_rate_hz)
-    padded_transient = np.pad(np.asarray(reference, dtype=np.float64), ((0, rows_after), (0, 0)))
-    preview = max(1, round(settings.preview_s * model.sample_rate_hz))
+    reference = make_default_transient(model) if transient is None else transient
+    _, rest_samples = CAUSAL.samples(model.sample_rate_hz)
+    padded_transient = np.pad(np.asarray(reference, dtype=np.float64), ((0, rest_samples), (0, 0)))
+    preview_samples = max(1, round(settings.preview_s * model.sample_rate_hz))
     return RealtimeController(
-        preview_tracker(problem, preview),
+        preview_tracker(problem, preview_samples),
         CausalSplit(band_edges(model), model.sample_rate_hz),
         make_rotatable_transient(stored_gains(problem, len(padded_transient)), padded_transient),
-        preview_loss(problem, preview),
+        preview_loss(problem, preview_samples),
         settings.cap_n,
     )
 
 
-def tap(model: IdentifiedModel) -> FloatArray:
-    """(N, p), m/s²: the default transient, exp(-t / TAP_DECAY_S) sin(2 pi f t) along the last output, with f in the
-    middle of the model's band."""
+def make_default_transient(model: IdentifiedModel) -> FloatArray:
+    """The default transient, accelerations (N, p) in m/s²: exp(-t / TRANSIENT_DECAY_S) sin(2 pi f t) at the last
+    output, zero at the others; f is the centre of the model's band."""
     low_hz, high_hz = model.band_hz
-    time_s = np.arange(round(TAP_S * model.sample_rate_hz)) / model.sample_rate_hz
+    time_s = np.arange(round(TRANSIENT_S * model.sample_rate_hz)) / model.sample_rate_hz
     acceleration = np.zeros((len(time_s), model.C.shape[0]))
     middle_hz = (low_hz + high_hz) / 2
-    acceleration[:, -1] = np.exp(-time_s / TAP_DECAY_S) * np.sin(2 * np.pi * middle_hz * time_s)
+    acceleration[:, -1] = np.exp(-time_s / TRANSIENT_DECAY_S) * np.sin(2 * np.pi * middle_hz * time_s)
     return acceleration

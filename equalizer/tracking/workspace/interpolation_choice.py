@@ -16,7 +16,7 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.periodic_inverse import WEIGHT
 from equalizer.tracking.feedforward.quality import Quality, measure_quality
 from equalizer.tracking.workspace.blended_inverse import blend_at
-from equalizer.tracking.workspace.modal_interpolation import ModalInterpolation, modal_interpolation
+from equalizer.tracking.workspace.modal_interpolation import ModalInterpolation, build_modal_interpolation
 from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 from equalizer.tracking.workspace.place_weights import OUTSIDE_M, place_weights
@@ -88,7 +88,7 @@ def choose_interpolation(
     held-out place at which one of the models was identified, because it would test nothing."""
     _check_distances(workspace, held_out)
     try:
-        modal = modal_interpolation(workspace) if len(workspace) > 1 else None
+        modal = build_modal_interpolation(workspace) if len(workspace) > 1 else None
     except ModesDoNotMatchError as error:
         return InterpolationChoice("blended forces", f"forces are blended, because {error}", (), workspace, None)
     if modal is None:
@@ -144,7 +144,7 @@ def _leave_one_out(workspace: WorkspaceModels) -> list[tuple[WorkspaceModels, Mo
         if place_weights(other_models.places_m, workspace.places_m[index]).outside_m > OUTSIDE_M:
             continue
         try:
-            modal: ModalInterpolation | None = modal_interpolation(other_models)
+            modal: ModalInterpolation | None = build_modal_interpolation(other_models)
         except ModesDoNotMatchError:
             modal = None
         folds.append((other_models, modal, held_out_model(model, workspace.band_hz)))

@@ -1,4 +1,4 @@
-"""Modal interpolation: a model for a place between identified models, with interpolated resonances.
+"""Modal interpolation: a model for a place between the places of identified models, with interpolated resonances.
 
 A weighted sum of responses would contain the resonances of every model. Here the resonances in the band are matched
 between models (`mode_matching`), and their natural frequencies, damping ratios and residues are interpolated. The
@@ -23,18 +23,18 @@ from equalizer.tracking.workspace.workspace_models import Place, WorkspaceModels
 
 REAL_POLES_PER_OCTAVE = 2.0
 """Density of the fixed real poles that describe the smooth remainder."""
-POLES_FROM, POLES_TO = 0.3, 4.5
-"""Lowest and highest of these poles, relative to the lower and the upper end of the band."""
-RANK_SHARE = 0.1
+LOWEST_POLE_RATIO, HIGHEST_POLE_RATIO = 0.3, 4.5
+"""Frequency of the lowest and the highest of these poles, relative to the lower and the upper end of the band."""
+RANK_TOLERANCE = 0.1
 """Singular values below this share of the largest are not counted in the rank of a residue matrix. The interpolated
 residue is truncated to the largest rank of the models' residues, because a sum of matrices has a higher rank."""
-POOR_FIT = 0.02
-"""Largest relative error of the fit of the remainder without a remark to the user."""
+LARGEST_SILENT_ERROR = 0.02
+"""Largest relative error of the fit of the remainder for which the user gets no remark."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModalInterpolation:
-    """Matched resonances of all models and the smooth remainders of their responses. Made by `modal_interpolation`."""
+    """Matched resonances of all models, and the smooth remainders of their responses."""
 
     workspace: WorkspaceModels
     tracks: tuple[tuple[BandMode, ...], ...]
@@ -46,36 +46,39 @@ class ModalInterpolation:
 
     def at(self, place_m: Place) -> ModelsAtPlace:
         """A single model for a place (m), from interpolated resonances and remainder, valid in the models' common band.
-        Remarks: a place outside the convex hull of the models, a poor fit of the remainder."""
+        Its remarks tell the user of a place outside the convex hull of the models, and of a poor fit of the
+        remainder."""
         weights = place_weights(self.workspace.places_m, place_m)
         modes = [_interpolate_mode(track, weights.smooth) for track in self.tracks]
         remainder = np.einsum("k,klpm->lpm", weights.linear, self.remainders)
         total = remainder + sum((mode.response(self.lines.z) for mode in modes), np.zeros_like(remainder))
-        model, error = _assemble_model(self, modes, remainder, np.linalg.norm(total, axis=(1, 2)))
+        model, fit_error = _assemble_model(self, modes, remainder, np.linalg.norm(total, axis=(1, 2)))
         remarks = [weights.remark] if weights.remark else []
-        if error > POOR_FIT:
-            remarks.append(f"the model between the given ones is {100 * error:.1f} % off where it is worst")
-        placed = replace(model, place_m=place_m)
-        return ModelsAtPlace(place_m, (placed,), (1.0,), tuple(remarks))
+        if fit_error > LARGEST_SILENT_ERROR:
+            remarks.append(f"the model between the given ones is {100 * fit_error:.1f} % off where it is worst")
+        placed_model = replace(model, place_m=place_m)
+        return ModelsAtPlace(place_m, (placed_model,), (1.0,), tuple(remarks))
 
 
-def modal_interpolation(workspace: WorkspaceModels) -> ModalInterpolation:
-    """Find and match the resonances of all models. Raises ModesDoNotMatchError where the matching of resonances of
-    neighbouring models is ambiguous."""
+def build_modal_interpolation(workspace: WorkspaceModels) -> ModalInterpolation:
+    """Find and match the resonances of all models; called by `interpolation_choice`. Raises ModesDoNotMatchError where
+    the matching of resonances of neighbouring models is ambiguous."""
     band_hz = workspace.band_hz
     modes = [band_modes(model, band_hz) for model in workspace.models]
     tracks = _track_modes(workspace, modes)
     lines = [band_lines(model, band_hz) for model in workspace.models]
     remainders = []
-    for index, line in enumerate(lines):
-        resonant = sum((track[index].response(line.z) for track in tracks), np.zeros_like(line.response))
-        remainders.append(line.response - resonant)
+    for index, model_lines in enumerate(lines):
+        resonant_response = sum(
+            (track[index].response(model_lines.z) for track in tracks), np.zeros_like(model_lines.response)
+        )
+        remainders.append(model_lines.response - resonant_response)
     return ModalInterpolation(workspace, tracks, lines[0], np.array(remainders))
 
 
 def _track_modes(workspace: WorkspaceModels, modes: Sequence[Sequence[BandMode]]) -> tuple[tuple[BandMode, ...], ...]:
-    """Modes of each resonance in all models, followed from neighbour to neighbour along the minimum spanning tree of
-    the places. Resonances that are not in every model are left out."""
+    """(resonances, models): the modes of each resonance, matched from neighbour to neighbour along the minimum spanning
+    tree of the places. modes: per model. Resonances that are not in every model are left out."""
     places = workspace.places_m
     distances_m = np.linalg.norm(places[:, None] - places[None], axis=2)
     tree = minimum_spanning_tree(distances_m)
@@ -97,32 +100,32 @@ def _track_modes(workspace: WorkspaceModels, modes: Sequence[Sequence[BandMode]]
 def _interpolate_mode(track: Sequence[BandMode], weights: FloatArray) -> BandMode:
     """Mode at a place: frequency and damping by weighted geometric means, the residue over frequency by a weighted
     mean. track: one mode per model; weights: (models,), sum 1."""
-    natural = float(np.exp(weights @ np.log([mode.natural_hz for mode in track])))
-    damping = float(np.exp(weights @ np.log([mode.damping_ratio for mode in track])))
+    natural_hz = float(np.exp(weights @ np.log([mode.natural_hz for mode in track])))
+    damping_ratio = float(np.exp(weights @ np.log([mode.damping_ratio for mode in track])))
     # The residue of an acceleration response is proportional to the natural frequency. It is divided by it before the
     # interpolation over places, and multiplied by the interpolated frequency afterwards.
-    residue = natural * np.einsum("k,kpm->pm", weights, np.array([mode.residue / mode.natural_hz for mode in track]))
-    rank = max(_rank(mode.residue) for mode in track)
+    residue = natural_hz * np.einsum("k,kpm->pm", weights, np.array([mode.residue / mode.natural_hz for mode in track]))
+    rank = max(_count_rank(mode.residue) for mode in track)
     u, s, v = np.linalg.svd(residue)
     share = float(weights @ [mode.share for mode in track])
-    return BandMode(natural, damping, (u[:, :rank] * s[:rank]) @ v[:rank], share, track[0].sample_rate_hz)
+    return BandMode(natural_hz, damping_ratio, (u[:, :rank] * s[:rank]) @ v[:rank], share, track[0].sample_rate_hz)
 
 
-def _rank(residue: ComplexArray) -> int:
-    """Numerical rank of a residue (p, m), by `RANK_SHARE`."""
-    sizes = np.linalg.svd(residue, compute_uv=False)
-    return int((sizes > RANK_SHARE * sizes[0]).sum())
+def _count_rank(residue: ComplexArray) -> int:
+    """Numerical rank of a residue (p, m), by `RANK_TOLERANCE`."""
+    singular_values = np.linalg.svd(residue, compute_uv=False)
+    return int((singular_values > RANK_TOLERANCE * singular_values[0]).sum())
 
 
 def _assemble_model(
-    interpolation: ModalInterpolation, modes: Sequence[BandMode], remainder: ComplexArray, size: FloatArray
+    interpolation: ModalInterpolation, modes: Sequence[BandMode], remainder: ComplexArray, total_norm: FloatArray
 ) -> tuple[IdentifiedModel, float]:
-    """State-space model of resonances and remainder, (lines, p, m), which is fitted by least squares with fixed real
-    poles; and the largest error of that fit relative to size, (lines,), the norm of the total response."""
-    first, lines = interpolation.workspace.models[0], interpolation.lines
-    poles = _smooth_poles(interpolation.workspace.band_hz, first.sample_rate_hz)
-    basis = np.hstack([(1 - poles) / (lines.z[:, None] - poles), np.ones((len(lines.z), 1))]) / size[:, None]
-    target = remainder.reshape(len(size), -1) / size[:, None]
+    """State-space model of the modes and of the remainder (lines, p, m), which is fitted by least squares with fixed
+    real poles; and the largest error of that fit relative to `total_norm`, (lines,), the norm of the total response."""
+    first_model, lines = interpolation.workspace.models[0], interpolation.lines
+    poles = _choose_remainder_poles(interpolation.workspace.band_hz, first_model.sample_rate_hz)
+    basis = np.hstack([(1 - poles) / (lines.z[:, None] - poles), np.ones((len(lines.z), 1))]) / total_norm[:, None]
+    target = remainder.reshape(len(total_norm), -1) / total_norm[:, None]
     real_basis = np.vstack([basis.real, basis.imag])
     scale = np.linalg.norm(real_basis, axis=0)
     coefficients = (
@@ -145,24 +148,24 @@ def _assemble_model(
     }
     band_hz = interpolation.workspace.band_hz
     return replace(
-        first, A=A, B=B, C=C, D=gains[-1], band_hz=band_hz, covariance=None, samples=None, provenance=provenance
+        first_model, A=A, B=B, C=C, D=gains[-1], band_hz=band_hz, covariance=None, samples=None, provenance=provenance
     ), error
 
 
-def _smooth_poles(band_hz: tuple[float, float], rate_hz: float) -> FloatArray:
+def _choose_remainder_poles(band_hz: tuple[float, float], rate_hz: float) -> FloatArray:
     """(poles,): discrete real poles, logarithmically spaced from below the band to above it, at most 0.4 of the sample
     rate."""
-    low, high = POLES_FROM * band_hz[0], min(POLES_TO * band_hz[1], 0.4 * rate_hz)
+    lowest_hz, highest_hz = LOWEST_POLE_RATIO * band_hz[0], min(HIGHEST_POLE_RATIO * band_hz[1], 0.4 * rate_hz)
     count = max(4, round(REAL_POLES_PER_OCTAVE * np.log2(band_hz[1] / band_hz[0])))
-    return np.asarray(np.exp(-2 * np.pi * np.geomspace(low, high, count) / rate_hz))
+    return np.asarray(np.exp(-2 * np.pi * np.geomspace(lowest_hz, highest_hz, count) / rate_hz))
 
 
 def _realise_mode(mode: BandMode) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Real state-space matrices A, B, C of R / (z - pole) plus its conjugate; two states per rank of the residue R."""
     u, s, v = np.linalg.svd(mode.residue)
     rank = int((s > 1e-9 * s[0]).sum())
-    p = mode.pole
-    rotation = np.array([[p.real, p.imag], [-p.imag, p.real]])
+    pole = mode.pole
+    rotation = np.array([[pole.real, pole.imag], [-pole.imag, pole.real]])
     A = np.kron(np.eye(rank), rotation)
     shapes, inputs = u[:, :rank] * np.sqrt(s[:rank]), np.sqrt(s[:rank])[:, None] * v[:rank]
     B = np.concatenate([np.stack([2 * row.real, -2 * row.imag]) for row in inputs])

@@ -1,7 +1,7 @@
-"""Accelerometer board on a serial line as a source of samples.
+"""Source of samples from an accelerometer board on a serial line; opened by `sources`.
 
-Reads bytes with pyserial and parses packets with `parser`. Used by a thread of its own, so that a silent line cannot
-block the force loop.
+Reads bytes with pyserial and parses packets with `parser`. A separate thread calls `SerialSource.read`, so that waiting
+for a silent line does not block the force loop.
 """
 
 import time
@@ -44,10 +44,11 @@ class SerialSource:
     def read(self) -> tuple[Samples, float]:
         """New samples, and their time of arrival by `time.monotonic` (s)."""
         data = self._port.read(READ_BYTES)
-        arrived_s = time.monotonic()
-        return self._parser.feed(data), arrived_s
+        arrival_s = time.monotonic()
+        return self._parser.feed(data), arrival_s
 
     def close(self) -> None:
+        """Close the serial line; may raise. Called once."""
         self._port.close()
 
 
@@ -76,13 +77,13 @@ class _SerialPort:
     """`Port` by pyserial, whose own `read(size)` would wait until all `size` bytes have arrived: this class waits for
     the first byte only, then reads the bytes that are already in the buffer."""
 
-    def __init__(self, line: Any) -> None:
-        self._line = line
+    def __init__(self, serial_port: Any) -> None:
+        self._serial_port = serial_port
 
     def read(self, size: int) -> bytes:
-        first: bytes = self._line.read(1)
-        waiting = min(size - 1, self._line.in_waiting)
-        return first + self._line.read(waiting) if first and waiting else first
+        first_byte: bytes = self._serial_port.read(1)
+        buffered_bytes = min(size - 1, self._serial_port.in_waiting)
+        return first_byte + self._serial_port.read(buffered_bytes) if first_byte and buffered_bytes else first_byte
 
     def close(self) -> None:
-        self._line.close()
+        self._serial_port.close()

@@ -13,7 +13,7 @@ from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
 from study.devices.governor.cells import IDLE, LATE, LATEST_S, PHASE, STAMP_S
-from study.devices.governor.compiling import fingerprint, part
+from study.devices.governor.compiling import fingerprint, njit_inline
 from study.devices.governor.govern import MISS_SIGNATURE, PUBLISH_SIGNATURE, ROWS, TICK_SIGNATURE, VECTOR
 from study.devices.native import now_s, sleep_until
 from study.devices.rig import READING_SIZE
@@ -61,7 +61,7 @@ _RUN_DUE = types.int64(SENSE, WRITE, TICK, PUBLISH, _RIG, _GOVERNOR, _COURSE, ty
 _ATTEND = types.int64(SENSE, WRITE, TICK, PUBLISH, MISS, _RIG, _GOVERNOR, _COURSE)
 
 
-@part
+@njit_inline
 def _tick(  # noqa: PLR0913 - compiled code takes function pointers one by one
     sense: Any, write: Any, govern: Any, publish: Any, rig: Any, governor: Any, loop_state: Any
 ) -> int:
@@ -100,13 +100,13 @@ def _tick(  # noqa: PLR0913 - compiled code takes function pointers one by one
     return RUNNING
 
 
-@part
+@njit_inline
 def _due_s(flags: FloatArray, tick: float) -> float:
     """Time (s) at which a tick is due, counted from the start, so that delays do not accumulate."""
     return float(flags[STARTED_S] + tick / flags[RATE_HZ])
 
 
-@part
+@njit_inline
 def _wait_for_tick(calls: Any, flags: FloatArray) -> float:
     """Sleep, then poll the clock, until the next tick is due. Returns the time (s)."""
     flags[DUE_S] = _due_s(flags, flags[RUN] + 1.0)
@@ -117,14 +117,14 @@ def _wait_for_tick(calls: Any, flags: FloatArray) -> float:
     return float(time_s)
 
 
-@part
+@njit_inline
 def _must_return(governor: Any, loop_state: Any) -> bool:
     """Whether `attend` has to return: the thread is needed, the rig is gone, or no force acts any more."""
     flags = loop_state[0]
     return bool(flags[THREAD_NEEDED] != 0.0 or flags[RIG_GONE] != 0.0 or governor[0][PHASE] == IDLE)
 
 
-@part
+@njit_inline
 def _attend_tick(  # noqa: PLR0913 - as above
     sense: Any, write: Any, govern: Any, publish: Any, record_missed: Any, rig: Any, governor: Any, loop_state: Any
 ) -> int:

@@ -1,8 +1,9 @@
-"""Acceptance test of the force limit of a real device, with no hand on the handle.
+"""Acceptance test of the force limit of a real device, with no hand on the handle. Called by
+`study.devices.opening.accept_device`.
 
 1. More than the cap is commanded, first of the safety layer's ticks, then directly of the vendor's library. The device
    must report no force above the cap (`check_cap_holds`).
-2. A small force is held, and the loop stops on purpose. The device's watchdog must switch the force off in time
+2. A small constant force is held, and its commands stop on purpose. The device's watchdog must switch it off in time
    (`check_force_vanishes`).
 """
 
@@ -17,23 +18,24 @@ from study.devices.force_dimension.watchdog_check import MARGIN_S
 from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
 
-FORCE_N = 0.5
+TEST_FORCE_N = 0.5
 """Force held in part 2, and cap in part 1 (N): above the friction of such devices, a sixth of the strongest stimulus
 (3 N)."""
-HELD_S, FADE_S, EVERY_S = 0.12, 0.05, 0.002
-"""Duration of the constant force, of its fades, and interval of polling (s). Short, because without spring and friction
-the handle moves by some 15 mm until the device brakes."""
-LEAST_SHARE = 0.8
-"""Share of `FORCE_N` that must have been commanded for the test to be valid: the damper subtracts some."""
+HOLD_DURATION_S, FADE_S, POLL_INTERVAL_S = 0.12, 0.05, 0.002
+"""Duration of the constant force, of its fades, and interval of polling the device (s). Short, because without the
+virtual spring the handle moves by some 15 mm until the device brakes."""
+MIN_COMMANDED_SHARE = 0.8
+"""Share of `TEST_FORCE_N` that must have been commanded for the test to be valid: the damper subtracts some."""
 PAUSE_S = 0.2
 """Pause in the commands in part 2 (s); a zero force is sent at its end."""
 
-COMMANDED_TO_CAP = 2.0
-"""Ratio of the commanded force to the cap (`FORCE_N`) in part 1. Even a failing cap lets only a small force through."""
-SHAKEN_HZ, SHAKEN_S = 12.5, 0.24
-"""Frequency (Hz) and duration (s) of that command: three periods. A free handle moves by less than 1 mm and ends at
-rest."""
-ALLOWED_TO_CAP = 1.05
+COMMAND_TO_CAP_RATIO = 2.0
+"""Ratio of the commanded force to the cap (`TEST_FORCE_N`) in part 1: small, so that the force is harmless if the cap
+fails."""
+OSCILLATION_HZ, OSCILLATION_DURATION_S = 12.5, 0.24
+"""Frequency (Hz) and duration (s) of the command in part 1: three periods. A free handle moves by less than 1 mm and
+ends at rest."""
+MAX_REPORTED_TO_CAP_RATIO = 1.05
 """Largest accepted ratio of the reported force to the cap: motor currents are quantized."""
 
 
@@ -58,15 +60,15 @@ class CappedDevice(Protocol):
 
 
 class ForceReporting(Protocol):
-    """A driver that reports the force that the device gives."""
+    """A driver that reads the force that the device reports."""
 
     def given_n(self) -> float:
-        """Norm of the force that the device gives now (N)."""
+        """Norm of the force that the device reports at this moment (N)."""
         ...
 
     def given_past_this_n(self, asked_n: float) -> float:
-        """Norm of the force (N) that the device gives when `asked_n` is commanded past the driver's own cap: that of
-        the vendor's library alone is tested."""
+        """Norm of the force (N) that the device reports when `asked_n` is commanded without the driver's own cap, so
+        that only the cap of the vendor's library acts."""
         ...
 
 
@@ -77,7 +79,7 @@ class CommandPausing(Protocol):
     """Timeout of the device's watchdog (s)."""
 
     def withhold(self, seconds: float) -> float:
-        """Send nothing for so long. Returns the monotonic time of the last command (s)."""
+        """Send no commands for this time (s). Returns the time of the last command (s, monotonic clock)."""
         ...
 
     def force_on(self) -> bool:
@@ -104,7 +106,7 @@ def require_testable(rig: object) -> None:
 def check_cap_holds(device: CappedDevice, rig: ForceReporting) -> float:
     """Part 1: command more than the cap of each layer in turn. Returns the largest force that the device reported (N).
 
-    device: opened without a spring and with caps of FORCE_N. Raises `DeviceError` where the cap was exceeded,
+    device: opened without a spring and with caps of TEST_FORCE_N. Raises `DeviceError` where the cap was exceeded,
     or where the force was too small for the test to be valid.
     """
     oscillation = _make_oscillation(device.info.sample_rate_hz)
@@ -114,84 +116,87 @@ def check_cap_holds(device: CappedDevice, rig: ForceReporting) -> float:
         pass
     else:
         device.release()
-        raise _not_accepted_error("A stimulus above its cap was not refused.")
+        raise _make_acceptance_error("A stimulus above its cap was not refused.")
     device.hold_unchecked(oscillation)
     ticks_force_n = _measure_largest_n(device, rig)
     device.release()
-    _check_given_force("at each tick", ticks_force_n)
+    _check_reported_force("at each tick", ticks_force_n)
     if device.fault() is not Fault.NONE:
-        raise _not_accepted_error(f"The force did not last: {device.fault().value}.")
-    library_force_n = rig.given_past_this_n(COMMANDED_TO_CAP * FORCE_N)
-    _check_given_force("of the library", library_force_n)
+        raise _make_acceptance_error(f"The force did not last: {device.fault().value}.")
+    library_force_n = rig.given_past_this_n(COMMAND_TO_CAP_RATIO * TEST_FORCE_N)
+    _check_reported_force("of the library", library_force_n)
     return max(ticks_force_n, library_force_n)
 
 
 def _measure_largest_n(device: CappedDevice, rig: ForceReporting) -> float:
-    """The largest force that the device reports during `SHAKEN_S`."""
-    largest_n, until_s = 0.0, time.monotonic() + SHAKEN_S
+    """The largest force (N) that the device reports during `OSCILLATION_DURATION_S`."""
+    largest_n, until_s = 0.0, time.monotonic() + OSCILLATION_DURATION_S
     while time.monotonic() < until_s:
         largest_n = max(largest_n, rig.given_n())
         device.keep_alive()
-        time.sleep(EVERY_S)
+        time.sleep(POLL_INTERVAL_S)
     return largest_n
 
 
-def _check_given_force(cap_name: str, given_n: float) -> None:
-    """Raise unless the given force is within the cap and large enough for a valid test."""
-    result_text = f"{COMMANDED_TO_CAP * FORCE_N:g} N were commanded, and the device gave {given_n:.2f} N"
-    if not given_n <= ALLOWED_TO_CAP * FORCE_N:
-        raise _not_accepted_error(f"The cap {cap_name} does not hold: {result_text}, where {FORCE_N:g} N are allowed.")
-    if given_n < LEAST_SHARE * FORCE_N:
-        raise _not_accepted_error(f"The cap {cap_name} could not be tried: {result_text}.")
+def _check_reported_force(cap_name: str, reported_n: float) -> None:
+    """Raise `DeviceError` unless the reported force is within the cap and large enough for a valid test."""
+    result_text = f"{COMMAND_TO_CAP_RATIO * TEST_FORCE_N:g} N were commanded, and the device gave {reported_n:.2f} N"
+    if not reported_n <= MAX_REPORTED_TO_CAP_RATIO * TEST_FORCE_N:
+        raise _make_acceptance_error(
+            f"The cap {cap_name} does not hold: {result_text}, where {TEST_FORCE_N:g} N are allowed."
+        )
+    if reported_n < MIN_COMMANDED_SHARE * TEST_FORCE_N:
+        raise _make_acceptance_error(f"The cap {cap_name} could not be tried: {result_text}.")
 
 
 def check_force_vanishes(device: Device, rig: CommandPausing) -> float:
-    """Part 2: stop the commands while a force is held. Returns the time (s) after which the device reported no force.
+    """Part 2: stop the commands while a force is held. Returns the time (s) after which the device reported its forces
+    as off.
 
     device: opened without a spring; its loop counts as failed afterwards, so that it must be closed. Raises
     `DeviceError` where the force remained, or where there was none before.
     """
     device.hold(_make_constant_force(device.info.sample_rate_hz))
-    _keep_alive_for(device, HELD_S)
+    _keep_alive_for(device, HOLD_DURATION_S)
     if device.fault() is not Fault.NONE or not rig.force_on():
-        raise _not_accepted_error(f"The force did not last: {device.fault().value}.")
-    if device.health().peak_command_n < LEAST_SHARE * FORCE_N:
-        raise _not_accepted_error(f"The force only reached {device.health().peak_command_n:.2f} N.")
+        raise _make_acceptance_error(f"The force did not last: {device.fault().value}.")
+    if device.health().peak_command_n < MIN_COMMANDED_SHARE * TEST_FORCE_N:
+        raise _make_acceptance_error(f"The force only reached {device.health().peak_command_n:.2f} N.")
     silent_since_s = rig.withhold(PAUSE_S)
     limit_s = rig.drops_force_after_s + MARGIN_S
     while rig.force_on():
         if time.monotonic() - silent_since_s > limit_s and rig.force_on():
             rig.withhold(0.0)
             device.stop()
-            raise _not_accepted_error(f"The force was still there {1000 * limit_s:.0f} ms after the last command.")
-        time.sleep(EVERY_S)
+            raise _make_acceptance_error(f"The force was still there {1000 * limit_s:.0f} ms after the last command.")
+        time.sleep(POLL_INTERVAL_S)
     force_off_after_s = time.monotonic() - silent_since_s
     device.release()
     return force_off_after_s
 
 
 def _make_constant_force(rate_hz: float) -> HeldStimulus:
-    """A constant force of `FORCE_N` along x, towards the operator. rate_hz: of the device."""
-    samples = np.tile([[FORCE_N, 0.0, 0.0]], (round(0.05 * rate_hz), 1))
+    """A constant force of `TEST_FORCE_N` along x, towards the operator. rate_hz: of the device."""
+    samples = np.tile([[TEST_FORCE_N, 0.0, 0.0]], (round(0.05 * rate_hz), 1))
     return HeldStimulus(Signal(samples, rate_hz, "force", "N", ("fx", "fy", "fz")), FADE_S, FADE_S, "linear")
 
 
 def _make_oscillation(rate_hz: float) -> HeldStimulus:
-    """A sinusoidal force along x, with `COMMANDED_TO_CAP` times the cap as amplitude. rate_hz: of the device."""
-    phase = 2 * np.pi * np.arange(round(rate_hz / SHAKEN_HZ)) * SHAKEN_HZ / rate_hz
-    samples = COMMANDED_TO_CAP * FORCE_N * np.sin(phase)[:, None] * [1.0, 0.0, 0.0]
+    """A sinusoidal force along x, with `COMMAND_TO_CAP_RATIO` times the cap as amplitude. rate_hz: of the device."""
+    phase = 2 * np.pi * np.arange(round(rate_hz / OSCILLATION_HZ)) * OSCILLATION_HZ / rate_hz
+    samples = COMMAND_TO_CAP_RATIO * TEST_FORCE_N * np.sin(phase)[:, None] * [1.0, 0.0, 0.0]
     return HeldStimulus(Signal(samples, rate_hz, "force", "N", ("fx", "fy", "fz")), FADE_S, FADE_S, "linear")
 
 
 def _keep_alive_for(device: Device, seconds: float) -> None:
-    """Give signs of life for this time (s)."""
+    """Restart the safety layer's watchdog every 20 ms for this time (s), so that the force is not faded out."""
     until_s = time.monotonic() + seconds
     while time.monotonic() < until_s:
         time.sleep(0.02)
         device.keep_alive()
 
 
-def _not_accepted_error(reason: str) -> DeviceError:
+def _make_acceptance_error(reason: str) -> DeviceError:
     return DeviceError(
         "The device was not accepted",
         reason,

@@ -103,7 +103,7 @@ class ForceDimensionRig:
 
     def buttons(self) -> frozenset[int]:
         """Numbers of the pressed buttons, from 0, at the last status check."""
-        mask = int(self._cells[loop_cells.PRESSED])
+        mask = int(self._cells[loop_cells.BUTTON_MASK])
         return frozenset(bit for bit in range(32) if mask >> bit & 1)
 
     def write(self, force_n: FloatArray) -> None:
@@ -159,14 +159,14 @@ class ForceDimensionRig:
         self._closed.set()
         is_locked = self._sending.acquire(LOCK_S)
         try:
-            self._cells[loop_cells.LET_GO] = self._handle.disconnect()
+            self._cells[loop_cells.RELEASE_CONFIRMED] = self._handle.disconnect()
         finally:
             if is_locked:
                 self._sending.release()
             if self._accelerometer is not None:
                 self._accelerometer.close()
         self._end_zero_thread()
-        return bool(self._cells[loop_cells.LET_GO])
+        return bool(self._cells[loop_cells.RELEASE_CONFIRMED])
 
     def _end_zero_thread(self) -> None:
         """Wait for the thread that repeats zeros, after the force is off and the brakes are on, so that a hanging call
@@ -176,7 +176,7 @@ class ForceDimensionRig:
             return
         self._zero_thread.join(JOIN_S)
         if not self._handle.disconnect():
-            self._cells[loop_cells.LET_GO] = 0.0
+            self._cells[loop_cells.RELEASE_CONFIRMED] = 0.0
 
     def _repeat_zero_force(self) -> None:
         """Repeat a zero force until closed or failed; a zero is sent only where the last force was zero. Has real-time
@@ -206,12 +206,12 @@ class ForceDimensionRig:
             return f"The library says: {self._handle.library.last_error(loop_cells.LIBRARY[function])}"
         cap_n, refused_n = self._cells[loop_cells.CAP_N], self._cells[loop_cells.REFUSED_N]
         return {
-            loop_cells.REPEATS: "It repeatedly reports the same position",
-            loop_cells.RELEASED: f"It let its force go: {describe_off_cause(int(self._cells[loop_cells.OFF_CAUSE]))}",
-            loop_cells.REFUSED: f"A force of {refused_n:g} N was refused; at most {cap_n:g} N may be sent",
-            loop_cells.LOCKED: "An earlier force is still being sent",
-            loop_cells.IS_CLOSED: "It is closed",
-            loop_cells.SCALED_DOWN: "Its motors cannot give the commanded force, and give less",
+            loop_cells.STALE_READINGS: "It repeatedly reports the same position",
+            loop_cells.FORCES_OFF: f"It let its force go: {describe_off_cause(int(self._cells[loop_cells.OFF_CAUSE]))}",
+            loop_cells.FORCE_REFUSED: f"A force of {refused_n:g} N was refused; at most {cap_n:g} N may be sent",
+            loop_cells.SEND_LOCKED: "An earlier force is still being sent",
+            loop_cells.DEVICE_CLOSED: "It is closed",
+            loop_cells.FORCE_SCALED_DOWN: "Its motors cannot give the commanded force, and give less",
             loop_cells.FORCE_MISMATCH: "It repeatedly reports another force than the one that it was sent",
         }[code]
 

@@ -28,26 +28,26 @@ from study.devices.force_dimension.loop_cells import (
     BRAKES,
     CAP_N,
     CLOSED,
+    DEVICE_CLOSED,
     DROPS_AFTER_S,
     ENABLE,
     FAILED,
     FAILED_BEFORE,
     FORCE,
-    IS_CLOSED,
-    LET_GO,
-    LOCKED,
+    FORCE_REFUSED,
+    FORCE_SCALED_DOWN,
+    FORCES_OFF,
     NUMBER,
     POSITION,
-    READS,
-    REFUSED,
+    READ_COUNT,
     REFUSED_N,
-    RELEASED,
-    REPEATED,
-    REPEATS,
+    RELEASE_CONFIRMED,
+    REPEAT_COUNT,
     SCALED_COUNT,
-    SCALED_DOWN,
+    SEND_LOCKED,
     SENT_S,
     SENT_ZERO,
+    STALE_READINGS,
     WITHHELD_UNTIL_S,
     check_force_on,
     check_status,
@@ -58,7 +58,7 @@ from study.devices.force_dimension.loop_cells import (
     record_library_failure,
     record_sent_force,
 )
-from study.devices.governor.compiling import fingerprint, part
+from study.devices.governor.compiling import fingerprint, njit_inline
 from study.devices.governor.govern import VECTOR
 from study.devices.native import Addresses, acquire, call_int, now_s, release
 from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED
@@ -83,7 +83,7 @@ LOCK_S = 0.002
 """Longest wait for the lock (s), ten times the duration of a write: a longer wait means that a call hangs."""
 
 
-@part
+@njit_inline
 def _sense_acceleration(samples: FloatArray, time_s: float, reading: FloatArray) -> None:
     """Read the accelerometer in compiled code, as `study.devices.accelerometer.newest_sample.NewestSample.read_zeroed`
     does in Python."""
@@ -101,7 +101,7 @@ def _sense_acceleration(samples: FloatArray, time_s: float, reading: FloatArray)
         count = newer
 
 
-@part
+@njit_inline
 def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: FloatArray) -> int:
     """Read the position (m), at some ticks the status, and the newest acceleration (m/s²) into `reading`."""
     if cells[FAILED] != 0.0:
@@ -113,33 +113,33 @@ def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: Fl
     answer = call_int(calls[POSITION], arguments)
     if not is_success(answer):
         return record_library_failure(cells, POSITION)
-    if cells[READS] % LOOKS_OF in LOOKS_AT:
+    if cells[READ_COUNT] % LOOKS_OF in LOOKS_AT:
         code = check_status(calls, cells)
         if code != 0:
             return code
-    cells[READS] += 1.0
-    cells[REPEATED] = count_beyond_share(cells[REPEATED], answer == STALE, STALE_SHARE)
-    if cells[REPEATED] >= STALE_FOR * (1.0 - STALE_SHARE):
-        return record_failure(cells, REPEATS)
+    cells[READ_COUNT] += 1.0
+    cells[REPEAT_COUNT] = count_beyond_share(cells[REPEAT_COUNT], answer == STALE, STALE_SHARE)
+    if cells[REPEAT_COUNT] >= STALE_FOR * (1.0 - STALE_SHARE):
+        return record_failure(cells, STALE_READINGS)
     reading[SENSOR_CLIPPED] = 0.0
     if samples.shape[0] > 1:
         _sense_acceleration(samples, now_s(calls), reading)
     return 0
 
 
-@part
+@njit_inline
 def _is_watchdog_expired(calls: Addresses, cells: FloatArray) -> bool:
     """Whether no force was sent for longer than the timeout of the device's watchdog."""
     return bool(now_s(calls) - cells[SENT_S] > cells[DROPS_AFTER_S] > 0.0)
 
 
-@part
+@njit_inline
 def _set_force(calls: Addresses, cells: FloatArray, x: float, y: float, z: float) -> int:
     """Call dhdSetForce (N). Returns its answer."""
     return int(call_int(calls[FORCE], (x, y, z, np.int32(cells[NUMBER]))))
 
 
-@part
+@njit_inline
 def _wake_device(calls: Addresses, cells: FloatArray) -> int:
     """Enable forces after a pause longer than the watchdog's timeout. Returns an error code where the forces are off
     for another cause, or a force acted; a pause after a zero (nothing was played, or the computer slept) is no
@@ -148,7 +148,7 @@ def _wake_device(calls: Addresses, cells: FloatArray) -> int:
     if code >= 0:
         return code
     if cells[CLOSED] != 0.0:
-        return record_failure(cells, IS_CLOSED)
+        return record_failure(cells, DEVICE_CLOSED)
     number = np.int32(cells[NUMBER])
     if not is_success(call_int(calls[BRAKES], (np.int32(0), number))):
         return record_library_failure(cells, BRAKES)
@@ -156,11 +156,11 @@ def _wake_device(calls: Addresses, cells: FloatArray) -> int:
         return record_library_failure(cells, ENABLE)
     if cells[CLOSED] != 0.0:  # the call hung while the device was closed: undo it
         _brake(calls, cells)
-        return record_failure(cells, IS_CLOSED)
+        return record_failure(cells, DEVICE_CLOSED)
     return 0 if is_success(_set_force(calls, cells, 0.0, 0.0, 0.0)) else record_library_failure(cells, FORCE)
 
 
-@part
+@njit_inline
 def _brake(calls: Addresses, cells: FloatArray) -> None:
     """Switch forces off and brakes on; the answers of the library are ignored."""
     number = np.int32(cells[NUMBER])
@@ -168,7 +168,7 @@ def _brake(calls: Addresses, cells: FloatArray) -> None:
     call_int(calls[BRAKES], (np.int32(1), number))
 
 
-@part
+@njit_inline
 def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
     """Send a force. The caller must hold the lock."""
     if _is_watchdog_expired(calls, cells):
@@ -185,11 +185,11 @@ def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
     cells[SENT_ZERO] = 1.0 if x == 0.0 and y == 0.0 and z == 0.0 else 0.0
     cells[SCALED_COUNT] = count_beyond_share(cells[SCALED_COUNT], answer != 0, SCALED_SHARE)
     if cells[SCALED_COUNT] >= SCALED_FOR * (1.0 - SCALED_SHARE):
-        return record_failure(cells, SCALED_DOWN)
+        return record_failure(cells, FORCE_SCALED_DOWN)
     return 0
 
 
-@part
+@njit_inline
 def _send_zero(calls: Addresses, cells: FloatArray) -> int:
     """Send a zero force; brake where the library answers anything but success or a notice."""
     began_s = now_s(calls)
@@ -200,7 +200,7 @@ def _send_zero(calls: Addresses, cells: FloatArray) -> int:
     if cells[SENT_ZERO] == 0.0 and _is_watchdog_expired(calls, cells):
         # The watchdog cut off a force whose call may still hang: the device must take no forces when it continues.
         code = check_force_on(calls, cells)
-        if code != 0 and code != RELEASED:
+        if code != 0 and code != FORCES_OFF:
             return code
     record_sent_force(cells, 0.0, 0.0, 0.0)
     cells[SENT_ZERO], cells[SCALED_COUNT] = 1.0, 0.0
@@ -209,11 +209,11 @@ def _send_zero(calls: Addresses, cells: FloatArray) -> int:
     return 0
 
 
-@part
+@njit_inline
 def _write_zero(calls: Addresses, cells: FloatArray) -> int:
     """Send a zero force in any case: neither a lock that is not free nor an earlier failure prevents it. It does not
     enable the forces of a braked device."""
-    if cells[LET_GO] != 0.0:
+    if cells[RELEASE_CONFIRMED] != 0.0:
         return 0
     got = acquire(calls, LOCK_S)
     code = _send_zero(calls, cells)
@@ -222,7 +222,7 @@ def _write_zero(calls: Addresses, cells: FloatArray) -> int:
     return code
 
 
-@part
+@njit_inline
 def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
     """Write a force (3,), N: a zero in any case, another only within the cap, without a failure, and under the lock."""
     if now_s(calls) < cells[WITHHELD_UNTIL_S]:
@@ -234,17 +234,17 @@ def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
         code = _write_zero(calls, cells)
         if cells[FAILED] == 0.0:
             cells[REFUSED_N] = norm
-        return code if code != 0 else record_failure(cells, REFUSED)
+        return code if code != 0 else record_failure(cells, FORCE_REFUSED)
     if cells[FAILED] != 0.0:
         return FAILED_BEFORE
     if not acquire(calls, LOCK_S):
-        return record_failure(cells, LOCKED)
-    code = _send_force(calls, cells, force) if cells[CLOSED] == 0.0 else record_failure(cells, IS_CLOSED)
+        return record_failure(cells, SEND_LOCKED)
+    code = _send_force(calls, cells, force) if cells[CLOSED] == 0.0 else record_failure(cells, DEVICE_CLOSED)
     release(calls)
     return code
 
 
-@part
+@njit_inline
 def _repeat_zero(calls: Addresses, cells: FloatArray, every_s: float, force: FloatArray) -> int:
     """Repeat the zero force while nothing is played, and brake where the device does not take it. The lock is held
     without the interpreter, so that the loop's next force waits for it no longer than `LOCK_S`."""

@@ -6,7 +6,7 @@ A force that is not finite becomes zero. The functions are compiled into the saf
 import math
 
 from equalizer.signals.signal import FloatArray
-from study.devices.governor.compiling import part
+from study.devices.governor.compiling import njit_inline
 
 OVERFLOWING = 1e100
 """Component or norm (N) from which squares of components may overflow; such a force becomes zero."""
@@ -16,26 +16,26 @@ LIMIT_FACTOR, EXCESS_FACTOR = 1 - 1e-12, 1 + 1e-9
 counts as limited only beyond EXCESS_FACTOR times the limit, so that a stimulus exactly at its cap does not count."""
 
 
-@part
+@njit_inline
 def norm_of(x: float, y: float, z: float) -> float:
     """Euclidean norm of the vector (x, y, z)."""
     return math.sqrt(x * x + y * y + z * z)
 
 
-@part
+@njit_inline
 def is_bounded(vector: FloatArray, bound: float) -> bool:
     """Whether all three components are smaller than the bound in magnitude; False for NaN and infinity."""
     return bool(abs(vector[0]) < bound and abs(vector[1]) < bound and abs(vector[2]) < bound)
 
 
-@part
+@njit_inline
 def clear(force: FloatArray) -> None:
     """Set a force (3,) to zero."""
     for i in range(3):
         force[i] = 0.0
 
 
-@part
+@njit_inline
 def limiting_factor(norm: float, cap: float) -> float:
     """Factor that limits a force of this norm (N) to the cap (N): 1 up to the cap, then cap / norm. 0 where either is
     not a number, the cap is not positive, or the norm is not below `OVERFLOWING`."""
@@ -44,7 +44,7 @@ def limiting_factor(norm: float, cap: float) -> float:
     return 1.0 if norm <= cap * LIMIT_FACTOR else cap * LIMIT_FACTOR / norm
 
 
-@part
+@njit_inline
 def confine(force: FloatArray, cap: float) -> bool:
     """Limit a force (3,), N, to the cap (N) in place; zero where a component is not finite or the cap is not positive.
     Returns whether the force exceeded the cap by more than rounding; False where it was not finite."""

@@ -26,11 +26,11 @@ from study.devices.governor.cells import (
     VELOCITY,
     VELOCITY_SHARE,
 )
-from study.devices.governor.compiling import part
+from study.devices.governor.compiling import njit_inline
 from study.devices.governor.confine import EXCESS_FACTOR, limiting_factor, norm_of
 
 
-@part
+@njit_inline
 def _track_velocity(state: FloatArray, settings: FloatArray, reading: FloatArray) -> None:
     """First-order low-pass filter of the velocity (m/s): v += share (dx/dt - v) per tick. It uses the time that
     actually passed since the last tick, so that its corner frequency stays the same when ticks are late."""
@@ -44,7 +44,7 @@ def _track_velocity(state: FloatArray, settings: FloatArray, reading: FloatArray
         state[VELOCITY + i] += share * (speed - state[VELOCITY + i])
 
 
-@part
+@njit_inline
 def _ease_feedback(state: FloatArray, settings: FloatArray) -> None:
     """Reduce the feedback force slowly while the position reading does not change (UNCHANGED, by `plausibility`).
 
@@ -56,7 +56,7 @@ def _ease_feedback(state: FloatArray, settings: FloatArray) -> None:
         state[EASED] = min(1.0, state[EASED] + 1.0 / settings[EASE_TICKS])
 
 
-@part
+@njit_inline
 def add_feedback(state: FloatArray, settings: FloatArray, reading: FloatArray, gain: float, force: FloatArray) -> None:
     """Add spring and damper to `force` (3,), N, each and their sum limited to FEEDBACK_CAP. gain: 0 to 1, the ramp at
     the start and end of a hold. PULL (N) is their magnitude before `_ease_feedback` reduces it."""

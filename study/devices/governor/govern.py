@@ -18,7 +18,7 @@ from typing import Any
 from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
-from study.devices.governor.compiling import fingerprint, part
+from study.devices.governor.compiling import fingerprint, njit_inline
 from study.devices.governor.confine import EXCESS_FACTOR, LIMIT_FACTOR, clear, confine, is_bounded, norm_of
 from study.devices.governor.feedback import add_feedback
 from study.devices.governor.plausibility import fault_of_reading
@@ -53,7 +53,7 @@ PUBLISH_SIGNATURE = types.void(VECTOR, VECTOR, ROWS, VECTOR)
 MISS_SIGNATURE = types.void(VECTOR, ROWS, VECTOR, types.int64)
 
 
-@part
+@njit_inline
 def _start_safety_fade(state: FloatArray, fault: int) -> None:
     """Begin the fade of the last force to zero, which needs neither sensor nor program. The first fault is kept."""
     state[PHASE] = LETTING_GO
@@ -64,7 +64,7 @@ def _start_safety_fade(state: FloatArray, fault: int) -> None:
         state[FAULT] = fault
 
 
-@part
+@njit_inline
 def _update_phase_while_playing(state: FloatArray, settings: FloatArray) -> None:
     """End of the stimulus: by request, at its length, without a sign of life (watchdog), or after the longest time."""
     tick = state[TICK]
@@ -80,7 +80,7 @@ def _update_phase_while_playing(state: FloatArray, settings: FloatArray) -> None
         _start_safety_fade(state, HELD_TOO_LONG)
 
 
-@part
+@njit_inline
 def _update_phase(state: FloatArray, settings: FloatArray) -> None:
     """Change of phase by requests and by time."""
     phase = state[PHASE]
@@ -99,7 +99,7 @@ def _update_phase(state: FloatArray, settings: FloatArray) -> None:
             _start_safety_fade(state, NO_FAULT)  # the slew limit delayed the fade-out: a force remains
 
 
-@part
+@njit_inline
 def _fade_share(ticks: float, length: float, raised_cosine: float) -> float:
     """Gain of a fade-in, from 0 at 0 ticks to 1 at `length`: linear, or (1 - cos(pi ticks / length)) / 2."""
     if ticks >= length:
@@ -111,7 +111,7 @@ def _fade_share(ticks: float, length: float, raised_cosine: float) -> float:
     return ticks / length
 
 
-@part
+@njit_inline
 def _compute_gains(state: FloatArray) -> tuple[float, float]:
     """Gains (0 to 1) of stimulus and of spring and damper at this tick. A release during a fade-in starts from the gain
     reached."""
@@ -124,7 +124,7 @@ def _compute_gains(state: FloatArray) -> tuple[float, float]:
     return remaining * state[STIMULUS_GAIN], remaining * state[SPRING_GAIN]
 
 
-@part
+@njit_inline
 def _update_elapsed(state: FloatArray, settings: FloatArray) -> None:
     """Time since the last reading, in ticks; by the time stamps of the readings where there are any."""
     elapsed = state[TICK] - state[READ_AT]
@@ -134,7 +134,7 @@ def _update_elapsed(state: FloatArray, settings: FloatArray) -> None:
     state[READ_AT], state[READ_AT_S] = state[TICK], state[STAMP_S]
 
 
-@part
+@njit_inline
 def _limit_slew(state: FloatArray, settings: FloatArray, force: FloatArray) -> bool:
     """Shorten the step from the last force to the slew limit. Both forces lie within the cap, and a ball is convex, so
     that the new force lies within it too. Returns whether the step exceeded the limit by more than rounding."""
@@ -148,7 +148,7 @@ def _limit_slew(state: FloatArray, settings: FloatArray, force: FloatArray) -> b
     return bool(step > settings[SLEW_STEP] * EXCESS_FACTOR)
 
 
-@part
+@njit_inline
 def _compute_force(
     state: FloatArray, settings: FloatArray, loop: FloatArray, reading: FloatArray, force: FloatArray
 ) -> None:
@@ -178,7 +178,7 @@ def _compute_force(
     state[SLEW_LIMITED] += _limit_slew(state, settings, force)
 
 
-@part
+@njit_inline
 def _apply_safety_fade(state: FloatArray, settings: FloatArray, force: FloatArray) -> None:
     """Safety fade: the last force before the fade, reduced linearly to zero within LET_GO_TICKS ticks."""
     remaining = 1.0 - (state[TICK] - state[LET_GO_AT] + 1.0) / settings[LET_GO_TICKS]
@@ -188,7 +188,7 @@ def _apply_safety_fade(state: FloatArray, settings: FloatArray, force: FloatArra
         state[PHASE] = IDLE
 
 
-@part
+@njit_inline
 def _record_row(state: FloatArray, buffer: FloatArray, reading: FloatArray) -> None:
     """Write command, excitation and reading of a tick into the recording ring, where the oldest row was."""
     if state[PHASE] == PLAYING and state[RECORD_FROM] <= state[TICK] < state[LENGTH]:

@@ -81,7 +81,7 @@ class Governor:
         """Set up a stimulus that is repeated until its release; the next tick is its first. The limits are checked
         before, in `admission`."""
         fade_in, fade_out = self._count_ticks(stimulus.fade_in_s), self._count_ticks(stimulus.fade_out_s)
-        self._reset_run(stimulus.played_once_then_loop, self._count_recorded_rows(len(stimulus.loop)))
+        self._reset_run(stimulus.onset_then_loop, self._count_recorded_rows(len(stimulus.loop)))
         state, onset_ticks = self.state, len(stimulus.onset) if stimulus.onset is not None else 0
         state[cells.ONSET_TICKS] = onset_ticks
         # An onset replaces the fade-in.

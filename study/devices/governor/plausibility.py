@@ -51,7 +51,7 @@ from study.devices.governor.cells import (
     UNCHANGED,
     WORKSPACE,
 )
-from study.devices.governor.compiling import part
+from study.devices.governor.compiling import njit_inline
 from study.devices.governor.confine import is_bounded, norm_of
 
 IMPLAUSIBLE_M = 0.5
@@ -76,7 +76,7 @@ STEPS_OF_RESOLUTION = 2.0
 half a step. Also the expected motion from which an unchanged reading is stale."""
 
 
-@part
+@njit_inline
 def _move_gripped(state: FloatArray, tick_s: float, force_n: float, cell_indices: tuple[int, int, int, int]) -> None:
     """Integrate the gripped handle along one axis over a tick (semi-implicit Euler), and extend its range. force_n: N.
     cell_indices: of position (m), velocity (m/s), least and greatest position in `state`."""
@@ -89,7 +89,7 @@ def _move_gripped(state: FloatArray, tick_s: float, force_n: float, cell_indices
     state[high] = max(state[high], state[position])
 
 
-@part
+@njit_inline
 def _expect_motion(state: FloatArray, settings: FloatArray) -> None:
     """Update the motion that the stimulus must have caused in a gripped handle over the last tick. Static forces are
     left out: a hand at rest balances them. Dry friction follows the play operator (Prandtl): the force that moves the
@@ -110,7 +110,7 @@ def _expect_motion(state: FloatArray, settings: FloatArray) -> None:
         _move_gripped(state, settings[TICK_S], state[MOVING_FORCE + i], cell_indices)
 
 
-@part
+@njit_inline
 def _has_changed(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
     """Whether the reading differs by half the resolution or more from the reference, the last reading that had changed.
     If so, it becomes the new reference, and the expected range starts anew."""
@@ -126,7 +126,7 @@ def _has_changed(state: FloatArray, settings: FloatArray, reading: FloatArray) -
     return True
 
 
-@part
+@njit_inline
 def _must_have_moved(state: FloatArray, settings: FloatArray, distance_m: float) -> bool:
     """Whether the spring's force has been reduced so far, since the last change, that even a gripped handle must have
     moved by `distance_m` (m): by more than friction + stiffness of the grip * way."""
@@ -134,7 +134,7 @@ def _must_have_moved(state: FloatArray, settings: FloatArray, distance_m: float)
     return bool(released_n > settings[FRICTION] + GRIPPED_N_PER_M * distance_m)
 
 
-@part
+@njit_inline
 def _is_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
     """Whether the position has not changed for `STALE_TICKS`, although a gripped handle must have moved."""
     if _has_changed(state, settings, reading):
@@ -153,7 +153,7 @@ def _is_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> b
     )
 
 
-@part
+@njit_inline
 def _expect_along_axis(state: FloatArray, settings: FloatArray, i: int) -> None:
     """As `_expect_motion` for axis i by itself, with the full friction on its component of the force."""
     difference_n = state[PASSED_TWICE + i] - state[AXIS_FORCE + i]
@@ -163,7 +163,7 @@ def _expect_along_axis(state: FloatArray, settings: FloatArray, i: int) -> None:
     _move_gripped(state, settings[TICK_S], state[AXIS_FORCE + i], cell_indices)
 
 
-@part
+@njit_inline
 def _is_axis_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
     """Whether the reading of a single axis is stale: unchanged although its component of the force must have moved
     it."""
@@ -184,7 +184,7 @@ def _is_axis_stale(state: FloatArray, settings: FloatArray, reading: FloatArray)
     return stale
 
 
-@part
+@njit_inline
 def _is_shaken(state: FloatArray, settings: FloatArray, x: float, y: float, z: float) -> bool:
     """Whether the low-passed acceleration of the readings exceeds its bound. x, y, z: the latest step, in m per
     tick."""
@@ -198,7 +198,7 @@ def _is_shaken(state: FloatArray, settings: FloatArray, x: float, y: float, z: f
     return bool(state[SHAKING] > settings[ACCELERATION])
 
 
-@part
+@njit_inline
 def fault_of_reading(state: FloatArray, settings: FloatArray, reading: FloatArray) -> int:
     """NO_FAULT, or the code of the fault for which the force must be released. reading: (3,), m. `state` holds the last
     position and the ticks since then (LAST_POSITION, ELAPSED)."""

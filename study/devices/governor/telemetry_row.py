@@ -39,10 +39,10 @@ from study.devices.governor.cells import (
     TICK_S,
     VELOCITY,
 )
-from study.devices.governor.compiling import part
+from study.devices.governor.compiling import njit_inline
 
 
-@part
+@njit_inline
 def write_row(state: FloatArray, settings: FloatArray, ring: FloatArray, reading: FloatArray) -> None:
     """Write the row of a tick into the ring; called after `tick`, which has advanced TICK already. ring (1 + rows,
     RING_WIDTH): a header, then the rows. Time in s, position in m, acceleration in m/s², forces in N."""

@@ -12,7 +12,7 @@ from study.devices.device import DeviceInfo
 from study.devices.rig import CompiledRig
 from study.devices.simulated.compiled import advance, sense
 from study.devices.simulated.layout import TICK_S
-from study.devices.simulated.packing import effective_mass_kg, make_rest_state, pack_parameters
+from study.devices.simulated.packing import compute_effective_mass_kg, make_rest_state, pack_parameters
 from study.devices.simulated.parameters import Omega3Parameters, Vector
 
 NAME = "simulated omega.3"
@@ -50,7 +50,7 @@ def build_omega3(
         packed[hand_cells] = (with_hand if on_handle and hand else without_hand)[hand_cells]
 
     details = f"{set_words}, {'with' if hand else 'without'} a hand, sensor noise from seed {seed}"
-    mass_kg = effective_mass_kg(parameters, packed)
+    mass_kg = compute_effective_mass_kg(parameters, packed)
     return CompiledRig(
         info=make_omega3_info(device_name if friction else f"{device_name} without friction", mass_kg, details),
         state=make_rest_state(packed, place_m),

@@ -1,7 +1,8 @@
-"""Packs named parameters into the flat array of the compiled functions (`layout`).
+"""Writes the named parameters of the simulated omega.3 into the flat array that its compiled functions read.
 
-Derived quantities are computed here: modal stiffness m w² and damping 2 zeta m w from frequency and damping ratio, the
-coefficients of first-order low passes, noise from its density, and the depth at which the linkage is isotropic.
+Called by `omega3` (a device) and `simulated_linkage`; `layout` defines the elements of the array. Derived quantities
+are computed here: modal stiffness m w² and damping 2 zeta m w from frequency and damping ratio, the coefficients of
+first-order low passes, noise from its density, and the depth at which the linkage is isotropic.
 """
 
 import math
@@ -14,46 +15,48 @@ from study.devices.simulated.compiled import pose
 from study.devices.simulated.parameters import GRAVITY_M_S2, Linkage, Omega3Parameters, Vector
 
 
-def isotropic_depth_m(linkage: Linkage) -> float:
+def compute_isotropic_depth_m(linkage: Linkage) -> float:
     """Distance from the base plane to the isotropic point on the axis, where the inertia is the same in all directions.
 
     On the axis each Jacobian row is parallel to its forearm. Three rows at 120 degrees give J^T J a multiple of the
     identity when the forearm's radial part is sqrt(2) times its axial part. Raises ValueError where the arms are too
     short or too long for such a point.
     """
-    radial = linkage.forearm_m * math.sqrt(2 / 3)
-    cosine = (radial - linkage.radius_m) / linkage.upper_arm_m
-    if not -1 < cosine < 1:
-        raise ValueError(f"no isotropic point on the axis: it would need cos q = {cosine:.3f}, between -1 and 1")
-    return linkage.forearm_m / math.sqrt(3) + linkage.upper_arm_m * math.sqrt(1 - cosine**2)
+    radial_m = linkage.forearm_m * math.sqrt(2 / 3)
+    cos_upper_arm = (radial_m - linkage.radius_m) / linkage.upper_arm_m
+    if not -1 < cos_upper_arm < 1:
+        raise ValueError(f"no isotropic point on the axis: it would need cos q = {cos_upper_arm:.3f}, between -1 and 1")
+    return linkage.forearm_m / math.sqrt(3) + linkage.upper_arm_m * math.sqrt(1 - cos_upper_arm**2)
 
 
 def pack_parameters(parameters: Omega3Parameters, hand: bool, place_m: Vector) -> FloatArray:
-    """The parameters as an array (layout.PARAMETERS_SIZE,). hand: whether a hand holds the handle, relaxed at place_m.
-    Raises ValueError as `isotropic_depth_m`."""
+    """The parameters as an array (layout.PARAMETERS_SIZE,). hand: whether a hand holds the handle. place_m: position at
+    which the hand's spring is relaxed. Raises ValueError as `compute_isotropic_depth_m`."""
     packed = np.zeros(layout.PARAMETERS_SIZE)
     _pack_linkage(packed, parameters)
     _pack_drives(packed, parameters)
     _pack_mount(packed, parameters)
     _pack_handle(packed, parameters, hand)
     _pack_sensor(packed, parameters)
-    _write_cells(packed, layout.HAND_REST, place_m)
+    _write_elements(packed, layout.HAND_REST, place_m)
     stops = parameters.stops
-    _write_cells(packed, layout.STOP_RADIUS, (stops.radius_m, stops.stiffness_n_per_m, stops.damping_n_s_per_m))
+    _write_elements(packed, layout.STOP_RADIUS, (stops.radius_m, stops.stiffness_n_per_m, stops.damping_n_s_per_m))
     return packed
 
 
 def make_rest_state(packed: FloatArray, place_m: Vector) -> FloatArray:
-    """The state (layout.STATE_SIZE,) at rest without stress, the handle at place_m, the motors at its joint angles."""
+    """The state (layout.STATE_SIZE,) at rest: the handle at place_m, the motors at the corresponding joint angles,
+    cables and modes without load. packed: the result of `pack_parameters`."""
     state = np.zeros(layout.STATE_SIZE)
-    _write_cells(state, layout.RELATIVE, place_m)
+    _write_elements(state, layout.RELATIVE, place_m)
     pose(packed, np.array(place_m, dtype=float), state[layout.MOTOR : layout.MOTOR + 3], np.empty((3, 3)))
     return state
 
 
-def effective_mass_kg(parameters: Omega3Parameters, packed: FloatArray) -> float:
-    """Effective mass at the origin without a hand: carried mass + I trace(J^T J) / 3, with arms and motors in I. At the
-    isotropic point it is the same in all directions."""
+def compute_effective_mass_kg(parameters: Omega3Parameters, packed: FloatArray) -> float:
+    """Effective mass at the origin without a hand, averaged over directions: m + I trace(J^T J) / 3, with the mass m of
+    handle and forearms, the inertia I of an arm with its drive, and the Jacobian J from velocity to joint speeds. At
+    the isotropic point it is the same in all directions."""
     jacobian = np.empty((3, 3))
     pose(packed, np.zeros(3), np.empty(3), jacobian)
     masses = parameters.masses
@@ -61,19 +64,21 @@ def effective_mass_kg(parameters: Omega3Parameters, packed: FloatArray) -> float
     return masses.handle_kg + masses.forearm_kg + float(joint_inertia * np.trace(jacobian.T @ jacobian) / 3)
 
 
-def _write_cells(packed: FloatArray, start: int, values: tuple[float, ...] | FloatArray) -> None:
+def _write_elements(packed: FloatArray, start: int, values: tuple[float, ...] | FloatArray) -> None:
+    """Write values of any shape, row by row, from the index `start` on."""
     flat = np.ravel(np.asarray(values, dtype=float))
     packed[start : start + flat.size] = flat
 
 
 def _normalise(directions: tuple[Vector, ...]) -> FloatArray:
+    """(directions, 3): unit vectors."""
     rows = np.array(directions, dtype=float)
-    units: FloatArray = rows / np.linalg.norm(rows, axis=1, keepdims=True)
-    return units
+    unit_vectors: FloatArray = rows / np.linalg.norm(rows, axis=1, keepdims=True)
+    return unit_vectors
 
 
-def _compute_pole(frequency_hz: float) -> float:
-    """Coefficient of a first-order low pass: share of the difference to its input that vanishes in a step, exactly."""
+def _compute_low_pass_coefficient(frequency_hz: float) -> float:
+    """Coefficient a of a first-order low pass y += a (x - y) per step, exact for a constant input x."""
     return 1.0 - math.exp(-2 * math.pi * frequency_hz * layout.STEP_S)
 
 
@@ -82,66 +87,68 @@ def _pack_linkage(packed: FloatArray, parameters: Omega3Parameters) -> None:
     packed[layout.UPPER_ARM] = linkage.upper_arm_m
     packed[layout.FOREARM] = linkage.forearm_m
     packed[layout.RADIUS] = linkage.radius_m
-    packed[layout.PLATFORM_DEPTH] = isotropic_depth_m(linkage) if linkage.depth_m is None else linkage.depth_m
+    packed[layout.PLATFORM_DEPTH] = compute_isotropic_depth_m(linkage) if linkage.depth_m is None else linkage.depth_m
     azimuths = np.radians(linkage.azimuths_deg)
-    _write_cells(packed, layout.AZIMUTH, np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1))
+    _write_elements(packed, layout.AZIMUTH, np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1))
     masses = parameters.masses
+    # Of a forearm, two thirds of the mass are lumped at the elbow and one third at the platform (`Masses`).
     packed[layout.ARM_INERTIA] = masses.upper_arm_kg_m2 + 2 / 3 * masses.forearm_kg * linkage.upper_arm_m**2
     packed[layout.DRIVE_INERTIA] = masses.drive_kg_m2
 
 
 def _pack_drives(packed: FloatArray, parameters: Omega3Parameters) -> None:
     drives = parameters.drives
-    packed[layout.AMPLIFIER] = _compute_pole(drives.amplifier_hz)
+    packed[layout.AMPLIFIER] = _compute_low_pass_coefficient(drives.amplifier_hz)
     packed[layout.FRICTION] = drives.friction_n_m
     packed[layout.PRESLIDING] = drives.presliding_rad
     packed[layout.DRIVE_DAMPING] = drives.damping_n_m_s
     packed[layout.COUNT] = 2 * math.pi / drives.counts_per_turn
     stiffness = np.array(drives.cable_n_m_per_rad)
-    _write_cells(packed, layout.CABLE, stiffness)
+    _write_elements(packed, layout.CABLE, stiffness)
     damping = 2 * drives.cable_damping_ratio * np.sqrt(stiffness * parameters.masses.drive_kg_m2)
-    _write_cells(packed, layout.CABLE_DAMPING, damping)
+    _write_elements(packed, layout.CABLE_DAMPING, damping)
 
 
 def _pack_mount(packed: FloatArray, parameters: Omega3Parameters) -> None:
     mount = parameters.mount
     masses, natural_rad_per_s = np.array(mount.masses_kg), 2 * math.pi * np.array(mount.frequencies_hz)
-    _write_cells(packed, layout.MOUNT_MASS, masses)
-    _write_cells(packed, layout.MOUNT_STIFFNESS, masses * natural_rad_per_s**2)
-    _write_cells(packed, layout.MOUNT_DAMPING, 2 * np.array(mount.damping_ratios) * masses * natural_rad_per_s)
-    _write_cells(packed, layout.MOUNT_DIRECTION, _normalise(mount.directions))
+    _write_elements(packed, layout.MOUNT_MASS, masses)
+    _write_elements(packed, layout.MOUNT_STIFFNESS, masses * natural_rad_per_s**2)
+    _write_elements(packed, layout.MOUNT_DAMPING, 2 * np.array(mount.damping_ratios) * masses * natural_rad_per_s)
+    _write_elements(packed, layout.MOUNT_DIRECTION, _normalise(mount.directions))
 
 
 def _pack_handle(packed: FloatArray, parameters: Omega3Parameters, hand: bool) -> None:
     modes = parameters.handle_modes
     masses, natural_rad_per_s = np.array(modes.masses_kg), 2 * math.pi * np.array(modes.frequencies_hz)
     directions = _normalise(modes.directions)
-    _write_cells(packed, layout.MODE_MASS, masses)
-    _write_cells(packed, layout.MODE_STIFFNESS, masses * natural_rad_per_s**2)
-    _write_cells(packed, layout.MODE_DAMPING, 2 * np.array(modes.damping_ratios) * masses * natural_rad_per_s)
-    _write_cells(packed, layout.MODE_GAIN, modes.gains)
-    _write_cells(packed, layout.MODE_DIRECTION, directions)
+    _write_elements(packed, layout.MODE_MASS, masses)
+    _write_elements(packed, layout.MODE_STIFFNESS, masses * natural_rad_per_s**2)
+    _write_elements(packed, layout.MODE_DAMPING, 2 * np.array(modes.damping_ratios) * masses * natural_rad_per_s)
+    _write_elements(packed, layout.MODE_GAIN, modes.gains)
+    _write_elements(packed, layout.MODE_DIRECTION, directions)
+    # Each of the three forearms adds a third of its mass to the platform.
     moving_mass_kg = parameters.masses.handle_kg + parameters.masses.forearm_kg
     # The modes' masses are part of the handle, so that its mass at low frequency is the same in all directions.
-    platform = moving_mass_kg * np.eye(3) - np.einsum("m,mi,mj->ij", masses, directions, directions)
+    platform_mass = moving_mass_kg * np.eye(3) - np.einsum("m,mi,mj->ij", masses, directions, directions)
     if hand:
-        platform += np.diag(parameters.hand.mass_kg)
-        _write_cells(packed, layout.HAND_DAMPING, parameters.hand.damping_n_s_per_m)
-        _write_cells(packed, layout.HAND_STIFFNESS, parameters.hand.stiffness_n_per_m)
-    _write_cells(packed, layout.PLATFORM_MASS, platform)
+        platform_mass += np.diag(parameters.hand.mass_kg)
+        _write_elements(packed, layout.HAND_DAMPING, parameters.hand.damping_n_s_per_m)
+        _write_elements(packed, layout.HAND_STIFFNESS, parameters.hand.stiffness_n_per_m)
+    _write_elements(packed, layout.PLATFORM_MASS, platform_mass)
 
 
 def _pack_sensor(packed: FloatArray, parameters: Omega3Parameters) -> None:
-    """Mounting as a small rotation (first order in the angles), then cross-axis sensitivity; white noise through a
-    first-order low pass has the noise bandwidth pi/2 times its corner frequency."""
+    """Pack mounting, as a small rotation (first order in the angles), cross-axis sensitivity, bandwidth, noise and
+    range. White noise through a first-order low pass has the noise bandwidth pi/2 times the corner frequency."""
     sensor = parameters.accelerometer
     about_x, about_y, about_z = np.radians(sensor.turns_deg)
     yz, zx, xy = sensor.cross_axis
     rotation = np.array([[1, about_z, -about_y], [-about_z, 1, about_x], [about_y, -about_x, 1]])
     cross_axis = np.array([[1, xy, zx], [xy, 1, yz], [zx, yz, 1]])
-    _write_cells(packed, layout.SENSOR_MATRIX, cross_axis @ rotation)
-    packed[layout.SENSOR_POLE] = _compute_pole(sensor.bandwidth_hz)
+    _write_elements(packed, layout.SENSOR_MATRIX, cross_axis @ rotation)
+    packed[layout.SENSOR_POLE] = _compute_low_pass_coefficient(sensor.bandwidth_hz)
     noise_bandwidth_hz = math.pi / 2 * sensor.bandwidth_hz
     density = np.array(sensor.noise_g_per_rthz)
-    _write_cells(packed, layout.SENSOR_NOISE, density * math.sqrt(noise_bandwidth_hz) * GRAVITY_M_S2)
+    _write_elements(packed, layout.SENSOR_NOISE, density * math.sqrt(noise_bandwidth_hz) * GRAVITY_M_S2)
     packed[layout.SENSOR_RANGE] = sensor.range_g * GRAVITY_M_S2

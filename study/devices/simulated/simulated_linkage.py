@@ -3,7 +3,8 @@ the simulated device that fit the linkage and the inertia of a calibration.
 
 Four lengths and a common turn of the azimuths are fitted to the Jacobians (nonlinear least squares), then two masses to
 the inertia matrices (linear least squares). A device of another design (hinge offsets, arms of unequal weight) is only
-approximated; `FittedLinkage` states the misfit.
+approximated; `FittedLinkage` states the misfit. `study.devices.opening` calls `make_simulated_linkage`,
+`study.devices.rigs_by_name` calls `fit_linkage`.
 """
 
 from dataclasses import dataclass, replace
@@ -12,19 +13,19 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from equalizer.linkage.calibration import LinkageCalibration, LinkageReading
-from equalizer.linkage.grid import arm_azimuths
+from equalizer.linkage.grid import estimate_arm_azimuths
 from equalizer.signals.signal import FloatArray
 from study.devices.device import DeviceInfo
 from study.devices.simulated import layout
 from study.devices.simulated.compiled import pose
 from study.devices.simulated.omega3 import NAME, make_omega3_info
-from study.devices.simulated.packing import effective_mass_kg, isotropic_depth_m, pack_parameters
+from study.devices.simulated.packing import compute_effective_mass_kg, compute_isotropic_depth_m, pack_parameters
 from study.devices.simulated.parameters import GRAVITY_M_S2, Linkage, Masses, Omega3Parameters
 
-MOST_MISFIT = 0.1
+MAX_MISFIT = 0.1
 """Largest accepted relative misfit of Jacobian or inertia; above it, the simulated device would not represent the
 calibrated device."""
-LIGHTEST_KG = 0.07
+MIN_MOVING_MASS_KG = 0.07
 """Smallest mass that moves with the handle (kg): the handle modes, which are part of it, have 54 g."""
 
 
@@ -37,7 +38,8 @@ class SimulatedLinkage:
         self._masses, self._reach_m = parameters.masses, parameters.stops.radius_m
 
     def at(self, position_m: FloatArray) -> LinkageReading | None:
-        """The linkage at a position of the handle (3,), m; None at or beyond the end stop."""
+        """Joint angles (rad), Jacobian (m/rad), inertia matrix (kg) and gravity force (N) at a position of the handle
+        (3,), m; None at or beyond the end stop."""
         if not float(np.linalg.norm(position_m)) < self._reach_m:
             return None
         angles, rates = _compute_pose(self._packed, position_m)
@@ -70,22 +72,22 @@ class FittedLinkage:
 def make_simulated_linkage() -> SimulatedLinkage:
     """Linkage of the simulated omega.3 with its default parameters."""
     parameters = Omega3Parameters()
-    mass_kg = effective_mass_kg(parameters, pack_parameters(parameters, False, (0.0, 0.0, 0.0)))
+    mass_kg = compute_effective_mass_kg(parameters, pack_parameters(parameters, False, (0.0, 0.0, 0.0)))
     return SimulatedLinkage(parameters, make_omega3_info(NAME, mass_kg, "parameter set 1, without a hand"))
 
 
 def fit_linkage(calibration: LinkageCalibration) -> FittedLinkage:
     """Fit the simulated device to a calibration. Raises ValueError where Jacobian or inertia differ by more than
-    `MOST_MISFIT`, or a fitted mass is too small."""
+    `MAX_MISFIT`, or a fitted mass is too small."""
     rates = np.linalg.inv(calibration.jacobian)
     rates = rates * np.sign(rates[:, :, :1])
-    centre = int(np.argmin(np.linalg.norm(calibration.position_m, axis=1)))
-    azimuths = arm_azimuths(calibration.jacobian[centre])
+    centre_index = int(np.argmin(np.linalg.norm(calibration.position_m, axis=1)))
+    azimuths = estimate_arm_azimuths(calibration.jacobian[centre_index])
     linkage, jacobian_misfit = _fit_lengths(calibration.position_m, rates, azimuths)
     parameters = replace(Omega3Parameters(), linkage=linkage)
     masses, inertia_misfit = _fit_masses(parameters, calibration)
     for name, misfit in (("Jacobian", jacobian_misfit), ("inertia", inertia_misfit)):
-        if not misfit <= MOST_MISFIT:
+        if not misfit <= MAX_MISFIT:
             raise ValueError(f"its {name} is {misfit:.0%} off that of any linkage of this kind, at the least")
     return FittedLinkage(replace(parameters, masses=masses), jacobian_misfit, inertia_misfit)
 
@@ -108,22 +110,26 @@ def _fit_lengths(positions: FloatArray, rates: FloatArray, azimuths: FloatArray)
     logarithms of four lengths over their start values, which are scaled to the size of the device, and a turn of all
     azimuths."""
     nominal = Linkage()
-    ratio = float(np.abs(_compute_rates(Omega3Parameters(), positions)).max() / np.abs(rates).max())
-    first = ratio * np.array([nominal.upper_arm_m, nominal.forearm_m, nominal.radius_m, isotropic_depth_m(nominal)])
-    largest = float(np.abs(rates).max())
+    size_ratio = float(np.abs(_compute_rates(Omega3Parameters(), positions)).max() / np.abs(rates).max())
+    start_lengths_m = size_ratio * np.array(
+        [nominal.upper_arm_m, nominal.forearm_m, nominal.radius_m, compute_isotropic_depth_m(nominal)]
+    )
+    largest_rate = float(np.abs(rates).max())
 
-    def make_linkage(numbers: FloatArray) -> Linkage:
-        azimuths_deg = np.degrees(azimuths + numbers[4])
-        upper, forearm, radius, depth = (float(length) for length in first * np.exp(numbers[:4]))
+    def make_linkage(unknowns: FloatArray) -> Linkage:
+        """Linkage of the unknowns (5,): four logarithms of length ratios, and the turn of the azimuths (rad)."""
+        azimuths_deg = np.degrees(azimuths + unknowns[4])
+        upper, forearm, radius, depth = (float(length) for length in start_lengths_m * np.exp(unknowns[:4]))
         return Linkage(
             upper, forearm, radius, (float(azimuths_deg[0]), float(azimuths_deg[1]), float(azimuths_deg[2])), depth
         )
 
-    def misfits(numbers: FloatArray) -> FloatArray:
-        fitted_rates = _compute_rates(replace(Omega3Parameters(), linkage=make_linkage(numbers)), positions)
-        return np.ravel(fitted_rates - rates) / largest
+    def compute_misfits(unknowns: FloatArray) -> FloatArray:
+        """Residuals (9 n,) of the inverse Jacobian, relative to its largest element."""
+        fitted_rates = _compute_rates(replace(Omega3Parameters(), linkage=make_linkage(unknowns)), positions)
+        return np.ravel(fitted_rates - rates) / largest_rate
 
-    solution = least_squares(misfits, np.zeros(5), bounds=(-1.5, 1.5))
+    solution = least_squares(compute_misfits, np.zeros(5), bounds=(-1.5, 1.5))
     return make_linkage(solution.x), float(np.abs(solution.fun).max())
 
 
@@ -138,24 +144,24 @@ def _fit_masses(parameters: Omega3Parameters, calibration: LinkageCalibration) -
     )
     inertia_kg = np.ravel(calibration.inertia_kg)
     (moving_mass_kg, inertia_kg_m2), *_ = np.linalg.lstsq(design_matrix, inertia_kg, rcond=None)
-    if moving_mass_kg < LIGHTEST_KG or inertia_kg_m2 <= 0:
+    if moving_mass_kg < MIN_MOVING_MASS_KG or inertia_kg_m2 <= 0:
         raise ValueError(
             f"its handle would weigh {1000 * moving_mass_kg:.0f} g and its arms {inertia_kg_m2:.2g} kg m^2; the "
-            f"simulated one weighs at least {1000 * LIGHTEST_KG:.0f} g"
+            f"simulated one weighs at least {1000 * MIN_MOVING_MASS_KG:.0f} g"
         )
     misfit = float(
         np.abs(design_matrix @ np.array([moving_mass_kg, inertia_kg_m2]) - inertia_kg).max() / np.abs(inertia_kg).max()
     )
     # The inertia does not show how i is divided between arms and motors: the ratio is that of the nominal device.
     forearm_kg_m2 = 2 / 3 * nominal.forearm_kg * arm_m**2
-    share = inertia_kg_m2 / (nominal.upper_arm_kg_m2 + forearm_kg_m2 + nominal.drive_kg_m2)
-    arms_kg_m2 = share * (nominal.upper_arm_kg_m2 + forearm_kg_m2) - forearm_kg_m2
+    inertia_ratio = inertia_kg_m2 / (nominal.upper_arm_kg_m2 + forearm_kg_m2 + nominal.drive_kg_m2)
+    arms_kg_m2 = inertia_ratio * (nominal.upper_arm_kg_m2 + forearm_kg_m2) - forearm_kg_m2
     if arms_kg_m2 <= 0:
         raise ValueError(f"its arms would weigh less than forearms of {1000 * nominal.forearm_kg:.0f} g alone")
     masses = replace(
         nominal,
         handle_kg=float(moving_mass_kg) - nominal.forearm_kg,
         upper_arm_kg_m2=float(arms_kg_m2),
-        drive_kg_m2=float(share * nominal.drive_kg_m2),
+        drive_kg_m2=float(inertia_ratio * nominal.drive_kg_m2),
     )
     return masses, misfit

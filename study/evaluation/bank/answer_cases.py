@@ -1,4 +1,5 @@
-"""Worker process that diagnoses the cases of a bank: `python -m study.evaluation.bank.answer_cases FOLDER`.
+"""Worker process that diagnoses the cases of a bank: `python -m study.evaluation.bank.answer_cases FOLDER`, started by
+`study.evaluation.bank.ask_engine`.
 
 It gets only the folder of open cases. It reads a case name per line on standard input, writes answer.json into the
 case's folder, and prints the name when that is done. So that the test is blind, an audit hook stops the process from
@@ -36,48 +37,52 @@ that this module has built."""
 
 def main(arguments: list[str]) -> None:
     """Read case names from standard input until it ends; answer each and print its name."""
-    cases = Path(arguments[0]).resolve()
+    open_folder = Path(arguments[0]).resolve()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C reaches all; the parent ends this process
-    isolate_process(cases)
-    engine_hash = engine_digest()
+    isolate_process(open_folder)
+    engine_hash = compute_engine_digest()
     for line in sys.stdin:
-        answer(cases / line.strip(), engine_hash)
+        answer_case(open_folder / line.strip(), engine_hash)
         sys.stdout.write(line)
         sys.stdout.flush()
 
 
-def isolate_process(cases: Path) -> None:
+def isolate_process(open_folder: Path) -> None:
     """Install an audit hook: from now on this process cannot import the challenge or open its files, open or list
-    anything in the parent folder of `cases` but `cases` itself, or start a program. The import then
+    anything in the parent folder of `open_folder` but `open_folder` itself, or start a program. The import then
     raises ImportError, the rest PermissionError."""
     sys.modules[CHALLENGE_PACKAGE] = cast(ModuleType, None)
-    bank_folder, cases_folder = os.path.realpath(cases.parent), os.path.realpath(cases)
+    bank_folder, real_open_folder = os.path.realpath(open_folder.parent), os.path.realpath(open_folder)
     challenge_folder = os.path.realpath(Path(study.__path__[0]).joinpath(*CHALLENGE_PACKAGE.split(".")[1:]))
 
-    def lies_in(path: str, folder: str) -> bool:
+    def is_inside(path: str, folder: str) -> bool:
+        """Whether a path is the folder or in it."""
         return path == folder or path.startswith(f"{folder}{os.sep}")
 
     def audit(event: str, arguments: tuple[Any, ...]) -> None:
+        """Raises PermissionError for an event that would break the blindness of the test."""
         if event in PROCESS_EVENTS:
             raise PermissionError(f"a diagnosis must not start a program ({event})")
         if event not in FILE_EVENTS or not arguments or not isinstance(arguments[0], str | bytes | os.PathLike):
             return
         path = os.path.realpath(os.fsdecode(arguments[0]))
-        if (lies_in(path, bank_folder) and not lies_in(path, cases_folder)) or lies_in(path, challenge_folder):
+        if (is_inside(path, bank_folder) and not is_inside(path, real_open_folder)) or is_inside(
+            path, challenge_folder
+        ):
             raise PermissionError(f"a diagnosis must not open {path}")
 
     sys.addaudithook(audit)
 
 
-def others_sha256(case_folder: Path) -> dict[str, str]:
+def hash_other_recordings(case_folder: Path) -> dict[str, str]:
     """SHA-256 of every recording of a case but the first, by its path relative to the case's folder `case_folder`."""
     paths = [path for path in sorted(case_folder.rglob("*.h5")) if path != case_folder / RECORDING]
     return {str(path.relative_to(case_folder)): sha256_of(path) for path in paths}
 
 
-def answer(case_folder: Path, digest: str) -> None:
-    """Diagnose the case in `case_folder` and write answer.json atomically. A crash of the diagnosis is written as a
-    failed answer."""
+def answer_case(case_folder: Path, engine_hash: str) -> None:
+    """Diagnose the case in `case_folder` and write answer.json atomically. An exception of the diagnosis is
+    written as a failed answer. engine_hash: from `compute_engine_digest`."""
     start_s, processor_start_s = time.perf_counter(), time.process_time()
     try:
         document = _diagnose_case(case_folder)
@@ -89,37 +94,37 @@ def answer(case_folder: Path, digest: str) -> None:
         "cpu_seconds": time.process_time() - processor_start_s,
         "recording_sha256": sha256_of(case_folder / RECORDING),
         "model_sha256": sha256_of(case_folder / MODEL),
-        "others_sha256": others_sha256(case_folder),
-        "engine": digest,
-        "knows_the_challenge": challenge_is_loaded(),
+        "others_sha256": hash_other_recordings(case_folder),
+        "engine": engine_hash,
+        "knows_the_challenge": is_challenge_loaded(),
     }
     write_text(case_folder / ANSWER, json.dumps(document, indent=1) + "\n", overwrite=True)
 
 
-def challenge_is_loaded() -> bool:
+def is_challenge_loaded() -> bool:
     """Whether the challenge package has been imported. A blocked import leaves None in sys.modules, which does not
     count."""
     return any(
         name.split(".")[:2] == CHALLENGE_PACKAGE.split(".")
-        for name, var in vars(sys)["modules"].items()
-        if var is not None
+        for name, module in vars(sys)["modules"].items()
+        if module is not None
     )
 
 
-def engine_digest() -> str:
+def compute_engine_digest() -> str:
     """Hash of the source code on which an answer depends: first 16 hex digits of SHA-256 over `analysis.diagnosis`
     and `equalizer`."""
     digest = hashlib.sha256()
     for package in (analysis.diagnosis, equalizer):
-        root = Path(package.__path__[0])
-        for file in sorted(root.rglob("*.py")):
-            digest.update(str(file.relative_to(root)).encode() + file.read_bytes())
+        package_folder = Path(package.__path__[0])
+        for source_file in sorted(package_folder.rglob("*.py")):
+            digest.update(str(source_file.relative_to(package_folder)).encode() + source_file.read_bytes())
     return digest.hexdigest()[:16]
 
 
-def _time_budget(processor_s: float | None) -> Callable[[], bool]:
-    """Function that says whether processor time is left; None: always. Processor time (s), not wall-clock time, so that
-    the load of the machine does not change an answer."""
+def _make_time_budget(processor_s: float | None) -> Callable[[], bool]:
+    """Make a predicate that is true while processor time is left; with processor_s None it is always true. Processor
+    time (s), not wall-clock time, so that the load of the machine does not change an answer."""
     start_s = time.process_time()
     return lambda: processor_s is None or time.process_time() - start_s < processor_s
 
@@ -134,12 +139,12 @@ def _diagnose_case(case_folder: Path) -> dict[str, Any]:
 
     case_settings = load_json(read_text(case_folder / SETTINGS))
     recordings = [read_recording(path) for path in sorted(case_folder.glob("*.h5"))]
-    clean = tuple(read_recording(path) for path in sorted(case_folder.glob(f"{CLEAN_FOLDER}/*.h5")))
+    clean_recordings = tuple(read_recording(path) for path in sorted(case_folder.glob(f"{CLEAN_FOLDER}/*.h5")))
     settings = DiagnosisSettings(
         without=tuple(case_settings["without"]),
-        clean=clean,
+        clean=clean_recordings,
         discovery=bool(case_settings.get("discovery")),
-        time_left=_time_budget(case_settings.get("processor_s")),
+        time_left=_make_time_budget(case_settings.get("processor_s")),
     )
     findings = diagnose(recordings, read_mechanical_model(case_folder / MODEL), settings, map, lambda step, share: None)
     errors = {stage: dict(channels) for stage, channels in findings.channel_errors.items()}
@@ -149,8 +154,8 @@ def _diagnose_case(case_folder: Path) -> dict[str, Any]:
         "remarks": list(findings.remarks),
     }
     if (proposal := findings.proposal) is not None:
-        best = [experiment.words for experiment in proposal.chosen.experiments]
-        answer["proposal"] = {"axis": proposal.axis, "level": proposal.level, "best": best}
+        experiment_names = [experiment.words for experiment in proposal.chosen.experiments]
+        answer["proposal"] = {"axis": proposal.axis, "level": proposal.level, "best": experiment_names}
     return answer
 
 

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from analysis.diagnosis.document import diagnosis_from_json
-from analysis.diagnosis.next_experiment.experiment_menu import Experiment, experiment_menu
+from analysis.diagnosis.next_experiment.experiment_menu import Experiment, list_experiments
 from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Outcome
-from study.evaluation.bank.answer_cases import others_sha256
+from study.evaluation.bank.answer_cases import hash_other_recordings
 from study.evaluation.bank.ask_engine import Workers, ask_and_count
 from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, show_case
 from study.evaluation.bank.proof_folder import (
@@ -83,7 +83,7 @@ def _seal(folder: ProofFolder, next_bank: ProofFolder, plan: BankPlan, start: Ou
     label: dict[str, Any] = {"number": start.number, "salt": secrets.token_hex(SALT_BYTES)}
     if proposal is not None:
         model = read_mechanical_model(first_folder / MODEL)
-        menu = experiment_menu(model, RATE_HZ, proposal["axis"], proposal["level"])
+        menu = list_experiments(model, RATE_HZ, proposal["axis"], proposal["level"])
         best = proposal["best"]
         proposed_words = [best] if isinstance(best, str) else best or ()  # a single text in answers of older versions
         proposed = [experiment for experiment in menu if experiment.words in proposed_words]
@@ -117,7 +117,7 @@ def _write_case(
         "words": "; ".join(experiment.words for experiment in experiments),
         "recording_sha256": sha256_of(case_folder / RECORDING),
         "model_sha256": sha256_of(case_folder / MODEL),
-        "others_sha256": others_sha256(case_folder),
+        "others_sha256": hash_other_recordings(case_folder),
     }
 
 

@@ -1,5 +1,5 @@
 """Summary of a blind test (`hapteq prove`) for the terminal and as JSON: misses and failed controls first, then the
-shares with their intervals."""
+shares with their intervals. `study.cli.prove` writes both; `write_proof` takes `list_remarks`."""
 
 import math
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from analysis.evaluation.blind_test.wording import (
 from study.evaluation.bank.prove import BlindTest
 
 
-def blind_test_lines(result: BlindTest) -> Iterator[str]:
+def format_blind_test(result: BlindTest) -> Iterator[str]:
     """Lines for the terminal: every miss, the controls, each share with its 95 % interval, the expected calibration
     error of the probabilities, remarks, the seal of the labels."""
     score = result.score
@@ -24,22 +24,23 @@ def blind_test_lines(result: BlindTest) -> Iterator[str]:
         strength = describe_strengths(miss)
         concealed = f"{describe_concealed(miss)}{f' at {strength}' if strength else ''}"
         yield f"  {miss.number:5d} {miss.kind}, {miss.bank}: {concealed} -> {describe_answer(miss)}"
-    yield from control_lines(result)
+    yield from format_controls(result)
     yield ""
     for figure in score.figures:
         yield f"{figure.name:52s} {format_figure(figure)}"
-    error = score.calibration.error
-    if error is not None:
+    calibration_error = score.calibration.error
+    if calibration_error is not None:
         low, high = score.calibration.low or 0.0, score.calibration.high or 0.0
-        yield f"{'expected calibration error':52s} {error:.3f} [{low:.3f}, {high:.3f}]"
+        yield f"{'expected calibration error':52s} {calibration_error:.3f} [{low:.3f}, {high:.3f}]"
     yield ""
-    yield from remarks(result)
+    yield from list_remarks(result)
     yield f"Seal of the labels (SHA-256 of labels.sha256): {result.seal}"
     yield f"Everything is in {result.folder.path}"
 
 
-def control_lines(result: BlindTest) -> Iterator[str]:
-    """Number of controls that held, and each failed control with the answers to it."""
+def format_controls(result: BlindTest) -> Iterator[str]:
+    """Lines with the number of controls that held (were answered as expected), and each failed control with its
+    answers."""
     if result.controls:
         yield f"{sum(outcome.held for outcome in result.controls)} of {len(result.controls)} controls held"
     for control in result.controls:
@@ -47,7 +48,7 @@ def control_lines(result: BlindTest) -> Iterator[str]:
             yield f"  {control.name}: {', then '.join(control.said)}"
 
 
-def remarks(result: BlindTest) -> Iterator[str]:
+def list_remarks(result: BlindTest) -> Iterator[str]:
     """Sentences on what limits this blind test: cases that were left out or have no answer, answers by several versions
     of the code."""
     if result.omitted_cases:
@@ -55,10 +56,10 @@ def remarks(result: BlindTest) -> Iterator[str]:
             f"{result.omitted_cases} cases of the second physics engine were left out: MuJoCo is not installed "
             "(pip install 'hapteq[prove]')."
         )
-    if died := unanswered(result):
-        cases = "1 case has no answer" if died == 1 else f"{died} cases have no answer"
+    if unanswered_count := count_unanswered_cases(result):
+        subject = "1 case has no answer" if unanswered_count == 1 else f"{unanswered_count} cases have no answer"
         yield (
-            f"{cases}, because the processes were killed or took too long: counted as failed diagnoses. Run the same "
+            f"{subject}, because the processes were killed or took too long: counted as failed diagnoses. Run the same "
             "command again to repeat them."
         )
     if set(result.other_engines) - set(result.engines):
@@ -73,19 +74,19 @@ def remarks(result: BlindTest) -> Iterator[str]:
         )
 
 
-def unanswered(result: BlindTest) -> int:
+def count_unanswered_cases(result: BlindTest) -> int:
     """Number of cases whose process died or was killed at every attempt: they have no duration, whereas a diagnosis
     that failed by itself has a duration."""
     return sum(outcome.diagnosis is None and math.isnan(outcome.seconds) for outcome in result.outcomes)
 
 
-def summary(result: BlindTest) -> dict[str, Any]:
+def summarise_blind_test(result: BlindTest) -> dict[str, Any]:
     """The summary as JSON values; of each share its value, 95 % interval and number of cases."""
     return {
         "folder": str(result.folder.path),
         "cases": len(result.outcomes),
         "left_out": result.omitted_cases,
-        "unanswered": unanswered(result),
+        "unanswered": count_unanswered_cases(result),
         "seal": result.seal,
         "engines": list(result.engines),
         "figures": {

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from analysis.evaluation.blind_test.controlled import ControlOutcome
+from analysis.evaluation.blind_test.control_claims import ControlOutcome
 from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Concealed, Outcome
 from analysis.evaluation.blind_test.score import Score, compute_score
@@ -20,7 +20,13 @@ from study.evaluation.bank.follow_up import FOLLOW_UP_FOLDER, follow_up
 from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.run_controls import run_controls
-from study.evaluation.bank.seal_cases import BankPlan, drawable_cases, read_case_names, redraw_recording, seal_cases
+from study.evaluation.bank.seal_cases import (
+    BankPlan,
+    list_drawable_cases,
+    read_case_names,
+    redraw_recording,
+    seal_cases,
+)
 from study.evaluation.bank.sealed_bank import BankOptions, Progress, answered_fields, engines, reveal_bank
 
 
@@ -68,7 +74,7 @@ def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progres
     """Run the bank in the folder `path`, or continue it after an interruption. on_progress: called with the step, the
     number done and the total. Raises StudyError."""
     folder = open_proof_folder(path, plan.seed, plan.brief)
-    numbers = [case_draw.number for case_draw in drawable_cases(plan)]
+    numbers = [case_draw.number for case_draw in list_drawable_cases(plan)]
     with resumable("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
         seal = seal_cases(folder, plan, options.workers, lambda done: on_progress("sealing", done, len(numbers)))
         names = read_case_names(folder, numbers)

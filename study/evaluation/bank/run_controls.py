@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from analysis.diagnosis.document import Diagnosis, diagnosis_from_json
-from analysis.evaluation.blind_test.controlled import ControlOutcome, judge_control
+from analysis.evaluation.blind_test.control_claims import ControlOutcome, judge_control
 from study.errors import StudyError
 from study.evaluation.bank.ask_engine import Workers, ask_and_count
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder

@@ -1,8 +1,9 @@
-"""Draws the cases of a bank and writes them: open inputs for the diagnosis, and sealed labels with the truth.
+"""Draw the cases of a bank and write them: open inputs for the diagnosis, and sealed labels with the truth. Called by
+`study.evaluation.bank.prove`.
 
 A seal is a commitment by hash: the SHA-256 of every label is written, and can be published, before any case is
-diagnosed; so that truth and answers cannot be changed to suit each other. Labels hold a random salt, or the few
-possible truths could be found by trying their hashes.
+diagnosed, so that truth and answers cannot be changed to suit each other. Labels hold a random salt; without it, the
+few possible truths could be found by trying their hashes.
 """
 
 import json
@@ -28,7 +29,7 @@ from study.store.formats.recording_file import write_recording
 from study.workflows.worker_processes import worker_processes
 
 
-def concealed_effects_json(case: Case) -> list[dict[str, Any]]:
+def list_concealed_effects(case: Case) -> list[dict[str, Any]]:
     """Concealed effects of a case as JSON values: name, place, axis, parameters; empty where the model lacks
     nothing."""
     return [asdict(truth) for truth in case.truth]
@@ -36,7 +37,7 @@ def concealed_effects_json(case: Case) -> list[dict[str, Any]]:
 
 SALT_BYTES = 16
 """Random bytes in a label: too many to be found by trying."""
-PROCESSOR_S = 60.0
+SEARCH_CPU_S = 60.0
 """Processor time for the search in one case (s); the best result so far is then the answer."""
 
 
@@ -50,7 +51,7 @@ class BankPlan:
     """One axis and short periods: for tests, and for a quick try."""
 
 
-def drawable_cases(plan: BankPlan) -> tuple[CaseDraw, ...]:
+def list_drawable_cases(plan: BankPlan) -> tuple[CaseDraw, ...]:
     """All cases that can be drawn on this machine: without MuJoCo its cases are left out."""
     draws = (draw_case_plan(plan.seed, number, plan.brief) for number in range(plan.cases))
     return tuple(case_draw for case_draw in draws if case_draw.bank != "engine" or second_engine.is_installed())
@@ -59,33 +60,36 @@ def drawable_cases(plan: BankPlan) -> tuple[CaseDraw, ...]:
 def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Callable[[int], None]) -> str:
     """Draw, write and seal the missing cases, calling `on_sealed(count)`. Returns the SHA-256 of labels.sha256, to
     be published before anything is diagnosed. Raises StudyError."""
-    write_case = {case_draw.number: partial(seal_one, folder, case_draw) for case_draw in drawable_cases(plan)}
-    return seal_missing(folder, write_case, workers, on_sealed)
+    case_writers = {
+        case_draw.number: partial(write_sealed_case, folder, case_draw) for case_draw in list_drawable_cases(plan)
+    }
+    return seal_missing_cases(folder, case_writers, workers, on_sealed)
 
 
-def seal_missing(
-    folder: ProofFolder, write_case: Mapping[int, Callable[[], None]], workers: int, on_sealed: Callable[[int], None]
+def seal_missing_cases(
+    folder: ProofFolder, case_writers: Mapping[int, Callable[[], None]], workers: int, on_sealed: Callable[[int], None]
 ) -> str:
-    """Write the cases without a label in worker processes, and seal the bank. write_case: by the case's number."""
-    missing = [write for number, write in write_case.items() if not folder.label_file(number).exists()]
-    done = len(write_case) - len(missing)
-    on_sealed(done)
-    with finish_begun_cases(folder), worker_processes(workers if len(missing) > 1 else 1) as pool:
-        for finished in as_completed([pool.submit(write) for write in missing]):
-            finished.result()
-            done += 1
-            on_sealed(done)
+    """Write the cases without a label in worker processes, and seal the bank. case_writers: function that writes a
+    case, by its number; on_sealed: called with the number of sealed cases. Returns the seal as `seal_cases`."""
+    missing_writers = [write for number, write in case_writers.items() if not folder.label_file(number).exists()]
+    sealed_count = len(case_writers) - len(missing_writers)
+    on_sealed(sealed_count)
+    with finish_begun_cases(folder), worker_processes(workers if len(missing_writers) > 1 else 1) as pool:
+        for written_case in as_completed([pool.submit(write) for write in missing_writers]):
+            written_case.result()
+            sealed_count += 1
+            on_sealed(sealed_count)
     return seal(folder)
 
 
-def seal_one(folder: ProofFolder, case_draw: CaseDraw) -> None:
+def write_sealed_case(folder: ProofFolder, case_draw: CaseDraw) -> None:
     """Write one case: recording, model and settings for the diagnosis, then the label, without which the case counts as
     unfinished."""
     case_folder = begin_case(folder)
     case = generate_case(case_draw, case_folder.name)
     write_recording(case_folder / RECORDING, case.recording, precision="float32")
     write_mechanical_model(case_folder / MODEL, case.model)
-    write_text(case_folder / SETTINGS, settings_text(case_draw.excluded_effects, PROCESSOR_S))
+    write_text(case_folder / SETTINGS, format_settings(case_draw.excluded_effects, SEARCH_CPU_S))
     write_text(
         folder.label_file(case_draw.number),
         json.dumps(_make_label(case_draw, case, case_folder), indent=1, allow_nan=False) + "\n",
@@ -93,7 +97,7 @@ def seal_one(folder: ProofFolder, case_draw: CaseDraw) -> None:
     show_case(folder, case_folder)
 
 
-def settings_text(excluded_effects: Sequence[str], processor_s: float | None = None) -> str:
+def format_settings(excluded_effects: Sequence[str], processor_s: float | None = None) -> str:
     """Settings of a diagnosis as JSON. excluded_effects: effects that it must not consider; processor_s: limit of the
     search (s)."""
     return json.dumps({"without": list(excluded_effects), "processor_s": processor_s}) + "\n"
@@ -123,7 +127,7 @@ def _make_label(case_draw: CaseDraw, case: Case, case_folder: Path) -> dict[str,
         "axes": ["xyz"[axis] for axis in case_draw.settings.axes],
         "extras": case_draw.settings.extras,
         "without": list(case_draw.excluded_effects),
-        "truth": concealed_effects_json(case),
+        "truth": list_concealed_effects(case),
         "adds": case.detectability,
         "recording_sha256": sha256_of(case_folder / RECORDING),
         "model_sha256": sha256_of(case_folder / MODEL),

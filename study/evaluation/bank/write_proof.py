@@ -14,13 +14,13 @@ from pathlib import Path
 import analysis.diagnosis
 from analysis.evaluation.blind_test.outcome import Outcome
 from analysis.evaluation.blind_test.score import compute_main_error
-from analysis.figures.blind_test_pictures import blind_test_pictures
+from analysis.figures.blind_test_pictures import make_blind_test_pictures
 from analysis.reports.blind_test_report import BlindTestFacts, render_blind_test_report
-from study.evaluation.bank.answer_cases import engine_digest
-from study.evaluation.bank.proof_summary import remarks
+from study.evaluation.bank.answer_cases import compute_engine_digest
+from study.evaluation.bank.proof_summary import list_remarks
 from study.evaluation.bank.prove import BlindTest
 from study.local_clock import local_now
-from study.store.disk.csv_rows import rows_to_csv
+from study.store.disk.csv_rows import format_csv_table
 from study.store.disk.json_document import read_json, write_json
 from study.store.disk.provenance import anonymise_arguments, gather_provenance, list_versions
 from study.store.disk.text_file import write_text
@@ -106,15 +106,15 @@ def write_proof(result: BlindTest) -> None:
     }
     write_json(folder / DOCUMENT, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
     rows = [_make_row(outcome, outcome in score.misses) for outcome in result.outcomes]
-    write_text(folder / TABLE, rows_to_csv(rows, CaseRow), overwrite=True)
-    pictures = blind_test_pictures(result.outcomes, score.calibration)
+    write_text(folder / TABLE, format_csv_table(rows, CaseRow), overwrite=True)
+    pictures = make_blind_test_pictures(result.outcomes, score.calibration)
     write_pictures(folder / "figures", pictures)
     facts = BlindTestFacts(
         format_seed_range(result),
         result.seal,
         commit_hash,
         result.engines,
-        tuple(remarks(result)),
+        tuple(list_remarks(result)),
         result.controls,
         result.follow_ups,
     )
@@ -149,9 +149,9 @@ def write_table(path: Path, result: BlindTest) -> None:
         f"# versions {json.dumps(list_versions())}",
         f"# controls {', not '.join((controls_text, *failed_controls))}",
     ]
-    write_text(path, "\n".join(lines) + "\n" + rows_to_csv(figures, FigureRow), overwrite=True)
+    write_text(path, "\n".join(lines) + "\n" + format_csv_table(figures, FigureRow), overwrite=True)
     misses = [_make_row(miss, True) for miss in result.score.misses]
-    write_text(misses_table_path(path), rows_to_csv(misses, CaseRow), overwrite=True)
+    write_text(misses_table_path(path), format_csv_table(misses, CaseRow), overwrite=True)
 
 
 def misses_table_path(path: Path) -> Path:
@@ -168,7 +168,9 @@ def read_answering_commit(result: BlindTest) -> str:
         if earlier.get("engines") == list(result.engines) and isinstance(earlier.get("commit"), str):
             return str(earlier["commit"])
     return (
-        read_current_commit() if result.engines in ((), (engine_digest(),)) else "unknown: the code has changed since"
+        read_current_commit()
+        if result.engines in ((), (compute_engine_digest(),))
+        else "unknown: the code has changed since"
     )
 
 

@@ -1,5 +1,5 @@
 """Linear part of a simulated device, the bench: a handle with three axes on springs and dampers to the ground, with
-three oscillators (structural modes) attached.
+three oscillators (structural modes) attached. Drawn by `draw_case`, integrated by `device`.
 
 Equation of motion: M d2q/dt2 + C dq/dt + K q = (f, 0), where q holds the positions of the handle and of the
 oscillators' masses along their directions, and f is the force on the handle.
@@ -11,7 +11,7 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 
-OFFSET_KG, OFFSET_STIFFNESS = 0.012, 0.03
+MAX_MASS_COUPLING_KG, MAX_STIFFNESS_COUPLING_SHARE = 0.012, 0.03
 """Largest off-diagonal elements: of the mass (kg), and of the stiffness as a fraction of its mean."""
 
 
@@ -52,52 +52,52 @@ class Bench:
     """(3, 3), N/m, to the ground"""
     oscillators: Oscillators
 
-    def matrices(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def assemble_matrices(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Mass (kg), damping (N s/m) and stiffness (N/m) of handle and k oscillators, (3 + k, 3 + k) each."""
         oscillators = self.oscillators
-        spring = oscillators.mass_kg * (2 * np.pi * oscillators.frequency_hz) ** 2
-        damper = 2 * oscillators.damping_ratio * np.sqrt(spring * oscillators.mass_kg)
-        mass = np.zeros((3 + len(spring),) * 2)
+        spring_stiffness = oscillators.mass_kg * (2 * np.pi * oscillators.frequency_hz) ** 2
+        damper_coefficient = 2 * oscillators.damping_ratio * np.sqrt(spring_stiffness * oscillators.mass_kg)
+        mass = np.zeros((3 + len(spring_stiffness),) * 2)
         mass[:3, :3] = self.mass
         mass[3:, 3:] = np.diag(oscillators.mass_kg)
         return (
             mass,
-            _with_oscillators(self.damping, damper, oscillators.direction),
-            _with_oscillators(self.stiffness, spring, oscillators.direction),
+            _add_oscillators(self.damping, damper_coefficient, oscillators.direction),
+            _add_oscillators(self.stiffness, spring_stiffness, oscillators.direction),
         )
 
 
 def draw_bench(random: np.random.Generator) -> Bench:
     """Draw the bench of a case: rigid below about 10 Hz, with modes near 11, 95 and 175 Hz. All values are uniformly
     distributed in the ranges below (kg, N s/m, N/m, Hz), the directions of the oscillators on the sphere."""
-    mean_kg = random.uniform(0.17, 0.29)
-    mass = np.diag(mean_kg * random.uniform(0.92, 1.08, 3)) + _symmetric(random, OFFSET_KG)
-    stiffness_mean = random.uniform(90.0, 210.0)
-    stiffness = np.diag(stiffness_mean * random.uniform(0.6, 1.5, 3)) + _symmetric(
-        random, OFFSET_STIFFNESS * stiffness_mean
+    mean_mass_kg = random.uniform(0.17, 0.29)
+    mass = np.diag(mean_mass_kg * random.uniform(0.92, 1.08, 3)) + _draw_symmetric(random, MAX_MASS_COUPLING_KG)
+    mean_stiffness = random.uniform(90.0, 210.0)
+    stiffness = np.diag(mean_stiffness * random.uniform(0.6, 1.5, 3)) + _draw_symmetric(
+        random, MAX_STIFFNESS_COUPLING_SHARE * mean_stiffness
     )
     direction = random.normal(size=(3, 3))
     oscillators = Oscillators(
         random.uniform((9.5, 77.0, 135.0), (13.2, 110.0, 208.0)),
-        mean_kg * random.uniform((0.12, 0.08, 0.06), (0.21, 0.18, 0.14)),
+        mean_mass_kg * random.uniform((0.12, 0.08, 0.06), (0.21, 0.18, 0.14)),
         random.uniform((0.06, 0.022, 0.016), (0.135, 0.047, 0.037)),
         direction / np.linalg.norm(direction, axis=1, keepdims=True),
     )
     return Bench(mass, np.diag(random.uniform(2.6, 6.5, 3)), stiffness, oscillators)
 
 
-def _symmetric(random: np.random.Generator, limit: float) -> FloatArray:
-    """Symmetric matrix (3, 3) with zero diagonal and uniform elements between -reach and reach."""
-    upper = np.triu(random.uniform(-limit, limit, (3, 3)), 1)
-    symmetric: FloatArray = upper + upper.T
+def _draw_symmetric(random: np.random.Generator, limit: float) -> FloatArray:
+    """Symmetric matrix (3, 3) with zero diagonal and off-diagonal elements uniform in [-limit, limit)."""
+    upper_triangle = np.triu(random.uniform(-limit, limit, (3, 3)), 1)
+    symmetric: FloatArray = upper_triangle + upper_triangle.T
     return symmetric
 
 
-def _with_oscillators(ground: FloatArray, coefficients: FloatArray, direction: FloatArray) -> FloatArray:
+def _add_oscillators(ground: FloatArray, coefficients: FloatArray, direction: FloatArray) -> FloatArray:
     """Damping or stiffness matrix (3 + k, 3 + k). ground: (3, 3); coefficients: (k,), of the oscillators; direction:
     (k, 3)."""
-    size = 3 + len(coefficients)
-    matrix = np.zeros((size, size))
+    coordinate_count = 3 + len(coefficients)
+    matrix = np.zeros((coordinate_count, coordinate_count))
     matrix[:3, :3] = ground + direction.T @ np.diag(coefficients) @ direction
     matrix[:3, 3:] = -direction.T * coefficients
     matrix[3:, :3] = matrix[:3, 3:].T

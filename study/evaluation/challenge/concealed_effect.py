@@ -1,7 +1,7 @@
 """Definition of a concealable effect: how its parameters are drawn for a strength, and how it is built into a device.
 
-The effects themselves are in `effects`. The strength, 0 to 1, places the main parameter of an effect geometrically
-between its weakest and its strongest value.
+The effects themselves are in `effects`; `draw_case` draws them and builds them in. The strength, 0 to 1, places the
+main parameter of an effect geometrically between its weakest and its strongest value.
 """
 
 from collections.abc import Callable, Mapping
@@ -38,7 +38,7 @@ class EffectContext:
     axes: tuple[int, ...] = (0, 1, 2)
     """Driven and measured axes."""
 
-    def log_between(self, weakest: float, strongest: float) -> float:
+    def interpolate_log(self, weakest: float, strongest: float) -> float:
         """Geometric interpolation between two values by the strength."""
         return float(weakest * (strongest / weakest) ** self.strength)
 
@@ -53,8 +53,8 @@ class EffectContext:
     def draw_direction(self) -> FloatArray:
         """Unit vector (3,), uniformly distributed."""
         components = self.random.normal(size=3)
-        unit: FloatArray = components / np.linalg.norm(components)
-        return unit
+        unit_vector: FloatArray = components / np.linalg.norm(components)
+        return unit_vector
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +88,6 @@ def with_forces(device: Device, axis: int, cells: Mapping[int, float]) -> Device
 def with_amplifier(device: Device, axis: int | None, cells: Mapping[int, float]) -> Device:
     """The device with these amplifier columns set; axis None: on all axes."""
     table = device.amplifiers
-    for index in range(3) if axis is None else (axis,):
-        table = with_cells(table, index, cells)
+    for amplifier_axis in range(3) if axis is None else (axis,):
+        table = with_cells(table, amplifier_axis, cells)
     return replace(device, amplifiers=table)

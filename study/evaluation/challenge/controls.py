@@ -2,7 +2,7 @@
 
 Negative controls (shuffled, silent, model of another device) must not be explained by an effect. Symmetry controls
 (axes exchanged, signs mirrored, names changed) must give the corresponding answer. The claims are judged in
-`analysis.evaluation.blind_test.controlled`.
+`analysis.evaluation.blind_test.control_claims`.
 """
 
 from collections.abc import Callable
@@ -42,7 +42,7 @@ class Control:
 
     name: str
     claim: str
-    """Name of the claim in `analysis.evaluation.blind_test.controlled.CLAIMS`."""
+    """Name of the claim in `analysis.evaluation.blind_test.control_claims.CLAIMS`."""
     draw: Callable[[int, CaseSettings], tuple[ControlInput, ...]]
     """Makes the inputs from a seed and the settings of a case."""
 

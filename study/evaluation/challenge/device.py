@@ -1,7 +1,8 @@
 """The true device of a case: the linear bench with all physics that its model may lack, and its sensor.
 
 Path of the signal: command -> law of the drive, skipped commands -> `actuator_kernel` -> `mechanism_kernel` (motion)
--> `sensor` (readings). By default a device has none of the effects. `record` measures it.
+-> `sensor` (readings). By default a device has none of the effects. `draw_case` builds the
+devices; `record` simulates a measurement of one.
 """
 
 from collections.abc import Callable
@@ -18,26 +19,26 @@ from study.evaluation.challenge.law_kernel import COLUMNS
 from study.evaluation.challenge.mechanism_kernel import AXIS, MOTOR_MASS, Mechanism, Motion, integrate_motion
 from study.evaluation.challenge.sensor import Sensor, read_sensor
 
-STEPS = 20
+STEPS_PER_SAMPLE = 20
 """Default number of integration steps per sample."""
 
 
-def _no_forces() -> FloatArray:
-    """Table of forces without any force, its end stops at infinity."""
+def _make_zero_forces() -> FloatArray:
+    """Table (3, 11) of forces that are all zero, with end stops at infinity."""
     forces = np.zeros((3, 11))
     forces[:, handle.ABOVE], forces[:, handle.BELOW] = np.inf, -np.inf
     return forces
 
 
-def _exact_amplifiers() -> FloatArray:
-    """Table of amplifiers whose force equals the command."""
+def _make_ideal_amplifiers() -> FloatArray:
+    """Table (3, 9) of amplifiers with gain 1 and no other effect: the force equals the command."""
     amplifiers = np.zeros((3, 9))
     amplifiers[:, GAIN] = 1.0
     return amplifiers
 
 
-def _no_play() -> FloatArray:
-    """Play on no axis."""
+def _make_zero_play() -> FloatArray:
+    """Backlash parameters (5,) with axis -1: no axis has play."""
     return np.array([-1.0, 0.0, 0.0, 0.0, 0.0])
 
 
@@ -47,11 +48,11 @@ class Device:
     read them."""
 
     bench: Bench
-    amplifiers: FloatArray = field(default_factory=_exact_amplifiers)
+    amplifiers: FloatArray = field(default_factory=_make_ideal_amplifiers)
     """(3, 9), columns in `actuator_kernel`"""
     friction: FloatArray = field(default_factory=lambda: np.zeros((3, 7)))
     """(3, 7), columns in `friction_kernel`"""
-    forces: FloatArray = field(default_factory=_no_forces)
+    forces: FloatArray = field(default_factory=_make_zero_forces)
     """(3, 11), columns in `handle_force_kernel`"""
     inertia_per_m: FloatArray = field(default_factory=lambda: np.zeros(3))
     """(3,), 1/m: relative change of the whole handle's inertia with the position along each axis"""
@@ -59,7 +60,7 @@ class Device:
     """(3,), kg/m: change of the mass for motion along an axis with the position along it"""
     varying: FloatArray = field(default_factory=lambda: np.zeros((3, 5)))
     """(3, 5), columns in `mechanism_kernel`"""
-    play: FloatArray = field(default_factory=_no_play)
+    play: FloatArray = field(default_factory=_make_zero_play)
     """(5,), columns in `mechanism_kernel`"""
     creep_stiffness: FloatArray = field(default_factory=lambda: np.zeros((3, 1)))
     """(3, elements), N/m: springs to the ground, each in series with a damper"""
@@ -74,13 +75,13 @@ class Device:
     drive_law: Callable[[FloatArray], FloatArray] | None = None
     """Maps the commands (samples, 3), N, before they reach the amplifiers."""
     sensor: Sensor = field(default_factory=Sensor)
-    steps: int = STEPS
+    steps: int = STEPS_PER_SAMPLE
     """Integration steps per sample."""
 
-    def mechanism(self) -> Mechanism:
+    def make_mechanism(self) -> Mechanism:
         """Parameters for `mechanism_kernel.move`, in SI units. On an axis with play the motor moves separately, so its
         mass is subtracted from the mass matrix."""
-        mass, damping, stiffness = self.bench.matrices()
+        mass, damping, stiffness = self.bench.assemble_matrices()
         axis = int(self.play[AXIS])
         if axis >= 0:
             mass[axis, axis] -= self.play[MOTOR_MASS]
@@ -108,7 +109,7 @@ def simulate_full_motion(device: Device, command: FloatArray) -> Motion:
     if device.skipped:
         written_command[device.skipped :: device.skipped] = written_command[device.skipped - 1 : -1 : device.skipped]
     force = drive_actuators(written_command, device.amplifiers, device.steps, RATE_HZ)
-    full_motion = integrate_motion(device.mechanism(), force, device.steps, RATE_HZ)
+    full_motion = integrate_motion(device.make_mechanism(), force, device.steps, RATE_HZ)
     if not (np.isfinite(full_motion.acceleration).all() and np.abs(full_motion.position).max() < 1.0):
         raise ValueError("the simulated device ran away: a stiffness, mass or per_m is too large for its step")
     return full_motion

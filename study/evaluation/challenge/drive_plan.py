@@ -1,4 +1,7 @@
-"""Excitation of every challenge recording: multisines to fit; sweeps, all axes at once and slow sines to test."""
+"""Excitation of every challenge recording: multisines to fit; sweeps, all axes at once and slow sines to test.
+
+`draw_case` plays a plan on a device; all numbers were chosen by hand.
+"""
 
 from dataclasses import dataclass
 
@@ -14,14 +17,15 @@ AXES = ("x", "y", "z")
 """Names of the bench's axes."""
 LEVELS_N = (0.5, 1.5, 3.0)
 """Peaks of the multisines."""
-PERIOD, PERIODS, TEST_PERIODS = 2000, 4, 2
+PERIOD_SAMPLES, FIT_PERIODS, TEST_PERIODS = 2000, 4, 2
+"""Samples of a multisine's period, and periods of a segment to fit and of one to test."""
 REST_SAMPLES = 500
 """Samples of rest between two segments."""
 FIRST_LINE, LAST_LINE = 3, 479
 """Lines of a 2 s period: 1.5 to 239.5 Hz, odd lines only."""
-SWEEP_N, SWEEP_HZ, SWEEP_SAMPLES, SWEEP_FADE = 1.8, (1.0, 240.0), 6000, 200
+SWEEP_PEAK_N, SWEEP_HZ, SWEEP_SAMPLES, SWEEP_FADE_SAMPLES = 1.8, (1.0, 240.0), 6000, 200
 """Swept sines of the test: peak, first and last frequency, samples, and samples of each fade."""
-SLOW_N, SLOW_HZ, SLOW_SAMPLES, SLOW_FADE = 1.6, (0.9, 1.3, 2.1), 4000, 500
+SLOW_PEAK_N, SLOW_HZ, SLOW_SAMPLES, SLOW_FADE_SAMPLES = 1.6, (0.9, 1.3, 2.1), 4000, 500
 """Slow sines of the test, for large motions: peak, frequency per axis, samples, and samples of each fade."""
 
 
@@ -34,10 +38,10 @@ class DrivePlan:
     segments: tuple[Segment, ...]
 
 
-def multisine(random: np.random.Generator, level_n: float, period: int = PERIOD) -> FloatArray:
+def draw_multisine(random: np.random.Generator, level_n: float, period: int = PERIOD_SAMPLES) -> FloatArray:
     """One period, (period,), N, with peak `level_n`: odd lines of amplitude f^-1/2 and random phase. One of every
     four neighbouring lines is left out, so that it shows odd distortion."""
-    lines = np.arange(FIRST_LINE * period // PERIOD | 1, LAST_LINE * period // PERIOD + 1, 2)
+    lines = np.arange(FIRST_LINE * period // PERIOD_SAMPLES | 1, LAST_LINE * period // PERIOD_SAMPLES + 1, 2)
     omitted_lines = [group[random.integers(len(group))] for group in np.array_split(lines, -(-len(lines) // 4))]
     spectrum = np.zeros(period // 2 + 1, dtype=complex)
     spectrum[lines] = np.exp(2j * np.pi * random.random(len(lines))) / np.sqrt(lines)
@@ -49,57 +53,60 @@ def multisine(random: np.random.Generator, level_n: float, period: int = PERIOD)
 
 def draw_plan(random: np.random.Generator, settings: CaseSettings = DEFAULT_SETTINGS) -> DrivePlan:
     """Commands and segments of a recording; 105 s for the whole bench."""
-    blocks: list[FloatArray] = []
+    commands: list[FloatArray] = []
     segments: list[Segment] = []
     start = 0
 
-    def append_segment(block: FloatArray, kind: str, level_n: float, period: int, role: str) -> None:
+    def append_segment(command: FloatArray, kind: str, level_n: float, period: int, role: str) -> None:
         nonlocal start
-        segments.append(Segment(start, start + len(block), kind, level_n, period, role))
-        blocks.extend((block, np.zeros((REST_SAMPLES, 3))))
-        start += len(block) + REST_SAMPLES
+        segments.append(Segment(start, start + len(command), kind, level_n, period, role))
+        commands.extend((command, np.zeros((REST_SAMPLES, 3))))
+        start += len(command) + REST_SAMPLES
 
     for axis in settings.axes:
         for level_n in LEVELS_N:
-            wave = np.tile(multisine(random, level_n, settings.period), settings.periods)
+            wave = np.tile(draw_multisine(random, level_n, settings.period), settings.periods)
             append_segment(_place_on_axis(axis, wave), "multisine", level_n, settings.period, "fit")
     for axis in settings.axes:
         append_segment(
-            _place_on_axis(axis, _sweep(settings.scale_duration(SWEEP_SAMPLES))), "sweep", SWEEP_N, 0, "test"
+            _place_on_axis(axis, _make_sweep(settings.scale_duration(SWEEP_SAMPLES))), "sweep", SWEEP_PEAK_N, 0, "test"
         )
     common_command = np.zeros((settings.period, 3))
     for axis in settings.axes:
-        common_command[:, axis] = multisine(random, LEVELS_N[1], settings.period)
+        common_command[:, axis] = draw_multisine(random, LEVELS_N[1], settings.period)
     append_segment(np.tile(common_command, (TEST_PERIODS, 1)), "multisine", LEVELS_N[1], settings.period, "test")
-    append_segment(_slow_sines(settings), "slow", SLOW_N, 0, "test")
+    append_segment(_make_slow_sines(settings), "slow", SLOW_PEAK_N, 0, "test")
     if settings.loud_n:
         loud_command = np.zeros((settings.period, 3))
         for axis in settings.axes:
-            loud_command[:, axis] = multisine(random, settings.loud_n, settings.period)
+            loud_command[:, axis] = draw_multisine(random, settings.loud_n, settings.period)
         append_segment(np.tile(loud_command, (TEST_PERIODS, 1)), "multisine", settings.loud_n, settings.period, "test")
-    return DrivePlan(np.vstack(blocks), tuple(segments))
+    return DrivePlan(np.vstack(commands), tuple(segments))
 
 
 def _place_on_axis(axis: int, wave: FloatArray) -> FloatArray:
-    block = np.zeros((len(wave), 3))
-    block[:, axis] = wave
-    return block
+    """Command (samples, 3), N, with the wave (samples,) on one axis and zero on the others."""
+    command = np.zeros((len(wave), 3))
+    command[:, axis] = wave
+    return command
 
 
-def _sweep(samples: int) -> FloatArray:
-    """Logarithmic sweep with linear fade-in and fade-out."""
-    t, total = np.arange(samples) / RATE_HZ, samples / RATE_HZ
-    octaves = np.log(SWEEP_HZ[1] / SWEEP_HZ[0])
-    turns = SWEEP_HZ[0] * total / octaves * (np.exp(octaves * t / total) - 1.0)
-    rise = np.minimum(np.arange(samples) / SWEEP_FADE, 1.0)
-    wave: FloatArray = SWEEP_N * np.sin(2 * np.pi * turns) * rise * np.append(1.0, rise[:0:-1])
+def _make_sweep(samples: int) -> FloatArray:
+    """Logarithmic sine sweep (samples,), N, with linear fade-in and fade-out."""
+    t, duration_s = np.arange(samples) / RATE_HZ, samples / RATE_HZ
+    log_ratio = np.log(SWEEP_HZ[1] / SWEEP_HZ[0])
+    cycles = SWEEP_HZ[0] * duration_s / log_ratio * (np.exp(log_ratio * t / duration_s) - 1.0)
+    fade_in = np.minimum(np.arange(samples) / SWEEP_FADE_SAMPLES, 1.0)
+    wave: FloatArray = SWEEP_PEAK_N * np.sin(2 * np.pi * cycles) * fade_in * np.append(1.0, fade_in[:0:-1])
     return wave
 
 
-def _slow_sines(settings: CaseSettings) -> FloatArray:
-    """All axes at once, each at its own frequency; no fade-out at the end."""
-    samples = np.arange(settings.scale_duration(SLOW_SAMPLES))
-    rise = np.minimum(samples / SLOW_FADE, 1.0)
-    block: FloatArray = SLOW_N * np.sin(2 * np.pi * np.outer(samples / RATE_HZ, SLOW_HZ)) * rise[:, None]
-    block[:, [axis for axis in range(3) if axis not in settings.axes]] = 0.0
-    return block
+def _make_slow_sines(settings: CaseSettings) -> FloatArray:
+    """Sines (samples, 3), N, of all driven axes at once, each at its own frequency, with fade-in but no fade-out."""
+    sample_numbers = np.arange(settings.scale_duration(SLOW_SAMPLES))
+    fade_in = np.minimum(sample_numbers / SLOW_FADE_SAMPLES, 1.0)
+    command: FloatArray = (
+        SLOW_PEAK_N * np.sin(2 * np.pi * np.outer(sample_numbers / RATE_HZ, SLOW_HZ)) * fade_in[:, None]
+    )
+    command[:, [axis for axis in range(3) if axis not in settings.axes]] = 0.0
+    return command

@@ -1,4 +1,5 @@
-"""Forces of concealed laws outside the catalogue, a row for each law, at an integration step (compiled).
+"""Forces of concealed laws outside the catalogue, a row for each law, at an integration step (compiled). Called by
+`mechanism_kernel` at each step, and by `laws.build_law`.
 
 The formulas and the ranges of their parameters are in `laws.concealed_laws`, by the same kinds.
 """
@@ -19,57 +20,59 @@ COLUMNS = 7
     EDGE_DRAG, GAIN_RIPPLE, PUMPED, RELAXATION, HEATING, CROSS_SQUARE, CROSS_SPRING, CROSS_DRAG, WHIRL, ALL_DRAG,
 ) = range(19)  # fmt: skip
 """Kinds of law: of the axis's own motion (to EDGE_DRAG), of command, time or a memory (to HEATING), of two axes. The
-order matters for `law_force`; `LAW_KINDS` in `laws.concealed_laws` gives the formulas."""
+order matters for `compute_law_force`; `LAW_KINDS` in `laws.concealed_laws` gives the formulas."""
 
 
 @njit(cache=True, nogil=True)
-def law_force(row: FloatArray, q: FloatArray, v: FloatArray, drive: FloatArray, memory: float, t: float) -> float:
+def compute_law_force(
+    row: FloatArray, q: FloatArray, v: FloatArray, drive: FloatArray, memory: float, t: float
+) -> float:
     """Force along the row's axis, N. q: positions (m); v: velocities (m/s); drive: forces of the drives (N); memory:
-    state of a law with memory (`law_memory`); t: time (s)."""
-    kind, j, k = int(row[KIND]), int(row[AXIS]), int(row[OTHER_AXIS])
+    state of a law with memory (`advance_law_memory`); t: time (s)."""
+    kind, axis, other_axis = int(row[KIND]), int(row[AXIS]), int(row[OTHER_AXIS])
     if kind >= CROSS_SQUARE:
-        return _cross_axis_force(row, q[j], v[j], q[k], v[k])
+        return _compute_cross_axis_force(row, q[axis], v[axis], q[other_axis], v[other_axis])
     if kind >= GAIN_RIPPLE:
-        return _command_or_memory_force(row, q[j], drive[j], memory, t)
-    return _own_motion_force(row, q[j], v[j])
+        return _compute_command_or_memory_force(row, q[axis], drive[axis], memory, t)
+    return _compute_own_motion_force(row, q[axis], v[axis])
 
 
 @njit(cache=True, nogil=True)
-def _own_motion_force(row: FloatArray, x: float, speed: float) -> float:
+def _compute_own_motion_force(row: FloatArray, x: float, speed: float) -> float:
     """Force of a law of the axis's own position (m) and velocity (m/s), N."""
-    kind, first, side = int(row[KIND]), row[FIRST], row[SIDE]
+    kind, a, sign = int(row[KIND]), row[FIRST], row[SIDE]
     if kind == SPEED_POWER:
-        force = abs(speed) ** first * (1.0 if speed > 0.0 else -1.0)
+        force = abs(speed) ** a * (1.0 if speed > 0.0 else -1.0)
     elif kind == PLACE_POWER:
-        force = abs(x) ** first * (1.0 if x > 0.0 else -1.0)
+        force = abs(x) ** a * (1.0 if x > 0.0 else -1.0)
     elif kind == PLACE_DRAG:
-        force = abs(x) ** first * speed
+        force = abs(x) ** a * speed
     elif kind == SPEED_SPRING:
-        force = side * x * abs(speed) ** first
+        force = sign * x * abs(speed) ** a
     elif kind == ATTRACTION:
-        force = -side * ((first - side * x) ** -row[SECOND] - first ** -row[SECOND])
+        force = -sign * ((a - sign * x) ** -row[SECOND] - a ** -row[SECOND])
     elif kind == SOFT_DRAG:
-        force = tanh(speed / first)
+        force = tanh(speed / a)
     elif kind == SOFT_SPRING:
-        force = atan(x / first)
+        force = atan(x / a)
     elif kind == FADING_DRAG:
-        force = speed / (1.0 + (speed / first) ** 2)
+        force = speed / (1.0 + (speed / a) ** 2)
     elif kind == CONTACT:
-        force = side * max(side * x - first, 0.0) ** row[SECOND]
+        force = sign * max(sign * x - a, 0.0) ** row[SECOND]
     else:
-        force = speed if side * x > first else 0.0
+        force = speed if sign * x > a else 0.0
     scaled_force: float = -row[FACTOR] * force
     return scaled_force
 
 
 @njit(cache=True, nogil=True)
-def _command_or_memory_force(row: FloatArray, x: float, drive: float, memory: float, t: float) -> float:
+def _compute_command_or_memory_force(row: FloatArray, x: float, drive: float, memory: float, t: float) -> float:
     """Force of a law of the drive force, the time or a memory state, N."""
-    kind, first, second = int(row[KIND]), row[FIRST], row[SECOND]
+    kind, a, b = int(row[KIND]), row[FIRST], row[SECOND]
     if kind == GAIN_RIPPLE:
-        force = -drive * sin(2.0 * pi * x / first + second)
+        force = -drive * sin(2.0 * pi * x / a + b)
     elif kind == PUMPED:
-        force = x * sin(2.0 * pi * first * t + second)
+        force = x * sin(2.0 * pi * a * t + b)
     elif kind == RELAXATION:
         force = x - memory
     else:
@@ -79,17 +82,17 @@ def _command_or_memory_force(row: FloatArray, x: float, drive: float, memory: fl
 
 
 @njit(cache=True, nogil=True)
-def _cross_axis_force(row: FloatArray, x: float, speed: float, other_x: float, other_speed: float) -> float:
+def _compute_cross_axis_force(row: FloatArray, x: float, speed: float, other_x: float, other_speed: float) -> float:
     """Force of a law of the motion of two axes, N."""
-    kind, side = int(row[KIND]), row[SIDE]
+    kind, sign = int(row[KIND]), row[SIDE]
     if kind == CROSS_SQUARE:
-        force = side * other_x * other_x
+        force = sign * other_x * other_x
     elif kind == CROSS_SPRING:
         force = x * other_x * other_x
     elif kind == CROSS_DRAG:
         force = speed * abs(other_speed)
     elif kind == WHIRL:
-        force = -side * other_speed
+        force = -sign * other_speed
     else:
         force = speed * sqrt(speed * speed + other_speed * other_speed)
     scaled_force: float = -row[FACTOR] * force
@@ -97,19 +100,19 @@ def _cross_axis_force(row: FloatArray, x: float, speed: float, other_x: float, o
 
 
 @njit(cache=True, nogil=True)
-def law_memory(row: FloatArray, q: FloatArray, drive: FloatArray, memory: float, step_s: float) -> float:
+def advance_law_memory(row: FloatArray, q: FloatArray, drive: FloatArray, memory: float, step_s: float) -> float:
     """Memory state at the end of a step, a first-order low pass (explicit Euler) with the time constant a (s): of the
     position (RELAXATION, m) or of the squared drive force (HEATING, N^2). Other laws have none."""
-    kind, j, new_memory = int(row[KIND]), int(row[AXIS]), memory
+    kind, axis, new_memory = int(row[KIND]), int(row[AXIS]), memory
     if kind == RELAXATION:
-        new_memory += (q[j] - memory) * step_s / row[FIRST]
+        new_memory += (q[axis] - memory) * step_s / row[FIRST]
     elif kind == HEATING:
-        new_memory += (drive[j] * drive[j] - memory) * step_s / row[FIRST]
+        new_memory += (drive[axis] * drive[axis] - memory) * step_s / row[FIRST]
     return new_memory
 
 
 @njit(cache=True, nogil=True)
-def law_forces(
+def sum_law_forces(
     rows: FloatArray,
     state: tuple[FloatArray, FloatArray, FloatArray],
     memory: FloatArray,
@@ -119,5 +122,5 @@ def law_forces(
     """Sum of the forces of all laws, in `total_n` (3,), N. state: positions, velocities and drive forces, of which the
     first three elements (the handle's) are used. memory: memory states (laws,)."""
     total_n[:] = 0.0
-    for index in range(rows.shape[0]):
-        total_n[int(rows[index, AXIS])] += law_force(rows[index], state[0], state[1], state[2], memory[index], t)
+    for law in range(rows.shape[0]):
+        total_n[int(rows[law, AXIS])] += compute_law_force(rows[law], state[0], state[1], state[2], memory[law], t)

@@ -18,7 +18,7 @@ from numba import njit
 from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.friction_kernel import bristle_force
 from study.evaluation.challenge.handle_force_kernel import handle_force
-from study.evaluation.challenge.law_kernel import law_forces, law_memory
+from study.evaluation.challenge.law_kernel import advance_law_memory, sum_law_forces
 
 RATE, DAMPING_DEPTH, STIFFNESS_DEPTH, PHASE, SQUARE = range(5)
 """Columns of `varying`: frequency (Hz, 0 = none), amplitude of the modulation of the ground's damping (N s/m) and
@@ -89,9 +89,9 @@ def integrate_motion(m: Mechanism, force: FloatArray, steps: int, rate_hz: float
         for j in range(3):
             drive[j] = force[k, j]
         if m.laws.shape[0] > 0:
-            law_forces(m.laws, (q, v_now, drive), memory, k * h, law_n)
+            sum_law_forces(m.laws, (q, v_now, drive), memory, k * h, law_n)
             for index in range(m.laws.shape[0]):
-                memory[index] = law_memory(m.laws[index], q, drive, memory[index], h)
+                memory[index] = advance_law_memory(m.laws[index], q, drive, memory[index], h)
             for j in range(3):
                 f[j] += law_n[j]
         if m.play[AXIS] >= 0.0:
@@ -125,7 +125,7 @@ def _accelerate_before(
         _accelerate(m, state[0], f, state[2], a)
         return
     previous_law_n, previous_f = np.zeros(3), f.copy()
-    law_forces(m.laws, state, memory, t, previous_law_n)
+    sum_law_forces(m.laws, state, memory, t, previous_law_n)
     for j in range(3):
         previous_f[j] += previous_law_n[j] - law_n[j]
     _accelerate(m, state[0], previous_f, state[2], a)

@@ -2,8 +2,8 @@
 
 Calibrated model: mass, damping and stiffness of the bench without the effect, at each of three driven axes, with
 independent normal errors whose standard deviation is the stated, tight tolerance. Re-tuned model: these nine parameters
-are fitted to the response of the true device at 1.5 N, so that they absorb as much of the concealed effect as they can;
-the stated tolerances are wide. Off-diagonal elements and modes are exact in both.
+are fitted by `retune` to the response of the true device at 1.5 N, so that they absorb as much of the concealed effect
+as they can; the stated tolerances are wide. Off-diagonal elements and modes are exact in both.
 """
 
 from dataclasses import replace
@@ -20,11 +20,12 @@ from study.evaluation.challenge.sensor_kernel import one_pole
 
 MODES_TOLERANCE = 0.005
 """Relative tolerance (standard deviation) of the modes, stated by every model of the challenge."""
-WIDE = Tolerance(0.05, 3.0, 100.0, MODES_TOLERANCE)
+RETUNED_TOLERANCE = Tolerance(0.05, 3.0, 100.0, MODES_TOLERANCE)
 """Tolerance of a re-tuned model: mass (kg), damping (N s/m), stiffness (N/m), modes."""
-ROUNDS, JACOBIAN_UPDATES = 6, 2
-"""Most Gauss-Newton steps of the re-tuning, and the number of first steps in which the Jacobian is recomputed."""
-DECIMALS = 8
+MAX_ITERATIONS, JACOBIAN_UPDATES = 6, 2
+"""Most Gauss-Newton iterations of the re-tuning, and the number of first iterations in which the Jacobian is
+recomputed."""
+SIGNIFICANT_DIGITS = 8
 """Significant digits of the matrices in the model file."""
 
 
@@ -40,60 +41,65 @@ def draw_calibration(
         stiffness_n_per_m=float(np.diag(bench.stiffness).mean() * random.uniform(0.033, 0.075)),
         modes=MODES_TOLERANCE,
     )
-    sizes = (tolerance.mass_kg, tolerance.damping_n_s_per_m, tolerance.stiffness_n_per_m)
-    errors = random.normal(size=9) * np.repeat(np.array(sizes, dtype=np.float64), 3)
-    return shift_diagonals(bench, errors * _axes_mask(axes)), tolerance
+    deviations = (tolerance.mass_kg, tolerance.damping_n_s_per_m, tolerance.stiffness_n_per_m)
+    errors = random.normal(size=9) * np.repeat(np.array(deviations, dtype=np.float64), 3)
+    return shift_diagonals(bench, errors * _make_axes_mask(axes)), tolerance
 
 
 def retune(
     bench: Bench, response: FloatArray, plan: DrivePlan, axes: tuple[int, ...] = (0, 1, 2)
 ) -> tuple[Bench, Tolerance]:
     """The bench whose mass, damping and stiffness at these axes best fit the response to the multisines at 1.5 N, and
-    the tolerance `WIDE`. response: (samples, 3), m/s^2; its residuals are divided by the sensor noise. Gauss-Newton
-    with forward differences, at most `ROUNDS` steps, until every change is below a twentieth of its difference step."""
-    fit_segments = [s for s in plan.segments if s.role == "fit" and s.amplitude == LEVELS_N[1]]
-    commands = [plan.command[s.start : s.stop] for s in fit_segments]
-    channels, axes_mask = list(axes), _axes_mask(axes)
+    the tolerance `RETUNED_TOLERANCE`. response: (samples, 3), m/s^2; its residuals are divided by the sensor noise.
+    Gauss-Newton with forward differences, at most `MAX_ITERATIONS` steps, until every change is below a twentieth of
+    its difference step."""
+    fit_segments = [segment for segment in plan.segments if segment.role == "fit" and segment.amplitude == LEVELS_N[1]]
+    commands = [plan.command[segment.start : segment.stop] for segment in fit_segments]
+    channels, axes_mask = list(axes), _make_axes_mask(axes)
     noise = np.array(NOISE_MPS2)[channels]
-    measured = np.vstack([response[s.start : s.stop, channels] for s in fit_segments]) / noise
+    measured = np.vstack([response[segment.start : segment.stop, channels] for segment in fit_segments]) / noise
     # Difference steps: kg, N s/m, N/m, for three axes each.
-    steps = np.repeat((1e-3, 1e-2, 1.0), 3)
+    difference_steps = np.repeat((1e-3, 1e-2, 1.0), 3)
     shift = np.zeros(9)
 
     def predict(trial_shift: FloatArray) -> FloatArray:
         responses = np.vstack(
-            [_linear_response(shift_diagonals(bench, trial_shift), command)[:, channels] for command in commands]
+            [
+                _simulate_linear_response(shift_diagonals(bench, trial_shift), command)[:, channels]
+                for command in commands
+            ]
         )
         return np.asarray(responses / noise)
 
     jacobian = np.zeros((measured.size, 9))
-    for iteration in range(ROUNDS):
+    for iteration in range(MAX_ITERATIONS):
         prediction = predict(shift)
         if iteration < JACOBIAN_UPDATES:
             columns = [
-                (predict(shift + h * unit) - prediction).ravel() / h for h, unit in zip(steps, np.eye(9), strict=True)
+                (predict(shift + difference_step * unit_vector) - prediction).ravel() / difference_step
+                for difference_step, unit_vector in zip(difference_steps, np.eye(9), strict=True)
             ]
             jacobian = np.column_stack(columns) * axes_mask
         change = np.linalg.lstsq(jacobian, (measured - prediction).ravel(), rcond=None)[0]
         shift = _limit_shift(shift + change, bench)
-        if np.abs(change / steps).max() < 0.05:
+        if np.abs(change / difference_steps).max() < 0.05:
             break
-    return shift_diagonals(bench, shift), WIDE
+    return shift_diagonals(bench, shift), RETUNED_TOLERANCE
 
 
 def shift_diagonals(bench: Bench, changes: FloatArray) -> Bench:
     """The bench with the diagonals of mass, damping and stiffness at the handle changed. changes: (9,): changes in kg,
     N s/m and N/m, for x, y, z each."""
-    mass, damping, stiffness = (np.diag(part) for part in np.asarray(changes).reshape(3, 3))
+    mass, damping, stiffness = (np.diag(values) for values in np.asarray(changes).reshape(3, 3))
     return replace(
         bench, mass=bench.mass + mass, damping=bench.damping + damping, stiffness=bench.stiffness + stiffness
     )
 
 
 def as_model(name: str, bench: Bench, tolerance: Tolerance, axes: tuple[int, ...] = (0, 1, 2)) -> MechanicalModel:
-    """The mechanical model as it is written to the file, with `DECIMALS` significant digits: driven and measured at
-    these axes, with the limits of the sensor and the tolerance."""
-    mass, damping, stiffness = (_round_significant(matrix) for matrix in bench.matrices())
+    """The mechanical model as it is written to the file, with `SIGNIFICANT_DIGITS` significant digits: driven and
+    measured at these axes, with the limits of the sensor and the tolerance."""
+    mass, damping, stiffness = (_round_significant(matrix) for matrix in bench.assemble_matrices())
     selection = np.eye(len(AXES), len(mass))[list(axes)]
     return MechanicalModel(
         name, "acceleration", mass, damping, stiffness, selection.T, selection,
@@ -101,13 +107,13 @@ def as_model(name: str, bench: Bench, tolerance: Tolerance, axes: tuple[int, ...
     )  # fmt: skip
 
 
-def _axes_mask(axes: tuple[int, ...]) -> FloatArray:
+def _make_axes_mask(axes: tuple[int, ...]) -> FloatArray:
     """(9,): 1 for the parameters of these axes, otherwise 0."""
     mask: FloatArray = np.array([float(axis in axes) for axis in range(3)] * 3)
     return mask
 
 
-def _linear_response(bench: Bench, command: FloatArray) -> FloatArray:
+def _simulate_linear_response(bench: Bench, command: FloatArray) -> FloatArray:
     """(samples, 3): acceleration of the bench, m/s^2, behind the sensor's first-order low pass. command: (samples, 3),
     N."""
     acceleration, _ = simulate_motion(Device(bench), command)
@@ -117,14 +123,14 @@ def _linear_response(bench: Bench, command: FloatArray) -> FloatArray:
 
 def _limit_shift(shift: FloatArray, bench: Bench) -> FloatArray:
     """The shift (9,), limited so that at least half of the mass and a tenth of damping and stiffness remain."""
-    lowest = np.concatenate(
+    lower_bound = np.concatenate(
         [-0.5 * np.diag(bench.mass), -0.9 * np.diag(bench.damping), -0.9 * np.diag(bench.stiffness)]
     )
-    allowed: FloatArray = np.maximum(shift, lowest)
-    return allowed
+    limited_shift: FloatArray = np.maximum(shift, lower_bound)
+    return limited_shift
 
 
 def _round_significant(matrix: FloatArray) -> FloatArray:
-    """The matrix rounded to `DECIMALS` significant digits."""
-    texts = [[f"{value:.{DECIMALS}g}" for value in row] for row in matrix]
+    """The matrix rounded to `SIGNIFICANT_DIGITS` significant digits."""
+    texts = [[f"{value:.{SIGNIFICANT_DIGITS}g}" for value in row] for row in matrix]
     return np.array(texts, dtype=np.float64)

@@ -12,7 +12,7 @@ import numpy as np
 from analysis.evaluation.blind_test.lab_kit import CHANGES, CHANGES_BY_NAME, CONTROL_CHANGE, Label
 from equalizer.plant.mechanical_model import suggest_word
 from study.errors import StudyError
-from study.store.disk.csv_rows import CsvError, rows_from_csv, rows_to_csv
+from study.store.disk.csv_rows import CsvError, format_csv_table, parse_csv_table
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.provenance import sha256_of
 from study.store.disk.text_file import read_text, write_text
@@ -35,7 +35,7 @@ def draw_labels(table_path: Path, repeats: int, seed: int | None) -> tuple[Label
         Label(f"rec_{number:02d}", change_names[int(index)], None, "", secrets.token_hex(8))
         for number, index in enumerate(order, start=1)
     )
-    write_text(table_path, rows_to_csv(labels, Label))
+    write_text(table_path, format_csv_table(labels, Label))
     return labels
 
 
@@ -43,7 +43,7 @@ def read_labels(path: Path) -> tuple[Label, ...]:
     """The rows of a table of labels. Raises CannotReadError; UnusableFileError for an invalid or empty table, an
     unknown change, or a recording that appears twice."""
     try:
-        labels = rows_from_csv(read_text(path), Label)
+        labels = parse_csv_table(read_text(path), Label)
     except CsvError as error:
         raise UnusableFileError(path, "table of labels", error.problems, CORRECT_FIRST) from error
     problems = [

@@ -20,7 +20,7 @@ from analysis.evaluation.blind_test.lab_kit import (
 )
 from study.errors import StudyError, WrongUseError
 from study.evaluation.kit.lab_kit import read_labels, read_sealed_hash, seal_of
-from study.store.disk.csv_rows import rows_to_csv
+from study.store.disk.csv_rows import format_csv_table
 from study.store.disk.provenance import sha256_of
 from study.store.disk.text_file import write_text
 from study.store.formats.diagnosis_file import DIAGNOSIS_NAME, read_diagnosis
@@ -55,7 +55,7 @@ def score_kit(path: Path, diagnoses: Path, scores_path: Path, seal: str | None =
         score_unanswered(label) if diagnosis is None else score_label(label, diagnosis)
         for label, diagnosis in zip(labels, diagnosis_of_labels, strict=True)
     )
-    write_text(scores_path, rows_to_csv(rows, Scored))
+    write_text(scores_path, format_csv_table(rows, Scored))
     return KitScore(rows, compute_kit_figures(rows), digest, compared_with)
 
 

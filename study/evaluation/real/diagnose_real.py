@@ -15,15 +15,15 @@ import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_model_of
-from analysis.diagnosis.data.measured_motion import all_as_force_driven
+from analysis.diagnosis.data.measured_motion import convert_all_to_force_driven
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
-from analysis.diagnosis.errors.prediction_error import PredictionError, prediction_error
+from analysis.diagnosis.errors.prediction_error import PredictionError, compute_prediction_error
 from analysis.diagnosis.first_model.first_model import FirstModel
-from analysis.diagnosis.first_model.one_motion_per_force import one_motion_per_force
+from analysis.diagnosis.first_model.one_motion_per_force import convert_to_driven_motions
 from analysis.diagnosis.localisation.clean_floor import NothingLearned
 from analysis.diagnosis.prepare_recordings import keep_common_signals, prepare_recordings
-from analysis.diagnosis.real_answer.answer_of_findings import answer_of_findings, describe_named
+from analysis.diagnosis.real_answer.answer_of_findings import describe_named_effects, make_real_answer
 from analysis.diagnosis.real_answer.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.guard import Guard
@@ -35,7 +35,7 @@ from study.errors import StudyError
 from study.evaluation.real.real_folder import RealRecording
 from study.importing.build_recording import build_recording
 from study.importing.map_library import FoundMap
-from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, not_diagnosable_error
+from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, make_not_diagnosable_error
 from study.workflows.diagnosis.fit_without_model import first_model_of, fit_linear_model
 from study.workflows.forked_map import map_forked
 
@@ -91,7 +91,7 @@ def diagnose_real(
         findings = replace(findings, remarks=(*case.remarks, *findings.remarks))
         diagnosis = real_recording.found_map.source.map.diagnosis
         names = (real_recording.folder.name, real_recording.name, real_recording.found_map.source.map.title)
-        answer = answer_of_findings(findings, case.recording, names, diagnosis.nominal)
+        answer = make_real_answer(findings, case.recording, names, diagnosis.nominal)
     except StudyError as refusal:
         return RealDiagnosis(_make_refusal(real_recording, f"{refusal.title}: {refusal.happened}"), None, parents)
     except (NothingLearned, MechanicalModelError, np.linalg.LinAlgError) as refusal:
@@ -127,7 +127,7 @@ def _downgrade_if_remainder(answer: RealAnswer, pair: PairOutcome) -> RealAnswer
 def import_real_recording(found_map: FoundMap) -> Recording:
     """The one force-driven recording of a map. Raises StudyError."""
     recording = build_recording(found_map.source.map, found_map.files, lambda share: None).recording
-    return all_as_force_driven([recording])[0]
+    return convert_all_to_force_driven([recording])[0]
 
 
 def _import_case(
@@ -137,7 +137,7 @@ def _import_case(
     diagnose."""
     on_progress("importing", 0.0)
     if skip_reason := real_recording.found_map.source.map.diagnosis.skip:
-        raise not_diagnosable_error((skip_reason,))
+        raise make_not_diagnosable_error((skip_reason,))
     # Of a real recording, for which there is no other, few cycles are a remark.
     try:
         prepared = prepare_recordings(
@@ -147,7 +147,7 @@ def _import_case(
             accept_short=True,
         )
     except NothingToDiagnose as refusal:
-        raise not_diagnosable_error(refusal.problems) from refusal
+        raise make_not_diagnosable_error(refusal.problems) from refusal
     references = () if real_recording.reference is None else (import_real_recording(real_recording.reference),)
     common = keep_common_signals((*prepared.recordings, *references))
     recording = common.recordings[0]
@@ -180,7 +180,7 @@ def _choose_model(
     try:
         require_model_of(given_model, (recording,))
     except NothingToDiagnose as refusal:
-        raise not_diagnosable_error(refusal.problems) from refusal
+        raise make_not_diagnosable_error(refusal.problems) from refusal
     return FirstModel(given_model, ())
 
 
@@ -221,9 +221,10 @@ def _test_on_further(test: FoundMap, real_recording: RealRecording, findings: Fi
     try:
         recording = import_real_recording(test)
         if _allows_force_balance(real_recording):
-            (recording,) = all_as_force_driven(one_motion_per_force((recording,), turns=False)[0])
+            (recording,) = convert_all_to_force_driven(convert_to_driven_motions((recording,), turns=False)[0])
         retuned, after = (
-            prediction_error(recording, model, "all") for model in (_require_retuned(findings), findings.improved)
+            compute_prediction_error(recording, model, "all")
+            for model in (_require_retuned(findings), findings.improved)
         )
     except (StudyError, MechanicalModelError, ValueError, np.linalg.LinAlgError) as problem:
         text = problem.happened if isinstance(problem, StudyError) else f"{problem}."
@@ -260,15 +261,15 @@ def _compare_pair(real_recording: RealRecording, case: _ImportedCase, findings: 
     """The recordings before and after a change of the device: what was named, and the errors of the model before and
     after it was re-tuned and effects were added."""
     assert real_recording.reference is not None and case.reference is not None
-    given_errors = prediction_error(case.recording, case.model, "test")
-    reference_errors = prediction_error(case.reference, case.model, "test")
+    given_errors = compute_prediction_error(case.recording, case.model, "test")
+    reference_errors = compute_prediction_error(case.reference, case.model, "test")
     errors = findings.diagnosis.fit.test
     return PairOutcome(
         changed=real_recording.changed,
         before=_join_file_names(real_recording.reference.files),
         after=_join_file_names(real_recording.found_map.files),
         verdict=findings.diagnosis.verdict,
-        named=describe_named(findings),
+        named=describe_named_effects(findings),
         returned=findings.diagnosis.returned_set,
         as_before=given_errors.without_gain,
         gain=given_errors.with_gain,

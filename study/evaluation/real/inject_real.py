@@ -1,4 +1,10 @@
-"""Inject faults into real recordings under a seal, diagnose them in separate processes, and count the outcomes."""
+"""Blind test of the diagnosis with faults injected into real recordings: inject, seal, diagnose, reveal.
+
+Each case contains an intact stretch of a recording, given to the diagnosis as clean, and another stretch with up to two
+simulated faults. The labels (the injected faults) are hashed before any diagnosis, so that later changes would show
+(`proof_seals`); the diagnoses run in separate processes. `run_injections` is called by `real_recordings` for
+`hapteq real --inject`.
+"""
 
 import json
 import secrets
@@ -13,12 +19,12 @@ from analysis.evaluation.blind_test.injected import InjectedOutcome, read_outcom
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from study.errors import StudyError
-from study.evaluation.bank.answer_cases import others_sha256
+from study.evaluation.bank.answer_cases import hash_other_recordings
 from study.evaluation.bank.ask_engine import Workers, ask_engine, is_answered
 from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, show_case
 from study.evaluation.bank.proof_folder import CLEAN_FOLDER, MODEL, RECORDING, SETTINGS, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import answers_sealed_case, broken_seal_error, read_answer, read_label, seal
-from study.evaluation.bank.seal_cases import settings_text
+from study.evaluation.bank.seal_cases import format_settings
 from study.evaluation.challenge.injection.injections import applicable_injections, inject, place_of
 from study.evaluation.real.diagnose_real import import_real_recording
 from study.evaluation.real.injected_halves import blank_lead_responses, draw_halves, held_out_change
@@ -30,13 +36,13 @@ from study.store.formats.mechanical_model_file import read_mechanical_model, wri
 from study.store.formats.recording_file import write_recording
 
 NO_FAULT_SHARE = 0.5
-"""Fraction of draws without a fault: naming an effect there is the worst answer."""
+"""Probability that a case has no fault: these cases count false alarms."""
 TWO_FAULTS_SHARE = 0.15
-"""Fraction of the other draws with two faults."""
+"""Probability that a case with faults has two of them instead of one."""
 PROCESSOR_S = 180.0
-"""Processor time (s) for the search in one case: real recordings take longer than those of a bank."""
+"""Limit of the processor time (s) of the search in a case: real recordings take longer than simulated ones."""
 KEPT_METADATA = ("feedback", "imposed", "parts")
-"""Keys of the metadata that a diagnosis uses."""
+"""Keys of the metadata that a diagnosis uses; all others are removed, because they may reveal the device."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,13 +55,15 @@ class Carrier:
     recording: Recording
 
 
-def load_carriers(out: Path, recordings: Sequence[RealRecording], answers: Sequence[RealAnswer]) -> tuple[Carrier, ...]:
-    """The recordings that were diagnosed (not refused), each with the improved model of its diagnosis in `out`.
-    recordings and answers: in the same order."""
+def load_carriers(
+    diagnosis_folder: Path, recordings: Sequence[RealRecording], answers: Sequence[RealAnswer]
+) -> tuple[Carrier, ...]:
+    """The recordings whose diagnosis was not refused, each with the improved model that its diagnosis wrote into
+    `diagnosis_folder`. answers: in the order of `recordings`."""
     return tuple(
         Carrier(
             real_recording.name,
-            read_mechanical_model(out / real_recording.folder.name / real_recording.name / MODEL_NAME),
+            read_mechanical_model(diagnosis_folder / real_recording.folder.name / real_recording.name / MODEL_NAME),
             import_real_recording(real_recording.found_map),
         )
         for real_recording, answer in zip(recordings, answers, strict=True)
@@ -64,7 +72,8 @@ def load_carriers(out: Path, recordings: Sequence[RealRecording], answers: Seque
 
 
 def seal_injections(folder: ProofFolder, carriers: Sequence[Carrier], count: int, seed: int) -> tuple[str, ...]:
-    """Draw, write and seal the missing cases; returns the case names in order. Raises StudyError."""
+    """Draw, write and seal the cases that do not exist yet; returns the names of all `count` cases in order. Raises
+    StudyError where there is no carrier."""
     if not carriers:
         raise StudyError(
             "There is nothing to inject faults into",
@@ -79,7 +88,8 @@ def seal_injections(folder: ProofFolder, carriers: Sequence[Carrier], count: int
 
 
 def _write_injection(folder: ProofFolder, carriers: Sequence[Carrier], number: int, seed: int) -> str:
-    """Draw one case, and write its files and its label, which `seal` seals afterwards; returns its name."""
+    """Draw one case, and write its files and its label, to be sealed by `seal`; returns its name. An existing case is
+    kept."""
     label_path = folder.label_file(number)
     if label_path.exists():
         return str(read_label(label_path)["name"])
@@ -92,14 +102,14 @@ def _write_injection(folder: ProofFolder, carriers: Sequence[Carrier], number: i
     for effect in effects:
         injected = inject(faulty, effect, strength, generator)
         faulty, values = injected.recording, values | injected.values
-    intact, faultless, faulty = (_without_origin(blank_lead_responses(half)) for half in (intact, faultless, faulty))
+    intact, faultless, faulty = (_remove_origin(blank_lead_responses(half)) for half in (intact, faultless, faulty))
     change = held_out_change(intact, faultless, faulty) if effects else 1.0
     case_folder = begin_case(folder)
     (case_folder / CLEAN_FOLDER).mkdir()
     write_recording(case_folder / RECORDING, faulty, precision="float64")
     write_recording(case_folder / CLEAN_FOLDER / RECORDING, intact, precision="float64")
     write_mechanical_model(case_folder / MODEL, carrier.model)
-    write_text(case_folder / SETTINGS, settings_text((), PROCESSOR_S))
+    write_text(case_folder / SETTINGS, format_settings((), PROCESSOR_S))
     label_values = {
         "name": case_folder.name,
         "number": number,
@@ -112,7 +122,7 @@ def _write_injection(folder: ProofFolder, carriers: Sequence[Carrier], number: i
         "change": change,
         "recording_sha256": sha256_of(case_folder / RECORDING),
         "model_sha256": sha256_of(case_folder / MODEL),
-        "others_sha256": others_sha256(case_folder),
+        "others_sha256": hash_other_recordings(case_folder),
         "salt": secrets.token_hex(16),
     }
     write_text(label_path, json.dumps(label_values, indent=1, allow_nan=False) + "\n")
@@ -129,20 +139,24 @@ def _draw_effects(recording: Recording, generator: np.random.Generator) -> tuple
     return tuple(sorted(effects, key=lambda effect: place_of(effect) == "sensor"))
 
 
-def _without_origin(recording: Recording) -> Recording:
-    """The recording without metadata that reveals its origin."""
+def _remove_origin(recording: Recording) -> Recording:
+    """The recording with the metadata of `KEPT_METADATA` alone."""
     return replace(recording, meta={key: recording.meta[key] for key in KEPT_METADATA if key in recording.meta})
 
 
 def run_injections(
     path: Path,
     carriers: Sequence[Carrier],
-    draws: tuple[int, int],
+    count_and_seed: tuple[int, int],
     on_done: Callable[[int, int], None],
     workers: Workers = 2,
 ) -> tuple[InjectedOutcome, ...]:
-    """Seal, diagnose and reveal injected faults. draws: number of cases, and seed. Resumable. Raises StudyError."""
-    count, seed = draws
+    """Inject, seal, diagnose and reveal faults in the folder `path`; continues an interrupted test.
+
+    count_and_seed: number of cases, and seed of their draws. on_done: called with the numbers of diagnosed cases and of
+    all cases. Raises StudyError, also where a label was changed after it was sealed.
+    """
+    count, seed = count_and_seed
     folder = open_proof_folder(path, seed, False)
     names = seal_injections(folder, carriers, count, seed)
     answered = sum(is_answered(folder.open / name) for name in names)

@@ -7,9 +7,9 @@ import numpy as np
 
 from analysis.diagnosis.contrast.bases import bases_of
 from analysis.diagnosis.contrast.compared_base import Base
-from analysis.diagnosis.contrast.joint_products import weights_of
+from analysis.diagnosis.contrast.joint_products import solve_residual_weights
 from analysis.diagnosis.contrast.part import Part, split_into_parts
-from analysis.diagnosis.data.observed_parts import part_of, parts_of
+from analysis.diagnosis.data.observed_parts import cut_part, find_parts
 from equalizer.signals.joining import concatenate, concatenate_if_all
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
@@ -26,7 +26,7 @@ def draw_halves(recording: Recording, random: np.random.Generator) -> tuple[Reco
     """Two random stretches of the recording, or random sets of its parts; which one stays intact is also random.
     Both are without roles: the fit samples are drawn anew in each."""
     without_roles = replace(recording, segments=tuple(replace(segment, role="") for segment in recording.segments))
-    parts = parts_of(without_roles)
+    parts = find_parts(without_roles)
     if len(parts) >= PARTS and random.random() < 0.5:
         order = random.permutation(len(parts))
         part_sets = [sorted(order[: len(parts) // 2]), sorted(order[len(parts) // 2 :])]
@@ -47,7 +47,7 @@ def _join_parts(recording: Recording, parts: Sequence[tuple[int, int]]) -> Recor
     remaining = MOST_SAMPLES
     for start, stop in parts:
         if remaining > 0:
-            stretches.append(part_of(recording, start, min(stop, start + remaining)))
+            stretches.append(cut_part(recording, start, min(stop, start + remaining)))
             remaining -= len(stretches[-1])
     stops = np.cumsum([len(stretch) for stretch in stretches])
     starts = stops - [len(stretch) for stretch in stretches]
@@ -75,13 +75,13 @@ def _half_with_lead(recording: Recording, start: int, stop: int) -> Recording:
     """A half begins in the middle of a motion: what was recorded before it is put in front, outside all segments, so
     that a simulation can start from rest."""
     lead = min(start, MOST_SAMPLES)
-    lead_and_half = part_of(recording, start - lead, stop)
+    lead_and_half = cut_part(recording, start - lead, stop)
     half_segments = [
         replace(segment, start=max(segment.start, lead)) for segment in lead_and_half.segments if segment.stop > lead
     ]
     parts = [
         {"start": max(part_start, start - lead) - start + lead, "stop": min(part_stop, stop) - start + lead}
-        for part_start, part_stop in parts_of(recording)
+        for part_start, part_stop in find_parts(recording)
         if min(part_stop, stop) > max(part_start, start - lead)
     ]
     meta = {key: value for key, value in recording.meta.items() if key != "parts"}
@@ -134,9 +134,11 @@ def _measure_error(base: Base, clean_parts: tuple[Part, ...], other_parts: tuple
     clean_rows, other_rows = _stack_rows(base, clean_parts), _stack_rows(base, other_parts)
     size = np.sqrt(np.mean(clean_rows**2, axis=0))
     size = np.where(size > 0, size, 1.0)
-    weights = weights_of((clean_rows / size).T @ (clean_rows / size)) / size
+    weights = solve_residual_weights((clean_rows / size).T @ (clean_rows / size)) / size
     return float(np.sqrt(np.mean((other_rows @ weights * size[0]) ** 2)))
 
 
 def _stack_rows(base: Base, parts: tuple[Part, ...]) -> FloatArray:
-    return np.vstack([part[mask] for part, mask in zip(base.rows(parts), base.valid_samples(parts), strict=True)])
+    return np.vstack(
+        [part[mask] for part, mask in zip(base.build_rows(parts), base.mask_valid_samples(parts), strict=True)]
+    )

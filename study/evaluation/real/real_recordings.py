@@ -28,13 +28,13 @@ from study.evaluation.real.real_folder import RealFolder, RealRecording, read_re
 from study.evaluation.real.reuse_answers import (
     ANSWER_NAME,
     INJECTED_NAME,
-    answer_folder,
-    origin_of_answer,
-    reusable_answers,
+    find_reusable_answers,
+    gather_answer_provenance,
+    locate_answer_folder,
 )
 from study.evaluation.real.write_real import PAGE_NAME, RealResults, WrittenReal, write_real
 from study.local_clock import machine_zone
-from study.session.views.local_time import local_time
+from study.session.views.local_time import format_time_in_zone
 from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.folder_contents import Files, read_files, write_files
 from study.store.disk.new_folder import new_folder
@@ -43,7 +43,7 @@ from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.real_answer_file import read_answer_and_origin, write_real_answer
 from study.workflows.crash_guard import crash_guard
 from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
-from study.workflows.forked_map import processor_s, without_forking
+from study.workflows.forked_map import measure_processor_s, without_forking
 from study.workflows.run_on_executor import run_tasks
 
 RETUNED_NAME = "retuned.toml"
@@ -95,7 +95,7 @@ def diagnose_folder(
         )
     inventory = _take_inventory(plan)
     used_clock = clock or RealClock()
-    reused = reusable_answers(plan.out, inventory.recordings, plan.seconds)
+    reused = find_reusable_answers(plan.out, inventory.recordings, plan.seconds)
     _make_writable(plan.out)
     saved = f"What was answered so far is in {plan.out}."
     with resumable("Not all recordings were diagnosed.", saved, further_types=(UserInterruptError,)):
@@ -106,7 +106,9 @@ def diagnose_folder(
         injected = _inject_faults(plan, inventory, answers, on_progress, executor or 2)
         on_progress("writing the page", 0.98)
         return write_real(
-            plan.out, RealResults(answers, inventory.troubles, injected), local_time(used_clock.utc(), machine_zone)
+            plan.out,
+            RealResults(answers, inventory.troubles, injected),
+            format_time_in_zone(used_clock.utc(), machine_zone),
         )
 
 
@@ -169,7 +171,7 @@ def _diagnose_here(
     remaining_s = dict.fromkeys((listed.folder.name for listed in inventory.recordings), limit_s)
     for number, recording in enumerate(inventory.recordings):
         remaining_count = sum(candidate.folder == recording.folder for candidate in inventory.recordings[number:])
-        start_s = processor_s()
+        start_s = measure_processor_s()
         budget = max(remaining_s[recording.folder.name] / remaining_count - OVERHEAD_S, 0.1 * limit_s)
 
         def show(step: str, share: float, number: int = number, real_recording: RealRecording = recording) -> None:
@@ -178,9 +180,9 @@ def _diagnose_here(
                 end_share * (number + min(share, 1.0)) / count,
             )
 
-        reused_answer = reused.get(answer_folder(plan.out, recording))
+        reused_answer = reused.get(locate_answer_folder(plan.out, recording))
         answers.append(reused_answer or _diagnose_and_write(plan, recording, budget, show, clock))
-        remaining_s[recording.folder.name] -= processor_s() - start_s
+        remaining_s[recording.folder.name] -= measure_processor_s() - start_s
     return tuple(answers)
 
 
@@ -193,7 +195,7 @@ def _diagnose_on_executor(
 ) -> tuple[RealAnswer, ...]:
     """Answers of all recordings in order; those not in `reused` are diagnosed on the workers of the executor, which
     return the files of the results."""
-    answer_paths = [answer_folder(plan.out, real_recording) for real_recording in inventory.recordings]
+    answer_paths = [locate_answer_folder(plan.out, real_recording) for real_recording in inventory.recordings]
     unanswered = [
         (answer_path, real_recording)
         for answer_path, real_recording in zip(answer_paths, inventory.recordings, strict=True)
@@ -229,7 +231,7 @@ def answer_sent_recording(folder: str, name: str, files: Files) -> Files:
                 saved="All answers so far.",
             )
         _diagnose_and_write(plan, real_recording, 0.0, lambda step, share: None, RealClock())
-        return read_files(answer_folder(plan.out, real_recording))
+        return read_files(locate_answer_folder(plan.out, real_recording))
 
 
 def _diagnose_and_write(
@@ -237,16 +239,16 @@ def _diagnose_and_write(
 ) -> RealAnswer:
     """Diagnose one recording and write its results. budget_s: processor time for the search, used where `plan.seconds`
     is given. A crash is written as an answer, unless the crash guard is off."""
-    start_s, processor_start_s, guard = clock.now_s(), processor_s(), crash_guard()
-    time_budget: TimeBudget = lambda: processor_s() - processor_start_s < budget_s  # noqa: E731
+    start_s, processor_start_s, guard = clock.now_s(), measure_processor_s(), crash_guard()
+    time_budget: TimeBudget = lambda: measure_processor_s() - processor_start_s < budget_s  # noqa: E731
     time_left = CountedBudget(MAX_EVALUATIONS) if plan.seconds is None else time_budget
 
     def write_result(diagnosis: RealDiagnosis) -> RealAnswer:
         answer = replace(diagnosis.answer, seconds=round(clock.now_s() - start_s, 1))
         _write_diagnosis(
-            answer_folder(plan.out, real_recording),
+            locate_answer_folder(plan.out, real_recording),
             replace(diagnosis, answer=answer),
-            origin_of_answer(real_recording, plan.seconds),
+            gather_answer_provenance(real_recording, plan.seconds),
         )
         return answer
 
@@ -255,7 +257,7 @@ def _diagnose_and_write(
     except StudyError:
         raise
     except Exception as crash:
-        if not guard.on:
+        if not guard.enabled:
             raise
         return write_result(report_crash(real_recording, crash))
 

@@ -1,7 +1,7 @@
 """Lines for the terminal that summarise the diagnosis of a folder of real recordings (`hapteq real`)."""
 
 from analysis.diagnosis.real_answer.real_answer import RealAnswer
-from analysis.diagnosis.unit_wording import error_text
+from analysis.diagnosis.unit_wording import format_error
 from analysis.evaluation.blind_test.injected import score_injections
 from analysis.reports.injected_section import figure_text
 from analysis.reports.real_report import VERDICT_WORDS
@@ -29,9 +29,9 @@ def _format_answer(real_answer: RealAnswer) -> str:
     if real_answer.held_out is None:
         return f"{text}. {real_answer.answer}"
     errors = real_answer.held_out
-    after_text = f", with what was found {error_text(errors.after)}" if real_answer.effects else ""
-    black_box_text = "" if real_answer.black_box is None else f", black box {error_text(real_answer.black_box)}"
+    after_text = f", with what was found {format_error(errors.after)}" if real_answer.effects else ""
+    black_box_text = "" if real_answer.black_box is None else f", black box {format_error(real_answer.black_box)}"
     return (
-        f"{text}. Held out: as given {error_text(errors.before)}, re-tuned {error_text(errors.retuned)}"
+        f"{text}. Held out: as given {format_error(errors.before)}, re-tuned {format_error(errors.retuned)}"
         f"{after_text}{black_box_text} ({real_answer.seconds:.0f} s)."
     )

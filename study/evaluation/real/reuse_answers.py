@@ -1,4 +1,4 @@
-"""Reuse of answers of an earlier run of `hapteq real`.
+"""Reuse of answers of an earlier run of `hapteq real`; called by `real_recordings`.
 
 An answer is reused if the hashes of its input files and its settings are unchanged. If any of them has changed, the
 whole run is refused before any work, with a list of the changes.
@@ -23,32 +23,34 @@ ANSWER_NAME, INJECTED_NAME = "answer.json", "injected"
 class _EarlierAnswer:
     """An answer of an earlier run, and what has changed since it was given."""
 
-    place: Path
+    folder: Path
     answer: RealAnswer
     changes: tuple[str, ...]
     """Changes of input files and settings, as clauses; empty if the answer can be reused."""
 
 
-def answer_folder(out: Path, real_recording: RealRecording) -> Path:
-    """Folder with the results of one recording."""
+def locate_answer_folder(out: Path, real_recording: RealRecording) -> Path:
+    """Folder with the results of one recording, in the output folder `out`."""
     return out / real_recording.folder.name / real_recording.name
 
 
-def origin_of_answer(real_recording: RealRecording, seconds: float | None) -> Provenance:
+def gather_answer_provenance(real_recording: RealRecording, seconds: float | None) -> Provenance:
     """Provenance of an answer: hashes of all input files, and settings, on which it depends. seconds: of --seconds;
     None if left out. Raises CannotReadError."""
-    files = tuple(dict.fromkeys((*real_recording.parents, *real_recording.tested_on)))
-    return gather_provenance(parents=files, settings={"seconds": seconds})
+    input_files = tuple(dict.fromkeys((*real_recording.parents, *real_recording.tested_on)))
+    return gather_provenance(parents=input_files, settings={"seconds": seconds})
 
 
-def reusable_answers(out: Path, recordings: Sequence[RealRecording], seconds: float | None) -> dict[Path, RealAnswer]:
+def find_reusable_answers(
+    out: Path, recordings: Sequence[RealRecording], seconds: float | None
+) -> dict[Path, RealAnswer]:
     """Earlier answers by the folder of their results; nothing is written. Raises StudyError where an answer is damaged
     or was given for other inputs or settings."""
-    answered = [recording for recording in recordings if (answer_folder(out, recording) / ANSWER_NAME).is_file()]
-    earlier = [_read_earlier_answer(answer_folder(out, recording), recording, seconds) for recording in answered]
+    answered = [recording for recording in recordings if (locate_answer_folder(out, recording) / ANSWER_NAME).is_file()]
+    earlier = [_read_earlier_answer(locate_answer_folder(out, recording), recording, seconds) for recording in answered]
     if outdated := [answer for answer in earlier if answer.changes]:
-        raise _inputs_changed_error(out, outdated)
-    return {answer.place: answer.answer for answer in earlier}
+        raise _make_inputs_changed_error(out, outdated)
+    return {answer.folder: answer.answer for answer in earlier}
 
 
 def _read_earlier_answer(folder: Path, real_recording: RealRecording, seconds: float | None) -> _EarlierAnswer:
@@ -62,7 +64,7 @@ def _read_earlier_answer(folder: Path, real_recording: RealRecording, seconds: f
             f"Move {folder} away to diagnose it again, or choose another --out.",
             saved="Nothing was written.",
         ) from error
-    current_origin = origin_of_answer(real_recording, seconds)
+    current_origin = gather_answer_provenance(real_recording, seconds)
     files = {(parent.file, parent.sha256) for parent in current_origin.parents}
     return _EarlierAnswer(
         folder, answer, (*_compare_files(_read_parents(origin), files), *_compare_settings(origin, seconds))
@@ -97,18 +99,21 @@ def _compare_settings(origin: Mapping[str, Any], seconds: float | None) -> Itera
 
 
 def _format_seconds(limit_s: float | None) -> str:
+    """Text of a value of --seconds."""
     return "left out" if limit_s is None else f"{limit_s:g}"
 
 
-def _inputs_changed_error(out: Path, outdated: Sequence[_EarlierAnswer]) -> StudyError:
+def _make_inputs_changed_error(out: Path, outdated: Sequence[_EarlierAnswer]) -> StudyError:
     """The error that lists the changes of all outdated answers, and what to move away."""
-    texts = (f"{answer.place.relative_to(out) / ANSWER_NAME}: {', '.join(answer.changes)}." for answer in outdated)
-    places = [str(answer.place) for answer in outdated]
-    if (injected := out / INJECTED_NAME).exists():
-        places.append(f"{injected}, which was computed from them")
+    change_texts = (
+        f"{answer.folder.relative_to(out) / ANSWER_NAME}: {', '.join(answer.changes)}." for answer in outdated
+    )
+    paths_to_move = [str(answer.folder) for answer in outdated]
+    if (injected_folder := out / INJECTED_NAME).exists():
+        paths_to_move.append(f"{injected_folder}, which was computed from them")
     return StudyError(
         "Inputs of existing answers have changed",
-        " ".join(texts),
-        f"Choose another --out; or, to diagnose them again, move away {'; '.join(places)}.",
+        " ".join(change_texts),
+        f"Choose another --out; or, to diagnose them again, move away {'; '.join(paths_to_move)}.",
         saved="The existing answers are unchanged, and nothing was written.",
     )

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from analysis.diagnosis.real_answer.real_answer import RealAnswer
 from analysis.evaluation.blind_test.injected import InjectedOutcome
-from analysis.figures.diagnosis.real_held_out import real_picture
+from analysis.figures.diagnosis.real_held_out import make_real_picture
 from analysis.reports.real_report import Trouble, render_real_report
-from study.store.disk.csv_rows import rows_to_csv
+from study.store.disk.csv_rows import format_csv_table
 from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.provenance import gather_provenance
 from study.store.disk.text_file import write_text
@@ -86,9 +86,11 @@ def write_real(folder: Path, results: RealResults, generated: str) -> WrittenRea
     """Write page, tables and figures, replacing earlier ones. generated: time shown on the page. Raises
     CannotWriteError."""
     answers = results.answers
-    pictures = {(answer.folder, answer.recording): real_picture(answer) for answer in answers}
+    pictures = {(answer.folder, answer.recording): make_real_picture(answer) for answer in answers}
     write_pictures(folder / FIGURES_NAME, tuple(pictures.values()))
-    write_text(folder / TABLE_NAME, rows_to_csv([_make_row(answer) for answer in answers], RealRow), overwrite=True)
+    write_text(
+        folder / TABLE_NAME, format_csv_table([_make_row(answer) for answer in answers], RealRow), overwrite=True
+    )
     origin = gather_provenance()
     origin_texts = {
         "command": " ".join(origin.command),
@@ -97,7 +99,7 @@ def write_real(folder: Path, results: RealResults, generated: str) -> WrittenRea
     if results.injected:
         write_text(
             folder / INJECTED_NAME,
-            rows_to_csv([_make_injection_row(outcome) for outcome in results.injected], InjectedRow),
+            format_csv_table([_make_injection_row(outcome) for outcome in results.injected], InjectedRow),
             overwrite=True,
         )
     else:

@@ -10,7 +10,7 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.feedforward.periodic_inverse import periodic_command
 from equalizer.tracking.workspace.blended_inverse import blend_at
-from equalizer.tracking.workspace.modal_interpolation import modal_interpolation
+from equalizer.tracking.workspace.modal_interpolation import build_modal_interpolation
 from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 from equalizer.tracking.workspace.workspace_models import WorkspaceModels
@@ -107,7 +107,7 @@ def make_single_model_driver(model: IdentifiedModel) -> Driver:
 def _interpolate_modes(workspace: WorkspaceModels) -> tuple[dict[str, PlaybackRow], tuple[str, ...]]:
     """The row with modal interpolation, or a remark where the modes do not match."""
     try:
-        at_edge = modal_interpolation(workspace).at(EDGE)
+        at_edge = build_modal_interpolation(workspace).at(EDGE)
     except ModesDoNotMatchError as mismatch:
         return {}, (f"No modes were interpolated: {mismatch}.",)
     row = PlaybackRow("Edge, modes interpolated (ours)", make_blending_driver(at_edge), EDGE)

@@ -1,4 +1,5 @@
-"""Reproduce the published figures 1 to 5 on the simulated omega.3; recordings and models are cached."""
+"""Reproduce the published figures 1 to 5 on the simulated omega.3 (`hapteq reproduce`); recordings and models are
+cached."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -6,12 +7,12 @@ from pathlib import Path
 
 from analysis.evaluation.reproduction.document import UsedModel
 from analysis.evaluation.reproduction.measured_device import MeasuredDevice
-from analysis.psychophysics.ellipsoid import EllipsoidResult, ellipsoids, sensor_frame
+from analysis.psychophysics.ellipsoid import EllipsoidResult, compute_ellipsoids, read_sensor_frame
 from analysis.psychophysics.study_analysis import analyse_study
 from equalizer.identification.frequency_response.coupling_onset import coupling_onset
 from equalizer.identification.frequency_response.resonances import find_resonances
 from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError, estimate_transfer
-from equalizer.identification.state_space.held_out import HeldOut, validate_on_test
+from equalizer.identification.state_space.held_out_validation import HeldOutValidation, validate_on_test
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.recording import Recording
 from study.devices.opening import FRICTIONLESS
@@ -28,7 +29,7 @@ from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.protocol_files import read_study_protocol
 from study.workflows.equalizer.identify_model import IdentifyPlan, identify_model
 from study.workflows.results.collect_sessions import collect_sessions
-from study.workflows.results.collected import CollectedTrials
+from study.workflows.results.collected_trials import CollectedTrials
 from study.workflows.session.rehearse_study import Rehearsal, rehearse_study
 
 
@@ -38,7 +39,7 @@ class ReproducedModel:
 
     model: IdentifiedModel
     """Includes the spring, so that playback under the same spring needs no separate compensation."""
-    tested: HeldOut | None
+    tested: HeldOutValidation | None
 
     def as_used_model(self, name: str) -> UsedModel:
         """Summary for the report. name: of its recording."""
@@ -59,10 +60,12 @@ def identify_or_load(
         identify_plan = IdentifyPlan((cached.path,), path, plan.band_hz, plan.order, with_spring=True)
         model = identify_model(identify_plan, on_share).model
     on_share(1.0)
-    return ReproducedModel(model, validate_on_test(model, (from_excitation(cached.recording),)))
+    return ReproducedModel(model, validate_on_test(model, (use_excitation_as_command(cached.recording),)))
 
 
 def _load_cached_model(path: Path, plan: ReproductionPlan, source: Path) -> IdentifiedModel | None:
+    """The cached model, if it was identified from the recording `source` with the order and band of the plan and states
+    its quality; else None."""
     try:
         model = read_identified_model(path) if path.exists() else None
     except UnusableFileError:
@@ -73,7 +76,7 @@ def _load_cached_model(path: Path, plan: ReproductionPlan, source: Path) -> Iden
     return model if parents == [sha256_of(source)] else None
 
 
-def from_excitation(recording: Recording) -> Recording:
+def use_excitation_as_command(recording: Recording) -> Recording:
     """The recording from excitation to response, so that the spring is part of the device."""
     return replace(recording, command=recording.excitation or recording.command)
 
@@ -81,14 +84,15 @@ def from_excitation(recording: Recording) -> Recording:
 SUBJECT_S, RECORDING_S, MODEL_S, PLAYING_S, BASELINES_S, WRITING_S = 5.0, 2.0, 12.0, 8.0, 12.0, 8.0
 """Approximate duration of each step (s), for the progress only."""
 
-CENTRE_NAME, SLICK_NAME, HAND_NAME = "centre", "frictionless", "hand"
+CENTRE_NAME, FRICTIONLESS_NAME, HAND_NAME = "centre", "frictionless", "hand"
+"""Recordings at the centre, without friction and with a hand, and the models of them."""
 
 
 def reproduce_paper(plan: ReproductionPlan, on_progress: Callable[[float], None]) -> WrittenReproduction:
     """Make all figures. `on_progress(share)`, 0 to 1. Resumable after UserInterruptError. Raises StudyError."""
     requests = _list_requests(plan)
-    models = _model_names()
-    steps = Steps(_step_weights(plan, requests, models), on_progress)
+    model_names = _list_model_names()
+    steps = Steps(_estimate_step_durations_s(plan, requests, model_names), on_progress)
     saved = f"Sessions, recordings and models so far are in {plan.out}."
     with resumable("The reproduction is not finished.", saved, further_types=(UserInterruptError,)):
         _make_folders(plan)
@@ -98,13 +102,14 @@ def reproduce_paper(plan: ReproductionPlan, on_progress: Callable[[float], None]
         }
         collected = _rehearse_study(plan, steps)
         identified = {
-            name: identify_or_load(plan, recordings[name], steps.progress_of(f"model {name}")) for name in models
+            name: identify_or_load(plan, recordings[name], steps.progress_of(f"model {name}")) for name in model_names
         }
         results = _collect_results(plan, recordings, identified, collected, steps)
         return write_reproduction_folder(plan, results, steps.progress_of("writing"))
 
 
 def _list_requests(plan: ReproductionPlan) -> Mapping[str, RecordingRequest]:
+    """All recordings that the figures need, by name."""
     protocols = plan.protocols
     requests = (
         RecordingRequest("ellipsoid", protocols.ellipsoid),
@@ -112,29 +117,32 @@ def _list_requests(plan: ReproductionPlan) -> Mapping[str, RecordingRequest]:
         RecordingRequest(CENTRE_NAME, protocols.band),
         *(
             RecordingRequest(name, protocols.band, place)
-            for name, place in zip(_intermediate_names(), INTERMEDIATE_PLACES, strict=True)
+            for name, place in zip(_list_intermediate_names(), INTERMEDIATE_PLACES, strict=True)
         ),
-        RecordingRequest(SLICK_NAME, protocols.band, device=FRICTIONLESS),
+        RecordingRequest(FRICTIONLESS_NAME, protocols.band, device=FRICTIONLESS),
         RecordingRequest(HAND_NAME, protocols.hand),
     )
     return {request.name: request for request in requests}
 
 
-def _intermediate_names() -> tuple[str, ...]:
+def _list_intermediate_names() -> tuple[str, ...]:
+    """Names of the recordings at the intermediate places."""
     return tuple(f"between_{number}" for number in range(1, len(INTERMEDIATE_PLACES) + 1))
 
 
-def _model_names() -> tuple[str, ...]:
-    return (CENTRE_NAME, *_intermediate_names(), SLICK_NAME, HAND_NAME)
+def _list_model_names() -> tuple[str, ...]:
+    """Names of the recordings from which a model is identified."""
+    return (CENTRE_NAME, *_list_intermediate_names(), FRICTIONLESS_NAME, HAND_NAME)
 
 
-def _step_weights(
-    plan: ReproductionPlan, requests: Mapping[str, RecordingRequest], models: tuple[str, ...]
+def _estimate_step_durations_s(
+    plan: ReproductionPlan, requests: Mapping[str, RecordingRequest], model_names: tuple[str, ...]
 ) -> dict[str, float]:
+    """Approximate duration (s) by step, for the progress."""
     return {
         **{f"recording {name}": RECORDING_S for name in requests},
         "study": SUBJECT_S * plan.subjects / plan.workers,
-        **{f"model {name}": MODEL_S for name in models},
+        **{f"model {name}": MODEL_S for name in model_names},
         "playing": PLAYING_S,
         "baselines": BASELINES_S,
         "writing": WRITING_S,
@@ -142,6 +150,7 @@ def _step_weights(
 
 
 def _make_folders(plan: ReproductionPlan) -> None:
+    """Make the folders of sessions, recordings and models. Raises CannotWriteError."""
     for folder in (plan.study, plan.recordings, plan.models):
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -150,10 +159,11 @@ def _make_folders(plan: ReproductionPlan) -> None:
 
 
 def _rehearse_study(plan: ReproductionPlan, steps: Steps) -> CollectedTrials:
+    """Run the study with simulated participants, and collect its trials."""
     source = read_study_protocol(plan.protocols.study, plan.study)
     rehearsal = Rehearsal(source.protocol, source.text, subjects=plan.subjects, seed=plan.seed, data=plan.study)
-    report = steps.progress_of("study")
-    rehearse_study(rehearsal, plan.workers, lambda done: report(done / plan.subjects))
+    report_share = steps.progress_of("study")
+    rehearse_study(rehearsal, plan.workers, lambda subjects_done: report_share(subjects_done / plan.subjects))
     return collect_sessions(plan.study, source.protocol.name)
 
 
@@ -164,17 +174,18 @@ def _collect_results(
     collected: CollectedTrials,
     steps: Steps,
 ) -> Results:
+    """Compute all figures. Raises StudyError where a recording does not suffice for its figure."""
     models = PlacedModels(
         centre=identified[CENTRE_NAME].model,
-        intermediate=tuple(identified[name].model for name in _intermediate_names()),
-        frictionless=identified[SLICK_NAME].model,
+        intermediate=tuple(identified[name].model for name in _list_intermediate_names()),
+        frictionless=identified[FRICTIONLESS_NAME].model,
         hand=identified[HAND_NAME].model,
     )
-    centre = recordings[CENTRE_NAME].recording
+    centre_recording = recordings[CENTRE_NAME].recording
     try:
         device = _measure_device(recordings["sweep"].recording)
         ellipsoid_results = _measure_ellipsoids(recordings["ellipsoid"].recording)
-        estimate = estimate_transfer((from_excitation(centre),))
+        estimate = estimate_transfer((use_excitation_as_command(centre_recording),))
     except (TransferEstimateError, ValueError) as problem:
         raise StudyError(
             "The recordings do not carry the figures",
@@ -186,12 +197,12 @@ def _collect_results(
         study=analyse_study(collected.trials, collected.protocol),
         ellipsoids=ellipsoid_results,
         device=device,
-        device_name=centre.device,
+        device_name=centre_recording.device,
         played=play_equalized(plan, models, steps.progress_of("playing")),
         baselines=play_baselines(plan, models, estimate, steps.progress_of("baselines")),
         models=tuple(reproduced.as_used_model(name) for name, reproduced in identified.items()),
         tested=identified[CENTRE_NAME].tested,
-        tested_frictionless=identified[SLICK_NAME].tested,
+        tested_frictionless=identified[FRICTIONLESS_NAME].tested,
         remarks=tuple(f"{name}: {warning}" for name, recording in recordings.items() for warning in recording.warnings),
         sources=tuple(recording.path for recording in recordings.values()),
         protocol_hash=collected.protocol_hash,
@@ -199,9 +210,11 @@ def _collect_results(
 
 
 def _measure_device(recording: Recording) -> MeasuredDevice:
+    """Frequency response of the sweep, its resonances and the onset of coupling."""
     response = estimate_transfer((recording,))
     return MeasuredDevice(response, find_resonances(response), coupling_onset(response))
 
 
 def _measure_ellipsoids(recording: Recording) -> tuple[EllipsoidResult, ...]:
-    return ellipsoids(recording, sensor_frame(recording))
+    """Acceleration ellipsoid of each stimulus of the recording."""
+    return compute_ellipsoids(recording, read_sensor_frame(recording))

@@ -8,7 +8,7 @@ from analysis.evaluation.reproduction.measured_device import MeasuredDevice
 from analysis.evaluation.reproduction.played_response import PlayedResponse
 from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.psychophysics.study_analysis import StudyAnalysis
-from equalizer.identification.state_space.held_out import HeldOut
+from equalizer.identification.state_space.held_out_validation import HeldOutValidation
 from study.evaluation.reproduction.reproduce_equalized import EqualizedPlayback
 
 
@@ -29,9 +29,9 @@ class Results:
     """Playback by other methods, for comparison."""
     models: tuple[UsedModel, ...]
     """Models that the equalizer used."""
-    tested: HeldOut | None
+    tested: HeldOutValidation | None
     """Held-out test of the model identified at the centre of the workspace; None where it was not tested."""
-    tested_frictionless: HeldOut | None
+    tested_frictionless: HeldOutValidation | None
     """The same for the device without friction."""
     remarks: tuple[str, ...]
     """Remarks on recordings and models, as sentences."""

@@ -9,7 +9,7 @@ from analysis.evaluation.reproduction.ellipsoid_findings import ellipsoid_findin
 from analysis.evaluation.reproduction.equalized_findings import make_equalized_findings
 from analysis.evaluation.reproduction.played_response import describe_played
 from analysis.evaluation.reproduction.response_findings import make_band_findings, make_response_findings
-from analysis.evaluation.reproduction.study_findings import direction_limit_hz, study_findings
+from analysis.evaluation.reproduction.study_findings import find_direction_limit, make_study_findings
 from analysis.figures.reproduction_pictures import reproduction_pictures
 from analysis.reports.reproduction_report import overview_lines, render_reproduction_report
 from equalizer.identification.frequency_response.frequency_bands import (
@@ -45,7 +45,7 @@ def write_reproduction_folder(
 ) -> WrittenReproduction:
     """Write figures, document and page, replacing those of an earlier run. on_share: called with the fraction done, 0
     to 1. Raises CannotWriteError."""
-    limit_hz = direction_limit_hz(results.study)
+    limit_hz = find_direction_limit(results.study)
     # Where the thresholds give no limit of direction, the published one separates the bands.
     used_limit_hz = PUBLISHED_DIRECTION_LIMIT_HZ if limit_hz is None else limit_hz
     bands = frequency_bands(results.device.onset.frequency_hz, used_limit_hz)
@@ -85,7 +85,7 @@ def _make_document(
         order=plan.order,
         figures=(
             make_band_findings(bands, limit_hz, used_limit_hz),
-            study_findings(results.study),
+            make_study_findings(results.study),
             ellipsoid_findings(results.ellipsoids),
             make_response_findings(results.device.response, results.device.resonances, results.device.onset),
             _equalization_findings(results),

@@ -1,4 +1,4 @@
-"""Read arrays from JSON files.
+"""Read arrays from JSON files; called by `study.importing.arrays.arrays`.
 
 Three forms are read: records (`[{"t": 0, "u": 1}, ...]`), columns (`{"t": [...], "u": [...]}`), and JSON Lines (a
 record per line). Arrays inside an object have its name as prefix (`run1/u`), unless it is the only object with arrays.
@@ -14,21 +14,21 @@ import numpy.typing as npt
 
 from study.importing.arrays.csv_arrays import MOST_COLUMNS
 from study.importing.arrays.table_cells import is_empty, is_number
-from study.importing.arrays.table_layout import with_units
+from study.importing.arrays.table_layout import append_units
 from study.regular_file import open_regular, read_regular
 from study.store.disk.strict_json import load_json
 
 Array = npt.NDArray[Any]
-JSON_BYTES = 2**26
+MAX_JSON_BYTES = 2**26
 """Largest JSON file in bytes: parsed, it takes about twenty times as much memory."""
-_MOST_OBJECTS, _MOST_VALUES = 2**21, 2**24
+_MAX_OBJECTS, _MAX_VALUES = 2**21, 2**24
 """Most objects and lists of a file, each of which takes hundreds of bytes of memory, and most values of it."""
 _OWN_PREFIX = "hapteq"
 """Beginning of the names of hapteq's own formats."""
-_OWN_FORMAT = re.compile(rb'"format"\s*:\s*"hapteq')
+_OWN_FORMAT_PATTERN = re.compile(rb'"format"\s*:\s*"hapteq')
 """Bytes in which a document declares one of these formats."""
 _SEARCHED_BYTES = 4096
-"""Bytes at the start of a file that are searched for `_OWN_FORMAT`."""
+"""Bytes at the start of a file that are searched for `_OWN_FORMAT_PATTERN`."""
 _UNIT_KEYS = ("unit", "units")
 """Keys that state the unit of the values in the same object."""
 _VALUE_KEYS = ("values", "value", "data", "samples")
@@ -38,7 +38,7 @@ _VALUE_KEYS = ("values", "value", "data", "samples")
 def read_json_arrays(path: Path) -> dict[str, Array]:
     """Arrays of a JSON file by name. Raises OSError; ValueError with the problem."""
     try:
-        text = read_regular(path, JSON_BYTES).decode("utf-8-sig")
+        text = read_regular(path, MAX_JSON_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as problem:
         raise ValueError(f"it is no UTF-8 text (byte {problem.start}), as JSON is; save it as UTF-8") from problem
     document = _parse(text)
@@ -56,14 +56,14 @@ def read_json_arrays(path: Path) -> dict[str, Array]:
 def is_own_document(path: Path) -> bool:
     """Whether the beginning of a JSON file declares one of our own formats."""
     with open_regular(path) as file:
-        return _OWN_FORMAT.search(file.read(_SEARCHED_BYTES)) is not None
+        return _OWN_FORMAT_PATTERN.search(file.read(_SEARCHED_BYTES)) is not None
 
 
 def _parse(text: str) -> Any:
     """The document of a JSON text, or the records of JSON Lines. Raises ValueError for another text, or too much
     content."""
-    if text.count("{") + text.count("[") > _MOST_OBJECTS or text.count(",") > _MOST_VALUES:
-        raise ValueError(f"it has more than {_MOST_OBJECTS} records or {_MOST_VALUES} values; save it as .csv or .npz")
+    if text.count("{") + text.count("[") > _MAX_OBJECTS or text.count(",") > _MAX_VALUES:
+        raise ValueError(f"it has more than {_MAX_OBJECTS} records or {_MAX_VALUES} values; save it as .csv or .npz")
     try:
         return load_json(text, with_nan=True)
     except ValueError as json_error:
@@ -89,10 +89,10 @@ def _parse_record(number: int, line: str) -> Any:
 
 
 def _find_arrays(value: Any, key_path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
-    """Arrays by the path of keys that leads to them."""
+    """Arrays in a JSON value, each with the path of keys that leads to it; a value outside any object is `data`."""
     match value:
         case dict():
-            yield from _arrays_of_object(value, key_path)
+            yield from _find_arrays_in_object(value, key_path)
         case []:
             return
         case [dict(), *_] if all(isinstance(record, dict) for record in value):
@@ -101,23 +101,26 @@ def _find_arrays(value: Any, key_path: tuple[str, ...]) -> Iterator[tuple[tuple[
             yield key_path or ("data",), _make_array(value)
 
 
-def _arrays_of_object(value: Mapping[str, Any], key_path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
-    """Arrays of an object. `{"unit": "N", "values": [...]}` is one array, with the unit in brackets behind its name."""
+def _find_arrays_in_object(
+    value: Mapping[str, Any], key_path: tuple[str, ...]
+) -> Iterator[tuple[tuple[str, ...], Array]]:
+    """Arrays of an object, each with its path of keys. `{"unit": "N", "values": [...]}` is one array, with the unit in
+    brackets behind its name."""
     units = [value[key] for key in _UNIT_KEYS if isinstance(value.get(key), str)]
-    lists = [key for key, entry in value.items() if isinstance(entry, list)]
-    values = lists[0] if len(lists) == 1 else next((key for key in _VALUE_KEYS if key in lists), "")
-    if key_path and len(units) == 1 and values:
+    list_keys = [key for key, entry in value.items() if isinstance(entry, list)]
+    values_key = list_keys[0] if len(list_keys) == 1 else next((key for key in _VALUE_KEYS if key in list_keys), "")
+    if key_path and len(units) == 1 and values_key:
         for key, entry in value.items():
-            if key == values:
-                yield (*key_path[:-1], with_units([key_path[-1]], units)[0]), _make_array(entry)
+            if key == values_key:
+                yield (*key_path[:-1], append_units([key_path[-1]], units)[0]), _make_array(entry)
             elif key not in _UNIT_KEYS:
-                yield from _arrays_beside_values(entry, (*key_path, key))
+                yield from _make_sibling_placeholder(entry, (*key_path, key))
         return
     for key, entry in value.items():
         yield from _find_arrays(entry, (*key_path, key))
 
 
-def _arrays_beside_values(entry: Any, key_path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
+def _make_sibling_placeholder(entry: Any, key_path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Array]]:
     """Placeholder for an entry in the same object as values and their unit, such as a description. Raises ValueError
     unless the entry is a text or null: a number, such as a scale, may change the values."""
     if entry is not None and (not isinstance(entry, str) or is_number(entry.strip(), ".")):
@@ -132,13 +135,13 @@ def _arrays_beside_values(entry: Any, key_path: tuple[str, ...]) -> Iterator[tup
 def _collect_columns(records: list[dict[str, Any]]) -> dict[str, list[Any]]:
     """One column for each key of any record, None where a record lacks it; objects inside a record are read one level
     deep, as `imu.x`. Raises ValueError with too many keys or values."""
-    flat = [dict(_flatten_record(record)) for record in records]
-    keys = dict.fromkeys(key for record in flat for key in record)
-    if len(keys) > MOST_COLUMNS or len(keys) * len(flat) > _MOST_VALUES:
+    rows = [dict(_flatten_record(record)) for record in records]
+    keys = dict.fromkeys(key for record in rows for key in record)
+    if len(keys) > MOST_COLUMNS or len(keys) * len(rows) > _MAX_VALUES:
         raise ValueError(
-            f"its {len(flat)} records have {len(keys)} keys; up to {MOST_COLUMNS} are read, and {_MOST_VALUES} values"
+            f"its {len(rows)} records have {len(keys)} keys; up to {MOST_COLUMNS} are read, and {_MAX_VALUES} values"
         )
-    return {key: [record.get(key) for record in flat] for key in keys}
+    return {key: [record.get(key) for record in rows] for key in keys}
 
 
 def _flatten_record(record: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
@@ -155,7 +158,7 @@ def _make_array(value: Any) -> Array:
     number; a placeholder where there is no rectangular array of numbers."""
     if isinstance(value, list) and value and all(_is_scalar(entry) for entry in value):
         if all(isinstance(entry, str) or entry is None for entry in value):
-            return _array_of_texts(["" if entry is None else entry.strip() for entry in value])
+            return _convert_texts(["" if entry is None else entry.strip() for entry in value])
         if all(not isinstance(entry, str) or is_empty(entry) for entry in value):
             return np.array([np.nan if entry is None or isinstance(entry, str) else float(entry) for entry in value])
         return np.array([str(entry) for entry in value])
@@ -166,12 +169,13 @@ def _make_array(value: Any) -> Array:
     return array if array.dtype.kind in "fiub" else np.array(None, dtype=object)
 
 
-def _array_of_texts(texts: list[str]) -> Array:
-    """Numbers if each text is a number or missing; otherwise the texts."""
+def _convert_texts(texts: list[str]) -> Array:
+    """Array of numbers (NaN where missing) if each text is a number or missing; otherwise of the texts."""
     if all(is_number(text, ".") for text in texts):
         return np.array([np.nan if is_empty(text) else float(text) for text in texts])
     return np.array(texts)
 
 
 def _is_scalar(entry: Any) -> bool:
+    """Whether a JSON value is neither a list nor an object."""
     return entry is None or isinstance(entry, bool | int | float | str)

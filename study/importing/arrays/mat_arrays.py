@@ -1,4 +1,4 @@
-"""Read arrays from MAT files of version 5 (Matlab's -v6 and -v7).
+"""Read arrays from MAT files of version 5 (Matlab's -v6 and -v7); called by `study.importing.arrays.arrays`.
 
 They are read in Python, not by a C library, so that declared sizes and nesting are checked against the file before
 memory is allocated. Real numeric arrays, structures, and cells of similar arrays are read; texts, objects, functions
@@ -19,7 +19,7 @@ from study.regular_file import read_regular
 from study.store.disk.declared_size import SizeLimit
 
 Array = npt.NDArray[Any]
-MOST_MAT_BYTES = 2**32
+MAX_MAT_BYTES = 2**32
 """Largest file that is read (4 GiB)."""
 MAX_STRUCTURE_DEPTH = 32
 """Deepest nesting of structures."""
@@ -31,9 +31,9 @@ _CELL, _STRUCT, _OBJECT, _TEXT, _FIRST_NUMBER, _LAST_NUMBER, _OPAQUE = 1, 2, 3, 
 """Array classes of the MAT-file format (mxCELL_CLASS and so on)."""
 _COMPLEX = 0x0800
 """Flag of an array with an imaginary part."""
-_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+_NUMBER_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 """NumPy type of the numbers of a data element, by its data type in the MAT-file format."""
-_CLASSES = {
+_CLASS_NUMBER_TYPES = {
     6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8",
 }  # fmt: skip
 """NumPy type of a numeric array, by its array class in the MAT-file format."""
@@ -47,25 +47,25 @@ _CONVERSIONS = {
 """Matlab statement that makes a readable array of one that is not read, by a part of its description."""
 
 
-def conversion_advice(name: str, kind: str) -> str:
-    """Matlab statement that converts an array of this kind before saving, as advice; empty where none is known. kind:
-    its kind."""
-    for problem, statement in _CONVERSIONS.items():
-        if problem in kind:
+def suggest_conversion(name: str, kind: str) -> str:
+    """Advice with the Matlab statement that converts an array before it is saved; empty where none is known. kind: the
+    description of its kind, from `unread_reason`."""
+    for pattern, statement in _CONVERSIONS.items():
+        if pattern in kind:
             return f"in Matlab: {statement.format(name=name, plain=name.replace('.', '_'))}"
     return ""
 
 
-OF_CELL = re.compile(r"\d+-of-\d+/")
+CELL_ENTRY_PREFIX = re.compile(r"\d+-of-\d+/")
 """Prefix of the name of an array that was an entry of a cell."""
 
 
-class _Cells(tuple[Array, ...]):
-    """Similar arrays of a cell, each of which is taken as a run."""
+class _CellArrays(tuple[Array, ...]):
+    """Similar arrays of a MATLAB cell array, each of which is read as a run of its own."""
 
 
-class _Bytes:
-    """A data element of the file, read from `position` onwards, with the byte order of the file."""
+class _ElementReader:
+    """Sequential reader of data elements, from `position` onwards. order: byte order of the file, `<` or `>`."""
 
     def __init__(self, content: memoryview, order: str) -> None:
         self.content = content
@@ -77,81 +77,83 @@ class _Bytes:
         """Number of bytes that are not read yet."""
         return len(self.content) - self.position
 
-    def element(self) -> "tuple[int, _Bytes]":
-        """Data type and content of the next element; `position` moves to its end. Raises ValueError if it is longer
-        than the rest of the file."""
+    def read_element(self) -> "tuple[int, _ElementReader]":
+        """Read data type and content of the next element; `position` moves to its end. Raises ValueError if it is
+        longer than the rest of the file."""
         if self.remaining < 8:
             raise ValueError("it is cut off")
-        kind, size = struct.unpack_from(self.order + "II", self.content, self.position)
-        start, padded = self.position + 8, True
-        if kind >> 16:  # data of up to four bytes are stored in the tag itself
-            kind, size, start = kind & 0xFFFF, kind >> 16, self.position + 4
-            padded = False
-        if size > (4 if not padded else self.remaining - 8):
+        data_type, size = struct.unpack_from(self.order + "II", self.content, self.position)
+        start, is_padded = self.position + 8, True
+        if data_type >> 16:  # data of up to four bytes are stored in the tag itself
+            data_type, size, start = data_type & 0xFFFF, data_type >> 16, self.position + 4
+            is_padded = False
+        if size > (4 if not is_padded else self.remaining - 8):
             raise ValueError(f"an element of {size} bytes is longer than the rest of the file")
-        self.position = self.position + 8 if not padded else start + size
-        if padded and kind != _COMPRESSED:
+        self.position = self.position + 8 if not is_padded else start + size
+        if is_padded and data_type != _COMPRESSED:
             self.position = min(start + -(-size // 8) * 8, len(self.content))
-        return kind, _Bytes(self.content[start : start + size], self.order)
+        return data_type, _ElementReader(self.content[start : start + size], self.order)
 
-    def numbers(self) -> Array:
+    def read_numbers(self) -> Array:
         """Numbers of the next element. Raises ValueError if it is of another data type."""
-        kind, element = self.element()
-        if kind not in _TYPES:
-            raise ValueError(f"an element of the type {kind} is found where numbers are needed")
-        return np.frombuffer(element.content, np.dtype(self.order + _TYPES[kind]))
+        data_type, element = self.read_element()
+        if data_type not in _NUMBER_TYPES:
+            raise ValueError(f"an element of the type {data_type} is found where numbers are needed")
+        return np.frombuffer(element.content, np.dtype(self.order + _NUMBER_TYPES[data_type]))
 
 
 def read_mat5_arrays(path: Path) -> dict[str, Array]:
     """Arrays by name: fields of structures as `data.u`, entries of a cell as `2-of-6/u`. Raises ValueError, OSError."""
-    content = read_regular(path, MOST_MAT_BYTES)
+    content = read_regular(path, MAX_MAT_BYTES)
     if len(content) < _HEADER_BYTES or content[126:128] not in (b"IM", b"MI"):
         raise ValueError("it is no MAT file of version 5 to 7.3; save it in Matlab with -v7")
     limit = SizeLimit(len(content))
-    file = _Bytes(memoryview(content)[_HEADER_BYTES:], "<" if content[126:128] == b"IM" else ">")
+    reader = _ElementReader(memoryview(content)[_HEADER_BYTES:], "<" if content[126:128] == b"IM" else ">")
     arrays: dict[str, Array] = {}
-    while file.remaining >= 8:
-        kind, element = file.element()
-        if kind == _COMPRESSED:
-            kind, element = _decompress(element, limit).element()
-        if kind == _MATRIX:
+    while reader.remaining >= 8:
+        data_type, element = reader.read_element()
+        if data_type == _COMPRESSED:
+            data_type, element = _decompress(element, limit).read_element()
+        if data_type == _MATRIX:
             name, value = _read_matrix(element, 0)
             if name and not name.startswith("__"):  # the contents of objects have no name
                 _add_arrays(arrays, name, value)
     return arrays
 
 
-def _decompress(compressed: _Bytes, limit: SizeLimit) -> _Bytes:
+def _decompress(compressed: _ElementReader, limit: SizeLimit) -> _ElementReader:
     """Decompress a variable. Raises DeclaredSizeError where it is larger than the limit."""
-    unpacker = zlib.decompressobj()
-    content = unpacker.decompress(compressed.content, limit.most_bytes)
-    if unpacker.unconsumed_tail:
+    decompressor = zlib.decompressobj()
+    content = decompressor.decompress(compressed.content, limit.most_bytes)
+    if decompressor.unconsumed_tail:
         limit.add_size("a compressed variable", limit.most_bytes + 1)
     limit.add_size("a compressed variable", len(content))
-    return _Bytes(memoryview(content), compressed.order)
+    return _ElementReader(memoryview(content), compressed.order)
 
 
-def _read_matrix(element: _Bytes, depth: int) -> tuple[str, Any]:
+def _read_matrix(element: _ElementReader, depth: int) -> tuple[str, Any]:
     """Name and value of a miMATRIX element: an array, a dict of arrays for a structure, or the arrays of a cell. depth:
-    its level of nesting. Raises ValueError where it is damaged or too deep."""
+    level of nesting, 0 for a variable. Raises ValueError where it is damaged or too deep."""
     if depth > MAX_STRUCTURE_DEPTH:
         raise ValueError(f"its structures are nested more than {MAX_STRUCTURE_DEPTH} levels deep")
     if not element.remaining:
         return "", np.empty(0)
-    flags = int(element.numbers()[0])
-    code = flags & 0xFF
-    if code == _OPAQUE:
-        name, _, kind = (bytes(element.element()[1].content).decode("utf-8", "replace") for _ in range(3))
-        return name, _make_placeholder(f"an object of the class {kind}")
-    shape = tuple(int(length) for length in element.numbers())
-    name = bytes(element.element()[1].content).decode("utf-8", "replace")
-    if _FIRST_NUMBER <= code <= _LAST_NUMBER:
-        return name, np.array(0j) if flags & _COMPLEX else _read_numeric(element, shape, _CLASSES[code])
-    if code == _STRUCT:
+    flags = int(element.read_numbers()[0])
+    array_class = flags & 0xFF
+    if array_class == _OPAQUE:
+        name, _, class_name = (bytes(element.read_element()[1].content).decode("utf-8", "replace") for _ in range(3))
+        return name, _make_placeholder(f"an object of the class {class_name}")
+    shape = tuple(int(length) for length in element.read_numbers())
+    name = bytes(element.read_element()[1].content).decode("utf-8", "replace")
+    if _FIRST_NUMBER <= array_class <= _LAST_NUMBER:
+        return name, np.array(0j) if flags & _COMPLEX else _read_numeric(
+            element, shape, _CLASS_NUMBER_TYPES[array_class]
+        )
+    if array_class == _STRUCT:
         return name, _read_structures(element, math.prod(shape), depth)
-    if code == _CELL:
+    if array_class == _CELL:
         return name, _read_cells(element, math.prod(shape), depth)
-    return name, _make_placeholder(_UNREAD_CLASSES.get(code, "no array"))
+    return name, _make_placeholder(_UNREAD_CLASSES.get(array_class, "no array"))
 
 
 def _make_placeholder(kind: str) -> Array:
@@ -159,32 +161,34 @@ def _make_placeholder(kind: str) -> Array:
     return np.array(kind, dtype=object)
 
 
-def _read_numeric(element: _Bytes, shape: tuple[int, ...], number: str) -> Array:
+def _read_numeric(element: _ElementReader, shape: tuple[int, ...], number_type: str) -> Array:
     """A numeric array; Matlab stores columns first. Raises ValueError where its shape and its numbers do not agree."""
-    values = element.numbers()
+    values = element.read_numbers()
     if math.prod(shape) != len(values) or min(shape, default=0) < 0:
         raise ValueError(f"an array of the shape {shape} has {len(values)} numbers")
-    return values.astype(number).reshape(shape, order="F")
+    return values.astype(number_type).reshape(shape, order="F")
 
 
-def _read_structures(element: _Bytes, count: int, depth: int) -> dict[str, Any]:
+def _read_structures(element: _ElementReader, count: int, depth: int) -> dict[str, Any]:
     """Fields of a structure by name; for an array of structures, those of each under its number, as in `signals.2`.
     Raises ValueError where it is damaged."""
-    length = int(element.numbers()[0])
-    names = bytes(element.element()[1].content)
-    if length < 1 or len(names) % length:
+    name_length = int(element.read_numbers()[0])
+    name_bytes = bytes(element.read_element()[1].content)
+    if name_length < 1 or len(name_bytes) % name_length:
         raise ValueError("the names of a structure's fields are damaged")
-    words = [
-        names[offset : offset + length].split(b"\0")[0].decode("utf-8", "replace")
-        for offset in range(0, len(names), length)
+    field_names = [
+        name_bytes[offset : offset + name_length].split(b"\0")[0].decode("utf-8", "replace")
+        for offset in range(0, len(name_bytes), name_length)
     ]
-    if count * len(words) * 8 > element.remaining:
-        raise ValueError(f"{count} structures of {len(words)} fields are longer than the rest of the file")
-    structures = [{word: _read_field(element, word, depth) for word in words} for _ in range(count)]
+    if count * len(field_names) * 8 > element.remaining:
+        raise ValueError(f"{count} structures of {len(field_names)} fields are longer than the rest of the file")
+    structures = [
+        {field_name: _read_field(element, field_name, depth) for field_name in field_names} for _ in range(count)
+    ]
     return structures[0] if count == 1 else {str(number): fields for number, fields in enumerate(structures, start=1)}
 
 
-def _read_cells(element: _Bytes, count: int, depth: int) -> Any:
+def _read_cells(element: _ElementReader, count: int, depth: int) -> Any:
     """Arrays of a cell, if all hold numbers and have the same number of dimensions and the same shorter side; otherwise
     a placeholder. Raises ValueError where it is damaged."""
     if count * 8 > element.remaining:
@@ -199,14 +203,14 @@ def _read_cells(element: _Bytes, count: int, depth: int) -> Any:
         > 1
     ):
         return _make_placeholder("a cell of arrays that are not alike")
-    return _Cells(arrays)
+    return _CellArrays(arrays)
 
 
-def _read_field(element: _Bytes, word: str, depth: int) -> Any:
+def _read_field(element: _ElementReader, field_name: str, depth: int) -> Any:
     """Value of the next field or entry. word: its name, for messages."""
-    kind, nested = element.element()
-    if kind != _MATRIX:
-        raise ValueError(f"the field '{word}' of a structure or cell is damaged")
+    data_type, nested = element.read_element()
+    if data_type != _MATRIX:
+        raise ValueError(f"the field '{field_name}' of a structure or cell is damaged")
     return _read_matrix(nested, depth + 1)[1]
 
 
@@ -215,9 +219,9 @@ def _add_arrays(arrays: dict[str, Array], name: str, value: Any) -> None:
     if isinstance(value, dict):
         for field, nested in value.items():
             _add_arrays(arrays, f"{name}.{field}", nested)
-    elif isinstance(value, _Cells) and len(value) > 1:
+    elif isinstance(value, _CellArrays) and len(value) > 1:
         arrays.update({f"{number}-of-{len(value)}/{name}": array for number, array in enumerate(value, start=1)})
-    elif isinstance(value, _Cells):
+    elif isinstance(value, _CellArrays):
         arrays[name] = value[0]
     else:
         arrays[name] = value

@@ -4,7 +4,7 @@ import csv
 import re
 from collections.abc import Collection, Sequence
 
-from equalizer.signals.units import UnknownUnitError, parse_unit, plain_unit
+from equalizer.signals.units import UnknownUnitError, normalise_unit, parse_unit
 from study.importing.arrays.time_stamps import is_stamp
 
 Line = tuple[int, str]
@@ -85,7 +85,7 @@ def is_text(field: str) -> bool:
 def is_unit(text: str) -> bool:
     """Whether a field is a unit in a known spelling."""
     try:
-        parse_unit(plain_unit(text))
+        parse_unit(normalise_unit(text))
     except UnknownUnitError:
         return False
     return True

@@ -1,7 +1,7 @@
 """Detect the layout of a table: delimiter, decimal sign, header, row of units, and rows of numbers.
 
 The rows of numbers are found first, because every table has them. The row above them is the header, or a row of units
-with the header above it; rows further up are remarks.
+with the header above it; rows further up are remarks. Called by `csv_arrays`.
 """
 
 import re
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, takewhile
 
-from equalizer.signals.units import parse_unit, plain_unit
+from equalizer.signals.units import normalise_unit, parse_unit
 from study.importing.arrays.table_cells import (
     COMMENTS,
     EMPTY,
@@ -45,9 +45,11 @@ class TableLayout:
     names: tuple[str, ...]
     """Column names, with the unit in brackets where a row of units states it."""
     body: Sequence[Line]
+    """Rows of data, each with its number in the file."""
     texts: frozenset[int] = frozenset()
     """Indices of the columns of words."""
     notes: tuple[str, ...] = ()
+    """Sentences about lines that were left out."""
 
 
 def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
@@ -60,67 +62,69 @@ def find_layout(lines: Sequence[Line], settings: CsvMap) -> TableLayout:
     marks = find_marks(rows, settings)
     first_row = first_numbers(rows, marks.delimiter, marks.decimal, marks.texts)
     if first_row is None:
-        return _with_given_names(rows, first_row, marks, settings)
-    kept_rows, notes = _without_remarks_below(rows, first_row, marks)
-    rows_above = _rows_above(lines, kept_rows, first_row, marks.delimiter)
-    faulty_count = _count_faulty(kept_rows[:first_row], len(split_row(kept_rows[first_row][1], marks.delimiter)), marks)
+        return _make_named_layout(rows, first_row, marks, settings)
+    kept_rows, notes = _drop_trailing_remarks(rows, first_row, marks)
+    header_fields = _collect_header_rows(lines, kept_rows, first_row, marks.delimiter)
+    faulty_count = _count_faulty_rows(
+        kept_rows[:first_row], len(split_row(kept_rows[first_row][1], marks.delimiter)), marks
+    )
     min_columns = max(
-        [len(settings.names), *map(count_filled_fields, rows_above[: len(rows_above) - faulty_count][-2:])]
+        [len(settings.names), *map(count_filled_fields, header_fields[: len(header_fields) - faulty_count][-2:])]
     )
     rows = [
         *kept_rows[: first_row - faulty_count],
-        *_without_empty_ends(kept_rows[first_row - faulty_count :], marks.delimiter, min_columns),
+        *_strip_empty_ends(kept_rows[first_row - faulty_count :], marks.delimiter, min_columns),
     ]
     if settings.names:
-        return replace(_with_given_names(rows, first_row, marks, settings), notes=notes)
+        return replace(_make_named_layout(rows, first_row, marks, settings), notes=notes)
     fields = split_row(rows[first_row][1], marks.delimiter)
-    width = len(fields)
-    header_rows = [_fit_header(row, fields, marks.delimiter) for row in rows_above]
-    header, units = _header_and_units(header_rows, width, marks.decimal)
+    column_count = len(fields)
+    fitted_headers = [_fit_header(row, fields, marks.delimiter) for row in header_fields]
+    header, units = _split_header_and_units(fitted_headers, column_count, marks.decimal)
     if header is None and faulty_count:
-        header, units = _header_and_units(header_rows[:-faulty_count], width, marks.decimal)
+        header, units = _split_header_and_units(fitted_headers[:-faulty_count], column_count, marks.decimal)
         first_row -= 0 if header is None else faulty_count
     if header is not None:
-        names = with_units(_name_columns(header), units)
+        names = append_units(_name_columns(header), units)
     elif first_row == 0 or (
-        len(rows_above[-1]) == 1 < width and all(len(row) != width for row in rows_above)
+        len(header_fields[-1]) == 1 < column_count and all(len(row) != column_count for row in header_fields)
     ):  # remarks
-        names = [f"column{k + 1}" for k in range(width)]
+        names = [f"column{k + 1}" for k in range(column_count)]
     else:
-        first_row = _first_header(rows[:first_row], width, marks) + 1
+        first_row = _find_header_row(rows[:first_row], column_count, marks) + 1
         names = _name_columns(split_row(rows[first_row - 1][1], marks.delimiter))
     return TableLayout(marks.delimiter, marks.decimal, tuple(names), rows[first_row:], marks.texts, notes)
 
 
-def _with_given_names(rows: Sequence[Line], first_row: int | None, marks: TableMarks, settings: CsvMap) -> TableLayout:
+def _make_named_layout(rows: Sequence[Line], first_row: int | None, marks: TableMarks, settings: CsvMap) -> TableLayout:
     """Layout of a table whose map names its columns, or that has no row of numbers. In the latter case the header is
     the first row as wide as the last."""
     width = len(split_row(rows[-1][1], marks.delimiter))
     wide_rows = [index for index, (_, text) in enumerate(rows) if len(split_row(text, marks.delimiter)) == width]
     rows = rows[0 if settings.names else wide_rows[0] :]
-    first = split_row(rows[0][1], marks.delimiter)
-    names = settings.names or tuple(_name_columns(first))
+    first_fields = split_row(rows[0][1], marks.delimiter)
+    names = settings.names or tuple(_name_columns(first_fields))
     if first_row is None or any(
         holds_number(split_row(text, marks.delimiter), marks.decimal) for _, text in rows[:first_row]
     ):
-        first_row = 0 if all(is_number(field, marks.decimal) for field in first) else 1
+        first_row = 0 if all(is_number(field, marks.decimal) for field in first_fields) else 1
     return TableLayout(marks.delimiter, marks.decimal, names, rows[first_row:], marks.texts)
 
 
-def _without_empty_ends(body: Sequence[Line], delimiter: str, min_columns: int) -> Sequence[Line]:
+def _strip_empty_ends(body: Sequence[Line], delimiter: str, min_columns: int) -> Sequence[Line]:
     """The rows without the delimiters with which every row ends, as long as at least `min_columns` columns remain."""
     if delimiter == " ":
         return body
-    surplus = len(split_row(body[0][1], delimiter)) - max(min_columns, 1)
+    surplus_delimiters = len(split_row(body[0][1], delimiter)) - max(min_columns, 1)
     blanks = f" \t{delimiter}"
     for _, text in body:
-        if surplus < 1:
+        if surplus_delimiters < 1:
             return body
-        surplus = min(surplus, text.count(delimiter, len(text.rstrip(blanks))))
-    return [(number, text.rsplit(delimiter, surplus)[0]) for number, text in body]
+        surplus_delimiters = min(surplus_delimiters, text.count(delimiter, len(text.rstrip(blanks))))
+    return [(number, text.rsplit(delimiter, surplus_delimiters)[0]) for number, text in body]
 
 
-def _without_remarks_below(
+def _drop_trailing_remarks(
     rows: Sequence[Line], first_row: int, marks: TableMarks
 ) -> tuple[Sequence[Line], tuple[str, ...]]:
     """The rows without lines of words below the last row, such as `End of file`; and a sentence about each of these
@@ -134,22 +138,24 @@ def _without_remarks_below(
     return rows[:end_row], tuple(f"Left out: line {number}, '{text.strip()[:60]}'." for number, text in rows[end_row:])
 
 
-def _count_faulty(rows_above: Sequence[Line], width: int, marks: TableMarks) -> int:
+def _count_faulty_rows(rows_above: Sequence[Line], width: int, marks: TableMarks) -> int:
     """Number of rows directly above the first row of numbers that are data with an invalid cell."""
     rows = (split_row(text, marks.delimiter) for _, text in reversed(rows_above))
     return sum(1 for _ in takewhile(lambda fields: len(fields) == width and holds_data(fields, marks.decimal), rows))
 
 
 def _strip_comment(line: str) -> str:
-    """The line without its comment mark."""
+    """The line without the comment mark at its start."""
     return line.strip().lstrip("".join(COMMENTS)).strip() if is_comment(line) else line
 
 
-def _rows_above(lines: Sequence[Line], rows: Sequence[Line], first_row: int, delimiter: str) -> list[list[str]]:
+def _collect_header_rows(
+    lines: Sequence[Line], rows: Sequence[Line], first_row: int, delimiter: str
+) -> list[list[str]]:
     """Fields of the header lines: lines that are not comments, and a comment below them that states units; comments if
     there are no others. A line whose first field is only a comment mark, with as many fields as columns, is a header
     too: the mark is a name."""
-    min_width = len(split_row(_without_empty_ends(rows[first_row:], delimiter, 1)[0][1], delimiter))
+    min_width = len(split_row(_strip_empty_ends(rows[first_row:], delimiter, 1)[0][1], delimiter))
     widths = range(min_width, len(split_row(rows[first_row][1], delimiter)) + 1)
     header_fields = [
         fields
@@ -174,10 +180,12 @@ def _is_marked_header(fields: list[str], widths: range, delimiter: str) -> bool:
     return delimiter != " " and len(fields) in widths and fields[0] in COMMENTS and not any(map(is_comment, fields[1:]))
 
 
-def _first_header(rows_above: Sequence[Line], width: int, marks: TableMarks) -> int:
+def _find_header_row(rows_above: Sequence[Line], width: int, marks: TableMarks) -> int:
     """Index of the first row above the numbers with the same width, without a number and not of units; otherwise 0."""
-    split = [split_row(text, marks.delimiter) for _, text in rows_above]
-    is_header = [len(row) == width and not holds_number(row, marks.decimal) and not _are_units(row) for row in split]
+    split_rows = [split_row(text, marks.delimiter) for _, text in rows_above]
+    is_header = [
+        len(row) == width and not holds_number(row, marks.decimal) and not _are_units(row) for row in split_rows
+    ]
     return is_header.index(True) if True in is_header else 0
 
 
@@ -198,7 +206,7 @@ def _fit_header(header: list[str], fields: Sequence[str], delimiter: str) -> lis
     )
 
 
-def _header_and_units(
+def _split_header_and_units(
     rows_above: Sequence[list[str]], width: int, decimal: str
 ) -> tuple[list[str] | None, list[str] | None]:
     """Header and row of units from the rows directly above the numbers. The header is None without a row of the right
@@ -215,12 +223,13 @@ def _are_units(fields: Sequence[str]) -> bool:
     """Whether each field is a known unit, in brackets or not, or empty; or whether all texts are in brackets."""
     texts = [field for field in fields if field.lower() not in _UNITLESS]
     return bool(texts) and (
-        all(is_unit(_strip_quotes(field)) for field in texts) or all(_strip_quotes(field) != field for field in texts)
+        all(is_unit(_strip_brackets(field)) for field in texts)
+        or all(_strip_brackets(field) != field for field in texts)
     )
 
 
-def _strip_quotes(field: str) -> str:
-    """Text of a field without the brackets around it."""
+def _strip_brackets(field: str) -> str:
+    """Text of a field without the round or square brackets around it."""
     match = re.fullmatch(r"[\[(]\s*(.*?)\s*[\])]", field)
     return match[1] if match else field
 
@@ -230,14 +239,14 @@ def _name_columns(header: Sequence[str]) -> list[str]:
     return [name or f"column{number}" for number, name in enumerate(header, start=1)]
 
 
-def with_units(header: Sequence[str], units: Sequence[str] | None) -> list[str]:
+def append_units(header: Sequence[str], units: Sequence[str] | None) -> list[str]:
     """Names with their units in brackets. Raises ValueError where a name states another unit."""
     if units is None:
         return list(header)
     names = []
     for name, field in zip(header, units, strict=True):
-        unit_text, parsed = _strip_quotes(field), parse_signal_name(name)
-        unit = plain_unit(unit_text)
+        unit_text, parsed = _strip_brackets(field), parse_signal_name(name)
+        unit = normalise_unit(unit_text)
         if unit.lower() in _UNITLESS:
             names.append(name)
             continue

@@ -1,4 +1,5 @@
-"""Detect delimiter, decimal sign and columns of words of a table: the choice by which most rows consist of numbers."""
+"""Detect delimiter, decimal sign and columns of words of a table: the choice by which most rows consist of numbers.
+Called by `table_layout`."""
 
 import re
 from collections import Counter
@@ -20,7 +21,7 @@ from study.importing.map_format.signal_words import parse_signal_name
 
 _DELIMITERS = (",", ";", "\t", "|", " ")
 """Delimiters that are tried, in this order."""
-_SAMPLED = 32
+_SAMPLE_ROWS = 32
 """Approximate number of rows on which delimiters and decimal signs are tried, spread over the table."""
 _POINT_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+")
 """A number whose points may separate thousands."""
@@ -43,99 +44,105 @@ def find_marks(rows: Sequence[Line], settings: CsvMap) -> TableMarks:
     numbers; tabs before blanks in a table with tabs; a line above the numbers that has as many fields; most columns.
     Columns of words are assumed where more rows consist of numbers with them. If no row consists of numbers, the
     delimiter is taken that splits most rows alike. Raises ValueError where a comma or point is ambiguous."""
-    sample = rows[:: max(len(rows) // _SAMPLED, 1)]
-    tabbed = all("\t" in text for _, text in sample[len(sample) // 2 :])
-    best, marks = (False, 0, False, False, 0), None
-    for delimiter, decimal in _pairs(sample, settings):
-        read = _rows_of_numbers(sample, TableMarks(delimiter, decimal))
-        if not read:
+    sample = rows[:: max(len(rows) // _SAMPLE_ROWS, 1)]
+    has_tabs = all("\t" in text for _, text in sample[len(sample) // 2 :])
+    best_rank, marks = (False, 0, False, False, 0), None
+    for delimiter, decimal in _list_mark_pairs(sample, settings):
+        number_rows = _select_number_rows(sample, TableMarks(delimiter, decimal))
+        if not number_rows:
             continue
-        columns = Counter(map(len, read)).most_common(1)[0][0]
+        columns = Counter(map(len, number_rows)).most_common(1)[0][0]
         first_row = first_numbers(rows, delimiter, decimal)
         header = rows[first_row - 1][1] if first_row else ""
         header_fields = split_row(header, delimiter)
-        fits = len(header_fields) == columns or count_filled_fields(header_fields) == max(
-            map(count_filled_fields, read)
+        has_fitting_fields = len(header_fields) == columns or count_filled_fields(header_fields) == max(
+            map(count_filled_fields, number_rows)
         )
-        is_header = fits and not _is_no_name(header, decimal, columns)
-        rank = (columns == len(settings.names), len(read), not (tabbed and delimiter == " "), is_header, columns)
-        if rank > best:
-            best, marks = rank, TableMarks(delimiter, decimal)
-    marks_with_texts = _marks_with_texts(sample, settings)
-    if marks_with_texts and len(_rows_of_numbers(sample, marks_with_texts)) > best[1]:
+        is_header = has_fitting_fields and not _has_delimiter_comma(header, decimal, columns)
+        rank = (
+            columns == len(settings.names),
+            len(number_rows),
+            not (has_tabs and delimiter == " "),
+            is_header,
+            columns,
+        )
+        if rank > best_rank:
+            best_rank, marks = rank, TableMarks(delimiter, decimal)
+    marks_with_texts = _find_marks_with_texts(sample, settings)
+    if marks_with_texts and len(_select_number_rows(sample, marks_with_texts)) > best_rank[1]:
         marks = marks_with_texts
     if marks and marks.decimal == "," and not settings.decimal:
-        _require_decimals(sample, marks)
+        _refuse_ambiguous_commas(sample, marks)
     if marks and marks.decimal == "." and not settings.decimal:
-        _require_points(rows, sample, marks)
-    delimiter = settings.delimiter or _likely_delimiter(sample, settings.decimal)
+        _refuse_ambiguous_points(rows, sample, marks)
+    delimiter = settings.delimiter or _guess_delimiter(sample, settings.decimal)
     return marks or TableMarks(delimiter, settings.decimal or ".")
 
 
-def _rows_of_numbers(sample: Sequence[Line], marks: TableMarks) -> list[list[str]]:
+def _select_number_rows(sample: Sequence[Line], marks: TableMarks) -> list[list[str]]:
     """Fields of the rows that consist of numbers, apart from columns of words."""
-    split = (split_row(text, marks.delimiter) for _, text in sample)
-    return [fields for fields in split if are_numbers(fields, marks.decimal, marks.texts)]
+    split_rows = (split_row(text, marks.delimiter) for _, text in sample)
+    return [fields for fields in split_rows if are_numbers(fields, marks.decimal, marks.texts)]
 
 
-def _pairs(sample: Sequence[Line], settings: CsvMap) -> Iterator[tuple[str, str]]:
+def _list_mark_pairs(sample: Sequence[Line], settings: CsvMap) -> Iterator[tuple[str, str]]:
     """Possible pairs of delimiter and decimal sign. Both may be a comma where fields are quoted."""
-    quoted = any('"' in text for _, text in sample)
+    has_quotes = any('"' in text for _, text in sample)
     for decimal in (settings.decimal,) if settings.decimal else (".", ","):
         for delimiter in (settings.delimiter,) if settings.delimiter else _DELIMITERS:
-            if delimiter != decimal or quoted:
+            if delimiter != decimal or has_quotes:
                 yield delimiter, decimal
 
 
-def _is_no_name(header: str, decimal: str, columns: int) -> bool:
+def _has_delimiter_comma(header: str, decimal: str, columns: int) -> bool:
     """Whether the line above rows with a decimal comma shows that commas are delimiters: a line with a comma (`t,u,`
     above `0,1`), or a remark of several words (`Rig 3`) above a single column."""
     if decimal != ",":
         return False
-    parsed = parse_signal_name(header)
-    remark = columns == 1 and len(header.split()) > 1 and not parsed.unit and not parsed.quantity
-    return ("," in header and '"' not in header) or remark
+    parsed_name = parse_signal_name(header)
+    is_remark = columns == 1 and len(header.split()) > 1 and not parsed_name.unit and not parsed_name.quantity
+    return ("," in header and '"' not in header) or is_remark
 
 
-def _marks_with_texts(sample: Sequence[Line], settings: CsvMap) -> TableMarks | None:
+def _find_marks_with_texts(sample: Sequence[Line], settings: CsvMap) -> TableMarks | None:
     """The marks with the most columns of numbers where other columns hold words; None if there are none. Only the lower
     half of the rows is used, which is below any header."""
-    best, marks = 0, None
-    for delimiter, decimal in _pairs(sample, settings):
+    most_number_columns, marks = 0, None
+    for delimiter, decimal in _list_mark_pairs(sample, settings):
         rows = [split_row(text, delimiter) for _, text in sample[len(sample) // 2 :]]
         columns = list(zip(*rows, strict=True)) if len({len(row) for row in rows}) == 1 else []
-        texts = frozenset(column for column, fields in enumerate(columns) if any(map(is_text, fields)))
-        are_texts = all(is_text(field) or is_empty(field) for column in texts for field in columns[column])
-        if are_texts and rows and all(are_numbers(row, decimal, texts) for row in rows):
-            numbers = sum(holds_number(fields, decimal) for fields in columns)
-            if numbers > best:
-                best, marks = numbers, TableMarks(delimiter, decimal, texts)
+        text_columns = frozenset(column for column, fields in enumerate(columns) if any(map(is_text, fields)))
+        are_texts = all(is_text(field) or is_empty(field) for column in text_columns for field in columns[column])
+        if are_texts and rows and all(are_numbers(row, decimal, text_columns) for row in rows):
+            number_columns = sum(holds_number(fields, decimal) for fields in columns)
+            if number_columns > most_number_columns:
+                most_number_columns, marks = number_columns, TableMarks(delimiter, decimal, text_columns)
     return marks
 
 
-def _require_decimals(sample: Sequence[Line], marks: TableMarks) -> None:
+def _refuse_ambiguous_commas(sample: Sequence[Line], marks: TableMarks) -> None:
     """Raises ValueError where each comma in a number may separate thousands, as in 1,250 but not in 0,250."""
-    read = [(number, split_row(text, marks.delimiter)) for number, text in sample]
-    with_comma = [
+    numbered_rows = [(number, split_row(text, marks.delimiter)) for number, text in sample]
+    comma_fields = [
         (number, field)
-        for number, row in read
+        for number, row in numbered_rows
         if are_numbers(row, ",", marks.texts)
         for column, field in enumerate(row)
         if "," in field and column not in marks.texts
     ]
-    if with_comma and all(re.fullmatch(r"[-+]?[1-9]\d{0,2},\d{3}", field) for _, field in with_comma):
-        number, field = with_comma[0]
+    if comma_fields and all(re.fullmatch(r"[-+]?[1-9]\d{0,2},\d{3}", field) for _, field in comma_fields):
+        number, field = comma_fields[0]
         raise ValueError(
             f"line {number}: the comma in '{field}' may separate thousands; where the decimal sign is a comma, "
             'the map says decimal = "," under [csv]'
         )
 
 
-def _require_points(rows: Sequence[Line], sample: Sequence[Line], marks: TableMarks) -> None:
+def _refuse_ambiguous_points(rows: Sequence[Line], sample: Sequence[Line], marks: TableMarks) -> None:
     """Raises ValueError where each point in a column may separate thousands, as in a column with 1.886 and 946."""
-    columns = list(zip(*_rows_of_numbers(sample, marks), strict=False))
+    columns = list(zip(*_select_number_rows(sample, marks), strict=False))
     for column in (column for column, fields in enumerate(columns) if _may_be_thousands(fields)):
-        all_fields = [fields[column] for fields in _rows_of_numbers(rows, marks) if len(fields) > column]
+        all_fields = [fields[column] for fields in _select_number_rows(rows, marks) if len(fields) > column]
         if _may_be_thousands(all_fields):
             example = next(field for field in all_fields if "." in field)
             raise ValueError(
@@ -148,21 +155,22 @@ def _may_be_thousands(fields: Sequence[str]) -> bool:
     """Whether some numbers of a column have points that may separate thousands, and the others have at most three
     digits."""
     numbers = [field for field in fields if not is_empty(field)]
-    with_point = [field for field in numbers if "." in field]
+    point_fields = [field for field in numbers if "." in field]
     return (
-        0 < len(with_point) < len(numbers)
-        and all(_POINT_THOUSANDS.fullmatch(field) for field in with_point)
+        0 < len(point_fields) < len(numbers)
+        and all(_POINT_THOUSANDS.fullmatch(field) for field in point_fields)
         and all(re.fullmatch(r"[-+]?\d{1,3}", field) for field in numbers if "." not in field)
     )
 
 
-def _likely_delimiter(sample: Sequence[Line], decimal: str) -> str:
+def _guess_delimiter(sample: Sequence[Line], decimal: str) -> str:
     """The delimiter that splits most rows of the lower half into the same number of fields, for a precise error
     message."""
-    lower = [text for _, text in sample[len(sample) // 2 :]]
+    lower_rows = [text for _, text in sample[len(sample) // 2 :]]
 
-    def most_common_width(mark: str) -> tuple[int, int]:
-        width, rows = Counter(len(split_row(text, mark)) for text in lower).most_common(1)[0]
+    def rank_delimiter(delimiter: str) -> tuple[int, int]:
+        """Number of rows with the most common number of fields, and that number; (0, 1) if rows are not split."""
+        width, rows = Counter(len(split_row(text, delimiter)) for text in lower_rows).most_common(1)[0]
         return (rows, width) if width > 1 else (0, 1)
 
-    return max((mark for mark in _DELIMITERS if mark != decimal), key=most_common_width)
+    return max((delimiter for delimiter in _DELIMITERS if delimiter != decimal), key=rank_delimiter)

@@ -1,9 +1,9 @@
-"""Reads the text of a table in its character encoding, which is stated by the import map or detected from the bytes.
+"""Decode the text of a table (CSV) whose character encoding the import map states, or detect it from the bytes.
 
-UTF-8 and UTF-16 are recognised by their structure. Legacy encodings accept nearly every byte sequence, so the content
-decides: Windows-1252 where non-ASCII characters occur singly or in pairs within words, as in `µs`, `°` and `Größe`;
-else the only encoding in which the text contains a known word for a quantity. If that is none or several, the error
-names the candidates.
+Called by `csv_arrays`. UTF-8 and UTF-16 are recognised by their structure. Legacy encodings accept nearly every byte
+sequence, so that the content decides: Windows-1252 if non-ASCII characters occur singly or in pairs within words, as in
+`µs`, `°` and `Größe`; else the only encoding in which the text contains a known word for a quantity. If there is none,
+or more than one, the error names the candidates.
 """
 
 import codecs
@@ -15,17 +15,18 @@ from study.importing.map_format.signal_words import FOREIGN_WORDS
 from study.regular_file import TABLE_BYTES, read_regular
 from study.store.disk.file_errors import CannotReadError
 
-_SEARCHED_BYTES = 4096
-"""Bytes searched for UTF-16 without a byte order mark, in which nearly every other byte of a table is zero."""
-_READ_FOR_WORDS = 65536
-"""Bytes of non-ASCII lines from which a legacy encoding is detected."""
-_ENCODINGS = ("gb18030", "shift_jis", "euc_jp", "euc_kr", "big5", "cp1251", "koi8_r", "cp1250", "cp1253")
-"""Encodings that are tried where a text is neither UTF-8 nor Western European."""
-_BEYOND_ASCII = re.compile(r"[^\x00-\x7f]+")
+_MAX_UTF16_SEARCH_BYTES = 4096
+"""Number of bytes searched for UTF-16 without a byte order mark, in which nearly every other byte of a table is
+zero."""
+_MAX_DETECTION_BYTES = 65536
+"""Approximate number of bytes, in non-ASCII lines, from which a legacy encoding is detected."""
+_LEGACY_ENCODINGS = ("gb18030", "shift_jis", "euc_jp", "euc_kr", "big5", "cp1251", "koi8_r", "cp1250", "cp1253")
+"""Encodings that are tried if a text is neither UTF-8, UTF-16 nor Windows-1252."""
+_NON_ASCII_RUN = re.compile(r"[^\x00-\x7f]+")
 """A run of non-ASCII characters."""
-_BYTE_BEYOND_ASCII = re.compile(rb"[\x80-\xff]")
+_NON_ASCII_BYTE = re.compile(rb"[\x80-\xff]")
 _LINE_END = re.compile(rb"[\r\n]|\Z")
-_MAX_SAMPLE = 24
+_MAX_SAMPLE_CHARACTERS = 24
 """Maximum number of characters in the sample of text that an error shows."""
 
 
@@ -35,87 +36,92 @@ class TableText:
 
     text: str
     note: str
-    """A sentence for the user where the encoding was detected from words; else empty."""
+    """A sentence for the user if the encoding was detected from words; else empty."""
 
 
 def read_text(path: Path, encoding: str) -> TableText:
-    """Read the text of a table. encoding: as stated by the map; empty to detect it. Raises CannotReadError, and
-    ValueError where the encoding is wrong, unknown or ambiguous (then with the key of the map that states it)."""
+    """Read the text of a table. encoding: as stated by the map; empty = detect it. Raises CannotReadError, and
+    ValueError if the encoding is wrong, unknown or ambiguous (then with the map's key that would state it)."""
     try:
         data = read_regular(path, TABLE_BYTES)
-    except OSError as problem:
-        raise CannotReadError(path, problem) from problem
+    except OSError as error:
+        raise CannotReadError(path, error) from error
     if encoding:
         return TableText(_decode(data, encoding), "")
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return TableText(_decode(data, "utf-16"), "")
-    if b"\0" in data[:_SEARCHED_BYTES]:
-        high_bytes = data[1:_SEARCHED_BYTES:2], data[:_SEARCHED_BYTES:2]
-        for zeros, name in zip(high_bytes, ("utf-16-le", "utf-16-be"), strict=True):
-            if 2 * zeros.count(0) > len(zeros):
+    if b"\0" in data[:_MAX_UTF16_SEARCH_BYTES]:
+        candidate_bytes = data[1:_MAX_UTF16_SEARCH_BYTES:2], data[:_MAX_UTF16_SEARCH_BYTES:2]
+        for high_bytes, name in zip(candidate_bytes, ("utf-16-le", "utf-16-be"), strict=True):
+            if 2 * high_bytes.count(0) > len(high_bytes):
                 return TableText(_decode(data, name), "")
         raise ValueError("it holds bytes of zero, as no text does; is it a table?")
     try:
         return TableText(data.decode("utf-8-sig"), "")
     except UnicodeDecodeError:
-        return _decode_other_encoding(data)
+        return _decode_legacy_encoding(data)
 
 
 def _decode(data: bytes, encoding: str) -> str:
     """Decode strictly. Raises ValueError for an unknown encoding or bytes that are invalid in it."""
     try:
         return data.decode(encoding)
-    except LookupError as problem:
-        raise ValueError(f"there is no encoding '{encoding}'; usual are utf-8, cp1252, {', '.join(_ENCODINGS)}") from (
-            problem
-        )
-    except UnicodeDecodeError as problem:
-        raise ValueError(f"it is no whole {encoding} text") from problem
+    except LookupError as error:
+        raise ValueError(
+            f"there is no encoding '{encoding}'; usual are utf-8, cp1252, {', '.join(_LEGACY_ENCODINGS)}"
+        ) from error
+    except UnicodeDecodeError as error:
+        raise ValueError(f"it is no whole {encoding} text") from error
 
 
-def _decode_other_encoding(data: bytes) -> TableText:
-    """Detect a legacy encoding from the non-ASCII lines that are not comments (# or %), and decode. Raises ValueError
-    where no encoding, or more than one, fits."""
-    non_ascii = b"\n".join(_find_lines_beyond_ascii(data))
+def _decode_legacy_encoding(data: bytes) -> TableText:
+    """Detect a legacy encoding from the non-ASCII lines that are not comments (# or %), and decode all of `data`.
+    Raises ValueError if no encoding fits, or more than one."""
+    non_ascii = b"\n".join(_select_non_ascii_lines(data))
     if _is_western(non_ascii):
         return TableText(data.decode("cp1252", errors="replace"), "")
-    readings = {encoding: text for encoding in _ENCODINGS if (text := _readable(non_ascii, encoding))}
-    recognised = {
-        encoding: text for encoding, text in readings.items() if any(word in text.lower() for word in FOREIGN_WORDS)
+    decoded_texts = {
+        encoding: text for encoding in _LEGACY_ENCODINGS if (text := _decode_or_empty(non_ascii, encoding))
     }
-    distinct = {text: encoding for encoding, text in reversed(recognised.items())}
-    if len(distinct) == 1:
-        encoding = next(iter(distinct.values()))
+    recognised_texts = {
+        encoding: text
+        for encoding, text in decoded_texts.items()
+        if any(word in text.lower() for word in FOREIGN_WORDS)
+    }
+    encoding_by_text = {text: encoding for encoding, text in reversed(recognised_texts.items())}
+    if len(encoding_by_text) == 1:
+        encoding = next(iter(encoding_by_text.values()))
         return TableText(
             _decode(data, encoding), f"Read in the encoding {encoding}, in which its words are understood."
         )
-    samples = ", ".join(f"{name}: '{_beyond_ascii(text)}'" for name, text in (recognised or readings).items())
+    samples = ", ".join(f"{name}: '{_make_sample(text)}'" for name, text in (recognised_texts or decoded_texts).items())
     raise ValueError(
         f"it is no UTF-8 text, and its encoding is ambiguous ({samples}); save it as UTF-8, or state the encoding in "
-        f'the map: under [csv], encoding = "{next(iter(recognised or readings), "cp1252")}"'
+        f'the map: under [csv], encoding = "{next(iter(recognised_texts or decoded_texts), "cp1252")}"'
     )
 
 
-def _find_lines_beyond_ascii(data: bytes) -> list[bytes]:
-    """The first non-ASCII lines that are not comments, up to about `_READ_FOR_WORDS` bytes. Lines are
-    kept whole: a cut within a character would make the right encoding invalid."""
-    lines, size, line_end = list[bytes](), 0, 0
-    while size < _READ_FOR_WORDS and (match := _BYTE_BEYOND_ASCII.search(data, line_end)):
+def _select_non_ascii_lines(data: bytes) -> list[bytes]:
+    """The first non-ASCII lines that are not comments, up to about `_MAX_DETECTION_BYTES` bytes. Lines are complete: a
+    cut within a multi-byte character would make the right encoding invalid."""
+    lines, byte_count, line_end = list[bytes](), 0, 0
+    while byte_count < _MAX_DETECTION_BYTES and (match := _NON_ASCII_BYTE.search(data, line_end)):
         position = match.start()
         line_start = max(data.rfind(b"\n", line_end, position), data.rfind(b"\r", line_end, position), line_end - 1) + 1
-        end = _LINE_END.search(data, position)
-        line_end = end.start() if end else len(data)
+        end_match = _LINE_END.search(data, position)
+        line_end = end_match.start() if end_match else len(data)
         line = data[line_start:line_end]
         if not line.lstrip().startswith((b"#", b"%")):
             lines.append(line)
-            size += len(line)
+            byte_count += len(line)
     return lines
 
 
 def _is_western(data: bytes) -> bool:
-    """Whether the text is plausible as Windows-1252: single non-ASCII characters, or two letters within a word."""
+    """Whether the bytes are plausible as Windows-1252: each run of non-ASCII characters is a single defined character,
+    or two letters within a word."""
     text = data.decode("cp1252", errors="replace")
-    for match in _BEYOND_ASCII.finditer(text):
+    for match in _NON_ASCII_RUN.finditer(text):
         neighbours = text[match.start() - 1 : match.start()] + text[match.end() : match.end() + 1]
         is_word = len(match[0]) == 2 and match[0].isalpha() and any(letter.isalpha() for letter in neighbours)
         if not is_word and (len(match[0]) > 1 or match[0] == "\ufffd"):
@@ -123,14 +129,14 @@ def _is_western(data: bytes) -> bool:
     return True
 
 
-def _readable(data: bytes, encoding: str) -> str:
-    """The decoded text; empty where the bytes are not valid in this encoding."""
+def _decode_or_empty(data: bytes, encoding: str) -> str:
+    """The decoded text; empty if the bytes are not valid in this encoding."""
     try:
         return data.decode(encoding)
     except UnicodeDecodeError:
         return ""
 
 
-def _beyond_ascii(text: str) -> str:
-    """Sample of the text for an error: its non-ASCII characters."""
-    return " ".join(_BEYOND_ASCII.findall(text))[:_MAX_SAMPLE]
+def _make_sample(text: str) -> str:
+    """Sample of the text for an error: its first non-ASCII characters."""
+    return " ".join(_NON_ASCII_RUN.findall(text))[:_MAX_SAMPLE_CHARACTERS]

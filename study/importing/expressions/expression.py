@@ -176,7 +176,7 @@ class _Evaluation:
                 f"in '{self.text}' there is no function '{name}'{suggestion(name, FUNCTIONS)}; {ALLOWED}"
             )
         function = FUNCTIONS[name]
-        if not function.fewest <= len(arguments) <= function.most:
+        if not function.min_arguments <= len(arguments) <= function.max_arguments:
             raise ImportProblemError(f"in '{self.text}' {function.usage} was given {len(arguments)} values")
         values: list[Value] = []
         for argument in arguments:

@@ -1,6 +1,7 @@
 """Functions that expressions of a map may call, such as `derivative(x)` and `clip(x, lowest, highest)`.
 
-`FUNCTIONS` lists them with their usage and meaning. Functions of time take the times of the samples from a `Clock`.
+`FUNCTIONS` lists them with their usage and meaning; `expression` calls them. Functions of time take the times of the
+samples from a `Clock`.
 """
 
 from collections.abc import Callable
@@ -11,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 Value = npt.NDArray[np.float64]
+"""Value of an expression: an array, or a number as an array without dimension."""
 
 
 class Clock(Protocol):
@@ -23,12 +25,13 @@ class Clock(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """A function of expressions, with the least and the largest number of its arguments."""
+    """A function that expressions may call, with its least and largest number of arguments. usage and meaning: texts
+    for the documentation."""
 
     usage: str
     meaning: str
-    fewest: int
-    most: int
+    min_arguments: int
+    max_arguments: int
     call: Callable[..., Any]
     """Arguments: the clock, then the values."""
 
@@ -45,35 +48,35 @@ def _require_vector(values: Value) -> Value:
     return values
 
 
-def _difference(values: Value) -> Value:
+def _compute_differences(values: Value) -> Value:
     """Differences of neighbouring samples (n,); the first is 0."""
     return np.diff(_require_vector(values), prepend=values[:1])
 
 
-def _derivative(clock: Clock, values: Value) -> Value:
+def _compute_derivative(clock: Clock, values: Value) -> Value:
     """Derivative (n,) per second, by central differences; one-sided at the ends."""
     derivative: Value = np.gradient(_require_vector(values), clock.times_s(len(values)))
     return derivative
 
 
-def _integral(clock: Clock, values: Value) -> Value:
+def _compute_integral(clock: Clock, values: Value) -> Value:
     """Integral (n,) over seconds from the first sample, by the trapezoidal rule."""
     steps = np.diff(clock.times_s(len(_require_vector(values))))
     return np.concatenate([[0.0], np.cumsum(steps * (values[1:] + values[:-1]) / 2)])
 
 
-def _onset(clock: Clock, values: Value, threshold: Value) -> int:
+def _find_onset(clock: Clock, values: Value, threshold: Value) -> int:
     """Index of the first sample that differs from the mean of the first ten by more than the threshold. Raises
     ValueError without such a sample."""
-    is_beyond = np.abs(_require_vector(values) - np.mean(values[:10])) > float(threshold)
-    if not is_beyond.any():
+    exceeds_threshold = np.abs(_require_vector(values) - np.mean(values[:10])) > float(threshold)
+    if not exceeds_threshold.any():
         raise ValueError(f"nothing leaves the mean of the first ten samples by more than {float(threshold):g}")
-    return int(np.argmax(is_beyond))
+    return int(np.argmax(exceeds_threshold))
 
 
-def _repeat(values: Value, times: Value) -> Value:
-    """The array, repeated `times` times."""
-    return np.tile(_require_vector(values), int(times))
+def _repeat(values: Value, repetitions: Value) -> Value:
+    """The array (n,), repeated in sequence `repetitions` times."""
+    return np.tile(_require_vector(values), int(repetitions))
 
 
 FUNCTIONS: dict[str, Function] = {
@@ -96,12 +99,20 @@ FUNCTIONS: dict[str, Function] = {
     "max": _make_time_independent("max(x)", "likewise", np.nanmax),
     "sum": _make_time_independent("sum(x)", "likewise", np.nansum),
     "length": _make_time_independent("length(x)", "number of samples", len),
-    "diff": _make_time_independent("diff(x)", "each sample minus the previous one; the first is 0", _difference),
+    "diff": _make_time_independent(
+        "diff(x)", "each sample minus the previous one; the first is 0", _compute_differences
+    ),
     "cumsum": _make_time_independent("cumsum(x)", "running sum", lambda x: np.cumsum(_require_vector(x))),
-    "derivative": Function("derivative(x)", "derivative per second, by central differences", 1, 1, _derivative),
-    "integral": Function("integral(x)", "integral over seconds from 0, by the trapezoidal rule", 1, 1, _integral),
+    "derivative": Function("derivative(x)", "derivative per second, by central differences", 1, 1, _compute_derivative),
+    "integral": Function(
+        "integral(x)", "integral over seconds from 0, by the trapezoidal rule", 1, 1, _compute_integral
+    ),
     "onset": Function(
-        "onset(x, by)", "index of the first sample that differs from the mean of the first ten by more", 2, 2, _onset
+        "onset(x, by)",
+        "index of the first sample that differs from the mean of the first ten by more",
+        2,
+        2,
+        _find_onset,
     ),
     "repeat": _make_time_independent("repeat(x, times)", "x repeated in sequence", _repeat, 2),
     "flatten": _make_time_independent("flatten(x)", "the rows of a table in sequence", np.ravel),

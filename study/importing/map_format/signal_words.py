@@ -16,10 +16,10 @@ from equalizer.signals.units import (
     UNSTATED,
     UnknownUnitError,
     check_quantity,
-    force_hint,
+    find_quantity,
+    normalise_unit,
     parse_unit,
-    plain_unit,
-    quantity_of,
+    suggest_force_unit,
     suggest_unit,
 )
 from study.importing.map_format.import_map import SignalRole
@@ -121,12 +121,12 @@ def split_bracketed_unit(header: str) -> tuple[str, str]:
     if not match or not match["name"].strip():
         return header, ""
     unit = match["unit"].strip()
-    return match["name"].strip(), "" if unit.lower() in _NO_UNITS else plain_unit(unit)
+    return match["name"].strip(), "" if unit.lower() in _NO_UNITS else normalise_unit(unit)
 
 
 def is_peak_value(unit: str) -> bool:
     """Whether a unit, as written in a file, states rms or peak values (`A (peak)`, `mV_rms`)."""
-    return plain_unit(unit) != unit and _PEAK.search(unit) is not None
+    return normalise_unit(unit) != unit and _PEAK.search(unit) is not None
 
 
 @lru_cache(_CACHE_SIZE)
@@ -141,7 +141,7 @@ def parse_signal_name(header: str) -> ParsedName:
         parsed_unit = parse_unit(unit_text)
     except UnknownUnitError:
         return ParsedName(header, name, "", stated, _describe_unknown_unit(unit) if unit else "")
-    by_unit = "time" if parsed_unit.si == "s" else quantity_of(parsed_unit.si)
+    by_unit = "time" if parsed_unit.si == "s" else find_quantity(parsed_unit.si)
     if by_unit == parsed_unit.si != UNSTATED and stated not in ("setting", *QUANTITY_UNITS):
         return ParsedName(header, name, unit_text, by_unit, f"what is measured in {unit_text} is not known")
     if not stated:
@@ -156,7 +156,8 @@ def parse_signal_name(header: str) -> ParsedName:
     except UnknownUnitError:
         if SEVERAL_MEANINGS & set(words_in(name)):
             return ParsedName(header, name, unit_text, by_unit, "")
-        doubt = f"its name says {stated}, its unit, {unit_text}, says {by_unit}{force_hint(stated, parsed_unit)}"
+        hint = suggest_force_unit(stated, parsed_unit)
+        doubt = f"its name says {stated}, its unit, {unit_text}, says {by_unit}{hint}"
         return ParsedName(header, name, unit_text, by_unit, doubt)
     return ParsedName(header, name, unit_text, stated, "")
 
@@ -282,7 +283,7 @@ def split_unit_at_end(name: str) -> tuple[str, str]:
     ]
     candidates += [(name[: separator.start()], name[separator.end() :]) for separator in _UNIT_SEPARATOR.finditer(name)]
     for stem, text in candidates:
-        unit = plain_unit(text)
+        unit = normalise_unit(text)
         try:
             parse_unit(unit)
         except UnknownUnitError:

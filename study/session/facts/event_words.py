@@ -33,13 +33,13 @@ from study.session.facts.events import (
     TrialSpoiled,
 )
 from study.session.views.archive_views import INELIGIBILITY_REASONS
-from study.session.views.local_time import Zone, in_utc, local_parts
+from study.session.views.local_time import Zone, split_time_in_zone, to_utc
 
 _Key = tuple[int, int, int]
 """Run, trial and attempt of a presentation."""
 
 
-def describe_log(events: Iterable[Event], zone: Zone = in_utc) -> tuple[str, ...]:
+def describe_log(events: Iterable[Event], zone: Zone = to_utc) -> tuple[str, ...]:
     """One line per event, oldest first: local time and a sentence. A line with the date precedes each change of date or
     UTC offset."""
     events = tuple(events)
@@ -48,7 +48,7 @@ def describe_log(events: Iterable[Event], zone: Zone = in_utc) -> tuple[str, ...
     lines: list[str] = []
     text = ""
     for event in events:
-        date, time, offset = local_parts(event.utc, zone)
+        date, time, offset = split_time_in_zone(event.utc, zone)
         day = f"{date} (times are UTC {offset})" if offset else ""
         if day and day != text:
             text = day

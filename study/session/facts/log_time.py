@@ -4,13 +4,14 @@ The wall clock can be set forward and back at any moment; the monotonic clock ca
 no exposure limit depends on the wall clock within a sitting. Between sittings only the wall clock is available: setting
 it forward there looks like elapsed time; setting it back is detected and counts as no time.
 
-The monotonic clock stops while the computer sleeps: sleep within a sitting looks like a clock set forward.
+The monotonic clock stops while the computer sleeps: sleep within a sitting looks like a clock set forward. Called where
+a log is folded into a state (`study.session.state`) or watched (`study.session.watching`).
 """
 
 from dataclasses import dataclass
 from datetime import datetime
 
-STEP_S = 5.0
+MIN_STEP_S = 5.0
 """Disagreement of the two clocks (s) above which the wall clock was set. NTP corrections are far smaller."""
 
 
@@ -37,43 +38,44 @@ class ClockStep:
     @property
     def sentence(self) -> str:
         """Sentence for the experimenter."""
-        step = _duration(abs(self.by_s))
+        step_text = _format_duration(abs(self.by_s))
         limits = "Time limits and the vibration dose do not follow it; the times in the log do."
         if self.by_s > 0:
-            return f"The computer's clock was set forward by {step}, or the computer slept that long. {limits}"
+            return f"The computer's clock was set forward by {step_text}, or the computer slept that long. {limits}"
         if self.between_sittings:
             return (
-                f"The computer's clock reads {step} earlier than at the last entry of the log. No time counts as "
+                f"The computer's clock reads {step_text} earlier than at the last entry of the log. No time counts as "
                 "passed since then: the vibration dose continues from there."
             )
-        return f"The computer's clock was set back by {step}. {limits}"
+        return f"The computer's clock was set back by {step_text}. {limits}"
 
 
-def elapsed_s(start: Moment, end: Moment) -> float:
+def compute_elapsed_s(start: Moment, end: Moment) -> float:
     """Time between two moments (s), never negative. By the monotonic clock where both carry it, otherwise by the
     wall clock."""
     if start.monotonic_s is not None and end.monotonic_s is not None:
         return max(0.0, end.monotonic_s - start.monotonic_s)
-    return max(0.0, seconds_between(start.utc, end.utc))
+    return max(0.0, compute_wall_clock_s(start.utc, end.utc))
 
 
-def clock_step(start: Moment, end: Moment, between_sittings: bool = False) -> ClockStep | None:
-    """Time by which the wall clock was set between two entries, or None; without monotonic times only a step back can
+def find_clock_step(start: Moment, end: Moment, between_sittings: bool = False) -> ClockStep | None:
+    """Step of the wall clock between two entries; None below `MIN_STEP_S`. Without monotonic times only a step back can
     be detected."""
-    wall_s = seconds_between(start.utc, end.utc)
-    monotonic = start.monotonic_s is not None and end.monotonic_s is not None
-    by_s = wall_s - elapsed_s(start, end) if monotonic else min(0.0, wall_s)
-    return ClockStep(end.utc, by_s, between_sittings) if abs(by_s) >= STEP_S else None
+    wall_s = compute_wall_clock_s(start.utc, end.utc)
+    has_monotonic = start.monotonic_s is not None and end.monotonic_s is not None
+    by_s = wall_s - compute_elapsed_s(start, end) if has_monotonic else min(0.0, wall_s)
+    return ClockStep(end.utc, by_s, between_sittings) if abs(by_s) >= MIN_STEP_S else None
 
 
-def seconds_between(first_utc: str, second_utc: str) -> float:
+def compute_wall_clock_s(first_utc: str, second_utc: str) -> float:
     """Seconds by the wall clock: negative if it was set back. Both ISO 8601; 0 if the first is empty."""
     if not first_utc:
         return 0.0
     return (datetime.fromisoformat(second_utc) - datetime.fromisoformat(first_utc)).total_seconds()
 
 
-def _duration(seconds: float) -> str:
+def _format_duration(seconds: float) -> str:
+    """Text of a duration in seconds, minutes, or hours and minutes."""
     if seconds < 120:
         return f"{seconds:.0f} s"
     hours, minutes = divmod(round(seconds / 60), 60)

@@ -1,7 +1,7 @@
 """Counts of received and lost samples of an accelerometer that has its own clock, logged for each trial.
 
-A trial is void where the missing fraction (`missing`) exceeds the limit of the protocol; see
-`study.workflows.trial.judge_trial`.
+Where the missing fraction (`missing`) exceeds the limit of the protocol, a trial is void if the protocol requires the
+accelerometer, and gets a remark otherwise: `study.workflows.trial.judge_trial`.
 """
 
 from pydantic.dataclasses import dataclass
@@ -12,13 +12,14 @@ from study.session.facts.sitting_events import FACT
 
 @dataclass(frozen=True, config=FACT)
 class SensorFacts:
-    """Record of the accelerometer for one trial, from the onset of the stimulus until the handle was at rest."""
+    """Counts and clock of the accelerometer over an interval: of a trial, from the onset of the stimulus until the
+    handle was at rest; also of a device check, and of a recording."""
 
     packets: Count
     """Number of complete packets received."""
     lost: Count
-    """Number of packets missing between the received ones, by their sequence numbers; it includes incomplete and
-    garbled packets."""
+    """Number of packets missing between the received ones, by their sequence numbers, including incomplete and garbled
+    packets."""
     spoiled_bytes: Count
     """Number of received bytes that belong to no complete packet."""
     restarts: Count
@@ -36,6 +37,6 @@ class SensorFacts:
 
     @property
     def missing(self) -> float:
-        """Missing fraction, 0 to 1: of packets or of ticks, the larger of the two; 1 where no packet arrived."""
-        packets = self.lost / (self.packets + self.lost) if self.packets else 1.0
-        return max(packets, self.unplaced_ticks / max(self.ticks, 1))
+        """Missing fraction, 0 to 1: of packets or of ticks, whichever is larger; 1 where no packet arrived."""
+        lost_fraction = self.lost / (self.packets + self.lost) if self.packets else 1.0
+        return max(lost_fraction, self.unplaced_ticks / max(self.ticks, 1))

@@ -7,11 +7,11 @@ from protocols.definition.study_protocol import StudyProtocol
 from protocols.procedure.schedule import (
     Run,
     are_labels_swapped,
-    detection_direction,
+    draw_detection_direction,
+    draw_practice_level_n,
     draw_trial,
     is_catch_trial,
     label_direction,
-    practice_level_n,
     rove_level_n,
 )
 from protocols.procedure.staircase import StaircaseState, level_n, to_db
@@ -19,7 +19,7 @@ from protocols.trial import Phase
 from study.session.facts.events import SessionOpened
 from study.session.facts.level_scale import acceleration_of_level
 from study.session.state.rules import repeats_same_stimulus
-from study.session.stimulus.stimulus import direction_angle_deg
+from study.session.stimulus.stimulus import compute_direction_angle_deg
 
 _ROVED = (Phase.TRAINING, Phase.TEST)
 """Trial phases of staircases on directions. Catch trials are at full level, and detection trials ask for no
@@ -67,11 +67,11 @@ def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRul
     label, direction = label_direction(draw.direction, has_swapped_labels(protocol, opened)), draw.direction
     if run.phase is Phase.DETECTION:  # the answer is an interval; the direction does not matter
         label = draw.direction
-        direction = detection_direction(opened.seed, run.index, place.trial, draws)
+        direction = draw_detection_direction(opened.seed, run.index, place.trial, draws)
     phase, level_db = run.phase, place.staircase.level_db
     force_n = level_n(rule, place.staircase)
     if run.practice:
-        force_n = practice_level_n(protocol.practice, opened.seed, run.index, place.trial, draws)
+        force_n = draw_practice_level_n(protocol.practice, opened.seed, run.index, place.trial, draws)
         level_db = to_db(force_n)
     elif run.phase is Phase.TEST and is_catch_trial(protocol.catch, opened.seed, run.index, place.trial):
         phase, force_n, level_db = Phase.CATCH, rule.cap_n, to_db(rule.cap_n)
@@ -91,7 +91,7 @@ def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRul
         level_n=force_n,
         label=label,
         direction=direction,
-        angle_deg=direction_angle_deg(protocol.directions, direction),
+        angle_deg=compute_direction_angle_deg(protocol.directions, direction),
         polarity=draw.polarity,
         wanted_mps2=acceleration_of_level(opened.equalized, force_n, run.frequency_hz),
         nominal_n=nominal_n,

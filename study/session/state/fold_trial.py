@@ -19,7 +19,7 @@ from study.session.facts.events import (
     TrialPresented,
     TrialSpoiled,
 )
-from study.session.facts.log_time import seconds_between
+from study.session.facts.log_time import compute_wall_clock_s
 from study.session.facts.sensor_facts import SensorFacts
 from study.session.facts.void_reasons import is_computer_busy
 from study.session.state.draw_check import LogContradiction, check_draw, describe_place
@@ -77,7 +77,7 @@ def _trial_row(
         angle_deg=event.angle_deg,
         wanted_mps2=event.wanted_mps2,
         repeat_cause=repeat_cause,
-        onset_s=seconds_between(opened.utc, event.utc),
+        onset_s=compute_wall_clock_s(opened.utc, event.utc),
         nominal_n=event.nominal_n,
     )
 

@@ -1,8 +1,8 @@
-"""State machine of a session: the next action, as a function of the state that the log gives (`fold`).
+"""State machine of a session: the next action, as a function of the state that `fold` computes from the log.
 
-`next_preparation` gives the steps before the instructions of a sitting (forms, device check), `next_action` those after
-them. Order of precedence there: end of the session, limits of the sitting, demonstration, rest, reference, probe,
-trial.
+`next_preparation` gives the steps before the instructions of a sitting (forms, device check) and is called by
+`prepare_sitting`. `next_action` gives the steps after them and is called by `run_session`; its order of precedence is:
+end of the session, limits of the sitting, demonstration, rest, reference, probe, trial.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from study.session.state.due_trial import PresentTrial
 from study.session.state.probe_state import Probe, Reference, find_due_probe, find_due_reference
 from study.session.state.sitting_state import compute_daily_dose, pass_time
 from study.session.state.state import SessionState, find_due_presentation
-from study.session.state.vibration_dose import a8_mps2
+from study.session.state.vibration_dose import compute_a8_mps2
 from study.session.views.archive_views import INELIGIBILITY_REASONS
 from study.session.views.form_views import Form, FormKind
 from study.session.views.forms import make_form
@@ -48,7 +48,7 @@ class EndSitting:
     """The sitting must end here."""
 
     reason: str
-    """Why, in words."""
+    """Reason that the user is shown, in words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,8 @@ Action = Demonstrate | PresentTrial | Probe | Reference | TakeRest | FillIn | En
 
 
 def next_preparation(state: SessionState) -> Preparation | None:
-    """Next step before the instructions of this sitting; None when all are done, and for simulated participants."""
+    """Next step before the instructions of this sitting; None when all are done, after the last trial of the session,
+    and for simulated participants."""
     sitting = state.sitting
     if state.opened.observer is not None or state.finished:
         return None
@@ -83,9 +84,11 @@ def next_preparation(state: SessionState) -> Preparation | None:
 
 
 def next_action(state: SessionState, utc: str = "", monotonic_s: float | None = None) -> Action:
-    """The next action. Raises ValueError while a trial is open: it must be answered, measured or spoiled first.
+    """The next action. Raises ValueError while a trial is open: its answer, its measurement or its failure must be
+    logged first.
 
-    utc, monotonic_s: the present time, which the limits of a sitting need; with an empty utc they are not applied.
+    utc, monotonic_s: the present time (ISO 8601) and monotonic clock (s), by which the limits of a sitting are judged;
+    with an empty utc the limits are not applied.
     """
     if state.presented is not None:
         raise ValueError("a trial is open; it must be closed before the next action")
@@ -104,13 +107,13 @@ def next_action(state: SessionState, utc: str = "", monotonic_s: float | None = 
 
 
 def find_reached_limit(state: SessionState, utc: str, monotonic_s: float | None = None) -> str:
-    """Why this sitting must end, in words; empty if it may continue. The limits are the duration of the sitting
-    (minutes) and the daily exposure A(8) of the hand (m/s²)."""
+    """Find the limit that ends this sitting; returns the reason in words, empty if the sitting may continue. The limits
+    are the duration of the sitting (minutes) and the daily vibration exposure A(8) of the hand (m/s²)."""
     limits = state.protocol.limits
     sitting = pass_time(state.sitting, Moment(utc, monotonic_s))
     if (sitting.sat_s or 0.0) / 60.0 >= limits.longest_min:
         return f"the longest sitting of {limits.longest_min:g} minutes is reached; go on another day"
-    dose = a8_mps2(compute_daily_dose(sitting))
+    dose = compute_a8_mps2(compute_daily_dose(sitting))
     if dose >= limits.dose_a8_mps2:
         return (
             f"the hand has got its vibration dose for today (A(8) {dose:.2f} of {limits.dose_a8_mps2:g} m/s²); "

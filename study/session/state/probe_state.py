@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from protocols.definition.probes import ProbeSettings
 
 LARGEST_WEIGHT_HZ = 11.4
-"""Frequency (Hz) at which the weighting Wh of hand-arm vibration (`vibration_dose.hand_arm_weight`, ISO 5349-1) is
-largest. A probe has many frequencies; its whole acceleration is weighted as if it were at this one, so that the dose is
-never underestimated."""
+"""Frequency (Hz) at which the weighting Wh of hand-arm vibration (`vibration_dose.compute_hand_arm_weight`, ISO 5349-1)
+is largest. A probe has many frequencies; its whole acceleration is weighted as if it were at this one, so that the dose
+is never underestimated."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ def begin_probe(probing: ProbeState, event: ProbePlayed, settings: ProbeSettings
     """
     is_hand_probe = event.kind == "hand"
     highest_n = settings.reference_n if event.kind == "reference" else settings.probe_cap_n
-    if not settings.played:
+    if not settings.is_enabled:
         raise LogContradiction(f"a probe of {event.level_n:g} N, but the protocol has no probes")
     if event.level_n > highest_n:
         raise LogContradiction(f"a probe of {event.level_n:g} N, but the protocol allows {highest_n:g} N at most")

@@ -51,7 +51,7 @@ def _minutes_left(state: SessionState, trials_left: float) -> int | None:
     not from the clock, because forms, instructions and pauses do not predict the time of further trials."""
     answered = state.answers - state.sitting.answers_before
     response_times_s = [
-        trial.response_time_s for trial in state.trials if trial.counts and trial.response_time_s is not None
+        trial.response_time_s for trial in state.trials if trial.is_valid and trial.response_time_s is not None
     ]
     if answered < FIRST or not response_times_s:
         return None

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from protocols.trial import Trial
-from study.session.facts.log_time import ClockStep, Moment, clock_step, elapsed_s
+from study.session.facts.log_time import ClockStep, Moment, compute_elapsed_s, find_clock_step
 from study.session.facts.sitting_events import DemoFinished, DeviceChecked, FormFilled
 from study.session.state.probe_state import ProbeState
 from study.session.state.vibration_dose import NO_DOSE, Dose, add_sinusoid, sum_doses
@@ -119,7 +119,7 @@ def pass_time(sitting: SittingState, moment: Moment, resumed: bool = False) -> S
     """Advance all durations to this moment. resumed: the moment begins a new sitting, whose monotonic clock cannot be
     compared with earlier values."""
     last = Moment(sitting.last.utc) if resumed else sitting.last
-    passed_s, step = elapsed_s(last, moment), clock_step(last, moment, between_sittings=resumed)
+    passed_s, step = compute_elapsed_s(last, moment), find_clock_step(last, moment, between_sittings=resumed)
     since_s = sitting.probing.since_s
     advanced = replace(
         sitting,

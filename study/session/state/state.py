@@ -71,7 +71,7 @@ class SessionState:
     @property
     def answers(self) -> int:
         """Number of answers that count."""
-        return sum(trial.counts for trial in self.trials)
+        return sum(trial.is_valid for trial in self.trials)
 
 
 def begin_session(opened: SessionOpened, protocol: StudyProtocol) -> SessionState:

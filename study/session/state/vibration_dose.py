@@ -1,4 +1,5 @@
-"""Vibration dose of a hand: daily exposure A(8) of hand-transmitted vibration.
+"""Vibration dose of a hand: daily exposure A(8) of hand-transmitted vibration. Called by `sitting_state` and
+`daily_dose`.
 
     A(8) = sqrt( (1 / T0) * integral of a_hw(t)^2 dt ),        T0 = 8 h
 
@@ -38,7 +39,7 @@ NO_DOSE = Dose(0.0, 0.0, 0.0)
 """The dose before the first vibration."""
 
 
-def hand_arm_weight(frequency_hz: float) -> float:
+def compute_hand_arm_weight(frequency_hz: float) -> float:
     """Frequency weighting Wh of an acceleration: |band transition| at s = 2 pi i f, with wn = 2 pi fn and
 
         band = s² w2² / ((s² + s w1/Q1 + w1²) (s² + s w2/Q1 + w2²))
@@ -58,23 +59,25 @@ def hand_arm_weight(frequency_hz: float) -> float:
 
 
 def add_sinusoid(dose: Dose, frequency_hz: float, amplitude_mps2: float | None, seconds: float) -> Dose:
-    """The dose after one more sinusoid of this duration (s). amplitude_mps2: peak; None if it was not measured.
+    """Add a sinusoid to a dose: returns the dose after a sinusoid of this duration (s). amplitude_mps2: peak; None if
+    it was not measured.
 
     Fades count at full amplitude, so the dose is overestimated, never underestimated. Raises ValueError for a negative
     duration.
     """
     if seconds < 0:
         raise ValueError(f"seconds is {seconds:g}; a vibration lasts 0 s or longer")
-    extended = replace(dose, vibrated_s=dose.vibrated_s + seconds)
+    extended_dose = replace(dose, vibrated_s=dose.vibrated_s + seconds)
     if amplitude_mps2 is None:
-        return replace(extended, unmeasured_s=dose.unmeasured_s + seconds)
+        return replace(extended_dose, unmeasured_s=dose.unmeasured_s + seconds)
     return replace(
-        extended, squared_s=dose.squared_s + _frequency_weighted_rms(frequency_hz, amplitude_mps2) ** 2 * seconds
+        extended_dose,
+        squared_s=dose.squared_s + _compute_weighted_rms_mps2(frequency_hz, amplitude_mps2) ** 2 * seconds,
     )
 
 
 def sum_doses(*doses: Dose) -> Dose:
-    """Sum of doses of one hand on one day."""
+    """Sum of the doses of a hand on a day."""
     return Dose(
         squared_s=sum(dose.squared_s for dose in doses),
         vibrated_s=sum(dose.vibrated_s for dose in doses),
@@ -82,11 +85,11 @@ def sum_doses(*doses: Dose) -> Dose:
     )
 
 
-def a8_mps2(dose: Dose) -> float:
+def compute_a8_mps2(dose: Dose) -> float:
     """Daily exposure A(8): the constant weighted rms acceleration (m/s^2) over eight hours with the same dose."""
     return math.sqrt(dose.squared_s / WORKING_DAY_S)
 
 
-def _frequency_weighted_rms(frequency_hz: float, amplitude_mps2: float) -> float:
+def _compute_weighted_rms_mps2(frequency_hz: float, amplitude_mps2: float) -> float:
     """Weighted rms acceleration (m/s^2) of a sinusoid with this peak."""
-    return hand_arm_weight(frequency_hz) * amplitude_mps2 / math.sqrt(2)
+    return compute_hand_arm_weight(frequency_hz) * amplitude_mps2 / math.sqrt(2)

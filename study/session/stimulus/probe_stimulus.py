@@ -9,10 +9,10 @@ reference is longer, at two levels, and played with no hand on the handle.
 import numpy as np
 
 from equalizer.signals.excitation import apply_fades
-from equalizer.signals.multisine import lines_between, make_interleaved_multisine
+from equalizer.signals.multisine import list_lines_between, make_interleaved_multisine
 from equalizer.signals.recording import Segment
 from equalizer.signals.signal import FloatArray, Signal
-from protocols.definition.probes import FROM_HZ, PERIOD_S, ProbeSettings
+from protocols.definition.probes import LOWEST_LINE_HZ, PERIOD_S, ProbeSettings
 from study.session.stimulus.held_stimulus import HeldStimulus
 
 FADE_S = 0.25
@@ -24,9 +24,10 @@ PHASES_SEED = 16
 
 
 def make_probe_wave(settings: ProbeSettings, sample_rate_hz: float) -> FloatArray:
-    """One period, (n, 3), whose norm over the axes peaks at 1. Each axis has every third odd line from `FROM_HZ` on."""
+    """One period, (n, 3), whose norm over the axes peaks at 1. Each axis has every third odd line from
+    `LOWEST_LINE_HZ` on."""
     n = round(PERIOD_S * sample_rate_hz)
-    lines = lines_between(FROM_HZ, settings.to_hz, n, sample_rate_hz, odd_only=True)
+    lines = list_lines_between(LOWEST_LINE_HZ, settings.to_hz, n, sample_rate_hz, odd_only=True)
     return make_interleaved_multisine(lines, n, 3, PHASES_SEED)
 
 

@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equalizer.signals.excitation import apply_fades, log_sweep, sine
-from equalizer.signals.multisine import lines_between, multisines
+from equalizer.signals.multisine import list_lines_between, make_multisines
 from equalizer.signals.recording import Segment
 from equalizer.signals.signal import FloatArray, Signal
 from protocols.definition.apparatus import TestDirections
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.recording_segments import MultisineSegment, SineSegment, SweepSegment
-from study.session.stimulus.stimulus import direction_vector, loop_length
+from study.session.stimulus.stimulus import compute_direction_vector, count_loop_samples
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,14 +75,14 @@ def make_unit_vector(directions: TestDirections, axis_name: str) -> FloatArray:
     if axis_name in ("x", "y", "z"):
         axis: FloatArray = np.eye(3)["xyz".index(axis_name)]
         return axis
-    return direction_vector(directions, int(axis_name.removeprefix("direction_")))
+    return compute_direction_vector(directions, int(axis_name.removeprefix("direction_")))
 
 
 def _make_sine_piece(
     protocol: RecordingProtocol, number: int, segment: SineSegment, frequency_hz: float, rate_hz: float
 ) -> RecordingPiece:
     """A sinusoid. The evaluated part is a whole number of loops of whole periods; settling and fades lie outside."""
-    period = loop_length(frequency_hz, rate_hz)
+    period = count_loop_samples(frequency_hz, rate_hz)
     fade_samples = round(protocol.fade_s * rate_hz)
     settle_samples = max(fade_samples, round(segment.settle_s * rate_hz))
     evaluated_samples = max(1, round(segment.duration_s * rate_hz) // period) * period
@@ -126,9 +126,9 @@ def _make_multisine_pieces(
     """A piece for each realisation of a multisine. A multisine does not start at zero, so its fades lie outside the
     evaluated periods."""
     period, fade = round(segment.duration_s * rate_hz), round(protocol.fade_s * rate_hz)
-    lines = lines_between(segment.from_hz, segment.to_hz, period, rate_hz, odd_only=segment.odd_only)
+    lines = list_lines_between(segment.from_hz, segment.to_hz, period, rate_hz, odd_only=segment.odd_only)
     vector = None if segment.along == "all" else make_unit_vector(protocol.directions, segment.along)
-    tiles = multisines(
+    tiles = make_multisines(
         lines, period, segment.amplitude_n, 3 if vector is None else 1, segment.realisations, segment.seed
     )
     pieces = []

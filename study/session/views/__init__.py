@@ -2,6 +2,6 @@
 
 The values for a participant contain no level, frequency or correctness of answers. `views` (the participant's display);
 `form_views` (structure of a form) -> `forms` (made from a protocol) -> `form_entry` (while it is filled in);
-`archive_views` (past sessions); `handle_notice` (warning before a device moves). Formatting of text: `local_time`,
+`archive_views` (past sessions); `handle_notice` (notices before a device moves). Formatting of text: `local_time`,
 `printable`, `count_text`, `participant_codes`. Begin at `views.py`.
 """

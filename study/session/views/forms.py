@@ -51,7 +51,9 @@ def make_form(protocol: StudyProtocol, kind: FormKind) -> Form | None:
     match kind:
         case FormKind.CONSENT:
             return (
-                _make_consent_form(protocol, words) if protocol.consent.statements or protocol.probes.played else None
+                _make_consent_form(protocol, words)
+                if protocol.consent.statements or protocol.probes.is_enabled
+                else None
             )
         case FormKind.EXCLUSION:
             return _make_exclusion_form(protocol.consent, words) if protocol.consent.exclusions else None

@@ -1,4 +1,7 @@
-"""Safety notices before a real device moves: whether a hand may be on the handle, largest force, duration."""
+"""Safety notices before a real device moves: whether a hand may be on the handle, largest force, duration.
+
+Used by the workflows that move a device: recordings, equalizer playbacks and the test of the force limit.
+"""
 
 from collections.abc import Callable
 
@@ -20,8 +23,8 @@ def refuse_unannounced(notice: str) -> None:
     )
 
 
-def handle_notice(protocol: RecordingProtocol, device: str, total_s: float) -> str:
-    """Notice before a recording. device: name of the device; total_s: duration (s) if no piece is repeated."""
+def format_recording_notice(protocol: RecordingProtocol, device: str, total_s: float) -> str:
+    """Notice before a recording. device: name of the device; total_s: duration (s) if no segment is repeated."""
     peak_n = max(segment.amplitude_n for segment in protocol.segments)
     if protocol.hand == "held":
         return (
@@ -29,10 +32,10 @@ def handle_notice(protocol: RecordingProtocol, device: str, total_s: float) -> s
             f"in the study, {_describe_duration(total_s)}. It will push with up to {peak_n:g} N. Letting go is always "
             "safe; Ctrl-C stops."
         )
-    return free_handle_notice(device, peak_n, total_s)
+    return format_free_handle_notice(device, peak_n, total_s)
 
 
-def free_handle_notice(device: str, peak_n: float, total_s: float) -> str:
+def format_free_handle_notice(device: str, peak_n: float, total_s: float) -> str:
     """Notice before a device moves a handle that no hand holds. peak_n: largest force (N); total_s: duration (s)."""
     return (
         f"No person may hold the handle: '{device}' is going to move by itself {_describe_duration(total_s)}, "
@@ -41,9 +44,9 @@ def free_handle_notice(device: str, peak_n: float, total_s: float) -> str:
     )
 
 
-def limit_test_notice(device: str, force_n: float) -> str:
-    """Notice before the test that a device's force cap and its release of the force work. force_n: force of the test
-    (N). The test is without a spring, so the handle moves freely."""
+def format_limit_test_notice(device: str, force_n: float) -> str:
+    """Notice before `study.devices.opening.accept_device`, the test of a device's force cap and watchdog. force_n:
+    force of the test (N). The virtual spring is off during the test, so the handle moves freely."""
     return (
         f"No person may hold the handle: within some seconds '{device}' is shaken along x for a quarter of a second, "
         f"by {force_n:g} N, or twice as much where its cap does not hold; then it is pushed along x with {force_n:g} N "
@@ -52,5 +55,5 @@ def limit_test_notice(device: str, force_n: float) -> str:
 
 
 def _describe_duration(total_s: float) -> str:
-    """A duration (s) in words, in minutes from one minute on."""
+    """A duration (s) in words: in minutes from 60 s on, else in seconds."""
     return f"for about {round(total_s / 60)} min" if total_s >= 60 else f"for about {max(1, round(total_s))} s"

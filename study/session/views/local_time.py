@@ -1,7 +1,7 @@
-"""Display of logged times in local time, with the offset from UTC.
+"""Format logged UTC times as local time with the offset from UTC, for screens, command-line tables and messages.
 
 Logs, tables and JSON contain UTC. The time zone is an argument, because this package does not read settings of the
-computer; screens and commands pass `study.local_clock.machine_zone`.
+computer; `study.tui` and `study.cli` pass `study.local_clock.machine_zone`.
 """
 
 from collections import Counter
@@ -12,41 +12,42 @@ from typing import Literal
 Zone = Callable[[datetime], datetime]
 """Converts a time with any UTC offset to local time, daylight saving time included."""
 
-Detail = Literal["minutes", "seconds"]
+TimePrecision = Literal["minutes", "seconds"]
 """Smallest unit of a time that is shown."""
 
 
-def in_utc(time: datetime) -> datetime:
+def to_utc(time: datetime) -> datetime:
     """Convert a time to UTC, the time zone of logs and JSON."""
     return time.astimezone(UTC)
 
 
-def local_time(utc: str, zone: Zone, to: Detail = "minutes") -> str:
-    """Date, time and offset, such as "2026-11-22 14:05 +01:00".
+def format_time_in_zone(utc: str, zone: Zone, precision: TimePrecision = "minutes") -> str:
+    """Format date, time and offset, such as "2026-11-22 14:05 +01:00".
 
     utc: ISO 8601; without an offset it is taken as UTC. A text that is no time, or cannot be converted, is returned
     unchanged.
     """
-    return " ".join(local_parts(utc, zone, to)).strip()
+    return " ".join(split_time_in_zone(utc, zone, precision)).strip()
 
 
-def local_parts(utc: str, zone: Zone, to: Detail = "seconds") -> tuple[str, str, str]:
-    """(date, time, offset) in local time; (the text, "", "") where it cannot be converted."""
+def split_time_in_zone(utc: str, zone: Zone, precision: TimePrecision = "seconds") -> tuple[str, str, str]:
+    """Convert a UTC time (ISO 8601) to (date, time, offset) in local time; (the text, "", "") where it cannot be
+    converted."""
     try:
         time = datetime.fromisoformat(utc)
         local = zone(time if time.tzinfo is not None else time.replace(tzinfo=UTC))
     except (ValueError, OverflowError, OSError):
         return utc, "", ""
     offset = local.strftime("%z")
-    return local.date().isoformat(), local.time().isoformat(to), f"{offset[:3]}:{offset[3:5]}"
+    return local.date().isoformat(), local.time().isoformat(precision), f"{offset[:3]}:{offset[3:5]}"
 
 
-def local_column(utcs: Sequence[str], zone: Zone) -> tuple[str, tuple[str, ...]]:
-    """Times as a column of a table: the most frequent offset, for the header, and each time, with its own offset where
-    that differs, such as in daylight saving time."""
-    parts = [local_parts(utc, zone, "minutes") for utc in utcs]
-    offsets = Counter(offset for _, _, offset in parts if offset)
+def format_times_in_zone(utcs: Sequence[str], zone: Zone) -> tuple[str, tuple[str, ...]]:
+    """Format UTC times as a column of a table. Returns the most frequent offset, for the header ("" without times), and
+    each time, with its own offset where that differs, such as in daylight saving time."""
+    local_times = [split_time_in_zone(utc, zone, "minutes") for utc in utcs]
+    offsets = Counter(offset for _, _, offset in local_times if offset)
     common_offset = offsets.most_common(1)[0][0] if offsets else ""
     return common_offset, tuple(
-        " ".join((date, time, offset if offset != common_offset else "")).strip() for date, time, offset in parts
+        " ".join((date, time, offset if offset != common_offset else "")).strip() for date, time, offset in local_times
     )

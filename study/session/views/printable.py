@@ -1,6 +1,7 @@
-"""Removes control characters from text of files before it is shown in a terminal.
+"""Replaces non-printable characters in text from files by blanks, before it is shown in a terminal.
 
-Control characters in a note or a damaged file could otherwise move the cursor or clear the screen.
+Control characters in a note or a damaged file could otherwise move the cursor or clear the screen. The functions that
+build views (`study.workflows.views`) call `make_printable` on their result.
 """
 
 import dataclasses
@@ -9,25 +10,26 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 
-def printable_text(text: str) -> str:
-    """The text with each non-printable character replaced by a blank; line ends are kept."""
+def replace_unprintable(text: str) -> str:
+    """Replace each non-printable character (`str.isprintable`) by a blank; newlines are kept, carriage returns not."""
     if text.isprintable():
         return text
-    return "".join(c if c.isprintable() or c == "\n" else " " for c in text)
+    return "".join(character if character.isprintable() or character == "\n" else " " for character in text)
 
 
-def printable(view: T) -> T:
-    """A copy of a value of dataclasses, tuples and text, in which `printable_text` is applied to all text."""
-    cleaned: T = _clean(view)
+def make_printable(view: T) -> T:
+    """Copy a value of nested dataclasses and tuples, with `replace_unprintable` applied to every string in them."""
+    cleaned: T = _replace_in_value(view)
     return cleaned
 
 
-def _clean(value: Any) -> Any:
+def _replace_in_value(value: Any) -> Any:
+    """Recursive part of `make_printable`; values of other types are returned as they are."""
     if isinstance(value, str):
-        return printable_text(value)
+        return replace_unprintable(value)
     if isinstance(value, tuple):
-        return tuple(map(_clean, value))
+        return tuple(map(_replace_in_value, value))
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        names = (field.name for field in dataclasses.fields(value))
-        return dataclasses.replace(value, **{name: _clean(getattr(value, name)) for name in names})
+        field_names = (field.name for field in dataclasses.fields(value))
+        return dataclasses.replace(value, **{name: _replace_in_value(getattr(value, name)) for name in field_names})
     return value

@@ -18,11 +18,11 @@ from study.session.facts.events import (
     TrialPresented,
     TrialSpoiled,
 )
-from study.session.facts.log_time import seconds_between
+from study.session.facts.log_time import compute_wall_clock_s
 from study.session.facts.sitting_events import FormFilled, NoteTaken
 from study.session.state.fold import apply_event
 from study.session.state.state import SessionState, begin_session
-from study.session.watching.watch_view import FormLine, NoteLine
+from study.session.watching.watch_view import FormRecord, NoteRecord
 
 UNMEASURED_FLAG = "no steady part to measure, or too little of it"
 """A flag in logs before version 1.1 that is not shown, because nearly every trial has it and it is no fault. Later logs
@@ -56,8 +56,8 @@ class FollowedSession:
     state: SessionState
     remarks: tuple[str, ...]
     """For each of `state.trials`, its flags or the reason why it is void; empty without a remark."""
-    forms: tuple[FormLine, ...]
-    notes: tuple[NoteLine, ...]
+    forms: tuple[FormRecord, ...]
+    notes: tuple[NoteRecord, ...]
     """Oldest first."""
     end_reason: str
     """Why the sitting was ended; empty while it has not ended."""
@@ -104,9 +104,9 @@ def apply_followed_event(watched: FollowedSession, event: Event) -> FollowedSess
         case ProbePlayed() | ProbeMeasured():
             return _record_probe(updated, event)
         case FormFilled():
-            return replace(updated, forms=(*watched.forms, FormLine(event.utc, event.form, event.passed)))
+            return replace(updated, forms=(*watched.forms, FormRecord(event.utc, event.form, event.passed)))
         case NoteTaken():
-            note = NoteLine(event.utc, event.who, event.text, event.adverse)
+            note = NoteRecord(event.utc, event.who, event.text, event.adverse)
             return replace(updated, notes=(*watched.notes, note))
         case SessionInterrupted():
             return replace(updated, end_reason=event.reason)
@@ -125,7 +125,7 @@ def apply_followed_event(watched: FollowedSession, event: Event) -> FollowedSess
 def _record_probe(watched: FollowedSession, event: ProbePlayed | ProbeMeasured) -> FollowedSession:
     """Note the beginning or the measurement of a probe; a declined reference, which was not played, is left out."""
     if isinstance(event, ProbePlayed):
-        started_s = max(0.0, seconds_between(watched.state.opened.utc, event.utc))
+        started_s = max(0.0, compute_wall_clock_s(watched.state.opened.utc, event.utc))
         return replace(
             watched, playing=PlayedProbe(event.number, event.kind, event.level_n, started_s, watched.sitting)
         )

@@ -10,7 +10,7 @@ from protocols.procedure.staircase import level_n
 from protocols.trial import Phase, Trial, TrialStatus
 from study.session.state.state import SessionState, find_due_presentation, make_current_rule
 from study.session.watching.followed_session import FollowedSession
-from study.session.watching.watch_view import ClosedTrial, OpenTrial, PracticeLine, StaircasePoint, WatchedRun
+from study.session.watching.watch_view import ClosedTrial, OpenTrial, PracticeResult, StaircasePoint, WatchedRun
 
 LAST_TRIALS = 40
 """Number of latest trials that the experimenter's view lists."""
@@ -19,7 +19,7 @@ LAST_TRIALS = 40
 def find_shown_run(state: SessionState) -> int | None:
     """Index of the run to plot: the current run while a trial is open or before the first answer of the session,
     otherwise the run of the latest counted answer. None for a finished session without answers."""
-    answered = [trial.run for trial in state.trials if trial.counts]
+    answered = [trial.run for trial in state.trials if trial.is_valid]
     if not state.finished and (not answered or state.presented is not None):
         return state.run
     return answered[-1] if answered else None
@@ -27,7 +27,7 @@ def find_shown_run(state: SessionState) -> int | None:
 
 def _select_counted(state: SessionState, run: int) -> list[Trial]:
     """Trials of a run that count."""
-    return [trial for trial in state.trials if trial.run == run and trial.counts]
+    return [trial for trial in state.trials if trial.run == run and trial.is_valid]
 
 
 def collect_points(state: SessionState, run: int | None) -> tuple[StaircasePoint, ...]:
@@ -96,7 +96,7 @@ def list_last_trials(watched: FollowedSession) -> tuple[ClosedTrial, ...]:
 def _make_closed_trial(state: SessionState, trial: Trial, remark: str) -> ClosedTrial:
     # The direction and correctness of a void trial stay hidden, because the same stimulus is presented again. They stay
     # hidden, too, until the health of the device is judged, because the trial may still become void.
-    is_revealed = trial.counts and not _is_open(state, trial)
+    is_revealed = trial.is_valid and not _is_open(state, trial)
     phase = "practice" if state.runs[trial.run].practice else trial.phase.value
     return ClosedTrial(
         run=trial.run,
@@ -117,7 +117,7 @@ def _make_closed_trial(state: SessionState, trial: Trial, remark: str) -> Closed
     )
 
 
-def collect_practice_lines(state: SessionState) -> tuple[PracticeLine, ...]:
+def collect_practice_results(state: SessionState) -> tuple[PracticeResult, ...]:
     """Results of the practice runs before the current run."""
     settings, lines = state.protocol.practice, []
     for run in state.runs[: state.run]:
@@ -125,7 +125,7 @@ def collect_practice_lines(state: SessionState) -> tuple[PracticeLine, ...]:
             done = PracticeState(tuple(bool(trial.correct) for trial in _select_counted(state, run.index)))
             answer_count = min(settings.of_last, len(done.correct))
             lines.append(
-                PracticeLine(
+                PracticeResult(
                     run.frequency_hz,
                     count_right_of_last(settings, done),
                     answer_count,

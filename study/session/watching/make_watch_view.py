@@ -3,14 +3,14 @@
 from dataclasses import dataclass
 
 from protocols.trial import Phase
-from study.session.facts.log_time import Moment, seconds_between
+from study.session.facts.log_time import Moment, compute_wall_clock_s
 from study.session.state.sitting_state import SittingState, compute_daily_dose, pass_time
-from study.session.state.vibration_dose import a8_mps2
+from study.session.state.vibration_dose import compute_a8_mps2
 from study.session.views.archive_views import INELIGIBILITY_REASONS
 from study.session.watching.followed_session import FollowedSession
 from study.session.watching.followed_trials import (
     collect_points,
-    collect_practice_lines,
+    collect_practice_results,
     find_shown_run,
     list_last_trials,
     make_open_trial,
@@ -19,7 +19,7 @@ from study.session.watching.followed_trials import (
 )
 from study.session.watching.live import Live
 from study.session.watching.watch_alarms import Situation, find_alarms
-from study.session.watching.watch_view import RUNNING_STATUSES, DriftLine, Exposure, SittingStatus, WatchView
+from study.session.watching.watch_view import RUNNING_STATUSES, DriftRecord, Exposure, SittingStatus, WatchView
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class LiveInfo:
     """Whether a program holds the session's lock; None if not checked."""
     problem: str = ""
     """Why the log cannot be followed any further; empty where it can."""
-    drifts: tuple[DriftLine, ...] = ()
+    drifts: tuple[DriftRecord, ...] = ()
 
 
 def make_watch_view(
@@ -42,7 +42,7 @@ def make_watch_view(
     situation = _make_situation(watched, live_info, now_utc)
     live, status = situation.live, situation.standing
     activity, since_utc = _describe_activity(watched, live, status)
-    catches = [trial for trial in state.trials if trial.phase is Phase.CATCH and trial.counts]
+    catches = [trial for trial in state.trials if trial.phase is Phase.CATCH and trial.is_valid]
     return WatchView(
         utc=now_utc,
         session=state.opened.session,
@@ -66,7 +66,7 @@ def make_watch_view(
         exposure=situation.exposure,
         catch_given=len(catches),
         catch_lapses=sum(not trial.correct for trial in catches),
-        practice=collect_practice_lines(state),
+        practice=collect_practice_results(state),
         forms=watched.forms,
         notes=watched.notes[::-1],
         gate_radius_mm=state.protocol.gate.radius_mm,
@@ -155,7 +155,7 @@ def _compute_exposure(watched: FollowedSession, live: Live | None, status: Sitti
     return Exposure(
         elapsed_min=(sitting.sat_s or 0.0) / 60.0,
         limit_min=limits.longest_min,
-        dose_a8_mps2=a8_mps2(compute_daily_dose(sitting)),
+        dose_a8_mps2=compute_a8_mps2(compute_daily_dose(sitting)),
         dose_limit_mps2=limits.dose_a8_mps2,
     )
 
@@ -171,4 +171,4 @@ def _advance_to_now(sitting: SittingState, live: Live | None, now_utc: str) -> S
 
 def _seconds_between(since_utc: str, now_utc: str) -> float:
     """Seconds between two times, never negative: the clocks of two computers differ."""
-    return max(0.0, seconds_between(since_utc, now_utc))
+    return max(0.0, compute_wall_clock_s(since_utc, now_utc))

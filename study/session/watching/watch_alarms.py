@@ -1,5 +1,5 @@
 """Alarms for the experimenter who follows a session: faults of device, sensor, computer or program, limits that are
-reached, trials that go wrong, and adverse events.
+reached, trials that go wrong, and adverse events. `make_watch_view` calls `find_alarms`.
 
 Each alarm is one function of the situation (`Situation`), listed in order of urgency in `_RUNNING_CHECKS` and
 `_ENDED_CHECKS`; it returns None where there is no reason for an alarm."""
@@ -8,35 +8,35 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from protocols.trial import Phase, Trial, TrialStatus
-from study.session.facts.log_time import Moment, elapsed_s, seconds_between
+from study.session.facts.log_time import Moment, compute_elapsed_s, compute_wall_clock_s
 from study.session.facts.void_reasons import HARDLY_ARRIVED, is_computer_busy
 from study.session.watching.followed_session import FollowedSession
 from study.session.watching.live import Live
-from study.session.watching.watch_view import RUNNING_STATUSES, Alarm, DriftLine, Exposure, SittingStatus
+from study.session.watching.watch_view import RUNNING_STATUSES, Alarm, DriftRecord, Exposure, SittingStatus
 
-SILENT_AFTER_S = 3.0
+LIVE_TIMEOUT_S = 3.0
 """Age of the live state (s) from which it is out of date. `live.json` is written about four times a second; a slow disk
 may delay it by a second or two."""
-_LIVELY = ("demo", "waiting for the handle", "rest", "probe", "reference")
+_LIVE_ACTIVITIES = ("demo", "waiting for the handle", "rest", "probe", "reference")
 """Activities during which the session writes `live.json` continuously; it does not while a form or a notice is read."""
-HANDLE_AWAY_S = 2.0
+HANDLE_AWAY_LIMIT_S = 2.0
 """Time for which the handle may be away from its place before that is an alarm (s)."""
-UNANSWERED_S = 60.0
+ANSWER_ALARM_S = 60.0
 """Time without an answer (s) after which the participant may need help; answers usually take seconds."""
-JUST_NOW_S = 60.0
+END_REPORTED_S = 60.0
 """Time for which the end of a sitting is reported (s)."""
-CATCH_TRIALS, LAPSES = 5, 2
-"""Alarm at `LAPSES` wrong answers among the last `CATCH_TRIALS` catch trials, which an attentive participant answers
-correctly, because they are at full level."""
-PRESENTATIONS, VOIDS = 10, 3
-"""Alarm at `VOIDS` void trials among the last `PRESENTATIONS` presentations."""
-WARNING_SHARE = 0.8
+CATCH_TRIAL_WINDOW, LAPSE_LIMIT = 5, 2
+"""Alarm at `LAPSE_LIMIT` wrong answers among the last `CATCH_TRIAL_WINDOW` catch trials, which an attentive participant
+answers correctly, because they are at full level."""
+TRIAL_WINDOW, VOID_LIMIT = 10, 3
+"""Alarm at `VOID_LIMIT` void trials among the last `TRIAL_WINDOW` presentations."""
+WARNING_FRACTION = 0.8
 """Fraction of a limit (time, dose) at which the experimenter is warned."""
 
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """All that alarms depend on, at one moment."""
+    """State of a followed session at one time, from which all alarms are decided."""
 
     watched: FollowedSession
     live: Live | None
@@ -46,7 +46,7 @@ class Situation:
     exposure: Exposure
     now_utc: str
     """Present time, ISO 8601."""
-    drifts: tuple[DriftLine, ...] = ()
+    drifts: tuple[DriftRecord, ...] = ()
     """Changes of device or grip that the probes showed."""
 
     @property
@@ -57,7 +57,7 @@ class Situation:
     @property
     def is_live_fresh(self) -> bool:
         """Whether the live state is up to date."""
-        return self.live is not None and self.seconds_since(self.live.utc) <= SILENT_AFTER_S
+        return self.live is not None and self.compute_seconds_since(self.live.utc) <= LIVE_TIMEOUT_S
 
     @property
     def open_s(self) -> float:
@@ -67,18 +67,21 @@ class Situation:
         if state.presented is None or state.answered is not None:
             return 0.0
         presented_at = Moment(state.presented.utc, state.presented.monotonic_s)
-        stamped = self.live is not None and self.live.monotonic_s is not None and presented_at.monotonic_s is not None
-        if self.live is not None and stamped:
-            return elapsed_s(presented_at, Moment(self.live.utc, self.live.monotonic_s))
-        return elapsed_s(presented_at, Moment(self.now_utc))
+        is_stamped = (
+            self.live is not None and self.live.monotonic_s is not None and presented_at.monotonic_s is not None
+        )
+        if self.live is not None and is_stamped:
+            return compute_elapsed_s(presented_at, Moment(self.live.utc, self.live.monotonic_s))
+        return compute_elapsed_s(presented_at, Moment(self.now_utc))
 
-    def seconds_since(self, utc: str) -> float:
+    def compute_seconds_since(self, utc: str) -> float:
         """Seconds from this UTC time (ISO 8601) to now; negative for a later one."""
-        return seconds_between(utc, self.now_utc)
+        return compute_wall_clock_s(utc, self.now_utc)
 
 
 def find_alarms(situation: Situation, previous_alarms: tuple[Alarm, ...]) -> tuple[Alarm, ...]:
-    """Current alarms, most urgent first. A lasting alarm keeps its start time."""
+    """Evaluate all checks. Returns the current alarms, most urgent first; an alarm that was among `previous_alarms`
+    keeps its start time."""
     previous_by_kind = {alarm.kind: alarm for alarm in previous_alarms}
     checks = _RUNNING_CHECKS if situation.standing in RUNNING_STATUSES else _ENDED_CHECKS
     current_alarms = [alarm for check in checks if (alarm := check(situation)) is not None]
@@ -90,136 +93,146 @@ def find_alarms(situation: Situation, previous_alarms: tuple[Alarm, ...]) -> tup
     ]
     # The end of a sitting is reported for a limited time, and permanently to a viewer who saw it happen.
     return tuple(
-        a
-        for a in dated_alarms
-        if a.kind not in _ENDS or a.kind in previous_by_kind or situation.seconds_since(a.since) < JUST_NOW_S
+        dated_alarm
+        for dated_alarm in dated_alarms
+        if dated_alarm.kind not in _END_KINDS
+        or dated_alarm.kind in previous_by_kind
+        or situation.compute_seconds_since(dated_alarm.since) < END_REPORTED_S
     )
 
 
-def _silence_alarm(situation: Situation) -> Alarm | None:
-    """The session should be active, but its live state is not updated."""
+def _check_live_state(situation: Situation) -> Alarm | None:
+    """Alarm where the live state is out of date during an activity that updates it continuously."""
     live, text = (
         situation.live,
         "The session has been silent for seconds: it hangs, or was killed. Hands off the handle.",
     )
     if live is None or situation.is_live_fresh:
         return None
-    expected = live.activity in _LIVELY or (live.activity == "trial" and situation.watched.state.presented is not None)
-    return Alarm("silent", text, live.utc) if expected else None
+    is_updated = live.activity in _LIVE_ACTIVITIES or (
+        live.activity == "trial" and situation.watched.state.presented is not None
+    )
+    return Alarm("silent", text, live.utc) if is_updated else None
 
 
-def _gone_alarm(situation: Situation) -> Alarm | None:
-    """The program ended without logging the end of the sitting."""
+def _check_program_ended(situation: Situation) -> Alarm | None:
+    """Alarm where the program ended without logging the end of the sitting."""
     if situation.standing != "not running":
         return None
     last_utc = max(situation.watched.last_utc, situation.live.utc if situation.live is not None else "")
     return Alarm("gone", "The program that ran the session is gone. hapteq resume continues the session.", last_utc)
 
 
-def _end_alarm(situation: Situation) -> Alarm | None:
-    """The sitting was ended."""
+def _check_sitting_ended(situation: Situation) -> Alarm | None:
+    """Alarm where the end of the sitting was logged, with its reason."""
     watched = situation.watched
     return Alarm("ended", f"The sitting ended: {watched.end_reason}.", watched.last_utc) if watched.end_reason else None
 
 
-def _log_alarm(situation: Situation) -> Alarm | None:
-    """The log cannot be followed any further."""
+def _check_log(situation: Situation) -> Alarm | None:
+    """Alarm where the log cannot be read any further."""
     if not situation.problem:
         return None
     return Alarm("log", f"The log cannot be followed: {situation.problem}", situation.now_utc)
 
 
-def _device_alarm(situation: Situation) -> Alarm | None:
-    """The device reports a fault."""
+def _check_device(situation: Situation) -> Alarm | None:
+    """Alarm where the device reports a fault."""
     if situation.live is None or not situation.is_live_fresh or not situation.live.fault:
         return None
     return Alarm("device", f"The device reported a fault: {situation.live.fault}.", situation.live.utc)
 
 
-def _sensor_alarm(situation: Situation) -> Alarm | None:
-    """The accelerometer is at the limit of its range."""
+def _check_sensor(situation: Situation) -> Alarm | None:
+    """Alarm where the accelerometer is at the limit of its range."""
     if situation.live is None or not situation.is_live_fresh or not situation.live.sensor_clipped:
         return None
     return Alarm("sensor", "The acceleration sensor is clipped: it reads too little.", situation.now_utc)
 
 
-def _handle_alarm(situation: Situation) -> Alarm | None:
-    """The handle is outside the gate: for longer than `HANDLE_AWAY_S` before a trial, or at any time during a trial."""
-    live, radius = situation.live, situation.watched.state.protocol.gate.radius_mm
+def _check_handle(situation: Situation) -> Alarm | None:
+    """Alarm where the handle is outside the gate: for longer than `HANDLE_AWAY_LIMIT_S` before a trial, or at any time
+    during a trial."""
+    live, radius_mm = situation.live, situation.watched.state.protocol.gate.radius_mm
     if live is None or not situation.is_live_fresh:
         return None
-    waiting = live.activity == "waiting for the handle"
-    if waiting and not live.handle_ready and situation.seconds_since(live.since_utc) > HANDLE_AWAY_S:
+    is_waiting = live.activity == "waiting for the handle"
+    if is_waiting and not live.handle_ready and situation.compute_seconds_since(live.since_utc) > HANDLE_AWAY_LIMIT_S:
         return Alarm("handle", "The handle is out of its place: no trial starts until it is back.", live.since_utc)
-    if live.activity == "trial" and radius > 0 and live.offset_mm is not None and live.offset_mm > radius:
+    if live.activity == "trial" and radius_mm > 0 and live.offset_mm is not None and live.offset_mm > radius_mm:
         return Alarm("handle", "The handle is out of its place while a trial runs.", situation.now_utc)
     return None
 
 
-def _adverse_alarm(situation: Situation) -> Alarm | None:
-    """The latest adverse event of this sitting."""
-    adverse = [note for note in situation.watched.notes[situation.watched.notes_before :] if note.adverse]
-    return Alarm("adverse", f"Adverse event: {adverse[-1].text}", adverse[-1].utc, event=True) if adverse else None
+def _check_adverse_events(situation: Situation) -> Alarm | None:
+    """Alarm with the latest adverse event of this sitting."""
+    events = [note for note in situation.watched.notes[situation.watched.notes_before :] if note.adverse]
+    return Alarm("adverse", f"Adverse event: {events[-1].text}", events[-1].utc, event=True) if events else None
 
 
-def _time_alarm(situation: Situation) -> Alarm | None:
-    """The time limit of the sitting is reached, or near (`WARNING_SHARE`)."""
-    share, limit = situation.exposure.time_share, f"the {situation.exposure.limit_min:g} minutes of a sitting"
+def _check_time_limit(situation: Situation) -> Alarm | None:
+    """Alarm where the time limit of the sitting is reached, or near (`WARNING_FRACTION`)."""
+    share, period = situation.exposure.time_share, f"the {situation.exposure.limit_min:g} minutes of a sitting"
     if share >= 1:
         return Alarm(
-            "time reached", f"{limit[0].upper()}{limit[1:]} are over: it ends after this trial.", situation.now_utc
+            "time reached", f"{period[0].upper()}{period[1:]} are over: it ends after this trial.", situation.now_utc
         )
     return (
-        Alarm("time near", f"{share:.0%} of {limit} are over.", situation.now_utc, urgent=False)
-        if share >= WARNING_SHARE
+        Alarm("time near", f"{share:.0%} of {period} are over.", situation.now_utc, urgent=False)
+        if share >= WARNING_FRACTION
         else None
     )
 
 
-def _dose_alarm(situation: Situation) -> Alarm | None:
-    """The vibration dose A(8) reached its limit, or is near it (`WARNING_SHARE`)."""
+def _check_dose(situation: Situation) -> Alarm | None:
+    """Alarm where the vibration dose A(8) reached its limit, or is near it (`WARNING_FRACTION`)."""
     share = situation.exposure.dose_share
     if share >= 1:
         return Alarm(
             "dose reached", "The vibration dose is reached: the sitting ends after this trial.", situation.now_utc
         )
     text = f"{share:.0%} of the vibration dose is reached."
-    return Alarm("dose near", text, situation.now_utc, urgent=False) if share >= WARNING_SHARE else None
+    return Alarm("dose near", text, situation.now_utc, urgent=False) if share >= WARNING_FRACTION else None
 
 
-def _lapse_alarm(situation: Situation) -> Alarm | None:
-    """Several of the latest catch trials were answered wrongly."""
-    last = [trial for trial in situation.trials if trial.phase is Phase.CATCH and trial.counts][-CATCH_TRIALS:]
-    wrong = sum(not trial.correct for trial in last)
-    if wrong < LAPSES:
+def _check_catch_trials(situation: Situation) -> Alarm | None:
+    """Alarm where `LAPSE_LIMIT` of the latest `CATCH_TRIAL_WINDOW` catch trials were answered wrongly."""
+    trials = [trial for trial in situation.trials if trial.phase is Phase.CATCH and trial.is_valid][
+        -CATCH_TRIAL_WINDOW:
+    ]
+    lapses = sum(not trial.correct for trial in trials)
+    if lapses < LAPSE_LIMIT:
         return None
-    text = f"{wrong} of the last {len(last)} catch trials were wrong: is the participant tired, or the grip off?"
+    text = f"{lapses} of the last {len(trials)} catch trials were wrong: is the participant tired, or the grip off?"
     return Alarm("lapses", text, situation.watched.last_utc)
 
 
-def _void_alarm(situation: Situation) -> Alarm | None:
-    """Several of the latest presentations were void."""
-    last = [trial for trial in situation.trials if trial.status is not TrialStatus.OPEN][-PRESENTATIONS:]
-    void = sum(trial.status is TrialStatus.SPOILED for trial in last)
-    if void < VOIDS:
+def _check_void_trials(situation: Situation) -> Alarm | None:
+    """Alarm where `VOID_LIMIT` of the latest `TRIAL_WINDOW` presentations were void."""
+    presentations = [trial for trial in situation.trials if trial.status is not TrialStatus.OPEN][-TRIAL_WINDOW:]
+    void_count = sum(trial.status is TrialStatus.SPOILED for trial in presentations)
+    if void_count < VOID_LIMIT:
         return None
-    text = f"{void} of the last {len(last)} presentations were void, the last because {_last_void(situation)}."
+    text = (
+        f"{void_count} of the last {len(presentations)} presentations were void, "
+        f"the last because {_find_void_reason(situation)}."
+    )
     return Alarm("voids", text, situation.watched.last_utc)
 
 
-def _load_alarm(situation: Situation) -> Alarm | None:
-    """Some of the latest presentations were void because the computer was too busy."""
-    remarks = situation.watched.remarks[-PRESENTATIONS:]
-    void = sum(map(is_computer_busy, remarks))
-    if not void:
+def _check_computer_load(situation: Situation) -> Alarm | None:
+    """Alarm where some of the latest presentations were void because the computer was too busy."""
+    remarks = situation.watched.remarks[-TRIAL_WINDOW:]
+    voids = sum(map(is_computer_busy, remarks))
+    if not voids:
         return None
-    void_text = f"{void} of the last {len(remarks)} presentations {'was' if void == 1 else 'were'} void because of it"
+    void_text = f"{voids} of the last {len(remarks)} presentations {'was' if voids == 1 else 'were'} void because of it"
     return Alarm("busy", f"The computer is too busy: {void_text}. Close other programs.", situation.watched.last_utc)
 
 
-def _still_alarm(situation: Situation) -> Alarm | None:
-    """In some of the latest presentations the handle moved less than with any hand (`HARDLY_ARRIVED`)."""
-    remarks = situation.watched.remarks[-PRESENTATIONS:]
+def _check_handle_motion(situation: Situation) -> Alarm | None:
+    """Alarm where the handle moved less than with any hand in some of the latest presentations (`HARDLY_ARRIVED`)."""
+    remarks = situation.watched.remarks[-TRIAL_WINDOW:]
     still_count = sum(HARDLY_ARRIVED in remark for remark in remarks)
     if not still_count:
         return None
@@ -228,40 +241,47 @@ def _still_alarm(situation: Situation) -> Alarm | None:
     return Alarm("still", f"{text}. {advice}", situation.watched.last_utc)
 
 
-def _drift_alarm(situation: Situation) -> Alarm | None:
-    """Device or grip changed by more than the analysis of the session allows."""
-    exceeding = [drift.sentence for drift in situation.drifts if drift.beyond]
-    if not exceeding:
+def _check_drift(situation: Situation) -> Alarm | None:
+    """Alarm where device or grip changed by more than the analysis of the session allows."""
+    exceeded_limits = [drift.sentence for drift in situation.drifts if drift.beyond]
+    if not exceeded_limits:
         return None
     text = (
-        f"Device or grip has changed by more than the analysis allows: {'; '.join(exceeding)}. Pause, and look at both."
+        f"Device or grip has changed by more than the analysis allows: {'; '.join(exceeded_limits)}. "
+        "Pause, and look at both."
     )
     return Alarm("drift", text, situation.watched.last_utc)
 
 
-def _last_void(situation: Situation) -> str:
+def _find_void_reason(situation: Situation) -> str:
     """Reason of the latest void trial; at least one must exist."""
     remarks = zip(situation.trials, situation.watched.remarks, strict=True)
     return [remark for trial, remark in remarks if trial.status is TrialStatus.SPOILED][-1]
 
 
-def _answer_alarm(situation: Situation) -> Alarm | None:
-    """The open trial has had no answer for longer than `UNANSWERED_S`."""
+def _check_answer_time(situation: Situation) -> Alarm | None:
+    """Alarm where the open trial has had no answer for longer than `ANSWER_ALARM_S`."""
     state = situation.watched.state
     if situation.standing != "running" or state.presented is None or state.answered is not None:
         return None
-    if situation.open_s <= UNANSWERED_S:
+    if situation.open_s <= ANSWER_ALARM_S:
         return None
     text = "Nothing was answered for more than a minute: is the participant all right?"
     return Alarm("unanswered", text, state.presented.utc, urgent=False)
 
 
-_ENDS = ("gone", "ended")
-"""Kinds of alarms about the end of a sitting: shown for `JUST_NOW_S`, and permanently to a viewer who saw the end."""
-_ENDED_CHECKS: tuple[Callable[[Situation], Alarm | None], ...] = (_log_alarm, _gone_alarm, _end_alarm)
+_END_KINDS = ("gone", "ended")
+"""Kinds of alarms about the end of a sitting: shown for `END_REPORTED_S`, and permanently to a viewer who saw the
+end."""
+_ENDED_CHECKS: tuple[Callable[[Situation], Alarm | None], ...] = (
+    _check_log,
+    _check_program_ended,
+    _check_sitting_ended,
+)
 """Alarms of a session that does not run, most urgent first."""
 _RUNNING_CHECKS: tuple[Callable[[Situation], Alarm | None], ...] = (
-    _device_alarm, _silence_alarm, _log_alarm, _adverse_alarm, _handle_alarm, _sensor_alarm, _dose_alarm,
-    _time_alarm, _still_alarm, _lapse_alarm, _drift_alarm, _load_alarm, _void_alarm, _answer_alarm,
+    _check_device, _check_live_state, _check_log, _check_adverse_events, _check_handle, _check_sensor, _check_dose,
+    _check_time_limit, _check_handle_motion, _check_catch_trials, _check_drift, _check_computer_load,
+    _check_void_trials, _check_answer_time,
 )  # fmt: skip
 """Alarms of a running session, most urgent first."""

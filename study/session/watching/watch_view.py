@@ -2,7 +2,8 @@
 
 The view contains no seed, and the direction of a trial only after the answer, because an experimenter who knows the
 direction could reveal it to the participant. Runs, trials and attempts are numbered from 0, as in the files; a screen
-adds one. `make_watch_view` fills these classes.
+adds 1. `make_watch_view` makes the view; screens, text lines and `hapteq watch --json` show it. Levels are stimulus
+amplitudes, stated as force (N).
 """
 
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from study.session.watching.live import Live
 
 SittingStatus = Literal["running", "paused", "resting", "not running", "finished", "stopped", "refused", "excluded"]
 """Status of a session. `stopped`: the sitting was ended; `not running`: the program ended without logging the end. Both
-can be resumed."""
+can be resumed. `refused`, `excluded`: the person does not take part."""
 
 RUNNING_STATUSES: tuple[SittingStatus, ...] = ("running", "paused", "resting")
 """The statuses in which the program of the session runs."""
@@ -26,11 +27,13 @@ class WatchedRun:
     """A run of the session's schedule and its progress, in counted trials and reversals."""
 
     run: int
+    """Index of the run in the schedule."""
     phase: str
     """Training, practice, test or detection."""
     frequency_hz: float
     status: RunStatus
     reversals: int
+    """Number of reversals so far."""
     reversals_needed: int
     """Number of reversals that end the run; 0 where the run ends by another rule (practice, Bayesian placement)."""
     trials: int
@@ -45,6 +48,7 @@ class StaircasePoint:
     level_n: float
     correct: bool
     reversal: bool
+    """Whether the staircase reversed its direction at this trial."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,25 +67,27 @@ class OpenTrial:
 
 @dataclass(frozen=True, slots=True)
 class ClosedTrial:
-    """A trial that was answered or is void. `shown` and `correct` are None for a void trial, and while the trial is not
-    judged yet."""
+    """A trial that was answered or is void. `shown` and `correct` are None for a void trial, and until it is decided
+    whether the trial counts."""
 
     run: int
     trial: int
     attempt: int
     phase: str
+    """Training, practice, test, detection or catch."""
     frequency_hz: float
     level_n: float
     shown: int | None
     """Correct answer, 1 or 2: number of the direction or, in a detection run, of the interval."""
     answer: int | None
+    """Answer of the participant, 1 or 2; None where there is none."""
     correct: bool | None
     reversal: bool
     response_time_s: float | None
     delivered_mps2: float | None
-    """Measured acceleration along the direction (m/s^2, peak)."""
+    """Measured amplitude of the acceleration along the direction (m/s²); None where it was not measured."""
     off_axis_mps2: float | None
-    """Measured acceleration across the direction (m/s^2, peak)."""
+    """Measured amplitude of the acceleration across the direction (m/s²); None where it was not measured."""
     status: str
     """ok, flagged, unmeasured or spoiled (`TrialStatus`); measuring while the measurement is not in the log."""
     remark: str
@@ -90,12 +96,12 @@ class ClosedTrial:
 
 @dataclass(frozen=True, slots=True)
 class Exposure:
-    """Duration of the sitting (min) and vibration dose of the hand (m/s^2), with their limits."""
+    """Duration of the sitting (min) and vibration dose of the hand (m/s²), with their limits."""
 
     elapsed_min: float
     limit_min: float
     dose_a8_mps2: float
-    """Daily exposure A(8), as in `vibration_dose`."""
+    """Daily vibration exposure A(8) by ISO 5349-1, as in `vibration_dose`."""
     dose_limit_mps2: float
 
     @property
@@ -110,7 +116,7 @@ class Exposure:
 
 
 @dataclass(frozen=True, slots=True)
-class PracticeLine:
+class PracticeResult:
     """Result of a practice run: `right` of the last `of` answers were correct. passed: whether the criterion was
     met."""
 
@@ -121,17 +127,18 @@ class PracticeLine:
 
 
 @dataclass(frozen=True, slots=True)
-class FormLine:
+class FormRecord:
     """A form that was filled in, without its answers. passed: False where consent was not given or the person may not
     take part."""
 
     utc: str
+    """Time at which it was filled in, ISO 8601."""
     form: str
     passed: bool
 
 
 @dataclass(frozen=True, slots=True)
-class NoteLine:
+class NoteRecord:
     """A note of the session's log. who: participant, experimenter or program; adverse: about an adverse event, such as
     pain."""
 
@@ -142,15 +149,15 @@ class NoteLine:
 
 
 @dataclass(frozen=True, slots=True)
-class DriftLine:
-    """A change of device or grip that the probes of the session show."""
+class DriftRecord:
+    """A drift (change of the device or of the grip during the session) that its probes show."""
 
     since_s: float
     """Time from the opening of the session to the first probe with this change (s)."""
     sentence: str
-    """The change in words."""
+    """The drift in words, with its unit and time."""
     beyond: bool
-    """Whether the drift exceeds what the analysis of the session allows."""
+    """Whether the drift exceeds its limit in `session_drift.MAX_CHANGES`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +169,7 @@ class Alarm:
     sentence: str
     """What is wrong, and what to do."""
     since: str
-    """Start time, UTC. An alarm keeps its start time as long as it lasts."""
+    """Start time, UTC (ISO 8601). An alarm keeps its start time as long as it lasts."""
     urgent: bool = True
     """Whether the alarm sounds until the experimenter has seen it; other alarms sound once."""
     event: bool = False
@@ -174,7 +181,7 @@ class WatchView:
     """The complete view of a followed session at one moment, from which screens and text lines are made."""
 
     utc: str
-    """Time of the view."""
+    """Time of the view, ISO 8601."""
     session: str
     """Name of the session."""
     subject: str
@@ -182,11 +189,13 @@ class WatchView:
     protocol: str
     """Title of the protocol."""
     device: str
+    """Name of the device."""
     simulated: bool
     """Whether the device is simulated, so that no real handle moves."""
     observer: str | None
     """Name of the simulated participant; None for a person."""
     standing: SittingStatus
+    """Status of the session."""
     reason: str
     """Why the session does not run, in words; empty while it runs."""
     activity: str
@@ -194,8 +203,9 @@ class WatchView:
     activity_s: float
     """Duration of this activity so far (s)."""
     runs: tuple[WatchedRun, ...]
+    """All runs of the schedule, in order."""
     shown_run: int | None
-    """Index of the run that `points` belong to: the present run, or the run of the latest answer (`shown_run`)."""
+    """Index of the run that `points` belong to, see `followed_trials.find_shown_run`."""
     points: tuple[StaircasePoint, ...]
     """Counted trials of that run."""
     next_level_n: float | None
@@ -203,6 +213,7 @@ class WatchView:
     cap_n: float
     """Highest level of the staircase (N)."""
     open_trial: OpenTrial | None
+    """Trial that waits for its answer; None if there is none."""
     last: tuple[ClosedTrial, ...]
     """Latest closed trials, newest first."""
     answers: int
@@ -212,18 +223,22 @@ class WatchView:
     """Number of catch trials that count."""
     catch_lapses: int
     """Number of wrong answers to catch trials."""
-    practice: tuple[PracticeLine, ...]
-    forms: tuple[FormLine, ...]
-    notes: tuple[NoteLine, ...]
+    practice: tuple[PracticeResult, ...]
+    """Results of the completed practice runs."""
+    forms: tuple[FormRecord, ...]
+    """Forms filled in so far, oldest first."""
+    notes: tuple[NoteRecord, ...]
     """Notes of the log, newest first."""
     gate_radius_mm: float
     """Radius (mm) within which the handle must be for a trial to start; 0 without a gate."""
     live: Live | None
     """Live state; None where it is out of date or the program does not run."""
     alarms: tuple[Alarm, ...]
+    """Present alarms."""
     probes: int = 0
     """Number of probes in the log with their measurement, references included."""
-    drifts: tuple[DriftLine, ...] = ()
+    drifts: tuple[DriftRecord, ...] = ()
+    """Drifts that the probes show at present."""
 
     @property
     def present_run(self) -> WatchedRun | None:

@@ -1,4 +1,7 @@
-"""Atomic writes: a file appears under its name complete and synced, or not at all."""
+"""Atomic writes: a file appears under its final name complete and synced to disk, or not at all.
+
+Used for result files (text, HDF5, WAV, images), so that a crash or a full disk leaves no partial file.
+"""
 
 import os
 import secrets
@@ -6,31 +9,34 @@ from contextlib import suppress
 from pathlib import Path
 
 from study.store.disk.file_errors import AlreadyThereError, CannotWriteError
-from study.store.disk.privacy import file_mode
+from study.store.disk.privacy import choose_file_mode
 
 
 def write_atomically(path: Path, content: bytes, *, overwrite: bool = False) -> None:
-    """Write beside the final name, sync, rename. Raises AlreadyThereError or CannotWriteError."""
-    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    """Write `content` to a temporary file in the same folder, sync it, and move it to `path`; its mode is
+    `privacy.choose_file_mode`. overwrite: replace an existing file. Raises AlreadyThereError if the file exists and is
+    not to be replaced, CannotWriteError for any error of the system; the temporary file is removed then."""
+    temporary_path = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
         if path.exists() and not overwrite:
             raise AlreadyThereError(path)
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
-        with os.fdopen(os.open(part, flags, file_mode(path.parent)), "wb") as file:
+        with os.fdopen(os.open(temporary_path, flags, choose_file_mode(path.parent)), "wb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        _move(part, path, overwrite)
+        _move_into_place(temporary_path, path, overwrite)
         sync_folder(path.parent)
     except OSError as problem:
         raise CannotWriteError(path, problem) from problem
     finally:
         with suppress(OSError):
-            part.unlink(missing_ok=True)
+            temporary_path.unlink(missing_ok=True)
 
 
 def sync_folder(folder: Path) -> None:
-    """Sync the directory entry to the disk, where the system can."""
+    """Sync the entries of a folder to the disk, so that created and renamed files survive a power failure; nothing on
+    systems that cannot open folders (Windows). Raises OSError."""
     if not hasattr(os, "O_DIRECTORY"):
         return
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
@@ -40,17 +46,19 @@ def sync_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
-def _move(part: Path, path: Path, overwrite: bool) -> None:
+def _move_into_place(temporary_path: Path, path: Path, overwrite: bool) -> None:
+    """Move the complete file to `path`. Without `overwrite`, raises AlreadyThereError if `path` exists; on file systems
+    without hard links, a file that another program creates between the check and the move is replaced."""
     if overwrite:
-        part.replace(path)
+        temporary_path.replace(path)
         return
     try:
-        # A link fails if the name was taken meanwhile; a rename would not.
-        path.hardlink_to(part)
+        # Creating a hard link fails if another program has created the file in the meantime; a rename would replace it.
+        path.hardlink_to(temporary_path)
     except FileExistsError as problem:
         raise AlreadyThereError(path) from problem
     except OSError:
-        # Some file systems (FAT, network shares) know no links.
+        # Some file systems (FAT, network shares) do not support hard links.
         if path.exists():
             raise AlreadyThereError(path) from None
-        part.replace(path)
+        temporary_path.replace(path)

@@ -1,5 +1,7 @@
 """CSV tables whose columns are the fields of a frozen dataclass, in declared order: conversion to and from text.
 
+All tables of a session (`study.store.sessions`, `study.store.formats`) are written and read by this module.
+
 Booleans are `true` and `false`, None is an empty field, enumerations are their values, and floats have all digits that
 are needed to read the same number again (`repr`).
 """
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
 
 Row = TypeVar("Row", bound="DataclassInstance")
 
-_LISTED_PROBLEMS = 8
+_LISTED_PROBLEM_LIMIT = 8
 """Number of problems that are listed individually; the others are counted."""
 
 
@@ -27,50 +29,53 @@ class CsvError(ListedProblemsError):
     """A table that cannot be used. `problems`: one sentence for each, with line and column where they apply."""
 
 
-def column_names(row_type: type[Any]) -> tuple[str, ...]:
-    """Column names of a row type: the names of its fields."""
+def list_columns(row_type: type[Any]) -> tuple[str, ...]:
+    """List the column names of a row type: the names of its fields, in declared order."""
     return tuple(field.name for field in fields(row_type))
 
 
-def rows_to_csv(rows: Iterable[Row], row_type: type[Row]) -> str:
-    """CSV text with a header."""
-    names = column_names(row_type)
+def format_csv_table(rows: Iterable[Row], row_type: type[Row]) -> str:
+    """Format rows as CSV text with a header line; lines end with a line feed."""
+    columns = list_columns(row_type)
     lines = [
-        format_csv_line(names),
-        *(format_csv_line([_format_field(getattr(row, name)) for name in names]) for row in rows),
+        format_csv_line(columns),
+        *(format_csv_line([_format_field(getattr(row, name)) for name in columns]) for row in rows),
     ]
     return "\n".join(lines) + "\n"
 
 
-def rows_from_csv(text: str, row_type: type[Row]) -> tuple[Row, ...]:
-    """Parse rows. Unknown columns after the known ones are ignored, no column may occur twice, and trailing columns
-    with a default may be missing. Raises CsvError with all problems."""
+def parse_csv_table(text: str, row_type: type[Row]) -> tuple[Row, ...]:
+    """Parse CSV text with a header into rows. Unknown columns after the known ones are ignored, no column may occur
+    twice, and trailing columns with a default may be missing. Raises CsvError with all problems."""
     try:
-        lines = list(csv.reader(io.StringIO(text.rstrip("\r\n")), strict=True)) or [[]]
+        csv_rows = list(csv.reader(io.StringIO(text.rstrip("\r\n")), strict=True)) or [[]]
     except csv.Error as error:
         raise CsvError((f"this is not CSV: {error}",)) from error
-    names = _present_columns(tuple(lines[0]), row_type)
-    if problem := find_header_problem(tuple(lines[0]), names) or _find_duplicate_column(lines[0]):
+    columns = _select_present_columns(tuple(csv_rows[0]), row_type)
+    if problem := find_header_problem(tuple(csv_rows[0]), columns) or _find_duplicate_column(csv_rows[0]):
         raise CsvError((problem,))
-    hints = get_type_hints(row_type)
+    column_types = get_type_hints(row_type)
     rows: list[Row] = []
     problems: list[str] = []
-    for line_number, row_fields in enumerate(lines[1:], start=2):
-        if len(row_fields) != len(lines[0]):
-            problems.append(f"line {line_number} has {len(row_fields)} fields, but the header names {len(lines[0])}")
+    for line_number, row_fields in enumerate(csv_rows[1:], start=2):
+        if len(row_fields) != len(csv_rows[0]):
+            problems.append(f"line {line_number} has {len(row_fields)} fields, but the header names {len(csv_rows[0])}")
             continue
         values: dict[str, Any] = {}
-        for name, field in zip(names, row_fields, strict=False):
+        for column, field_text in zip(columns, row_fields, strict=False):
             try:
-                values[name] = _parse_field(field, hints[name])
+                values[column] = _parse_field(field_text, column_types[column])
             except ValueError as error:
-                problems.append(f"line {line_number}, column {name}: {error}")
-        if len(values) == len(names):
+                problems.append(f"line {line_number}, column {column}: {error}")
+        if len(values) == len(columns):
             rows.append(row_type(**values))
     if problems:
-        unlisted = len(problems) - _LISTED_PROBLEMS
+        unlisted_count = len(problems) - _LISTED_PROBLEM_LIMIT
         raise CsvError(
-            (*problems[:_LISTED_PROBLEMS], *([f"and {unlisted} more problems of this kind"] if unlisted > 0 else []))
+            (
+                *problems[:_LISTED_PROBLEM_LIMIT],
+                *([f"and {unlisted_count} more problems of this kind"] if unlisted_count > 0 else []),
+            )
         )
     return tuple(rows)
 
@@ -79,22 +84,22 @@ def drop_absent_columns(text: str, rows: Iterable[Row], row_type: type[Row]) -> 
     """Rows as a table of an earlier version would hold them. text: that table; in columns that it lacks, the rows get
     their defaults."""
     header = next(csv.reader(io.StringIO(text.partition("\n")[0])), [])
-    absent = column_names(row_type)[len(_present_columns(tuple(header), row_type)) :]
-    defaults = {field.name: field.default for field in fields(row_type) if field.name in absent}
+    absent_columns = list_columns(row_type)[len(_select_present_columns(tuple(header), row_type)) :]
+    defaults = {field.name: field.default for field in fields(row_type) if field.name in absent_columns}
     return tuple(replace(row, **defaults) for row in rows)
 
 
-def _present_columns(header: tuple[str, ...], row_type: type[Any]) -> tuple[str, ...]:
-    """The columns to read; trailing columns with a default may be missing, as in tables of earlier versions."""
-    names = column_names(row_type)
+def _select_present_columns(header: tuple[str, ...], row_type: type[Any]) -> tuple[str, ...]:
+    """Select the columns to read; trailing columns with a default may be missing, as in tables of earlier versions."""
+    columns = list_columns(row_type)
     required_count = sum(field.default is MISSING for field in fields(row_type))
-    while len(names) > required_count and header[: len(names)] != names:
-        names = names[:-1]
-    return names
+    while len(columns) > required_count and header[: len(columns)] != columns:
+        columns = columns[:-1]
+    return columns
 
 
 def find_header_problem(header: tuple[str, ...], expected: tuple[str, ...]) -> str:
-    """Problem with the header, in words; empty if the header begins with the expected columns."""
+    """Describe the first problem of the header; empty if the header begins with the expected columns."""
     if header[: len(expected)] == expected:
         return ""
     for position, name in enumerate(expected, start=1):
@@ -112,26 +117,26 @@ def _find_duplicate_column(header: Sequence[str]) -> str:
     return f"the header names the column '{duplicate}' twice; only one of both can be meant" if duplicate else ""
 
 
-def format_csv_line(fields_of_row: Sequence[str]) -> str:
-    """A row of CSV without the line end; fields are quoted where needed."""
-    text = io.StringIO()
+def format_csv_line(row_fields: Sequence[str]) -> str:
+    """Format a row of CSV without the line end; fields are quoted where needed."""
+    buffer = io.StringIO()
     # The writer quotes fields that contain a character of its line terminator: with both, a carriage return is quoted.
-    csv.writer(text, lineterminator="\r\n").writerow(fields_of_row)
-    return text.getvalue().removesuffix("\r\n")
+    csv.writer(buffer, lineterminator="\r\n").writerow(row_fields)
+    return buffer.getvalue().removesuffix("\r\n")
 
 
-def describe_type(hint: Any) -> str:
-    """Content of a column of this type in words, for the documentation of a table."""
-    if get_origin(hint) in (Union, UnionType):
-        (option_type,) = (option for option in get_args(hint) if option is not NoneType)
+def describe_type(column_type: Any) -> str:
+    """Describe the content of a column of this type in words, for the documentation of a table."""
+    if get_origin(column_type) in (Union, UnionType):
+        (option_type,) = (option for option in get_args(column_type) if option is not NoneType)
         return f"{describe_type(option_type)}, or empty"
-    if isinstance(hint, type) and issubclass(hint, Enum):
-        return ", ".join(f"`{option.value}`" for option in hint)
-    return {bool: "`true` or `false`", int: "whole number", float: "number", str: "text"}[hint]
+    if isinstance(column_type, type) and issubclass(column_type, Enum):
+        return ", ".join(f"`{option.value}`" for option in column_type)
+    return {bool: "`true` or `false`", int: "whole number", float: "number", str: "text"}[column_type]
 
 
 def _format_field(value: Any) -> str:
-    """A value as the text of a field."""
+    """Format a value as the text of a field; None gives an empty field."""
     match value:
         case None:
             return ""
@@ -144,35 +149,36 @@ def _format_field(value: Any) -> str:
     return str(value)
 
 
-def _parse_field(field: str, hint: Any) -> Any:
-    """The value of a field, by the type of its column. Raises ValueError with a sentence fragment."""
-    if get_origin(hint) in (Union, UnionType):
-        if field == "" and NoneType in get_args(hint):
+def _parse_field(field_text: str, column_type: Any) -> Any:
+    """Convert the text of a field to the type of its column; an empty field of an optional column gives None. Raises
+    ValueError with a sentence fragment."""
+    if get_origin(column_type) in (Union, UnionType):
+        if field_text == "" and NoneType in get_args(column_type):
             return None
-        (hint,) = (option for option in get_args(hint) if option is not NoneType)
-    if field == "" and hint is not str:
+        (column_type,) = (option for option in get_args(column_type) if option is not NoneType)
+    if field_text == "" and column_type is not str:
         raise ValueError("it is empty, but a value is needed")
-    if hint is bool:
-        return _parse_bool(field)
-    if isinstance(hint, type) and issubclass(hint, Enum):
-        return _parse_enum(field, hint)
+    if column_type is bool:
+        return _parse_bool(field_text)
+    if isinstance(column_type, type) and issubclass(column_type, Enum):
+        return _parse_enum(field_text, column_type)
     try:
-        return hint(field)
+        return column_type(field_text)
     except ValueError:
-        expected = {int: "a whole number", float: "a number"}[hint]
-        raise ValueError(f"'{field}' is not {expected}") from None
+        expected_text = {int: "a whole number", float: "a number"}[column_type]
+        raise ValueError(f"'{field_text}' is not {expected_text}") from None
 
 
-def _parse_bool(field: str) -> bool:
-    """The Boolean of a field. Raises ValueError with a sentence fragment."""
-    if field not in ("true", "false"):
-        raise ValueError(f"'{field}' is neither true nor false")
-    return field == "true"
+def _parse_bool(field_text: str) -> bool:
+    """Convert `true` or `false` to a Boolean. Raises ValueError with a sentence fragment."""
+    if field_text not in ("true", "false"):
+        raise ValueError(f"'{field_text}' is neither true nor false")
+    return field_text == "true"
 
 
-def _parse_enum(field: str, options: type[Enum]) -> Enum:
-    """The member of `options` whose value a field contains. Raises ValueError with a sentence fragment."""
-    for option in options:
-        if str(option.value) == field:
-            return option
-    raise ValueError(f"'{field}' is none of {', '.join(str(option.value) for option in options)}")
+def _parse_enum(field_text: str, enum_type: type[Enum]) -> Enum:
+    """Find the member of `enum_type` whose value the field contains. Raises ValueError with a sentence fragment."""
+    for member in enum_type:
+        if str(member.value) == field_text:
+            return member
+    raise ValueError(f"'{field_text}' is none of {', '.join(str(member.value) for member in enum_type)}")

@@ -2,6 +2,7 @@
 
 Folders of a study have mode 700 and their files 600, regardless of the umask. A new file elsewhere gets the usual
 rights (666 minus umask) where its folder is open to others, otherwise 600.
+Modules of `study.store` create files and folders by it; commands print its warnings.
 """
 
 import contextlib
@@ -26,8 +27,8 @@ def is_open_to_others(folder: Path) -> bool:
         return False
 
 
-def file_mode(folder: Path) -> int:
-    """Mode of a new file in `folder`, before the umask: private where the folder is."""
+def choose_file_mode(folder: Path) -> int:
+    """Choose the mode of a new file in `folder`, before the umask: 600 where the folder is private, otherwise 666."""
     return 0o666 if is_open_to_others(folder) else PRIVATE_FILE
 
 
@@ -55,8 +56,8 @@ def make_folder(folder: Path, *, private: bool = False) -> None:
 def close_to_others(folder: Path, *, recursive: bool = False) -> None:
     """Remove the rights of group and others from a folder; recursive: also from all its contents. Links are not
     followed, and files of another account are unchanged. Never raises OSError."""
-    with contextlib.suppress(OSError), open_folder(folder.absolute()) as place:
-        _restrict_folder(place, recursive)
+    with contextlib.suppress(OSError), open_folder(folder.absolute()) as opened_folder:
+        _restrict_folder(opened_folder, recursive)
 
 
 def close_data_folder(data: Path) -> None:
@@ -74,18 +75,19 @@ def explain_open_folder(data: Path) -> str:
     belongs to another account, is meant to be shared (sticky or set-group bit), or holds the working or home folder."""
     if not is_open_to_others(data):
         return ""
-    folder_stat, place = data.stat(), data.resolve()
+    folder_stat, resolved_data = data.stat(), data.resolve()
     if folder_stat.st_uid != os.geteuid():
         return "it belongs to another account"
     if folder_stat.st_mode & (stat.S_ISVTX | stat.S_ISGID):
         return "it was made to be shared"
-    if any(protected.is_relative_to(place) for protected in (Path.cwd(), Path.home().resolve())):
+    if any(protected.is_relative_to(resolved_data) for protected in (Path.cwd(), Path.home().resolve())):
         return "it holds more than the study"
     return ""
 
 
-def privacy_warning(folder: Path, reason: str = "") -> str:
-    """Warning if others have rights to the folder, otherwise empty. reason: why a session does not remove them."""
+def format_privacy_warning(folder: Path, reason: str = "") -> str:
+    """Format a warning if others have rights to the folder; otherwise empty. reason: why a session does not remove
+    them."""
     if not is_open_to_others(folder):
         return ""
     mode = stat.S_IMODE(folder.stat().st_mode)
@@ -93,24 +95,25 @@ def privacy_warning(folder: Path, reason: str = "") -> str:
     return f"{text}{reason and f' A session leaves them: {reason}.'} Remove these rights: chmod 700 {folder}"
 
 
-def data_folder_warning(data: Path) -> str:
-    """Warning if others have rights to a data folder that a session will not remove; otherwise empty."""
+def format_data_folder_warning(data: Path) -> str:
+    """Format a warning if others have rights to a data folder that a session will not remove; otherwise empty."""
     reason = explain_open_folder(data)
-    return privacy_warning(data, reason) if reason else ""
+    return format_privacy_warning(data, reason) if reason else ""
 
 
-def _restrict_folder(place: RealFolder, recursive: bool) -> None:
-    """As `close_to_others`, for an open folder. Non-blocking opening, because an entry may be a pipe."""
-    if place.descriptor is None:
+def _restrict_folder(opened_folder: RealFolder, recursive: bool) -> None:
+    """Remove the rights of group and others from an opened folder; recursive: also from its contents. Non-blocking
+    opening, because an entry may be a pipe."""
+    if opened_folder.descriptor is None:
         return
-    _restrict_access(place.descriptor)
-    for name in place.names() if recursive else ():
+    _restrict_access(opened_folder.descriptor)
+    for name in opened_folder.names() if recursive else ():
         with contextlib.suppress(OSError):
-            descriptor = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=place.descriptor)
+            descriptor = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=opened_folder.descriptor)
             try:
                 _restrict_access(descriptor)
                 if stat.S_ISDIR(os.fstat(descriptor).st_mode):
-                    _restrict_folder(RealFolder(place.path / name, descriptor), recursive)
+                    _restrict_folder(RealFolder(opened_folder.path / name, descriptor), recursive)
             finally:
                 os.close(descriptor)
 

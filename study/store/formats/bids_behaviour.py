@@ -12,7 +12,7 @@ from typing import Any
 
 from protocols.trial import Trial
 from study.session.views.form_views import parse_number
-from study.store.disk.csv_rows import column_names, rows_to_csv
+from study.store.disk.csv_rows import format_csv_table, list_columns
 from study.store.disk.text_file import write_text
 from study.store.formats.answer_table import AnswerColumn, AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
@@ -76,7 +76,7 @@ def write_bids(
                 part for part in (TASK, _describe_target(protocol_text), _read_title(protocol_text)) if part
             ),
             "Instructions": QUESTION,
-            **{column: _describe_column(column) for column in column_names(Trial) if column not in IN_FILE_NAME},
+            **{column: _describe_column(column) for column in list_columns(Trial) if column not in IN_FILE_NAME},
         }),
     ]  # fmt: skip
     subjects = list(dict.fromkeys(trial.subject for trial in trials))
@@ -156,8 +156,8 @@ def _format_cell(answer: str) -> str:
 
 def _format_tsv(trials: Sequence[Trial]) -> str:
     """The trials as TSV. No value of a trial contains a comma or a quote, so that CSV can be split at its commas."""
-    lines = [line.split(",") for line in rows_to_csv(trials, Trial).splitlines()]
-    kept_columns = [number for number, column in enumerate(column_names(Trial)) if column not in IN_FILE_NAME]
+    lines = [line.split(",") for line in format_csv_table(trials, Trial).splitlines()]
+    kept_columns = [number for number, column in enumerate(list_columns(Trial)) if column not in IN_FILE_NAME]
     return "".join("\t".join(line[number] or "n/a" for number in kept_columns) + "\n" for line in lines)
 
 

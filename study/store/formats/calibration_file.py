@@ -1,7 +1,8 @@
 """Calibrations of a linkage as HDF5: the format `hapteq-calibration`, version 1.
 
 A calibration is the device's own kinematics and dynamics over a grid of handle positions: joint angles, Jacobian,
-inertia and gravity force, in SI units. `LAYOUT` lists the contents with shapes and units.
+inertia and gravity force, in SI units. `LAYOUT` lists the contents with shapes and units. Written by
+`hapteq calibrate`; read by `study.devices.rigs_by_name` for simulated devices and by `hapteq twin`.
 """
 
 import json
@@ -50,9 +51,9 @@ LAYOUT = (
 )
 """Contents of the file: checked by tests, and listed in docs/formats.md."""
 
-ARRAYS = ("position_m", "joint_angle_rad", "jacobian", "inertia_kg", "gravity_n", "filled")
+ARRAY_NAMES = ("position_m", "joint_angle_rad", "jacobian", "inertia_kg", "gravity_n", "filled")
 """Datasets of the file, in the order in which they are written."""
-DIMENSIONS = {"jacobian": "(positions, 3, 3)", "inertia_kg": "(positions, 3, 3)", "filled": "(positions)"}
+ARRAY_SHAPES = {"jacobian": "(positions, 3, 3)", "inertia_kg": "(positions, 3, 3)", "filled": "(positions)"}
 """Shapes in words, for messages; all other arrays are (positions, 3)."""
 
 
@@ -60,11 +61,11 @@ def read_calibration(path: Path) -> LinkageCalibration:
     """Read a calibration of a linkage. Raises CannotReadError, or UnusableFileError with all problems of the file."""
     problems = Problems()
     with open_hdf5(path, KIND, FORMAT, VERSION, sealed=True) as file:
-        parts = _read_parts(file, problems)
+        fields = _read_fields(file, problems)
     if problems.messages:
         raise UnusableFileError(path, KIND, tuple(problems.messages))
     try:
-        return LinkageCalibration(**parts)
+        return LinkageCalibration(**fields)
     except CalibrationError as error:
         raise UnusableFileError(path, KIND, error.problems) from error
 
@@ -73,43 +74,47 @@ def write_calibration(path: Path, calibration: LinkageCalibration) -> None:
     """Write a calibration of a linkage, sealed and never over an existing file. Raises AlreadyThereError,
     CannotWriteError."""
 
-    def fill(file: Any) -> None:
+    def fill_file(file: Any) -> None:
+        """Write attributes and datasets (with Fletcher-32 checksums) into the open HDF5 file."""
         file.attrs.update({"format": FORMAT, "version": VERSION, "difference": calibration.difference})
         for name in ("device", "details", "read_on", "line_deg", "asymmetry"):
             file.attrs[name] = getattr(calibration, name)
-        for name in ARRAYS:
+        for name in ARRAY_NAMES:
             file.create_dataset(name, data=getattr(calibration, name), fletcher32=True)
         file.attrs["provenance"] = json.dumps(dict(calibration.provenance), allow_nan=False)
 
-    write_hdf5(path, fill, overwrite=False, sealed=True)
+    write_hdf5(path, fill_file, overwrite=False, sealed=True)
 
 
-def _read_parts(file: Any, problems: Problems) -> dict[str, Any]:
-    """Fields of `LinkageCalibration`; where a part is missing or wrong, the problem is recorded and a placeholder
-    returned."""
+def _read_fields(file: Any, problems: Problems) -> dict[str, Any]:
+    """Read the fields of `LinkageCalibration`; where a part is missing or wrong, the problem is recorded and a
+    placeholder returned."""
 
-    def array(name: str) -> FloatArray:
-        shape = DIMENSIONS.get(name, "(positions, 3)")
+    def read_array(name: str) -> FloatArray:
+        """Read a dataset of the shape in `ARRAY_SHAPES`; an empty array where it is wrong."""
+        shape = ARRAY_SHAPES.get(name, "(positions, 3)")
         return problems.attempt(lambda: read_float_dataset(file, name, shape), np.empty(0))
 
-    def text(name: str) -> str:
+    def read_text(name: str) -> str:
+        """Read a text attribute; "" where it is wrong."""
         return problems.attempt(lambda: read_text_attribute(file, name), "")
 
-    def numbers(name: str, count: int) -> FloatArray:
+    def read_numbers(name: str, count: int) -> FloatArray:
+        """Read an attribute of `count` numbers; zeros where it is wrong."""
         return np.array(problems.attempt(lambda: read_numbers_attribute(file, name, count), (0.0,) * count))
 
     provenance: dict[str, Any] = problems.attempt(lambda: _read_provenance(file), {})
     return {
-        **{name: text(name) for name in ("device", "details", "read_on")},
-        **{name: array(name) for name in ARRAYS},
-        **{name: numbers(name, 3) for name in ("line_deg", "asymmetry")},
-        "difference": float(numbers("difference", 1)[0]),
+        **{name: read_text(name) for name in ("device", "details", "read_on")},
+        **{name: read_array(name) for name in ARRAY_NAMES},
+        **{name: read_numbers(name, 3) for name in ("line_deg", "asymmetry")},
+        "difference": float(read_numbers("difference", 1)[0]),
         "provenance": provenance,
     }
 
 
 def _read_provenance(file: Any) -> dict[str, Any]:
-    """The attribute `provenance`, empty if missing. Raises ValueError where it is not a JSON object."""
+    """Read the attribute `provenance`, empty if missing. Raises ValueError where it is not a JSON object."""
     provenance = load_json(read_text_attribute(file, "provenance", "{}"))
     if not isinstance(provenance, dict):
         raise ValueError("the attribute 'provenance' must be a JSON object")

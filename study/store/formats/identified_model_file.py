@@ -1,7 +1,8 @@
 """Identified models as HDF5 files: the format `hapteq-model`, version 1.
 
 A model is a discrete-time linear state space, x[k+1] = A x[k] + B u[k], y[k] = C x[k] + D u[k], with its band, units,
-uncertainty and quality; `equalizer.plant.identified_model` checks it.
+uncertainty and quality; `equalizer.plant.identified_model` validates it. `identify_model` writes these files; playback,
+`export_controller` and the start screen read them.
 """
 
 import json
@@ -68,33 +69,33 @@ LAYOUT = (
     Entry("quality_remarks", "attribute, list of text", "sources of the errors", False),
     Entry("provenance", "attribute, JSON text", "versions, command, seeds, parents", False),
 )
-"""Contents of the file, as docs/formats.md lists them."""
+"""Contents of the file, for docs/formats.md. n states, m inputs, p outputs, k entries of A, B, C, D together."""
 
 
 def read_identified_model(path: Path | str) -> IdentifiedModel:
-    """Read a model. Raises CannotReadError, or UnusableFileError with all problems."""
+    """Read a model. Raises CannotReadError, or UnusableFileError with all problems of the file."""
     path, problems = Path(path), Problems()
     with open_hdf5(path, KIND, FORMAT, VERSION) as file:
-        parts = _read_parts(file, problems)
+        model_fields = _read_model_fields(file, problems)
     if problems.messages:
         raise UnusableFileError(path, KIND, tuple(problems.messages))
     try:
-        return IdentifiedModel(**parts)
+        return IdentifiedModel(**model_fields)
     except IdentifiedModelError as error:
         raise UnusableFileError(path, KIND, error.problems) from error
 
 
-def is_identified_model(path: Path) -> bool:
-    """True for an identified model, by its format and version; its contents are not read. Raises CannotReadError or
-    UnusableFileError for any other file, so that the result is never False."""
+def confirm_identified_model(path: Path) -> bool:
+    """Return True if a file's format and version are those of an identified model; the contents are not read. Raises
+    CannotReadError or UnusableFileError for any other file, so that the result is never False."""
     with open_hdf5(path, KIND, FORMAT, VERSION):
         return True
 
 
 def write_identified_model(path: Path | str, model: IdentifiedModel, *, overwrite: bool = False) -> None:
-    """Write a model. Raises AlreadyThereError, CannotWriteError."""
+    """Write a model. Raises AlreadyThereError if the file exists and `overwrite` is false, and CannotWriteError."""
 
-    def fill(file: Any) -> None:
+    def write_contents(file: Any) -> None:
         file.attrs.update({"format": FORMAT, "version": VERSION, "sample_rate_hz": model.sample_rate_hz})
         file.attrs.update({"band_hz": model.band_hz, "delay_samples": model.delay_samples})
         if model.place_m is not None:
@@ -108,25 +109,25 @@ def write_identified_model(path: Path | str, model: IdentifiedModel, *, overwrit
             _write_quality(file, model.quality)
         file.attrs["provenance"] = json.dumps(dict(model.provenance), allow_nan=False)
 
-    write_hdf5(Path(path), fill, overwrite=overwrite)
+    write_hdf5(Path(path), write_contents, overwrite=overwrite)
 
 
-QUALITY = tuple(field.name for field in fields(ModelQuality) if field.name != "remarks")
-"""Names of the numbers of a model's quality, each an attribute of the file; see `ModelQuality`."""
+QUALITY_NUMBERS = tuple(field.name for field in fields(ModelQuality) if field.name != "remarks")
+"""Names of the numbers in `ModelQuality`; each is an attribute of the file."""
 
 
 def _write_quality(file: Any, quality: ModelQuality) -> None:
-    for name in QUALITY:
+    for name in QUALITY_NUMBERS:
         if getattr(quality, name) is not None:
             file.attrs[name] = getattr(quality, name)
     write_texts(file, "quality_remarks", quality.remarks)
 
 
 def _read_quality(file: Any) -> ModelQuality | None:
-    """Quality of the model; None for a file of an earlier version. Raises ValueError for an unusable attribute."""
+    """Quality of the model; None if the file states none (older files). Raises ValueError for an unusable attribute."""
     if "expected_error" not in file.attrs:
         return None
-    numbers = {name: read_numbers_attribute(file, name, 1)[0] for name in QUALITY if name in file.attrs}
+    numbers = {name: read_numbers_attribute(file, name, 1)[0] for name in QUALITY_NUMBERS if name in file.attrs}
     remarks = read_texts_attribute(file, "quality_remarks") if "quality_remarks" in file.attrs else ()
     return ModelQuality(
         expected_error=numbers["expected_error"],
@@ -139,35 +140,36 @@ def _read_quality(file: Any) -> ModelQuality | None:
     )
 
 
-def _read_parts(file: Any, problems: Problems) -> dict[str, Any]:
-    """Fields of the model, by name. Problems are collected; a field with a problem has a substitute value."""
+def _read_model_fields(file: Any, problems: Problems) -> dict[str, Any]:
+    """Arguments of `IdentifiedModel`, by name. Problems are collected in `problems`; an unreadable field has a
+    placeholder value."""
 
-    def matrix(name: str) -> FloatArray:
+    def read_matrix(name: str) -> FloatArray:
         return problems.attempt(lambda: read_float_dataset(file, name, "(rows, columns)"), np.empty((0, 0)))
 
-    def texts(name: str) -> tuple[str, ...]:
+    def read_texts(name: str) -> tuple[str, ...]:
         return problems.attempt(lambda: read_texts_attribute(file, name), ())
 
-    def numbers(name: str, count: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
+    def read_numbers(name: str, count: int, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
         return problems.attempt(lambda: read_numbers_attribute(file, name, count, default), (0.0,) * count)
 
     provenance: dict[str, Any] = problems.attempt(lambda: _read_provenance(file), {})
     optional_matrices = [name for name in ("covariance", "samples") if name in file]
     return {
-        **{name: matrix(name) for name in ("A", "B", "C", "D", *optional_matrices)},
-        **{name: text_or_list(texts(name)) for name in ("input_unit", "output_unit")},
-        **{name: texts(name) for name in ("input_channels", "output_channels")},
-        "sample_rate_hz": numbers("sample_rate_hz", 1)[0],
-        "band_hz": numbers("band_hz", 2),
-        "delay_samples": numbers("delay_samples", 1, (0.0,))[0],
-        "place_m": numbers("place_m", 3) if "place_m" in file.attrs else None,
+        **{name: read_matrix(name) for name in ("A", "B", "C", "D", *optional_matrices)},
+        **{name: text_or_list(read_texts(name)) for name in ("input_unit", "output_unit")},
+        **{name: read_texts(name) for name in ("input_channels", "output_channels")},
+        "sample_rate_hz": read_numbers("sample_rate_hz", 1)[0],
+        "band_hz": read_numbers("band_hz", 2),
+        "delay_samples": read_numbers("delay_samples", 1, (0.0,))[0],
+        "place_m": read_numbers("place_m", 3) if "place_m" in file.attrs else None,
         "provenance": provenance,
         "quality": problems.attempt(lambda: _read_quality(file), None),
     }
 
 
 def _read_provenance(file: Any) -> dict[str, Any]:
-    """Provenance, empty where the file has none. Raises ValueError where it is no JSON object."""
+    """Provenance; empty if the file has none. Raises ValueError if it is not a JSON object."""
     text = read_text_attribute(file, "provenance", "{}")
     try:
         provenance = load_json(text)

@@ -6,7 +6,7 @@ This module reads and writes the file and describes its keys; `equalizer.plant.m
 from pathlib import Path
 
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalModel, MechanicalModelError
-from equalizer.plant.mechanical_model_toml import mechanical_model_toml, parse_mechanical_model
+from equalizer.plant.mechanical_model_toml import format_mechanical_model, parse_mechanical_model
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.layout import Entry
 from study.store.disk.text_file import read_toml_text, write_text
@@ -65,4 +65,4 @@ def read_mechanical_model(path: Path | str) -> MechanicalModel:
 
 def write_mechanical_model(path: Path | str, model: MechanicalModel, *, overwrite: bool = False) -> None:
     """Write a model. Raises AlreadyThereError, CannotWriteError."""
-    write_text(Path(path), mechanical_model_toml(model), overwrite=overwrite)
+    write_text(Path(path), format_mechanical_model(model), overwrite=overwrite)

@@ -18,7 +18,7 @@ from protocols.document.lock import LockError, ProtocolLock, check_lock, lock_fr
 from study.errors import StudyError, WrongUseError
 from study.local_clock import machine_zone
 from study.regular_file import DOCUMENT_BYTES
-from study.session.views.local_time import local_time
+from study.session.views.local_time import format_time_in_zone
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.text_file import read_text, read_toml_text, write_text
 from study.store.formats.participant_texts import load_in_language
@@ -148,7 +148,7 @@ def _read_lock(path: Path, protocol: Protocol) -> ProtocolLock | None:
     except LockError as error:
         raise UnusableFileError(path, "protocol lock", (str(error),)) from error
     try:
-        check_lock(lock, protocol, local_time(lock.locked_utc, machine_zone))
+        check_lock(lock, protocol, format_time_in_zone(lock.locked_utc, machine_zone))
     except LockError as error:
         raise LockedProtocolChangedError(path, error) from error
     return lock

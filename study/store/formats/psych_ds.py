@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from protocols.trial import Trial
-from study.store.disk.csv_rows import CsvError, column_names, rows_from_csv, rows_to_csv
+from study.store.disk.csv_rows import CsvError, format_csv_table, list_columns, parse_csv_table
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
@@ -74,7 +74,7 @@ def write_psych_ds(
     for session in dict.fromkeys(trial.session for trial in trials):
         rows = [trial for trial in trials if trial.session == session]
         path = folder / "data" / f"subject-{_keyword_value(rows[0].subject)}_session-{_keyword_value(session)}_data.csv"
-        write_text(path, rows_to_csv(rows, Trial), overwrite=False)
+        write_text(path, format_csv_table(rows, Trial), overwrite=False)
         paths.append(path)
     if answers.columns:
         paths.append(folder / ANSWERS_NAME)
@@ -87,7 +87,7 @@ def write_psych_ds(
         "description": "Trials of a study of force directions, one row per presentation, as hapteq logged them.",
         "schemaVersion": "Psych-DS 0.4.0",
         "variableMeasured": [
-            *(_describe_variable(column, *TRIAL_COLUMNS[column]) for column in column_names(Trial)),
+            *(_describe_variable(column, *TRIAL_COLUMNS[column]) for column in list_columns(Trial)),
             *(_describe_variable(column.name, column.description, column.question.unit) for column in answers.columns),
         ],
         FACTS_KEY: dict(facts),
@@ -123,7 +123,7 @@ def read_described_trials(path: Path, kind: str) -> tuple[Trial, ...]:
     """Trials of a CSV table. kind: name of the kind of dataset for messages. Raises CannotReadError,
     UnusableFileError."""
     try:
-        rows = rows_from_csv(read_text(path), Trial)
+        rows = parse_csv_table(read_text(path), Trial)
     except CsvError as error:
         raise UnusableFileError(path, kind, error.problems) from error
     if wrong := find_trial_problems(rows):

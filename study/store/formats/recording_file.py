@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 
 from equalizer.signals.recording import Hold, Recording, Segment
-from equalizer.signals.recording_checks import check_recording, signals_of
+from equalizer.signals.recording_checks import check_recording, collect_signals
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.units import check_quantity, parse_unit
 from study.store.disk.file_errors import UnusableFileError
@@ -83,7 +83,7 @@ def write_recording(
             {"format": FORMAT, "version": VERSION, "sample_rate_hz": recording.sample_rate_hz,
              "device": recording.device, "hold": recording.hold.value}
         )  # fmt: skip
-        for name, signal in signals_of(recording).items():
+        for name, signal in collect_signals(recording).items():
             _write_signal(file, name, signal, "float64" if name == "position" else precision)
         if recording.time_s is not None:
             file.create_dataset("time_s", data=np.asarray(recording.time_s, dtype=np.float64), fletcher32=True)

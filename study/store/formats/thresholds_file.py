@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from analysis.psychophysics.thresholds import Threshold
-from study.store.disk.csv_rows import CsvError, column_names, rows_from_csv, rows_to_csv
+from study.store.disk.csv_rows import CsvError, format_csv_table, list_columns, parse_csv_table
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.text_file import read_text, write_text
 
@@ -16,7 +16,7 @@ THRESHOLDS_NAME = "thresholds.csv"
 """Table of direction thresholds."""
 DETECTION_NAME = "detection.csv"
 """Table of detection thresholds, written only if there are detection runs."""
-THRESHOLDS_HEADER = column_names(Threshold)
+THRESHOLDS_HEADER = list_columns(Threshold)
 """Names of the columns, in order."""
 KIND = "table of thresholds"
 """Name of this kind of file in error messages."""
@@ -25,13 +25,13 @@ KIND = "table of thresholds"
 def write_thresholds(path: Path, thresholds: Iterable[Threshold]) -> None:
     """Write the table. An existing table is replaced, because it can be recomputed from the trials. Raises
     CannotWriteError."""
-    write_text(path, rows_to_csv(thresholds, Threshold), overwrite=True)
+    write_text(path, format_csv_table(thresholds, Threshold), overwrite=True)
 
 
 def read_thresholds(path: Path) -> tuple[Threshold, ...]:
     """Read the table. Raises CannotReadError where the file cannot be read, UnusableFileError where it is not such a
     table."""
     try:
-        return rows_from_csv(read_text(path), Threshold)
+        return parse_csv_table(read_text(path), Threshold)
     except CsvError as error:
         raise UnusableFileError(path, KIND, error.problems) from error

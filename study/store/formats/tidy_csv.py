@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from protocols.trial import Trial
-from study.store.disk.csv_rows import column_names, format_csv_line, rows_to_csv
+from study.store.disk.csv_rows import format_csv_line, format_csv_table, list_columns
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
@@ -42,10 +42,10 @@ def write_tidy_csv(
 ) -> tuple[Path, ...]:
     """Write the export and return its files. folder: existing and empty. name: of the study. protocol_text: TOML.
     facts: JSON values about the study and the program. Raises CannotWriteError."""
-    rows = [["column", "description", "unit"], *([column, *TRIAL_COLUMNS[column]] for column in column_names(Trial))]
+    rows = [["column", "description", "unit"], *([column, *TRIAL_COLUMNS[column]] for column in list_columns(Trial))]
     rows += [[column.name, column.description, column.question.unit] for column in answers.columns]
     texts = {
-        TRIALS_NAME: rows_to_csv(trials, Trial),
+        TRIALS_NAME: format_csv_table(trials, Trial),
         DICTIONARY_NAME: "".join(format_csv_line(row) + "\n" for row in rows),
         PROTOCOL_NAME: protocol_text,
         FACTS_NAME: json.dumps({"study": name, **facts}, indent=2, ensure_ascii=False) + "\n",

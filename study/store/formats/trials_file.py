@@ -9,13 +9,13 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from protocols.trial import Trial
-from study.store.disk.csv_rows import CsvError, column_names, rows_from_csv, rows_to_csv
+from study.store.disk.csv_rows import CsvError, format_csv_table, list_columns, parse_csv_table
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.text_file import read_text, write_text
 
 TRIALS_NAME = "trials.csv"
 """Name of the file."""
-TRIALS_HEADER = column_names(Trial)
+TRIALS_HEADER = list_columns(Trial)
 """Names of the columns, in order."""
 KIND = "table of trials"
 """Name of this kind of file in error messages."""
@@ -23,7 +23,7 @@ KIND = "table of trials"
 
 def write_trials(path: Path, trials: Iterable[Trial]) -> None:
     """Write the table. An existing table is replaced, because it can be derived again. Raises CannotWriteError."""
-    write_text(path, rows_to_csv(trials, Trial), overwrite=True)
+    write_text(path, format_csv_table(trials, Trial), overwrite=True)
 
 
 def read_trials(path: Path | str) -> tuple[Trial, ...]:
@@ -31,7 +31,7 @@ def read_trials(path: Path | str) -> tuple[Trial, ...]:
     table of trials or has rows with `find_trial_problems`."""
     path = Path(path)
     try:
-        trials = rows_from_csv(read_text(path), Trial)
+        trials = parse_csv_table(read_text(path), Trial)
     except CsvError as error:
         raise UnusableFileError(path, KIND, error.problems) from error
     if wrong := find_trial_problems(trials):

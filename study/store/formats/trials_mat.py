@@ -15,7 +15,7 @@ import numpy as np
 
 from protocols.trial import Trial
 from study.store.disk.atomic_write import write_atomically
-from study.store.disk.csv_rows import column_names
+from study.store.disk.csv_rows import list_columns
 from study.store.formats.answer_table import AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
 
@@ -42,10 +42,10 @@ def write_trials_mat(
         {
             "study": name,
             "trials": {
-                column: _convert_column([getattr(trial, column) for trial in trials]) for column in column_names(Trial)
+                column: _convert_column([getattr(trial, column) for trial in trials]) for column in list_columns(Trial)
             },
-            "units": {column: TRIAL_COLUMNS[column][1] for column in column_names(Trial)},
-            "descriptions": {column: TRIAL_COLUMNS[column][0] for column in column_names(Trial)},
+            "units": {column: TRIAL_COLUMNS[column][1] for column in list_columns(Trial)},
+            "descriptions": {column: TRIAL_COLUMNS[column][0] for column in list_columns(Trial)},
             **_convert_answers(answers),
             "protocol": protocol_text,
             "provenance": json.dumps(dict(facts), ensure_ascii=False),

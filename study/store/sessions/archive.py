@@ -1,4 +1,4 @@
-"""Folders of sessions within the data folder: naming, creation, search, and paths of the files in them.
+"""Session folders within the data folder of a study: naming, creation, search, and paths of the files in them.
 
 A folder is named by participant code and session number, as in `P01_001`. Folders of withdrawn sessions remain, with a
 tombstone in place of the data, so that their numbers are not used again.
@@ -15,16 +15,16 @@ from study.store.disk.atomic_write import sync_folder
 from study.store.disk.privacy import PRIVATE_FOLDER, close_data_folder, make_folder
 from study.store.sessions.event_log import LOG_NAME
 
-FOLDER = re.compile(r"(?P<subject>[A-Za-z0-9]{1,16})_(?P<number>\d{3,})")
-"""Pattern of a folder's name: participant code (1 to 16 letters or digits), underscore, number of three digits or
-more."""
+FOLDER_PATTERN = re.compile(r"(?P<subject>[A-Za-z0-9]{1,16})_(?P<number>\d{3,})")
+"""Pattern of a session folder's name: participant code (1 to 16 letters or digits), underscore, session number (three
+digits or more)."""
 TOMBSTONE_NAME = "withdrawn.json"
 """File that replaces the data in each session folder of a withdrawn participant."""
 
 
 @dataclass(frozen=True, slots=True)
 class SessionFolder:
-    """Folder of a session, named by participant code and number, and the paths of its files."""
+    """Folder of a session, named by participant code and session number, and the paths of its files."""
 
     path: Path
 
@@ -57,7 +57,7 @@ class SessionFolder:
     def withdrawal(self) -> Path:
         """Path of the withdrawal record, which exists while the erasing of this participant's sessions is
         unfinished."""
-        return withdrawal_file(self.path.parent, self.subject)
+        return locate_withdrawal_record(self.path.parent, self.subject)
 
     @property
     def withdrawn(self) -> bool:
@@ -65,12 +65,12 @@ class SessionFolder:
         return self.tombstone.exists() or self.withdrawal.exists()
 
     @property
-    def erased_words(self) -> str:
-        """How far a withdrawal has come."""
+    def erasure_status(self) -> str:
+        """Whether a withdrawal has erased all data, as a clause for messages."""
         return "not all data are erased yet" if self.withdrawal.exists() else "the data were erased"
 
 
-def withdrawal_file(data: Path, subject: str) -> Path:
+def locate_withdrawal_record(data: Path, subject: str) -> Path:
     """Path of the withdrawal record of a participant."""
     return data / f"{subject}.withdrawal.json"
 
@@ -81,14 +81,14 @@ class SessionWithdrawnError(StudyError):
     def __init__(self, folder: SessionFolder) -> None:
         super().__init__(
             "This session was withdrawn",
-            f"The participant of {folder.name} withdrew; {folder.erased_words}.",
+            f"The participant of {folder.name} withdrew; {folder.erasure_status}.",
             f"Nothing can be done with it; hapteq validate {folder.path} says whether anything remains.",
         )
 
 
 def check_subject(code: str) -> str:
-    """Return the participant code if it is valid (`is_code`). Raises WrongUseError otherwise, so that names and e-mail
-    addresses do not become names of folders."""
+    """Return the participant code if it is valid (`is_code`); otherwise raise WrongUseError, so that names of persons
+    and e-mail addresses do not become names of folders."""
     if not is_code(code):
         raise WrongUseError(
             "This is no participant code",
@@ -98,16 +98,21 @@ def check_subject(code: str) -> str:
     return code
 
 
-def new_session_folder(data: Path, subject: str) -> SessionFolder:
-    """Create the participant's next session folder. An existing folder is never used, even if two programs create one
-    at the same time. Raises WrongUseError for an invalid code, StudyError where the folder cannot be created."""
+def create_session_folder(data: Path, subject: str) -> SessionFolder:
+    """Create the participant's next session folder, numbered from 1. An existing folder is never used, even if two
+    programs create one at the same time. Raises WrongUseError for an invalid code, StudyError if the folder cannot be
+    created."""
     check_subject(subject)
     try:
         is_new = not data.exists()
         make_folder(data, private=True)
         close_data_folder(data)
         for _ in range(1000):
-            used_numbers = [folder_number(f.name) for f in list_session_folders(data) if f.subject == subject]
+            used_numbers = [
+                parse_session_number(session_folder.name)
+                for session_folder in list_session_folders(data)
+                if session_folder.subject == subject
+            ]
             path = data / f"{subject}_{max(used_numbers, default=0) + 1:03d}"
             try:
                 path.mkdir(mode=PRIVATE_FOLDER)
@@ -120,38 +125,43 @@ def new_session_folder(data: Path, subject: str) -> SessionFolder:
                 with contextlib.suppress(OSError):  # the parent folder may not be readable
                     sync_folder(data.absolute().parent)
             return SessionFolder(path)
-    except OSError as problem:
+    except OSError as error:
         raise StudyError(
             "The session folder cannot be made",
-            f"In {data}: {problem.strerror}.",
+            f"In {data}: {error.strerror}.",
             "Choose another folder with --data, or make room and check its permissions.",
-        ) from problem
+        ) from error
     raise StudyError("The session folder cannot be made", f"{data} is changing all the time.", "Try again.")
 
 
 def list_session_folders(data: Path) -> tuple[SessionFolder, ...]:
-    """All session folders below `data`, withdrawn ones included, in alphabetical order."""
+    """All session folders in the data folder, withdrawn ones included, in alphabetical order."""
     if not data.is_dir():
         return ()
-    return tuple(SessionFolder(p) for p in sorted(data.iterdir()) if p.is_dir() and FOLDER.fullmatch(p.name))
+    return tuple(
+        SessionFolder(path) for path in sorted(data.iterdir()) if path.is_dir() and FOLDER_PATTERN.fullmatch(path.name)
+    )
 
 
-def folder_number(name: str) -> int:
-    """Session number in a folder's name; 0 if it is not the name of a session folder."""
-    match = FOLDER.fullmatch(name)
+def parse_session_number(name: str) -> int:
+    """Session number in a folder's name; 0 if the name is not that of a session folder."""
+    match = FOLDER_PATTERN.fullmatch(name)
     return int(match["number"]) if match else 0
 
 
 def find_session(session: str, data: Path) -> SessionFolder:
-    """The session with this folder or, within `data`, this name. Raises SessionWithdrawnError, and WrongUseError where
-    there is none with a log."""
+    """Find a session by the path of its folder or by its name within `data`. Raises SessionWithdrawnError for a
+    withdrawn session, WrongUseError if there is no such folder with an event log."""
     for path in (Path(session), data / session):
         folder = SessionFolder(path.resolve())
         if folder.withdrawn:
             raise SessionWithdrawnError(folder)
         if folder.log.exists():
             return folder
-    session_names = ", ".join(f.name for f in list_session_folders(data) if not f.withdrawn) or "none"
+    session_names = (
+        ", ".join(session_folder.name for session_folder in list_session_folders(data) if not session_folder.withdrawn)
+        or "none"
+    )
     raise WrongUseError(
         "There is no such session",
         f"'{session}' is neither a session folder nor the name of one in {data}. Sessions there: {session_names}.",

@@ -1,7 +1,7 @@
 """The log of a session: an append-only file with one JSON event per line, each with a checksum (`log_chain`).
 
-A program appends the line and syncs it to the disk (fsync) before it acts on the event, so that the log never lacks
-what happened. Lines are never rewritten; only an incomplete last line, which a crash leaves, is removed.
+A program appends the line and syncs it to the disk (fsync) before it acts on the event (write-ahead), so that the log
+never lacks what happened. Lines are never rewritten; only an incomplete last line, which a crash leaves, is removed.
 """
 
 import contextlib
@@ -78,7 +78,7 @@ class EventLog:
         self._chain = extended
 
     def close(self) -> None:
-        """Close the file; its lines are on the disk already. Called once."""
+        """Close the file; all lines are on the disk already. To be called once only."""
         os.close(self._descriptor)
 
 
@@ -88,7 +88,7 @@ class LogContents:
 
     events: tuple[Event, ...]
     torn: str
-    """An incomplete last line, left by a crash; empty if there is none."""
+    """Text of an incomplete last line (torn write), left by a crash; empty if there is none."""
     torn_bytes: int
     """Length of the incomplete line in bytes."""
     chain: Chain

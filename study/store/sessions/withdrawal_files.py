@@ -13,7 +13,7 @@ from typing import Any
 from study.errors import StudyError
 from study.store.disk.json_document import read_json, write_json
 from study.store.disk.real_folder import is_real_file, is_real_folder, open_folder
-from study.store.sessions.archive import FOLDER, SessionFolder, withdrawal_file
+from study.store.sessions.archive import FOLDER_PATTERN, SessionFolder, locate_withdrawal_record
 from study.store.sessions.session_lock import LOCK_NAME
 
 TOMBSTONE_FORMAT, TOMBSTONE_VERSION = "hapteq-tombstone", 1
@@ -48,14 +48,14 @@ class WithdrawalIntent:
 
 def write_intent(data: Path, intent: WithdrawalIntent) -> None:
     """Write the intent and sync it to the disk. Raises CannotWriteError."""
-    path = withdrawal_file(data, intent.subject)
+    path = locate_withdrawal_record(data, intent.subject)
     write_json(path, WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION, asdict(intent), overwrite=True)
 
 
 def read_intent(data: Path, subject: str) -> WithdrawalIntent | None:
     """The intent; None if the file is missing or invalid, and its content must be determined again. Names that are not
     sessions of the participant, or that lead out of the data folder, are dropped. Never raises."""
-    path = withdrawal_file(data, subject)
+    path = locate_withdrawal_record(data, subject)
     if not is_real_file(path):
         return None
     try:
@@ -136,7 +136,7 @@ def _has_valid_types(facts: Mapping[str, Any]) -> bool:
 
 def _is_of_subject(name: Any, subject: str) -> bool:
     """Whether it is the name of a session folder of this participant."""
-    match = FOLDER.fullmatch(str(name))
+    match = FOLDER_PATTERN.fullmatch(str(name))
     return match is not None and match["subject"] == subject
 
 
@@ -146,4 +146,4 @@ def _is_plain_name(name: str) -> bool:
     if not path.parts or path.is_absolute() or ".." in path.parts:
         return False
     # Files in a session folder are erased with that folder, or belong to another participant.
-    return FOLDER.fullmatch(path.parts[0]) is None
+    return FOLDER_PATTERN.fullmatch(path.parts[0]) is None

@@ -12,7 +12,7 @@ from study.regular_file import DOCUMENT_BYTES, read_regular
 from study.store.disk.atomic_write import write_atomically
 from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.real_folder import is_real_file
-from study.store.sessions.archive import FOLDER
+from study.store.sessions.archive import FOLDER_PATTERN
 
 WRITTEN_ELSEWHERE = "written_elsewhere.txt"
 """Name of the file in the data folder; one absolute path per line."""
@@ -28,13 +28,13 @@ def note_written_folder(source: Path, folder: Path, always: bool = False) -> Non
     an export, which a withdrawal does not find.
     """
     folder, source = folder.resolve(), source.resolve()
-    data = source.parent if FOLDER.fullmatch(source.name) else source
+    data = source.parent if FOLDER_PATTERN.fullmatch(source.name) else source
     noted = read_written_folders(data)
     relative_parts = folder.relative_to(data).parts if folder.is_relative_to(data) else None
     is_searched = (
         not always
         and relative_parts is not None
-        and (len(relative_parts) < 2 or FOLDER.fullmatch(relative_parts[0]) is not None)
+        and (len(relative_parts) < 2 or FOLDER_PATTERN.fullmatch(relative_parts[0]) is not None)
     )
     if is_searched or folder in noted:
         return

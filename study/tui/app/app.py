@@ -1,4 +1,8 @@
-"""`hapteq study` on a screen. This process draws and reads keys and never blocks: the engine does all work."""
+"""Application of `hapteq study` on a terminal screen: it draws, reads keys and never blocks.
+
+A second process, the engine (`study.tui.engine`), drives the device, writes to disk and analyses. `study.cli` runs
+the application.
+"""
 
 from __future__ import annotations
 
@@ -58,11 +62,11 @@ class HapteqApp(App[None]):
         self.outcome: Finished | Failed | None = None
         """Result of the last sitting, which the command line prints after the screen has closed."""
         self._start = start
-        self._direct = start.first is not None
+        self._started_from_terminal = start.first is not None
         self._engine = EngineLine(self)
         self._archive = ArchiveScreens(self, self._engine.send, start)
         self._sitting: SittingScreens | None = None
-        self._letting_go: OutcomeScreen | None = None
+        self._stop_panel: OutcomeScreen | None = None
         self._watching = Watching(self)
         self._keys = KeysInOrder(self, super().on_event)
         if "TEXTUAL_ANIMATIONS" not in os.environ:
@@ -80,16 +84,17 @@ class HapteqApp(App[None]):
         if self._start.first is not None:
             await self._begin_sitting(self._start.first)
         else:
-            await self._archive.home()
-        self.call_after_refresh(self._start_the_rest)
+            await self._archive.show_home()
+        self.call_after_refresh(self._start_engine)
 
-    def _start_the_rest(self) -> None:
+    def _start_engine(self) -> None:
+        """Start the engine and import further screens, after the first screen is drawn."""
         self._engine.start()
         load_screens()
 
     @property
     def engine_pid(self) -> int | None:
-        """Number of the engine's process; None before it has started."""
+        """Process identifier of the engine; None before it has started."""
         return self._engine.pid
 
     def close_engine(self) -> None:
@@ -105,8 +110,10 @@ class HapteqApp(App[None]):
         return ENGLISH_WORDS if self._sitting is None else self._sitting.words
 
     async def _begin_sitting(self, first: BeginSession | Resume) -> None:
-        self._direct = self._direct and first is self._start.first
-        self.outcome = self._letting_go = None
+        """Show the first screen of a sitting, and send its command to the engine. first: the command, new or
+        resumed."""
+        self._started_from_terminal = self._started_from_terminal and first is self._start.first
+        self.outcome = self._stop_panel = None
         self._archive.clear()
         self._sitting = SittingScreens(self, self._engine.send, self._start.keys, self._keys.forget_earlier)
         await self._sitting.prepare()
@@ -116,31 +123,35 @@ class HapteqApp(App[None]):
         message = event.message
         match message:
             case Finished():
-                self._end_sitting(outcomes.completion_outcome(message, self._words), message)
+                self._end_sitting(outcomes.make_completion_outcome(message, self._words), message)
             case Failed() if self._sitting is None:
-                self._archive.end_diagnosing()
-                self._archive.end_calibrating()
-                self._panel(outcomes.failure_outcome(message, at_home=True), message.path)
+                self._archive.close_diagnosis_progress()
+                self._archive.reset_sensor_screen()
+                self._show_outcome(outcomes.make_failure_outcome(message, at_home=True), message.path)
             case Failed():
-                self._end_sitting(outcomes.failure_outcome(message, False, self._words), message)
+                self._end_sitting(outcomes.make_failure_outcome(message, False, self._words), message)
             case _ if self._sitting is not None:
                 await self._sitting.handle_message(message)
             case _:
                 await self._archive.handle_message(message)
 
     def _end_sitting(self, outcome: Outcome, end: Finished | Failed) -> None:
+        """End a sitting: show its outcome, or exit where a sitting of the command line could not be begun."""
         was_opened = self._sitting is not None and self._sitting.path
-        self._sitting = self._letting_go = None
+        self._sitting = self._stop_panel = None
         self.outcome = end
-        if self._direct and not was_opened:
+        if self._started_from_terminal and not was_opened:
             # What was typed in the terminal could not be begun: the terminal says why.
             self.exit()
             return
         self._watching.close()
         self._archive.clear()
-        self._panel(outcome, end.path)
+        self._show_outcome(outcome, end.path)
 
-    def _panel(self, outcome: Outcome, path: str) -> OutcomeScreen:
+    def _show_outcome(self, outcome: Outcome, path: str) -> OutcomeScreen:
+        """Show the outcome panel and carry out the decision made on it. path: of the session that it may resume or
+        show."""
+
         async def act_on_decision(decision: Decision | None) -> None:
             match decision:
                 case "resume":
@@ -148,7 +159,7 @@ class HapteqApp(App[None]):
                 case "look":
                     self._engine.send(ShowSession(path))
                 case "home":
-                    await self._archive.home()
+                    await self._archive.show_home()
                 case "quit":
                     self._leave_app(ExitCode.DONE)
 
@@ -158,20 +169,22 @@ class HapteqApp(App[None]):
         return panel
 
     def _leave_app(self, code: ExitCode) -> None:
+        """Exit with this exit code; `close_engine` follows."""
         self.exit(return_code=int(code))
 
     def action_let_go(self) -> None:
         """Ctrl-C. First press: force off, and a panel. Second press: leave."""
-        if self._sitting is None or self._letting_go is not None:
+        if self._sitting is None or self._stop_panel is not None:
             self._leave_app(ExitCode.INTERRUPTED)
             return
         self._engine.send(LetGo())
-        panel = self._letting_go = self._panel(outcomes.stop_told_panel(self._words), "")
-        self.set_timer(outcomes.UNHEARD_AFTER_S, lambda: self._unheard(panel))
+        panel = self._stop_panel = self._show_outcome(outcomes.make_stop_sent_outcome(self._words), "")
+        self.set_timer(outcomes.STOP_REPLY_TIMEOUT_S, lambda: self._report_unanswered_stop(panel))
 
-    def _unheard(self, panel: OutcomeScreen) -> None:
-        if self._letting_go is panel:
-            panel.show_outcome(outcomes.stop_unanswered_panel(self._words))
+    def _report_unanswered_stop(self, panel: OutcomeScreen) -> None:
+        """Show that the engine did not answer the stop, if `panel` still waits for its answer."""
+        if self._stop_panel is panel:
+            panel.show_outcome(outcomes.make_stop_unanswered_outcome(self._words))
             self.bell()
 
     async def action_quit(self) -> None:
@@ -202,9 +215,10 @@ class HapteqApp(App[None]):
             return
         from study.tui.screens.note import NoteScreen
 
-        self.push_screen(NoteScreen(adverse, "experimenter", self._sitting.words), self._write)
+        self.push_screen(NoteScreen(adverse, "experimenter", self._sitting.words), self._send_note)
 
-    def _write(self, note: NoteAsked | None) -> None:
+    def _send_note(self, note: NoteAsked | None) -> None:
+        """Send a note to the engine for the session's log; None: the note was cancelled."""
         if note is not None:
             self._engine.send(Relay(note))
             self.notify(self._words["goes_into_log"], markup=False)
@@ -239,7 +253,7 @@ class HapteqApp(App[None]):
         await self._begin_sitting(Resume(event.path, self._start.device, self._start.data))
 
     async def on_home_wanted(self) -> None:
-        await self._archive.home()
+        await self._archive.show_home()
 
     def on_command_wanted(self, event: home_messages.CommandWanted) -> None:
         self._engine.send(event.command)

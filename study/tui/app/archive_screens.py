@@ -1,4 +1,4 @@
-"""Screens of the terminal interface outside sittings: start screen, past sessions, diagnoses.
+"""Screens of the terminal interface outside sittings: start screen, past sessions, diagnoses; used by `app`.
 
 Screens exchange messages with the engine, a separate process that reads files and computes (`study.tui.engine`). They
 are imported when they are first shown, so that the program starts quickly.
@@ -14,17 +14,17 @@ from textual.app import App
 from study.session.views.archive_views import DiagnosisView, SessionView
 from study.tui.app.app_start import AppStart
 from study.tui.engine.from_engine import (
-    Calibrated,
+    CalibrationComputed,
     CalibrationStored,
-    Diagnosis,
+    DiagnosisContent,
+    DiagnosisProgress,
     FromEngine,
-    Home,
-    LayDown,
-    Preparing,
-    Session,
-    Trouble,
+    HomeContent,
+    PlacementRequest,
+    PreparationStarted,
+    SessionContent,
+    UserNotice,
     Withdrawn,
-    Working,
 )
 from study.tui.engine.to_engine import Diagnose, LetGo, ShowHome, ToEngine
 
@@ -47,7 +47,7 @@ class ArchiveScreens:
         self._session_path = ""
         self._diagnosing: DiagnosingScreen | None = None
 
-    async def home(self) -> None:
+    async def show_home(self) -> None:
         """Show the start screen at once, and request its list, which is shown when the engine has read it."""
         from study.tui.screens.home import HomeScreen
 
@@ -66,22 +66,22 @@ class ArchiveScreens:
     async def handle_message(self, message: FromEngine) -> None:
         """Display the content of a message from the engine. Called only outside sittings."""
         match message:
-            case Home(view=view) if self._home is not None:
+            case HomeContent(view=view) if self._home is not None:
                 self._home.show(view)
-            case Session(view=view):
+            case SessionContent(view=view):
                 await self._show_session(view)
-            case Working(step=step, share=share) if self._diagnosing is not None:
-                self._diagnosing.show(step, share)
-            case Diagnosis(view=view):
-                self.end_diagnosing()
+            case DiagnosisProgress(step=step, share=share) if self._diagnosing is not None:
+                self._diagnosing.show_progress(step, share)
+            case DiagnosisContent(view=view):
+                self.close_diagnosis_progress()
                 await self._show_diagnosis(view)
-            case LayDown() | Calibrated() | CalibrationStored():
-                if (screen := self._sensor_screen()) is not None:
+            case PlacementRequest() | CalibrationComputed() | CalibrationStored():
+                if (screen := self._find_sensor_screen()) is not None:
                     screen.handle_message(message)
             case Withdrawn(sessions=sessions):
                 self._app.notify(f"Everything of the participant was erased: {', '.join(sessions)}.", markup=False)
-                await self.home()
-            case Trouble(sentence=sentence) | Preparing(sentence=sentence):
+                await self.show_home()
+            case UserNotice(sentence=sentence) | PreparationStarted(sentence=sentence):
                 self._app.notify(sentence, markup=False)
 
     async def diagnose(self, command: Diagnose) -> None:
@@ -97,18 +97,18 @@ class ArchiveScreens:
         self._diagnosing = DiagnosingScreen("Getting ready.")
         await self._app.push_screen(self._diagnosing, on_closed)
 
-    def end_diagnosing(self) -> None:
+    def close_diagnosis_progress(self) -> None:
         """Remove the diagnosis screen and everything above it."""
-        diagnosing, self._diagnosing = self._diagnosing, None
-        while diagnosing is not None and diagnosing in self._app.screen_stack:
+        diagnosing_screen, self._diagnosing = self._diagnosing, None
+        while diagnosing_screen is not None and diagnosing_screen in self._app.screen_stack:
             self._app.pop_screen()
 
-    def end_calibrating(self) -> None:
+    def reset_sensor_screen(self) -> None:
         """Allow the calibration of the sensor to be started again after an error."""
-        if (screen := self._sensor_screen()) is not None:
+        if (screen := self._find_sensor_screen()) is not None:
             screen.reset_after_error()
 
-    def _sensor_screen(self) -> SensorScreen | None:
+    def _find_sensor_screen(self) -> SensorScreen | None:
         """The sensor screen, if it is open."""
         from study.tui.screens.sensor import SensorScreen
 
@@ -136,6 +136,7 @@ class ArchiveScreens:
         await self._app.push_screen(screen)
 
     async def _show_diagnosis(self, view: DiagnosisView) -> None:
+        """Show a diagnosis on a new screen."""
         from study.tui.screens.diagnosis import DiagnosisScreen
 
         await self._app.push_screen(DiagnosisScreen(view))

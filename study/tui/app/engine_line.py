@@ -50,7 +50,7 @@ class EngineLine:
 
     def send(self, message: ToEngine) -> None:
         """Send a message and return at once. Starts a new engine first if the present engine has died."""
-        if self._engine.dead:
+        if self._engine.has_failed:
             self._engine = EngineClient(self._deliver)
             self._engine.start()
         if isinstance(message, BeginSession | Resume):
@@ -62,7 +62,7 @@ class EngineLine:
         self._engine.close()
 
     def _beat(self) -> None:
-        if not self._engine.dead:
+        if not self._engine.has_failed:
             self._engine.send(Heartbeat())
 
     def _deliver(self, message: FromEngine) -> None:

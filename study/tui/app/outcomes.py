@@ -1,37 +1,40 @@
-"""Texts of the panel that is shown when something ended."""
+"""Texts of the panel that is shown after a session, a stop or a failure; used by `study.tui.app.app`."""
 
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.tui.engine.from_engine import Failed, Finished
 from study.tui.screens.outcome import Decision, Outcome
 
-UNHEARD_AFTER_S = 2.0
+STOP_REPLY_TIMEOUT_S = 2.0
 """Time without an answer of the engine to a stop (s) after which the panel says so."""
 
 
-def stop_told_panel(words: Words) -> Outcome:
-    """Panel after a stop was asked for: the engine was told."""
+def make_stop_sent_outcome(words: Words) -> Outcome:
+    """Make the panel after Ctrl-C: the stop was sent to the engine."""
     return Outcome(words["stop_title"], (("", words["stop_told"]),), ("quit",), words=words)
 
 
-def stop_unanswered_panel(words: Words) -> Outcome:
-    """Panel after the engine did not answer a stop in time."""
-    unheard = words.fill("stop_unheard", {"seconds": f"{UNHEARD_AFTER_S:g}"})
-    texts = (unheard, words["stop_safe"], words["stop_do_now"])
+def make_stop_unanswered_outcome(words: Words) -> Outcome:
+    """Make the panel for a stop that the engine did not answer within `STOP_REPLY_TIMEOUT_S`."""
+    unanswered_text = words.fill("stop_unheard", {"seconds": f"{STOP_REPLY_TIMEOUT_S:g}"})
+    texts = (unanswered_text, words["stop_safe"], words["stop_do_now"])
     return Outcome(words["stop_unheard_title"], tuple(("", text) for text in texts), ("quit",), words=words)
 
 
-def failure_outcome(failure: Failed, at_home: bool, words: Words = ENGLISH_WORDS) -> Outcome:
-    """Panel for a failure. at_home: nothing was running, and the screen below continues. words: of the participant,
-    who may still sit there."""
+def make_failure_outcome(failure: Failed, at_home: bool, words: Words = ENGLISH_WORDS) -> Outcome:
+    """Make the panel for a failure, with "resume" where it names a session. at_home: no sitting was running, and the
+    screen below continues. words: texts in the participant's language."""
     error = failure.error
     parts = (("What happened", error.happened), ("What is safe", error.saved), ("What to do now", error.do_now))
     decisions: tuple[Decision, ...] = ("back",) if at_home else ("home", "quit")
     paragraphs = tuple((heading, text) for heading, text in parts if text)
-    return Outcome(error.title, (*_for_whom(words), *paragraphs), ("resume", *decisions) if failure.path else decisions)
+    return Outcome(
+        error.title, (*_state_addressee(words), *paragraphs), ("resume", *decisions) if failure.path else decisions
+    )
 
 
-def completion_outcome(end: Finished, words: Words = ENGLISH_WORDS) -> Outcome:
-    """Panel for a finished session. words: of the participant."""
+def make_completion_outcome(end: Finished, words: Words = ENGLISH_WORDS) -> Outcome:
+    """Make the panel for a finished session: thresholds, warnings, path of the report. words: texts in the
+    participant's language."""
     results = end.results
     parts = (
         ("Thresholds", "\n".join(results.table)),
@@ -40,9 +43,10 @@ def completion_outcome(end: Finished, words: Words = ENGLISH_WORDS) -> Outcome:
     )
     paragraphs = tuple((heading, text) for heading, text in parts if text)
     title = f"The session is finished: {end.answers} answers"
-    return Outcome(title, (*_for_whom(words), *paragraphs), ("look", "home", "quit"), grave=False)
+    return Outcome(title, (*_state_addressee(words), *paragraphs), ("look", "home", "quit"), grave=False)
 
 
-def _for_whom(words: Words) -> tuple[tuple[str, str], ...]:
-    """English is the experimenter's: stated in the participant's language, where that is another."""
+def _state_addressee(words: Words) -> tuple[tuple[str, str], ...]:
+    """Make the paragraph that says, in the participant's language, that the English text is for the experimenter; none
+    where the participant's language is English."""
     return () if words == ENGLISH_WORDS else (("", words["for_experimenter"]),)

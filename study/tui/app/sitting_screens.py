@@ -1,7 +1,7 @@
 """Shows the screens of one sitting in the terminal, on request of the engine, and sends the replies.
 
-The engine runs the session in another process. Each of its requests (`Ask`) opens a screen above the trial's screen,
-which stays open underneath; the screen's result is sent back with the number of the request.
+The engine runs the session in another process. Each of its requests (`ScreenRequest`) opens a screen above the trial's
+screen, which stays open underneath; the screen's result is sent back with the number of the request.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from textual.widgets import Footer
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import Reply as TrialReply
 from study.tui.engine.from_engine import (
-    Ask,
-    Call,
     CloseRequest,
+    DisplayCall,
     Feedback,
     FromEngine,
-    LookUpdate,
+    HandleUpdate,
     ParticipantWords,
-    Preparing,
+    PreparationStarted,
+    ScreenRequest,
     SessionReady,
-    Trouble,
+    UserNotice,
 )
 from study.tui.engine.to_engine import Reply, ToEngine
 from study.tui.keys.answer_keys import AnswerKeys
@@ -46,28 +46,28 @@ from study.tui.screens.rest import RestScreen
 from study.tui.screens.trial import TrialScreen
 from study.tui.trial_replies import LEAVING
 
-SCREENS: dict[Call, Callable[[Any, Words], Screen[Any]]] = {
-    Call.FILL_IN: FormScreen,
-    Call.DEVICE_CHECKED: DeviceCheckScreen,
-    Call.SHOW_PLAYING: PlayingScreen,
-    Call.AWAIT_HANDLE: HandleScreen,
-    Call.PRACTICE_OVER: PracticeOverScreen,
-    Call.REST: RestScreen,
-    Call.AWAIT_RETURN: AwaitReturnScreen,
-    Call.GOODBYE: GoodbyeScreen,
+SCREENS: dict[DisplayCall, Callable[[Any, Words], Screen[Any]]] = {
+    DisplayCall.FILL_IN: FormScreen,
+    DisplayCall.DEVICE_CHECKED: DeviceCheckScreen,
+    DisplayCall.SHOW_PLAYING: PlayingScreen,
+    DisplayCall.AWAIT_HANDLE: HandleScreen,
+    DisplayCall.PRACTICE_OVER: PracticeOverScreen,
+    DisplayCall.REST: RestScreen,
+    DisplayCall.AWAIT_RETURN: AwaitReturnScreen,
+    DisplayCall.GOODBYE: GoodbyeScreen,
 }
 """Screen of each request of the engine that needs only the content and the texts. `screen_for` makes those of the other
 requests, except the trial's."""
 
 
-def screen_for(ask: Ask, keys: AnswerKeys, words: Words) -> Screen[Any]:
+def screen_for(ask: ScreenRequest, keys: AnswerKeys, words: Words) -> Screen[Any]:
     """A new screen for a request other than a trial, whose screen is kept between requests. The screen is dismissed
     with the reply as its result."""
-    if ask.call is Call.WELCOME:
+    if ask.call is DisplayCall.WELCOME:
         return InstructionsScreen(ask.content, keys, words)
-    if ask.call is Call.CHOOSE_DEMO:
+    if ask.call is DisplayCall.CHOOSE_DEMO:
         return DemoScreen(ask.content, keys, words)
-    if ask.call is Call.PAUSE:
+    if ask.call is DisplayCall.PAUSE:
         return PauseScreen(ask.content, ask.content.reason == LEAVING.reason, words)
     return SCREENS[ask.call](ask.content, words)
 
@@ -117,16 +117,16 @@ class SittingScreens:
     async def handle_message(self, message: FromEngine) -> None:
         """Handle one message of the engine, in the order of arrival."""
         match message:
-            case Ask():
+            case ScreenRequest():
                 await self._ask(message)
             case CloseRequest(number=number) if number == self._number:
                 self._drop()
-            case LookUpdate():
+            case HandleUpdate():
                 self._update_handle(message)
             case Feedback(correct=correct) if self._trial is not None:
                 self._trial.show_saved()
                 self._trial.show_feedback(correct)
-            case Trouble(sentence=sentence):
+            case UserNotice(sentence=sentence):
                 self._show_trouble(sentence)
             case SessionReady(path=path):
                 self.path = path
@@ -134,7 +134,7 @@ class SittingScreens:
                 self.words = words
                 if self._preparing is not None:
                     self._preparing.speak(words)
-            case Preparing(sentence=sentence):
+            case PreparationStarted(sentence=sentence):
                 await self.prepare(sentence)
 
     def send_trial_reply(self, reply: TrialReply) -> None:
@@ -154,14 +154,14 @@ class SittingScreens:
             self._app.pop_screen()
         self._preparing.say(sentence, afresh=covered)
 
-    async def _ask(self, ask: Ask) -> None:
+    async def _ask(self, ask: ScreenRequest) -> None:
         """Replace the previous request's screen by that of a new request."""
         self._drop()
         self._number = ask.number
         if self._preparing is not None and self._app.screen is self._preparing:
             # Cover the preparing screen: only an empty screen must show in the moment between two others.
             await self._app.push_screen(Screen())
-        if ask.call is Call.ASK:
+        if ask.call is DisplayCall.ASK:
             trial = self._trial if self._trial is not None else await self._trial_screen()
             trial.arm(ask.content)
             return
@@ -175,7 +175,7 @@ class SittingScreens:
         await self._app.push_screen(self._trial)
         return self._trial
 
-    def _update_handle(self, update: LookUpdate) -> None:
+    def _update_handle(self, update: HandleUpdate) -> None:
         if update.number == self._number and isinstance(self._request_screen, HandleScreen):
             self._request_screen.update_view(update.view)
 

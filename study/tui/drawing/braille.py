@@ -1,7 +1,8 @@
 """Raster graphics in a UTF-8 terminal: a canvas of braille characters (from U+2800), each with 2 x 4 dots.
 
-Lines are sampled at each dot, filled shapes are convex polygons drawn row by row (scan lines). The dots are nearly
-square, because a character cell is about twice as high as wide. Coordinates are in dots.
+Used by the drawings of staircases, directions, numbers and recordings. Lines are sampled at each dot; filled shapes are
+convex polygons, drawn row by row (scan lines). The grid of dots is nearly square, because a character cell is about
+twice as high as wide. Coordinates are in dots.
 """
 
 import math
@@ -38,68 +39,70 @@ class Canvas:
         return 4 * self.rows
 
     @property
-    def middle(self) -> Point:
+    def centre(self) -> Point:
         """Centre of the canvas; it lies between dots."""
         return (self.width - 1) / 2, (self.height - 1) / 2
 
-    def dot(self, x: int, y: int) -> None:
-        """Set a dot; outside the canvas, nothing happens."""
+    def set_dot(self, x: int, y: int) -> None:
+        """Set a dot; dots outside the canvas are ignored."""
         if 0 <= x < self.width and 0 <= y < self.height:
             self._cells[(y // 4) * self.columns + x // 2] |= _DOTS[y % 4][x % 2]
 
-    def line(self, start: Point, end: Point, dashed: bool = False) -> None:
-        """Draw a line of the width of one dot, both ends included. dashed: set only five of every eight dots."""
+    def draw_line(self, start: Point, end: Point, dashed: bool = False) -> None:
+        """Draw a straight line one dot wide, both ends included. dashed: set only five of every eight dots."""
         steps = max(1, round(max(abs(end[0] - start[0]), abs(end[1] - start[1]))))
-        for i in range(steps + 1):
-            if dashed and i % 8 >= 5:
+        for step in range(steps + 1):
+            if dashed and step % 8 >= 5:
                 continue
-            share = i / steps
-            x, y = start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1])
-            self.dot(round(x), round(y))
+            fraction = step / steps
+            x, y = start[0] + fraction * (end[0] - start[0]), start[1] + fraction * (end[1] - start[1])
+            self.set_dot(round(x), round(y))
 
-    def stroke(self, start: Point, end: Point, thickness: float) -> None:
-        """Draw a straight bar of this thickness with square ends; nothing if its length is 0."""
+    def draw_bar(self, start: Point, end: Point, thickness: float) -> None:
+        """Draw a filled straight bar with square ends; nothing if its length is 0. thickness: in dots."""
         length = math.dist(start, end)
         if length == 0:
             return
-        offset = (start[1] - end[1]) / length * thickness / 2, (end[0] - start[0]) / length * thickness / 2
-        self.fill(
+        half_width = (start[1] - end[1]) / length * thickness / 2, (end[0] - start[0]) / length * thickness / 2
+        self.fill_polygon(
             (
-                (start[0] + offset[0], start[1] + offset[1]),
-                (end[0] + offset[0], end[1] + offset[1]),
-                (end[0] - offset[0], end[1] - offset[1]),
-                (start[0] - offset[0], start[1] - offset[1]),
+                (start[0] + half_width[0], start[1] + half_width[1]),
+                (end[0] + half_width[0], end[1] + half_width[1]),
+                (end[0] - half_width[0], end[1] - half_width[1]),
+                (start[0] - half_width[0], start[1] - half_width[1]),
             )
         )
 
-    def circle(self, centre: Point, radius: float) -> None:
+    def draw_circle(self, centre: Point, radius: float) -> None:
         """Draw the outline of a circle, one dot wide."""
         steps = max(8, math.ceil(2 * math.pi * radius))
-        for i in range(steps):
-            turn = 2 * math.pi * i / steps
-            self.dot(round(centre[0] + radius * math.cos(turn)), round(centre[1] + radius * math.sin(turn)))
+        for step in range(steps):
+            angle = 2 * math.pi * step / steps
+            self.set_dot(round(centre[0] + radius * math.cos(angle)), round(centre[1] + radius * math.sin(angle)))
 
-    def disc(self, centre: Point, radius: float) -> None:
-        """Draw a filled circle, approximated by a polygon of 24 corners."""
-        turns = [2 * math.pi * i / 24 for i in range(24)]
-        self.fill([(centre[0] + radius * math.cos(turn), centre[1] + radius * math.sin(turn)) for turn in turns])
+    def draw_disc(self, centre: Point, radius: float) -> None:
+        """Draw a filled circle, approximated by a regular polygon with 24 corners."""
+        angles = [2 * math.pi * i / 24 for i in range(24)]
+        self.fill_polygon(
+            [(centre[0] + radius * math.cos(angle), centre[1] + radius * math.sin(angle)) for angle in angles]
+        )
 
-    def fill(self, corners: Sequence[Point]) -> None:
+    def fill_polygon(self, corners: Sequence[Point]) -> None:
         """Fill a convex polygon, outline included, row by row between the outermost crossings with its edges."""
         top = max(0, math.ceil(min(y for _, y in corners)))
         bottom = min(self.height - 1, math.floor(max(y for _, y in corners)))
-        sides = list(zip(corners, [*corners[1:], corners[0]], strict=True))
+        edges = list(zip(corners, [*corners[1:], corners[0]], strict=True))
         for y in range(top, bottom + 1):
-            crossings = [_edge_crossing_x(a, b, y) for a, b in sides if min(a[1], b[1]) <= y <= max(a[1], b[1])]
+            crossings = [_edge_crossing_x(a, b, y) for a, b in edges if min(a[1], b[1]) <= y <= max(a[1], b[1])]
             for x in range(math.ceil(min(crossings)), math.floor(max(crossings)) + 1):
-                self.dot(x, y)
+                self.set_dot(x, y)
 
-    def lines(self) -> list[str]:
-        """The canvas as lines of `columns` characters, `rows` of them; cells without a dot are blanks."""
-        cells = ["".join(chr(0x2800 + c) for c in self._row(r)) for r in range(self.rows)]
+    def render_lines(self) -> list[str]:
+        """The canvas as text: `rows` lines of `columns` characters; cells without a dot are spaces."""
+        cells = ["".join(chr(0x2800 + c) for c in self._select_row(r)) for r in range(self.rows)]
         return [row.replace("\u2800", " ") for row in cells]
 
-    def _row(self, row: int) -> list[int]:
+    def _select_row(self, row: int) -> list[int]:
         return self._cells[row * self.columns : (row + 1) * self.columns]
 
 

@@ -17,12 +17,12 @@ def large_number(number: int, columns: int, rows: int) -> tuple[str, ...]:
     """The digit 1 or 2 as `rows` lines of `columns` braille characters, scaled to the smaller side. Raises KeyError for
     another number."""
     canvas = Canvas(columns, rows)
-    x, y = canvas.middle
+    x, y = canvas.centre
     thick = max(2.5, y / 5)
     reach = min(x, y) - thick / 2
     corners = [(x + reach * corner_right, y - reach * corner_up) for corner_right, corner_up in _STROKES[number]]
     for start, end in pairwise(corners):
-        canvas.stroke(start, end, thick)
+        canvas.draw_bar(start, end, thick)
     for corner in corners:
-        canvas.disc(corner, thick / 2)
-    return tuple(canvas.lines())
+        canvas.draw_disc(corner, thick / 2)
+    return tuple(canvas.render_lines())

@@ -1,6 +1,7 @@
 """Draw the channels of a recording with braille characters: time series and amplitude spectra.
 
-Each channel takes two lines of text, so that a recording can be judged in a terminal before any plot is made.
+Each channel takes two lines of text, so that a recording can be judged in a terminal before any plot is made; `hapteq
+look` prints them.
 """
 
 import itertools
@@ -13,69 +14,76 @@ from analysis.look.overview import Overview
 from equalizer.signals.signal import FloatArray
 from study.tui.drawing.braille import Canvas
 
-LABEL, COLUMNS, ROWS = 24, 54, 2
+LABEL_COLUMNS, DRAWING_COLUMNS, DRAWING_ROWS = 24, 54, 2
 """Width of the label, and width and height of the drawing, in characters."""
-_DECADES = 4.0
+_SHOWN_DECADES = 4.0
 """Range of amplitudes that a spectrum shows, in decades below its maximum."""
 
 
-def time_series_lines(channel: Channel) -> Iterable[str]:
+def draw_time_series(channel: Channel) -> Iterable[str]:
     """Draw a channel over time: each column of dots spans the lowest to the highest of its samples. The extremes of the
     whole channel are written at the right, with their unit. Missing samples leave gaps."""
     finite_samples = channel.finite_samples
     if not finite_samples.size:
-        yield f"{_channel_label(channel)} {'':{COLUMNS}} no samples"
+        yield f"{_format_channel_label(channel)} {'':{DRAWING_COLUMNS}} no samples"
         return
-    canvas = Canvas(COLUMNS, ROWS)
+    canvas = Canvas(DRAWING_COLUMNS, DRAWING_ROWS)
     low, high = float(finite_samples.min()), float(finite_samples.max())
     span = high - low or 1.0
-    for x, (bottom, top) in enumerate(_columns(channel.samples, canvas.width)):
+    for x, (bottom, top) in enumerate(_compute_column_ranges(channel.samples, canvas.width)):
         if np.isfinite(bottom):
-            from_y, to_y = (round((high - value) / span * (canvas.height - 1)) for value in (top, bottom))
-            canvas.line((x, from_y), (x, to_y))
-    first, last = canvas.lines()
-    yield f"{_channel_label(channel)} {first:{COLUMNS}} {format_value(high, channel.unit)}".rstrip()
-    yield f"{'':{LABEL}} {last:{COLUMNS}} {format_value(low, channel.unit)}".rstrip()
+            top_y, bottom_y = (round((high - value) / span * (canvas.height - 1)) for value in (top, bottom))
+            canvas.draw_line((x, top_y), (x, bottom_y))
+    upper_line, lower_line = canvas.render_lines()
+    yield f"{_format_channel_label(channel)} {upper_line:{DRAWING_COLUMNS}} {format_value(high, channel.unit)}".rstrip()
+    yield f"{'':{LABEL_COLUMNS}} {lower_line:{DRAWING_COLUMNS}} {format_value(low, channel.unit)}".rstrip()
 
 
-def _columns(samples: FloatArray, columns: int) -> list[tuple[float, float]]:
-    """Lowest and highest finite sample in each of `columns` equal parts of the channel; NaN for a part without one."""
-    edges = np.linspace(0, len(samples), columns + 1).astype(int)
+def _compute_column_ranges(samples: FloatArray, column_count: int) -> list[tuple[float, float]]:
+    """Compute the lowest and highest finite sample in each of `column_count` equal parts of the channel; NaN for a part
+    without one."""
+    edges = np.linspace(0, len(samples), column_count + 1).astype(int)
     ranges = []
     for start, stop in itertools.pairwise(edges):
-        part = samples[start : max(stop, start + 1)]
-        part = part[np.isfinite(part)]
-        ranges.append((float(part.min()), float(part.max())) if part.size else (np.nan, np.nan))
+        column_samples = samples[start : max(stop, start + 1)]
+        column_samples = column_samples[np.isfinite(column_samples)]
+        ranges.append(
+            (float(column_samples.min()), float(column_samples.max())) if column_samples.size else (np.nan, np.nan)
+        )
     return ranges
 
 
-def spectrum_lines(overview: Overview) -> Iterable[str]:
+def draw_spectra(overview: Overview) -> Iterable[str]:
     """Draw the amplitude spectral densities of command and response channels, the square roots of their power spectral
     densities, both axes logarithmic. Nothing is drawn without spectra; channels without power are left out."""
     if overview.spectra is None:
         return
     frequency_hz = overview.spectra.frequency_hz
-    for k, channel in enumerate(overview.channels):
-        power = overview.spectra.power(k)
-        if channel.role not in ("command", "response") or power.max() <= 0:
+    for channel_index, channel in enumerate(overview.channels):
+        power_density = overview.spectra.get_power_density(channel_index)
+        if channel.role not in ("command", "response") or power_density.max() <= 0:
             continue
-        canvas = Canvas(COLUMNS, ROWS)
-        edges = np.geomspace(frequency_hz[0], frequency_hz[-1] * 1.001, canvas.width + 1)
-        for x, (start, stop) in enumerate(itertools.pairwise(edges)):
+        canvas = Canvas(DRAWING_COLUMNS, DRAWING_ROWS)
+        edges_hz = np.geomspace(frequency_hz[0], frequency_hz[-1] * 1.001, canvas.width + 1)
+        for x, (start_hz, stop_hz) in enumerate(itertools.pairwise(edges_hz)):
             # The largest line within the column; where low frequencies have none, interpolate between lines.
-            column_power = power[(frequency_hz >= start) & (frequency_hz < stop)]
-            size = float(column_power.max()) if column_power.size else float(np.interp(start, frequency_hz, power))
+            column_density = power_density[(frequency_hz >= start_hz) & (frequency_hz < stop_hz)]
+            peak_density = (
+                float(column_density.max())
+                if column_density.size
+                else float(np.interp(start_hz, frequency_hz, power_density))
+            )
             # Distance below the maximum over the range; 0.5 log10 of a power ratio is log10 of the amplitude ratio.
-            depth = -0.5 * np.log10(max(size / power.max(), 1e-99)) / _DECADES
+            depth = -0.5 * np.log10(max(peak_density / power_density.max(), 1e-99)) / _SHOWN_DECADES
             if depth <= 1:
-                canvas.line((x, round(depth * (canvas.height - 1))), (x, canvas.height - 1))
-        first, last = canvas.lines()
-        yield f"{_channel_label(channel)} {first:{COLUMNS}} amplitude, {_DECADES:g} decades"
-        span = f"{frequency_hz[0]:.3g} to {frequency_hz[-1]:.4g} Hz"
-        yield f"{'':{LABEL}} {last:{COLUMNS}} {span}"
+                canvas.draw_line((x, round(depth * (canvas.height - 1))), (x, canvas.height - 1))
+        upper_line, lower_line = canvas.render_lines()
+        yield f"{_format_channel_label(channel)} {upper_line:{DRAWING_COLUMNS}} amplitude, {_SHOWN_DECADES:g} decades"
+        frequency_range = f"{frequency_hz[0]:.3g} to {frequency_hz[-1]:.4g} Hz"
+        yield f"{'':{LABEL_COLUMNS}} {lower_line:{DRAWING_COLUMNS}} {frequency_range}"
 
 
-def _channel_label(channel: Channel) -> str:
-    """Role and name of a channel, cut and padded to `LABEL` characters."""
+def _format_channel_label(channel: Channel) -> str:
+    """Format role and name of a channel, cut and padded to `LABEL_COLUMNS` characters."""
     name = f"{channel.role} {channel.name}"
-    return f"{name[: LABEL - 1]:{LABEL}}"
+    return f"{name[: LABEL_COLUMNS - 1]:{LABEL_COLUMNS}}"

@@ -1,4 +1,4 @@
-"""The screen's end of the pipe: starts the engine, delivers its messages, and detects its end.
+"""Client of the engine process, for the screen process: start it, deliver its messages, detect its end.
 
 The engine is the process that drives the device and runs the session; the screen only draws. The drawing thread never
 blocks: one further thread starts the engine and reads from it, another writes to it.
@@ -22,8 +22,8 @@ from study.tui.engine.child_process import start_child
 from study.tui.engine.from_engine import ErrorText, Failed, FromEngine, SessionReady
 from study.tui.engine.to_engine import Heartbeat, ToEngine
 
-CLOSING_S = 6.0
-"""Longest wait (s) for the engine to end; an engine that lost its screen ends by itself sooner."""
+ENGINE_EXIT_TIMEOUT_S = 6.0
+"""Longest wait (s) for the engine to end; an engine whose screen process has ended exits sooner by itself."""
 
 
 class EngineClient:
@@ -32,14 +32,14 @@ class EngineClient:
 
     def __init__(self, deliver: Callable[[FromEngine], None]) -> None:
         self._deliver = deliver
-        self._outbox: SimpleQueue[ToEngine | None] = SimpleQueue()
+        self._send_queue: SimpleQueue[ToEngine | None] = SimpleQueue()
         self._process: subprocess.Popen[bytes] | None = None
         self._connection: Connection | None = None
         self._closing = False
         self._session: SessionReady | None = None
-        self.dead = False
+        self.has_failed = False
         """Whether the engine could not be started or ended without `close`; a new client can then be started."""
-        self._thread = threading.Thread(target=self._run_thread, name="engine-client", daemon=True)
+        self._thread = threading.Thread(target=self._run_engine, name="engine-client", daemon=True)
 
     @property
     def pid(self) -> int | None:
@@ -53,44 +53,44 @@ class EngineClient:
     def send(self, message: ToEngine) -> None:
         """Queue a message and return at once. A heartbeat is dropped while other messages are queued, because it would
         be late."""
-        if not isinstance(message, Heartbeat) or self._outbox.empty():
-            self._outbox.put(message)
+        if not isinstance(message, Heartbeat) or self._send_queue.empty():
+            self._send_queue.put(message)
 
-    def close(self, patience_s: float = CLOSING_S) -> None:
+    def close(self, timeout_s: float = ENGINE_EXIT_TIMEOUT_S) -> None:
         """Close the pipe and wait up to `patience_s` (s) for the engine to release the force, write its last line of
         the log, and end; then kill it. May be called twice."""
         self._closing = True
-        self._outbox.put(None)
+        self._send_queue.put(None)
         if self._thread.ident is None:
             return
-        self._thread.join(patience_s)
+        self._thread.join(timeout_s)
         process = self._process
         if process is not None and process.poll() is None:
             process.kill()
             process.wait()
 
-    def _run_thread(self) -> None:
+    def _run_engine(self) -> None:
         """Start the engine, deliver its messages until the pipe ends, and report an unexpected end."""
         with tempfile.TemporaryFile() as output:
             try:
                 connection, process = start_child("study.tui.engine.engine", "run", output=output)
             except OSError as problem:
-                self.dead = True
-                self._deliver(_not_started(problem))
+                self.has_failed = True
+                self._deliver(_make_start_failure(problem))
                 return
             self._connection, self._process = connection, process
-            writer = threading.Thread(target=self._write, args=(connection,), name="engine-writer", daemon=True)
+            writer = threading.Thread(target=self._send_messages, args=(connection,), name="engine-writer", daemon=True)
             writer.start()
-            self._read(connection)
-            self._outbox.put(None)
-            code = _code_at_end(process)
+            self._deliver_messages(connection)
+            self._send_queue.put(None)
+            exit_code = _await_exit_code(process)
             writer.join()
             connection.close()
             if not self._closing:
-                self.dead = True
-                self._deliver(_death(code, _last_words(output), self._session))
+                self.has_failed = True
+                self._deliver(_make_end_failure(exit_code, _read_last_line(output), self._session))
 
-    def _read(self, connection: Connection) -> None:
+    def _deliver_messages(self, connection: Connection) -> None:
         """Deliver messages until the pipe ends or a message cannot be decoded."""
         try:
             while True:
@@ -100,49 +100,49 @@ class EngineClient:
                 self._deliver(message)
         except (EOFError, OSError):
             return
-        except Exception:  # noqa: BLE001 - what cannot be understood is the end of the engine, and is told as that
+        except Exception:  # noqa: BLE001 - a message that cannot be decoded is reported as the end of the engine
             traceback.print_exc()
 
-    def _write(self, connection: Connection) -> None:
+    def _send_messages(self, connection: Connection) -> None:
         """Send the queued messages until None is queued, then end this direction of the pipe."""
         with contextlib.suppress(OSError):
-            while (message := self._outbox.get()) is not None:
+            while (message := self._send_queue.get()) is not None:
                 connection.send(message)
         # Only sending is shut down: the engine sees the end of the pipe, and its last messages still arrive here.
         with contextlib.suppress(OSError), socket.socket(fileno=os.dup(connection.fileno())) as end:
             end.shutdown(socket.SHUT_WR)
 
 
-def _code_at_end(process: "subprocess.Popen[bytes]") -> int:
-    """Exit code of an engine whose pipe has ended; it is killed if it does not end."""
+def _await_exit_code(process: "subprocess.Popen[bytes]") -> int:
+    """Wait for an engine whose pipe has ended, and kill it after `ENGINE_EXIT_TIMEOUT_S` (s). Returns its exit code."""
     try:
-        return process.wait(CLOSING_S)
+        return process.wait(ENGINE_EXIT_TIMEOUT_S)
     except subprocess.TimeoutExpired:
         process.kill()
         return process.wait()
 
 
-def _not_started(problem: OSError) -> Failed:
-    """Message for an engine process that the system refused to start."""
+def _make_start_failure(problem: OSError) -> Failed:
+    """Make the message for an engine process that the system refused to start."""
     explanation = f"The system refused to start the process that drives the device: {problem.strerror or problem}."
     advice = "Close other programs, or start the computer anew, and begin again."
     return Failed(ErrorText("The device program cannot be started", explanation, "", advice, int(ExitCode.ERROR)))
 
 
-def _last_words(output: IO[bytes]) -> str:
-    """Last line that the engine printed, usually of a traceback; empty if it printed nothing."""
+def _read_last_line(output: IO[bytes]) -> str:
+    """Read the last line that the engine printed, usually of a traceback; empty if it printed nothing."""
     output.seek(0)
     lines = output.read().decode(errors="replace").strip().splitlines()
     return lines[-1].strip() if lines else ""
 
 
-def _death(code: int, last_words: str, session: SessionReady | None) -> Failed:
-    """Message for an engine that ended unexpectedly. code: exit code, negative for a signal. session: the session that
-    can be resumed, if any."""
-    end_text = f"by signal {signal.Signals(-code).name}" if code < 0 else f"with code {code}"
+def _make_end_failure(exit_code: int, last_line: str, session: SessionReady | None) -> Failed:
+    """Make the message for an engine that ended unexpectedly. exit_code: negative for a signal. session: the session
+    that can be resumed, if any."""
+    end_text = f"by signal {signal.Signals(-exit_code).name}" if exit_code < 0 else f"with code {exit_code}"
     explanation = f"The process that drives the device ended {end_text}."
-    if last_words:
-        explanation += f" Its last words: {last_words}"
+    if last_line:
+        explanation += f" Its last words: {last_line}"
     advice = "Take the hand off the handle until you know that no force is on."
     if session is not None:
         advice += f" Then continue with: hapteq resume {session.path}"

@@ -25,13 +25,13 @@ from study.tui.engine.to_engine import Command
 if TYPE_CHECKING:
     from study.tui.engine.engine_commands import EngineCommands
 
-NEEDED_FOR_A_SESSION = ("study.devices.safe", "study.devices.rigs_by_name", "study.store.sessions.trial_recordings")
+SESSION_MODULES = ("study.devices.safe", "study.devices.rigs_by_name", "study.store.sessions.trial_recordings")
 """Modules that are imported while the user types the participant's code, so that a session starts quickly."""
 
-NEEDED_AT_THE_END = ("study.workflows.results.analyze_data",)
+ANALYSIS_MODULES = ("study.workflows.results.analyze_data",)
 """Modules of statistics and plots, imported next if no command waits, so that results appear quickly."""
 
-LAST_RESORT_S = 5.0
+FORCED_EXIT_S = 5.0
 """Time (s) from the loss of the screen to the forced end of this process. The device was stopped before."""
 
 INTERRUPTED = StudyError(
@@ -46,34 +46,35 @@ class Engine:
 
     def __init__(self, connection: Connection) -> None:
         self._busy = False
-        self._link = ScreenLink(connection, self._interrupt, _end_by_force)
+        self._link = ScreenLink(connection, self._interrupt, _force_exit)
         self._commands: EngineCommands | None = None
-        for name in ("SIGINT", "SIGTERM"):
-            signal.signal(getattr(signal, name), self._on_signal)
+        for signal_name in ("SIGINT", "SIGTERM"):
+            signal.signal(getattr(signal, signal_name), self._on_signal)
 
     def work(self) -> None:
         """Perform commands until the screen's process has ended."""
         self._link.start()
         while not self._link.ended:
             try:
-                command = self._next_command()
+                command = self._await_command()
                 if command is None:
                     return
                 self._perform(command)
             except KeyboardInterrupt:  # the interrupt came just after a command had ended
                 if not self._link.ended:
-                    self._fail(INTERRUPTED, ExitCode.INTERRUPTED)
+                    self._report_failure(INTERRUPTED, ExitCode.INTERRUPTED)
 
-    def _next_command(self) -> Command | None:
+    def _await_command(self) -> Command | None:
+        """Wait for the next command; None after the end of the screen's process."""
         if not self._link.command_waits:
-            self._warm_up()
+            self._import_in_advance()
         return self._link.next_command()
 
-    def _warm_up(self) -> None:
+    def _import_in_advance(self) -> None:
         """Import modules in advance, as long as no command waits."""
-        for name in ("study.tui.engine.engine_commands", *NEEDED_FOR_A_SESSION, *NEEDED_AT_THE_END):
+        for module_name in ("study.tui.engine.engine_commands", *SESSION_MODULES, *ANALYSIS_MODULES):
             if not self._link.command_waits:
-                import_module(name)
+                import_module(module_name)
 
     def _perform(self, command: Command) -> None:
         """Perform a command; an error is sent to the screen as `Failed`."""
@@ -83,14 +84,14 @@ class Engine:
             commands.perform(command)
         except KeyboardInterrupt:
             self._busy = False
-            self._fail(INTERRUPTED, ExitCode.INTERRUPTED)
+            self._report_failure(INTERRUPTED, ExitCode.INTERRUPTED)
         except StudyError as error:
             self._busy = False
-            self._fail(error, error.exit_code)
-        except Exception as bug:  # noqa: BLE001 - the screen must say it, and the device is closed
+            self._report_failure(error, error.exit_code)
+        except Exception as bug:  # noqa: BLE001 - the screen shows it, and the device is closed
             self._busy = False
             traceback.print_exc()
-            self._fail(_bug_error(bug), ExitCode.ERROR)
+            self._report_failure(_make_bug_error(bug), ExitCode.ERROR)
         finally:
             self._busy = False
 
@@ -102,7 +103,7 @@ class Engine:
             self._commands = EngineCommands(self._link)
         return self._commands
 
-    def _fail(self, error: StudyError, exit_code: ExitCode) -> None:
+    def _report_failure(self, error: StudyError, exit_code: ExitCode) -> None:
         """Send an error to the screen, with the path of the session that can be resumed, if there is one."""
         session_folder = self._commands.session_folder if self._commands is not None else None
         # A withdrawn session cannot be resumed.
@@ -113,13 +114,13 @@ class Engine:
     def _interrupt(self) -> None:
         """Interrupt the current command; called from the reading thread. A signal of the operating system is used,
         because nothing else wakes a main thread that sleeps or waits."""
-        main = threading.main_thread().ident
-        if self._busy and main is not None:
-            signal.pthread_kill(main, signal.SIGINT)
+        main_thread_id = threading.main_thread().ident
+        if self._busy and main_thread_id is not None:
+            signal.pthread_kill(main_thread_id, signal.SIGINT)
 
-    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+    def _on_signal(self, signal_number: int, frame: FrameType | None) -> None:
         """Raise KeyboardInterrupt in the main thread if a command runs, or if the engine shall end."""
-        if number == signal.SIGTERM:
+        if signal_number == signal.SIGTERM:
             self._link.ended = True
         if self._busy or self._link.ended:
             # Only once per command: the cleaning up that follows must not be interrupted.
@@ -127,15 +128,15 @@ class Engine:
             raise KeyboardInterrupt
 
 
-def _end_by_force() -> None:
-    """End the process `LAST_RESORT_S` after the loss of the screen. Reached only if the main thread hangs, in a driver
+def _force_exit() -> None:
+    """End the process `FORCED_EXIT_S` after the loss of the screen. Reached only if the main thread hangs, in a driver
     or on a disk; called in a daemon thread, which ends with the process otherwise."""
-    time.sleep(LAST_RESORT_S)
+    time.sleep(FORCED_EXIT_S)
     os._exit(1)
 
 
-def _bug_error(bug: Exception) -> StudyError:
-    """An unexpected exception as an error that the screen can show."""
+def _make_bug_error(bug: Exception) -> StudyError:
+    """Convert an unexpected exception to an error that the screen can show."""
     return StudyError(
         "Something in hapteq went wrong",
         f"{type(bug).__name__}: {bug}.",
@@ -145,6 +146,7 @@ def _bug_error(bug: Exception) -> StudyError:
 
 
 def run(descriptor: int) -> None:
-    """Main function of the process. descriptor: file descriptor of its end of the pipe."""
+    """Main function of the process, which `study.tui.engine.client` starts. descriptor: file descriptor of its end of
+    the pipe."""
     faulthandler.enable(sys.stderr)
     Engine(Connection(descriptor)).work()

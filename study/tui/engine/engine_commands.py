@@ -1,7 +1,8 @@
 """Commands of the screen, as the engine performs them one after another.
 
 They are: lists and views of sessions and diagnoses, whole sittings, analyses, withdrawals, and the calibration of the
-accelerometer. Results and progress are sent to the screen as messages of `from_engine`.
+accelerometer. Results and progress are sent to the screen as messages of `from_engine`. `study.tui.engine.engine`
+calls `EngineCommands.perform`.
 """
 
 import contextlib
@@ -19,23 +20,23 @@ from study.errors import StudyError, WrongUseError
 from study.local_clock import machine_zone
 from study.session.views.archive_views import HomeView
 from study.session.views.forms import make_words
-from study.store.disk.privacy import data_folder_warning
+from study.store.disk.privacy import format_data_folder_warning
 from study.store.sessions.archive import SessionFolder, find_session
 from study.tui.engine.from_engine import (
-    Calibrated,
+    CalibrationComputed,
     CalibrationStored,
-    Diagnosis,
+    DiagnosisContent,
+    DiagnosisProgress,
     Finished,
-    Home,
-    LayDown,
+    HomeContent,
     ParticipantWords,
-    Preparing,
+    PlacementRequest,
+    PreparationStarted,
     Results,
-    Session,
+    SessionContent,
     SessionReady,
-    Trouble,
+    UserNotice,
     Withdrawn,
-    Working,
 )
 from study.tui.engine.remote_display import RemoteDisplay
 from study.tui.engine.screen_link import ScreenLink
@@ -58,15 +59,15 @@ from study.workflows.results.fold_session import fold_session
 from study.workflows.results.write_results import write_results
 from study.workflows.results.written_analysis import WrittenAnalysis
 from study.workflows.session.conduct_session import ConductedSitting, Participant, conduct_new, conduct_resumed
-from study.workflows.session.end_sitting import end_sitting, finish_closed
+from study.workflows.session.end_sitting import end_sitting, write_missing_results
 from study.workflows.session.plan_sitting import plan_sitting
-from study.workflows.session.withdraw_participant import copies_elsewhere, plan_withdrawal, withdraw
+from study.workflows.session.withdraw_participant import list_remaining_copies, plan_withdrawal, withdraw
 from study.workflows.trial.display import PersonsHand
 from study.workflows.views.send_request import send_request
-from study.workflows.views.view_home import home_view, model_words, protocol_line
-from study.workflows.views.view_session import session_view
+from study.workflows.views.view_home import describe_model_quality, make_home_view, make_protocol_line
+from study.workflows.views.view_session import make_session_view
 
-REPLY_S = 0.5
+REPLY_POLL_S = 0.5
 """Longest single wait (s) for a reply; between two waits an interruption takes effect."""
 
 CALIBRATION_STOPPED = StudyError("The calibration was stopped", "", "Begin it again.", "Nothing was written.")
@@ -96,9 +97,9 @@ class EngineCommands:
             case Resume():
                 self._resume(command)
             case Analyze(session=session):
-                self._link.send(Preparing("Making the tables and the report."))
+                self._link.send(PreparationStarted("Making the tables and the report."))
                 write_results(SessionFolder(Path(session)))
-                self._link.send(Session(session_view(Path(session), machine_zone)))
+                self._link.send(SessionContent(make_session_view(Path(session), machine_zone)))
             case Withdraw(session=session):
                 self._withdraw(SessionFolder(Path(session)))
             case Diagnose():
@@ -113,7 +114,7 @@ class EngineCommands:
         model = Path(order.model) if order.model else None
         plan = plan_sitting(order.protocol, order.subject, None, order.seed, Path(order.data), model)
         for note in plan.notes:
-            self._link.send(Trouble(note))
+            self._link.send(UserNotice(note))
         words = make_words(plan.session.protocol)
         self._conduct_sitting(words, lambda participant: conduct_new(plan.session, order.device, participant))
 
@@ -130,12 +131,12 @@ class EngineCommands:
                 f"Continue it with: hapteq resume {folder.path}",
                 saved="Nothing was changed.",
             )
-        if folder_warning := data_folder_warning(folder.path.parent):
-            self._link.send(Trouble(folder_warning))
+        if folder_warning := format_data_folder_warning(folder.path.parent):
+            self._link.send(UserNotice(folder_warning))
         if folded_session.state.closed:
-            self._link.send(Preparing("Making the tables and the report."))
-            analysis = finish_closed(folder, folded_session)
-            self._link.send(Finished(str(folder.path), folded_session.state.answers, _results(analysis)))
+            self._link.send(PreparationStarted("Making the tables and the report."))
+            analysis = write_missing_results(folder, folded_session)
+            self._link.send(Finished(str(folder.path), folded_session.state.answers, _make_results_message(analysis)))
             return
         words = make_words(folded_session.state.protocol)
         self._conduct_sitting(words, lambda participant: conduct_resumed(folder, command.device, participant))
@@ -143,40 +144,45 @@ class EngineCommands:
     def _conduct_sitting(self, words: Words, conduct: Callable[[Participant], ConductedSitting]) -> None:
         """Conduct a sitting, write its results and send them. words: texts of the protocol's language."""
         self._link.send(ParticipantWords(words))
-        self._link.send(Preparing(words["preparing_device"]))
-        with self._participant() as participant:
-            end = conduct(participant)
-        if end.state.closed:
+        self._link.send(PreparationStarted(words["preparing_device"]))
+        with self._open_participant() as participant:
+            conducted_sitting = conduct(participant)
+        if conducted_sitting.state.closed:
             self.session_folder = None  # a closed session cannot be resumed
-        if not end.end_reason:
-            self._link.send(Preparing(words["preparing_report"]))
-        analysis = end_sitting(end, self._clock.utc())
-        self._link.send(Finished(str(end.folder.path), end.state.answers, _results(analysis)))
+        if not conducted_sitting.end_reason:
+            self._link.send(PreparationStarted(words["preparing_report"]))
+        analysis = end_sitting(conducted_sitting, self._clock.utc())
+        self._link.send(
+            Finished(
+                str(conducted_sitting.folder.path), conducted_sitting.state.answers, _make_results_message(analysis)
+            )
+        )
 
     @contextlib.contextmanager
-    def _participant(self) -> Iterator[Participant]:
-        """The participant at the screen, without requests and replies of an earlier session."""
+    def _open_participant(self) -> Iterator[Participant]:
+        """Make the participant at the screen, without requests and replies of an earlier session."""
         self._link.requests.take()  # discard requests to an earlier session
         self._link.forget_replies()
         display = RemoteDisplay(self._link, self._clock)
         try:
-            yield Participant(display, PersonsHand(), self._clock, self._link.requests, self._report_requests)
+            yield Participant(display, PersonsHand(), self._clock, self._link.requests, self._connect_requests)
         finally:
             self._link.stop_device = None
 
-    def _report_requests(self, folder: SessionFolder, device: Device) -> None:
-        """Called when session and device are open: the screen's requests and its emergency stop reach them."""
+    def _connect_requests(self, folder: SessionFolder, device: Device) -> None:
+        """Called when session and device are open: send the session to the screen, and connect the screen's emergency
+        stop to the device."""
         self.session_folder = folder
         self._link.stop_device = device.stop
         self._link.send(SessionReady(folder.name, str(folder.path)))
 
     def _withdraw(self, folder: SessionFolder) -> None:
         """Erase the participant's sessions, and name copies that may exist elsewhere."""
-        data, plan = folder.path.parent, plan_withdrawal(folder)
-        external_copies = copies_elsewhere(data, plan)
-        withdraw(data, plan, self._clock.utc())
+        data_folder, plan = folder.path.parent, plan_withdrawal(folder)
+        external_copies = list_remaining_copies(data_folder, plan)
+        withdraw(data_folder, plan, self._clock.utc())
         for sentence in (*plan.doubtful, *external_copies):
-            self._link.send(Trouble(sentence))
+            self._link.send(UserNotice(sentence))
         self._link.send(Withdrawn(plan.sessions))
 
     def _diagnose(self, command: Diagnose) -> None:
@@ -185,13 +191,13 @@ class EngineCommands:
         from study.workflows.diagnosis.diagnose_at_screen import diagnose_at_screen, free_out
         from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan
 
-        self._link.send(Working("getting ready", 0.0))
+        self._link.send(DiagnosisProgress("getting ready", 0.0))
         sources = tuple(Path(source) for source in command.sources)
         out_folder = Path(command.out) if command.out else free_out(sources[0])
         model, clean = Path(command.model) if command.model else None, tuple(Path(path) for path in command.clean)
         plan = DiagnosePlan(sources, out_folder, model, clean=clean)
-        document_path = diagnose_at_screen(plan, lambda step, share: self._link.send(Working(step, share)))
-        self._link.send(_diagnosis(document_path))
+        document_path = diagnose_at_screen(plan, lambda step, share: self._link.send(DiagnosisProgress(step, share)))
+        self._link.send(_read_diagnosis(document_path))
 
     def _calibrate(self, command: CalibrateSensor | KeepSensor) -> None:
         """Calibrate the accelerometer with instructions on the screen, or store a calibration. Raises
@@ -199,56 +205,67 @@ class EngineCommands:
         if isinstance(command, KeepSensor):
             self._link.send(CalibrationStored(str(save_accelerometer_calibration(command.table))))
             return
-        number = itertools.count(1)
+        request_numbers = itertools.count(1)
         self._link.forget_replies()
 
-        def lay_down(position: str, readings: tuple[float, float, float] | None) -> None:
-            request = LayDown(next(number), position, readings)
+        def request_placement(position: str, readings: tuple[float, float, float] | None) -> None:
+            """Ask the user to place the sensor in a position, and wait for the reply. readings: of the position
+            before."""
+            request = PlacementRequest(next(request_numbers), position, readings)
             self._link.send(request)
-            while (reply := self._link.reply(REPLY_S)) is None or reply.number != request.number:
+            while (reply := self._link.reply(REPLY_POLL_S)) is None or reply.number != request.number:
                 pass
 
         try:
-            table = calibrate_accelerometer(command.port, command.baud, lay_down)
+            table = calibrate_accelerometer(command.port, command.baud, request_placement)
         except KeyboardInterrupt:
             if self._link.ended:
                 raise
             raise CALIBRATION_STOPPED from None
-        self._link.send(Calibrated(table, str(lab_file_path())))
+        self._link.send(CalibrationComputed(table, str(lab_file_path())))
 
 
-def _read_view(command: ShowHome | ShowSession | ShowDiagnosis) -> Home | Session | Diagnosis:
-    """The view that the command asks for."""
+def _read_view(command: ShowHome | ShowSession | ShowDiagnosis) -> HomeContent | SessionContent | DiagnosisContent:
+    """Read the view that the command requests."""
     match command:
         case ShowHome():
-            return Home(_home_view(command))
+            return HomeContent(_read_home_view(command))
         case ShowSession(path=path):
-            return Session(session_view(Path(path), machine_zone))
+            return SessionContent(make_session_view(Path(path), machine_zone))
         case ShowDiagnosis(path=path):
-            return _diagnosis(Path(path))
+            return _read_diagnosis(Path(path))
 
 
-def _diagnosis(path: Path) -> Diagnosis:
+def _read_diagnosis(path: Path) -> DiagnosisContent:
+    """Read the view of the diagnosis document at `path`."""
     # Imported here, because compilers and solvers take long to load.
-    from study.workflows.views.view_diagnosis import diagnosis_view
+    from study.workflows.views.view_diagnosis import make_diagnosis_view
 
-    return Diagnosis(diagnosis_view(path))
+    return DiagnosisContent(make_diagnosis_view(path))
 
 
-def _home_view(command: ShowHome) -> HomeView:
-    """Content of the start screen, with the protocol, device and model of the command line first in their lists."""
-    view = home_view(Path(command.data))
-    line = protocol_line(command.protocol, Path(command.data)) if command.protocol else None
-    protocols = (line, *(listed for listed in view.protocols if listed.name != line.name)) if line else view.protocols
+def _read_home_view(command: ShowHome) -> HomeView:
+    """Read the content of the start screen, with the protocol, device and model of the command line first in their
+    lists."""
+    view = make_home_view(Path(command.data))
+    requested_protocol = make_protocol_line(command.protocol, Path(command.data)) if command.protocol else None
+    protocols = (
+        (
+            requested_protocol,
+            *(listed_protocol for listed_protocol in view.protocols if listed_protocol.name != requested_protocol.name),
+        )
+        if requested_protocol
+        else view.protocols
+    )
     devices = tuple(sorted(view.devices, key=lambda name: name != command.device))
     models = (command.model, *(name for name in view.models if name != command.model)) if command.model else view.models
     known_qualities = dict(view.qualities)
-    qualities = tuple((model, known_qualities.get(model) or model_words(model)) for model in models)
+    qualities = tuple((model, known_qualities.get(model) or describe_model_quality(model)) for model in models)
     return replace(view, protocols=protocols, devices=devices, models=models, qualities=qualities)
 
 
-def _results(analysis: WrittenAnalysis) -> Results:
-    """The written analysis as a message, with thresholds and warnings as JSON text too."""
+def _make_results_message(analysis: WrittenAnalysis) -> Results:
+    """Make the message about a written analysis, with thresholds and warnings as JSON text too."""
     document = {
         "thresholds": [asdict(threshold) for threshold in analysis.thresholds],
         "warnings": list(analysis.warnings),

@@ -1,7 +1,8 @@
-"""Messages from the engine process to the screen's process, sent pickled through the pipe.
+"""Messages from the engine process to the screen's process, sent pickled through a pipe.
 
-They are plain values, and the module imports nothing heavy, so that the first frame appears soon. `to_engine` holds
-the messages of the other direction.
+The engine process conducts sessions and reads results (`engine_commands`, `remote_display`); the screen's process shows
+the terminal interface (`study.tui.app`). Messages are plain values, and the module imports no heavy package, so that
+the first frame appears soon. `to_engine` defines the messages in the other direction.
 """
 
 from dataclasses import dataclass
@@ -13,8 +14,9 @@ from study.session.views.archive_views import DiagnosisView, HomeView, SessionVi
 from study.session.views.views import HandleView
 
 
-class Call(Enum):
-    """Methods of the display port (`display.Display`) that need a screen and its reply; the values are their names."""
+class DisplayCall(Enum):
+    """Methods of the display port (`study.workflows.trial.display.Display`) that need a screen and its reply; the
+    values are their names."""
 
     FILL_IN = "fill_in"
     DEVICE_CHECKED = "device_checked"
@@ -31,18 +33,19 @@ class Call(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Ask:
-    """Request to show a screen and to send its reply. content: the argument of the method of the display port."""
+class ScreenRequest:
+    """Request to show a screen and to send its reply."""
 
     number: int
     """Number of the request, from 1 within a sitting; the reply has the same number."""
-    call: Call
+    call: DisplayCall
     content: Any
+    """Argument of the method of the display port."""
 
 
 @dataclass(frozen=True, slots=True)
-class LookUpdate:
-    """Current position of the handle, during the request `Call.AWAIT_HANDLE` of this number."""
+class HandleUpdate:
+    """Current position of the handle, during the request `DisplayCall.AWAIT_HANDLE` of this number."""
 
     number: int
     view: HandleView
@@ -57,34 +60,34 @@ class CloseRequest:
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
-    """Whether the last answer was right; sent only if the protocol gives feedback."""
+    """Whether the participant's last answer was correct; sent only if the protocol gives feedback."""
 
     correct: bool
 
 
 @dataclass(frozen=True, slots=True)
-class Trouble:
+class UserNotice:
     """A message to the user that ends neither the session nor a command."""
 
     sentence: str
 
 
 @dataclass(frozen=True, slots=True)
-class Home:
+class HomeContent:
     """Content of the start screen."""
 
     view: HomeView
 
 
 @dataclass(frozen=True, slots=True)
-class Session:
+class SessionContent:
     """Content of the screen of a past session."""
 
     view: SessionView
 
 
 @dataclass(frozen=True, slots=True)
-class Diagnosis:
+class DiagnosisContent:
     """Content of the screen of a diagnosis."""
 
     view: DiagnosisView
@@ -98,14 +101,14 @@ class ParticipantWords:
 
 
 @dataclass(frozen=True, slots=True)
-class Preparing:
+class PreparationStarted:
     """A preparation that takes some time has begun; the sentence describes it."""
 
     sentence: str
 
 
 @dataclass(frozen=True, slots=True)
-class Working:
+class DiagnosisProgress:
     """Progress of a diagnosis: current step, and share of the work that is done (0 to 1)."""
 
     step: str
@@ -113,7 +116,7 @@ class Working:
 
 
 @dataclass(frozen=True, slots=True)
-class LayDown:
+class PlacementRequest:
     """Request to the user in a calibration: lay the accelerometer down in this position, then send a `Reply`."""
 
     number: int
@@ -125,7 +128,7 @@ class LayDown:
 
 
 @dataclass(frozen=True, slots=True)
-class Calibrated:
+class CalibrationComputed:
     """The calibration is computed from all six positions, and not stored yet."""
 
     table: str
@@ -153,13 +156,14 @@ class SessionReady:
 
 @dataclass(frozen=True, slots=True)
 class ErrorText:
-    """The texts of a StudyError; fields as there. exit_code: that of the error, an `ExitCode`."""
+    """The texts of a `study.errors.StudyError`; the fields have the same names as there."""
 
     title: str
     happened: str
     saved: str
     do_now: str
     exit_code: int
+    """Value of the error's `ExitCode`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,19 +207,19 @@ class Failed:
 
 
 FromEngine = (
-    Ask
-    | LookUpdate
+    ScreenRequest
+    | HandleUpdate
     | CloseRequest
     | Feedback
-    | Trouble
-    | Home
-    | Session
-    | Diagnosis
-    | Preparing
+    | UserNotice
+    | HomeContent
+    | SessionContent
+    | DiagnosisContent
+    | PreparationStarted
     | ParticipantWords
-    | Working
-    | LayDown
-    | Calibrated
+    | DiagnosisProgress
+    | PlacementRequest
+    | CalibrationComputed
     | CalibrationStored
     | SessionReady
     | Finished

@@ -105,8 +105,8 @@ class Diagnose:
 
 @dataclass(frozen=True, slots=True)
 class CalibrateSensor:
-    """Calibrate the accelerometer under gravity in six positions; the engine requests each by `LayDown`. `LetGo`
-    interrupts the calibration."""
+    """Calibrate the accelerometer under gravity in six positions; the engine requests each by
+    `PlacementRequest`. `LetGo` interrupts the calibration."""
 
     port: str
     """Name of the serial port."""
@@ -119,7 +119,7 @@ class KeepSensor:
     """Store a calibration in the lab's file."""
 
     table: str
-    """The calibration as a TOML table, as in `Calibrated`."""
+    """The calibration as a TOML table, as in `CalibrationComputed`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +151,8 @@ class Heartbeat:
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """Reply to the `Ask` or `LayDown` of the same number. A reply to a request that has ended is ignored."""
+    """Reply to the `ScreenRequest` or `PlacementRequest` of the same number. A reply to a request that has ended is
+    ignored."""
 
     number: int
     value: Any

@@ -67,7 +67,7 @@ class WatchFeed:
                     self._problem = "the program that reads the log has ended; leave, and watch again."
                 return
             if isinstance(received, WatchView):
-                self._latest = received
+                self._latest, self._problem = received, ""
             else:
                 self._problem = received
 

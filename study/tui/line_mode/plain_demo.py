@@ -4,12 +4,12 @@ from collections.abc import Callable
 
 from protocols.wording.words import Words
 from study.session.views.views import DemoChoice, DemoDone, DemoMenu, HandleView, PlayDemo, PlayingNotice, Unanswered
-from study.tui.drawing.direction_picture import ends
+from study.tui.drawing.direction_picture import describe_direction_ends
 from study.tui.keys.answer_keys import AnswerKeys
 from study.tui.line_mode.conversation import POLL_INTERVAL_S, Conversation, WaitOver
 from study.tui.line_mode.plain_question import PARTICIPANT_LEFT
 from study.tui.trial_replies import PAUSE
-from study.tui.trial_words import describe_felt
+from study.tui.trial_words import describe_felt_directions
 from study.workflows.trial.display import SignOfLife
 
 SAY_AGAIN_S = 1.0
@@ -52,7 +52,9 @@ def show_playing(notice: PlayingNotice, conversation: Conversation, sign_of_life
     conversation.discard_early_lines()
     if notice.title:  # the gap between two intervals has no title
         direction_text = (
-            "" if notice.picture is None else f" ({ends(notice.picture, notice.number, conversation.words)})"
+            ""
+            if notice.picture is None
+            else f" ({describe_direction_ends(notice.picture, notice.number, conversation.words)})"
         )
         conversation.say(f"{conversation.words.fact(notice.title)}{direction_text}")
     until_s = conversation.clock.now_s() + notice.seconds
@@ -106,4 +108,4 @@ def _place_text(menu: DemoMenu, vibration: int, words: Words) -> str:
     """Which vibration is chosen, which of its directions were felt, and whether the device is simulated."""
     place = words.fill("line_demo_place", {"vibration": vibration, "vibrations": menu.vibrations})
     moves = "" if menu.handle_moves else f" {words['simulation']}"
-    return f"{place} {describe_felt(menu, vibration, words)}{moves}"
+    return f"{place} {describe_felt_directions(menu, vibration, words)}{moves}"

@@ -31,7 +31,7 @@ from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.line_mode import plain_demo, plain_forms, plain_pause, plain_question
 from study.tui.line_mode.conversation import Conversation
 from study.tui.line_mode.line_input import LineInput
-from study.tui.trial_words import progress_sentence, refusal_words, run_key, void_words
+from study.tui.trial_words import choose_run_text, describe_progress, describe_refusal, describe_void_trial
 from study.workflows.trial.display import SignOfLife
 
 
@@ -65,12 +65,12 @@ class PlainDisplay:
         return plain_forms.device_checked(report, self._conversation)
 
     def welcome(self, notice: Welcome) -> None:
-        plain_question.welcome(notice, self._conversation, self._keys)
+        plain_question.show_instructions(notice, self._conversation, self._keys)
 
     def choose_demo(self, menu: DemoMenu, sign_of_life: SignOfLife) -> DemoChoice:
         if not self._demo_shown:
             self._conversation.say(
-                "", self._words["line_demo"], *plain_question.picture_lines(menu.picture, self._words)
+                "", self._words["line_demo"], *plain_question.draw_direction_picture(menu.picture, self._words)
             )
             self._demo_shown = True
         return plain_demo.choose_demo(menu, self._conversation, self._keys, sign_of_life)
@@ -82,17 +82,17 @@ class PlainDisplay:
         return plain_demo.await_handle(look, self._conversation, sign_of_life)
 
     def ask(self, question: Question, sign_of_life: SignOfLife) -> Reply:
-        run = (run_key(question), question.run_number)
-        if question.progress is not None and run != self._announced_run:
-            self._conversation.say("", progress_sentence(question.progress, self._words))
-            self._announced_run = run
-        return plain_question.ask(question, self._conversation, self._keys, sign_of_life)
+        current_run = (choose_run_text(question), question.run_number)
+        if question.progress is not None and current_run != self._announced_run:
+            self._conversation.say("", describe_progress(question.progress, self._words))
+            self._announced_run = current_run
+        return plain_question.ask_question(question, self._conversation, self._keys, sign_of_life)
 
     def feedback(self, correct: bool) -> None:
         self._conversation.say_texts("right" if correct else "wrong")
 
     def practice_over(self, result: PracticeResult) -> None:
-        plain_question.practice_over(result, self._conversation)
+        plain_question.show_practice_result(result, self._conversation)
 
     def rest(self, notice: RestNotice, sign_of_life: SignOfLife) -> float:
         return plain_pause.run_rest(notice, self._conversation, sign_of_life)
@@ -102,19 +102,19 @@ class PlainDisplay:
 
     def await_return(self, reason: str) -> None:
         self._conversation.discard_early_lines()
-        self._conversation.say("", f"{self._words['void_title']}. {void_words(reason, self._words)}")
+        self._conversation.say("", f"{self._words['void_title']}. {describe_void_trial(reason, self._words)}")
         self._conversation.say_texts("line_ready_again")
         self._conversation.answer_or_leave()
 
     def goodbye(self, notice: Goodbye) -> None:
         words = self._words
         if notice.outcome:
-            self._conversation.say("", *refusal_words(notice.outcome, words))
+            self._conversation.say("", *describe_refusal(notice.outcome, words))
         elif notice.finished:
             self._conversation.say("", words.fill_count("line_finished", notice.answers))
         else:
-            because = words.fill("line_over_because", {"reason": words.fact(notice.reason)})
-            ending = because if notice.reason else words["line_over"]
+            ending_with_reason = words.fill("line_over_because", {"reason": words.fact(notice.reason)})
+            ending = ending_with_reason if notice.reason else words["line_over"]
             self._conversation.say("", f"{ending} {words.fill_count('saved', notice.answers)} {words['line_thanks']}")
 
     def trouble(self, sentence: str) -> None:

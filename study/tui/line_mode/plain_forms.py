@@ -5,7 +5,7 @@ from study.session.views.form_entry import CHECKED
 from study.session.views.form_views import Form, FormField, FormReply, has_answer
 from study.session.views.views import DeviceReport
 from study.tui.line_mode.conversation import Conversation, Line, printable, quote_line
-from study.tui.trial_words import limits_words, origin
+from study.tui.trial_words import describe_form_origin, describe_number_limits
 
 BACK = "b"
 """Line that returns to the previous question, the same in every language."""
@@ -16,7 +16,7 @@ def ask_form(form: Form, conversation: Conversation) -> FormReply:
     (consent, exclusion), changed answers must be confirmed. Raises KeyboardInterrupt when the participant leaves."""
     conversation.discard_early_lines()
     words = conversation.words
-    conversation.say("", form.title, *filter(None, (form.introduction, origin(form, words))))
+    conversation.say("", form.title, *filter(None, (form.introduction, describe_form_origin(form, words))))
     conversation.say(words.fill_count("line_form", len(form.fields)))
     answers: dict[str, str] = {}
     index, is_changed = 0, False
@@ -126,7 +126,9 @@ def _refusal(field: FormField, line: Line, by_number: bool, words: Words) -> str
     """Text on a line that is no valid answer: the limits or the choices of the field."""
     quoted_line = quote_line(line, words)
     if field.limits is not None:
-        return words.fill("line_form_limits", {"typed": quoted_line, "wanted": limits_words(field.limits, words)})
+        return words.fill(
+            "line_form_limits", {"typed": quoted_line, "wanted": describe_number_limits(field.limits, words)}
+        )
     if not field.choices:
         return words["line_form_needed"]
     answers = field.choices[0]

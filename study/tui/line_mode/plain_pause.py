@@ -9,7 +9,7 @@ from protocols.wording.words import Words
 from study.session.views.views import AfterPause, PauseNotice, RestNotice
 from study.session.watching.requests import NoteAsked
 from study.tui.line_mode.conversation import POLL_INTERVAL_S, Conversation, Line, WaitOver, printable
-from study.tui.trial_words import progress_sentence
+from study.tui.trial_words import describe_progress
 from study.workflows.trial.display import SignOfLife
 
 COUNT_EVERY_S = 10.0
@@ -23,7 +23,7 @@ def run_rest(notice: RestNotice, conversation: Conversation, sign_of_life: SignO
     rested = words.fill("line_rest", {"seconds": f"{notice.seconds:.0f}"})
     conversation.say("", f"{rested} {words.fill_count('runs_left', notice.runs_left)}")
     if notice.progress is not None:
-        conversation.say(progress_sentence(notice.progress, words))
+        conversation.say(describe_progress(notice.progress, words))
     started_s = conversation.clock.now_s()
     if _count_down(started_s + notice.seconds, conversation, sign_of_life):
         conversation.discard_early_lines()

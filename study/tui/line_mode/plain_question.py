@@ -1,4 +1,7 @@
-"""Line mode: the instructions, the question of a trial and its reply, and the result of a practice."""
+"""Line mode: the instructions, the question of a trial and its reply, and the result of a practice.
+
+Called by `PlainDisplay` (`plain_display`).
+"""
 
 from protocols.trial import VoidCause
 from protocols.wording.words import Words
@@ -12,28 +15,28 @@ from study.session.views.views import (
     Unanswered,
     Welcome,
 )
-from study.tui.drawing.direction_picture import draw_directions, sentence
+from study.tui.drawing.direction_picture import describe_direction, draw_directions
 from study.tui.keys.answer_keys import AnswerKeys
 from study.tui.line_mode.conversation import Conversation, Line, WaitOver, quote_line
 from study.tui.trial_replies import PAUSE, REPEAT, repeat_words
-from study.tui.trial_words import heading, plan
+from study.tui.trial_words import describe_plan, format_heading
 from study.workflows.trial.display import SignOfLife
 
 PARTICIPANT_LEFT = Unanswered("the participant left", ends_sitting=True)
 """Reply for the line q: the participant leaves the sitting."""
 
 
-def keys_sentence(keys: AnswerKeys, words: Words) -> str:
-    """Sentence on the keys that answer 1 and 2."""
+def describe_answer_keys(keys: AnswerKeys, words: Words) -> str:
+    """Describe the keys that answer 1 and 2 in one sentence."""
     return words.fill("line_keys", {"keys": keys.choice(words)})
 
 
-def picture_lines(picture: DirectionPicture, words: Words) -> tuple[str, ...]:
-    """Lines of the drawing of the two directions, and a sentence on each."""
-    return (*draw_directions(picture), sentence(picture, 1, words), sentence(picture, 2, words))
+def draw_direction_picture(picture: DirectionPicture, words: Words) -> tuple[str, ...]:
+    """Draw the two directions as lines of text, followed by a sentence on each."""
+    return (*draw_directions(picture), describe_direction(picture, 1, words), describe_direction(picture, 2, words))
 
 
-def welcome(notice: Welcome, conversation: Conversation, keys: AnswerKeys) -> None:
+def show_instructions(notice: Welcome, conversation: Conversation, keys: AnswerKeys) -> None:
     """Write title, instructions and plan of a sitting, and wait for Enter. Raises KeyboardInterrupt when the
     participant leaves."""
     words = conversation.words
@@ -44,11 +47,11 @@ def welcome(notice: Welcome, conversation: Conversation, keys: AnswerKeys) -> No
     conversation.say(
         words["line_hold"],
         "",
-        *picture_lines(notice.picture, words),
+        *draw_direction_picture(notice.picture, words),
         "",
         words["line_how"],
-        plan(notice, words),
-        keys_sentence(keys, words),
+        describe_plan(notice, words),
+        describe_answer_keys(keys, words),
     )
     if not notice.device_moves:
         conversation.say("", words.fill("not_felt", {"device": words.fact(notice.device)}))
@@ -56,51 +59,51 @@ def welcome(notice: Welcome, conversation: Conversation, keys: AnswerKeys) -> No
     conversation.answer_or_leave()
 
 
-def ask(question: Question, conversation: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> Reply:
+def ask_question(question: Question, conversation: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> Reply:
     """Ask the question of a trial until there is a reply, the time limit is over, or the stimulus ended early. Other
     lines are refused, and the question is asked again."""
-    words, choice = conversation.words, {"keys": keys.choice(conversation.words)}
+    words, key_names = conversation.words, {"keys": keys.choice(conversation.words)}
     conversation.discard_early_lines()
-    conversation.say("", heading(question, words))
-    until_s = conversation.clock.now_s() + question.time_limit_s if question.time_limit_s else float("inf")
-    prompt = words.fill("line_which_interval" if question.task is Task.INTERVAL else "line_which", choice)
+    conversation.say("", format_heading(question, words))
+    deadline_s = conversation.clock.now_s() + question.time_limit_s if question.time_limit_s else float("inf")
+    prompt = words.fill("line_which_interval" if question.task is Task.INTERVAL else "line_which", key_names)
     while True:
         conversation.prompt(prompt)
-        line = conversation.wait(sign_of_life, until_s)
+        line = conversation.wait(sign_of_life, deadline_s)
         if isinstance(line, WaitOver):
             cause = VoidCause.LATE if line is WaitOver.TIME_LIMIT else VoidCause.FAULT
             return Unanswered(line.value, ends_sitting=line is WaitOver.INPUT_ENDED, cause=cause)
         reply = parse_reply(line, keys)
         if reply is REPEAT:
             if question.repeats_left == 0:
-                conversation.say(f"{words['no_repeats']} {words.fill('line_type', choice)}")
+                conversation.say(f"{words['no_repeats']} {words.fill('line_type', key_names)}")
                 continue
             conversation.say(repeat_words(question.repeats_left, words))
         if reply is not None:
             return reply
         if line.word == "?":
-            conversation.say(*_explanation(question, words), keys_sentence(keys, words))
+            conversation.say(*_explain_question(question, words), describe_answer_keys(keys, words))
         else:
-            refused = words.fill("no_answer", {"typed": quote_line(line, words)})
-            conversation.say(f"{refused} {words.fill('line_type', choice)}")
+            refusal = words.fill("no_answer", {"typed": quote_line(line, words)})
+            conversation.say(f"{refusal} {words.fill('line_type', key_names)}")
 
 
-def _explanation(question: Question, words: Words) -> tuple[str, ...]:
-    """Help on the question: the task of intervals, or both directions."""
+def _explain_question(question: Question, words: Words) -> tuple[str, ...]:
+    """Explain the question: the task of intervals, or both directions."""
     if question.task is Task.INTERVAL:
         return (words["line_intervals"],)
-    return picture_lines(question.picture, words)
+    return draw_direction_picture(question.picture, words)
 
 
 def parse_reply(line: Line, keys: AnswerKeys) -> Reply | None:
-    """The reply in a typed line: an answer, or q (leave), p (pause), r (repeat); None for any other line."""
+    """Parse the reply in a typed line: an answer, or q (leave), p (pause), r (repeat); None for any other line."""
     answer = keys.answer(line.text)
     if answer is not None:
         return Answered(answer, line.at_s)
     return {"q": PARTICIPANT_LEFT, "p": PAUSE, "r": REPEAT}.get(line.word)
 
 
-def practice_over(result: PracticeResult, conversation: Conversation) -> None:
+def show_practice_result(result: PracticeResult, conversation: Conversation) -> None:
     """Write the result of a practice, and wait for Enter. Raises KeyboardInterrupt when the participant leaves."""
     conversation.discard_early_lines()
     conversation.say(

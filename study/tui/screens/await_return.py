@@ -9,7 +9,7 @@ from textual.widgets import Footer
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.translated_screen import TranslatedScreen
-from study.tui.trial_words import void_words
+from study.tui.trial_words import describe_void_trial
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
@@ -28,7 +28,7 @@ class AwaitReturnScreen(TranslatedScreen[None]):
 
     def compose(self) -> ComposeResult:
         with Card(self.words["void_title"]):
-            yield LiteralText(void_words(self._reason, self.words))
+            yield LiteralText(describe_void_trial(self._reason, self.words))
             yield LiteralText(self.words["void_saved"], classes="gap")
             yield LiteralText(self.words["void_ready"], classes="gap strong")
         yield Footer(show_command_palette=False)

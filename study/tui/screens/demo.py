@@ -18,7 +18,7 @@ from study.session.views.views import DemoChoice, DemoDone, DemoMenu, PlayDemo
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.translated_screen import TranslatedScreen
-from study.tui.trial_words import describe_felt
+from study.tui.trial_words import describe_felt_directions
 from study.tui.widgets.direction_panel import DirectionPanel
 from study.tui.widgets.literal_text import LiteralText
 
@@ -90,7 +90,7 @@ class DemoScreen(TranslatedScreen[DemoChoice]):
             self._show(self.words["demo_fastest"])
         else:
             self._vibration = vibration
-            self._show(describe_felt(self._menu, self._vibration, self.words))
+            self._show(describe_felt_directions(self._menu, self._vibration, self.words))
 
     def action_pause(self) -> None:
         """Ask the application for a pause."""

@@ -36,19 +36,19 @@ class DeviceCheckScreen(TranslatedScreen[bool]):
         self._report = report
 
     def compose(self) -> ComposeResult:
-        """Title, one line per finding with advice where it is not fine, and the conclusion."""
+        """Title, a line per finding with advice where its value is out of order, and the conclusion."""
         report, words = self._report, self.words
-        names = max((len(finding.name) for finding in report.findings), default=0)
+        name_width = max((len(finding.name) for finding in report.findings), default=0)
         with Sheet():
             yield LiteralText(words.fill("check_title", {"device": words.fact(report.device)}), classes="title")
             if report.simulated:
                 yield LiteralText(words["simulation"])
             yield LiteralText(words["for_experimenter"] if report.findings else "")
             for finding in report.findings:
-                yield LiteralText(_line(finding, names), classes="fine" if finding.fine else "look")
+                yield LiteralText(_format_finding(finding, name_width), classes="fine" if finding.fine else "look")
                 if finding.advice and not finding.fine:
                     yield LiteralText(finding.advice, classes="advice")
-            yield LiteralText(_conclusion(report, words), classes="gap strong")
+            yield LiteralText(_format_conclusion(report, words), classes="gap strong")
         yield Footer(show_command_palette=False)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
@@ -69,13 +69,13 @@ class DeviceCheckScreen(TranslatedScreen[bool]):
         dismiss_screen(self, False)
 
 
-def _conclusion(report: DeviceReport, words: Words) -> str:
-    """The last sentence: whether the device is ready, ready with a warning, or needs attention."""
+def _format_conclusion(report: DeviceReport, words: Words) -> str:
+    """Format the conclusion: the device is ready, ready with a warning, or needs attention."""
     if not report.usable:
         return words["check_look"]
     return f"{words['check_ready' if report.fine else 'check_ready_warning']} {words['enter_goes_on']}"
 
 
-def _line(finding: DeviceFinding, names: int) -> str:
-    """One finding: verdict, name padded to `names` characters, measured value."""
-    return f"{'LOOK' if finding.wrong else finding.verdict:<4}  {finding.name:<{names}}  {finding.value}"
+def _format_finding(finding: DeviceFinding, name_width: int) -> str:
+    """Format a finding: verdict, name padded to `name_width` characters, measured value."""
+    return f"{'LOOK' if finding.wrong else finding.verdict:<4}  {finding.name:<{name_width}}  {finding.value}"

@@ -1,4 +1,4 @@
-"""Screen that shows the progress of a running diagnosis, and lets the user stop it."""
+"""Screen that shows the progress of a running diagnosis, and lets the user stop it; opened by `archive_screens`."""
 
 import time
 from collections.abc import Callable
@@ -25,7 +25,8 @@ suggest is fitted, and compared with its rivals on data that no fit has seen.
 
 
 class DiagnosingScreen(Screen[bool]):
-    """Current step, progress and elapsed time of a diagnosis; Esc stops it. Returns True if it was stopped."""
+    """Current step, progress and elapsed time of a diagnosis. Esc closes the screen with the result True: the diagnosis
+    is to be stopped. At the end of the diagnosis the screen is removed without a result."""
 
     HELP = HELP
     CSS = """
@@ -45,7 +46,7 @@ class DiagnosingScreen(Screen[bool]):
         super().__init__()
         self._step = step
         self._now_s = now_s
-        self._began_s = now_s()
+        self._started_s = now_s()
 
     def compose(self) -> ComposeResult:
         with Vertical() as box:
@@ -58,7 +59,7 @@ class DiagnosingScreen(Screen[bool]):
     def on_mount(self) -> None:
         self.set_interval(TICK_S, self._tick)
 
-    def show(self, step: str, share: float) -> None:
+    def show_progress(self, step: str, share: float) -> None:
         """Show the current step and progress. step: sentence without capital letter and full stop; share: 0 to 1."""
         if self.query("#what"):
             self.query_one("#what", Static).update(f"{step[:1].upper()}{step[1:]}.")
@@ -69,4 +70,5 @@ class DiagnosingScreen(Screen[bool]):
         dismiss_screen(self, True)
 
     def _tick(self) -> None:
-        self.query_one("#elapsed", Static).update(describe_elapsed(self._now_s() - self._began_s))
+        """Draw the elapsed time; called every `TICK_S`."""
+        self.query_one("#elapsed", Static).update(describe_elapsed(self._now_s() - self._started_s))

@@ -29,7 +29,7 @@ from study.session.views.form_entry import (
 from study.session.views.form_views import Form, FormReply, find_missing_fields
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.translated_screen import TranslatedScreen
-from study.tui.trial_words import limits_words, origin
+from study.tui.trial_words import describe_form_origin, describe_number_limits
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.choice_row import ChoiceRow
 from study.tui.widgets.form_question import FormQuestion
@@ -97,7 +97,7 @@ class FormScreen(TranslatedScreen[FormReply]):
             yield LiteralText(form.introduction, id="introduction")
             for number, field in enumerate(form.fields, start=1):
                 yield FormQuestion(number, field, self.words)
-            yield LiteralText(origin(form, self.words), id="origin")
+            yield LiteralText(describe_form_origin(form, self.words), id="origin")
             button = Button(self.words["key_continue"], variant="primary", compact=True)
             button.can_focus = False
             yield button
@@ -171,7 +171,7 @@ class FormScreen(TranslatedScreen[FormReply]):
         except NoWidget:
             return None
         if isinstance(widget, ChoiceRow):
-            return self.Pointed(widget, widget.choice_at(click.screen_x - region.x, click.screen_y - region.y))
+            return self.Pointed(widget, widget.find_choice_at(click.screen_x - region.x, click.screen_y - region.y))
         if isinstance(widget, Button):
             return self.Pointed(widget)
         question = next((node for node in widget.ancestors_with_self if isinstance(node, FormQuestion)), None)
@@ -226,7 +226,9 @@ def _compose_message(entry: FormEntry, all_answered: bool, words: Words) -> str:
     """The line below the form: the first missing answer, or changed answers to be checked, or that it is complete."""
     if entry.open:
         remaining, field = len(entry.open) - 1, entry.form.fields[entry.open[0]]
-        question_text = _quote_label(field.label, words) if field.limits is None else limits_words(field.limits, words)
+        question_text = (
+            _quote_label(field.label, words) if field.limits is None else describe_number_limits(field.limits, words)
+        )
         request = words.fill("form_please", {"number": entry.open[0] + 1, "question": question_text})
         return f"{request} {words.fill_count('form_more', remaining)}" if remaining else request
     if entry.check:

@@ -10,7 +10,7 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import Goodbye
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.translated_screen import TranslatedScreen
-from study.tui.trial_words import refusal_words
+from study.tui.trial_words import describe_refusal
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
@@ -32,7 +32,7 @@ class GoodbyeScreen(TranslatedScreen[None]):
         title = "end_thanks" if notice.outcome else "end_finished" if notice.finished else "end_sitting"
         with Card(words[title]):
             if notice.outcome:
-                for sentence in refusal_words(notice.outcome, words):
+                for sentence in describe_refusal(notice.outcome, words):
                     yield LiteralText(sentence, classes="strong")
             elif notice.finished:
                 yield LiteralText(words["end_last_trial"], classes="strong")

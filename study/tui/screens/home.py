@@ -17,7 +17,7 @@ from study.tui.home_messages import HomeWanted
 from study.tui.screens.browse import BrowseScreen
 from study.tui.screens.diagnose_form import DiagnoseForm
 from study.tui.screens.sensor import SensorScreen
-from study.tui.session_status import describe
+from study.tui.session_status import describe_session
 from study.tui.widgets.new_session_form import NewSessionForm
 from study.tui.widgets.session_table import SessionTable
 
@@ -171,7 +171,7 @@ class HomeScreen(Screen[None]):
 
     @on(SessionTable.Looked)
     def _describe(self, event: SessionTable.Looked) -> None:
-        self.query_one("#detail", Static).update(describe(event.line))
+        self.query_one("#detail", Static).update(describe_session(event.line))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Show F2 or F3 in the footer only while the focus is in the other half of the screen."""

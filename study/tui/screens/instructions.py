@@ -1,4 +1,4 @@
-"""Screen of the instructions that a participant reads before the first trial of a sitting."""
+"""Screen of the instructions that a participant reads before the first trial of a sitting (`sitting_screens`)."""
 
 from typing import ClassVar
 
@@ -12,15 +12,15 @@ from study.session.views.views import Welcome
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.translated_screen import TranslatedScreen
-from study.tui.trial_words import plan
+from study.tui.trial_words import describe_plan
 from study.tui.widgets.card import Sheet
 from study.tui.widgets.direction_panel import DirectionPanel
 from study.tui.widgets.literal_text import LiteralText
 
 
 class InstructionsScreen(TranslatedScreen[None]):
-    """Shows how to hold the handle, the two directions, how to answer, and the plan of the sitting; with a device that
-    does not move, that the answers are only practice. Enter begins."""
+    """How to hold the handle, the two directions, how to answer, and the number of runs of the sitting. If the device
+    does not move, a note states that the answers are only practice. Enter closes the screen."""
 
     PAGE = "help_instructions"
     DEFAULT_CSS = """
@@ -31,6 +31,7 @@ class InstructionsScreen(TranslatedScreen[None]):
     BINDINGS: ClassVar[list[BindingType]] = [Binding("enter", "begin", "Begin", key_display="Enter")]
 
     def __init__(self, welcome: Welcome, keys: AnswerKeys = DIGITS, words: Words = ENGLISH_WORDS) -> None:
+        """welcome: facts about the sitting; keys: keys for the two answers; words: texts in its language."""
         super().__init__(words)
         self._welcome = welcome
         self._keys = keys
@@ -46,7 +47,7 @@ class InstructionsScreen(TranslatedScreen[None]):
                 yield DirectionPanel(1, welcome.picture, words)
                 yield DirectionPanel(2, welcome.picture, words)
             yield LiteralText(words.fill("how", {"keys": self._keys.choice(words)}))
-            yield LiteralText(plan(welcome, words))
+            yield LiteralText(describe_plan(welcome, words))
             yield LiteralText(words["stop_any_time"])
             if not welcome.device_moves:
                 yield LiteralText(words.fill("not_felt", {"device": words.fact(welcome.device)}), classes="practice")

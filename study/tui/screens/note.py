@@ -67,7 +67,7 @@ class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | Non
             yield LiteralText(id="message")
         yield Footer(show_command_palette=False)
 
-    @on(ChoiceRow.Left)
+    @on(ChoiceRow.Submitted)
     def _focus_next(self) -> None:
         """Move the focus to the next field when a row of choices is left."""
         self.focus_next()

@@ -1,4 +1,4 @@
-"""Screen of an enforced rest between runs: the remaining time, the number of runs left and the progress of the session.
+"""Screen of an enforced rest between runs: remaining time, number of remaining runs, and progress of the session.
 
 The rest cannot be shortened: Enter has no effect before its end.
 """
@@ -15,17 +15,17 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import RestNotice
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.translated_screen import TranslatedScreen
-from study.tui.trial_words import progress_sentence
+from study.tui.trial_words import describe_progress
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
-TICK_S = 0.2
-"""Interval (s) at which the remaining time is redrawn."""
+UPDATE_INTERVAL_S = 0.2
+"""Interval (s) between updates of the remaining time."""
 
 
 class RestScreen(TranslatedScreen[float]):
-    """Counts the enforced rest down and says how many runs are left; Enter continues once it is over. Returns the
-    seconds rested, never fewer than requested."""
+    """Countdown of the enforced rest, with the number of remaining runs; Enter continues after its end. Returns the
+    duration of the rest (s), at least the requested one."""
 
     PAGE = "help_rest"
     DEFAULT_CSS = """
@@ -48,34 +48,34 @@ class RestScreen(TranslatedScreen[float]):
             yield LiteralText(id="message", classes="gap strong")
             yield LiteralText(words.fill_count("runs_left", notice.runs_left), classes="gap")
             if notice.progress is not None:
-                yield LiteralText(progress_sentence(notice.progress, words))
+                yield LiteralText(describe_progress(notice.progress, words))
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
         self._began_s = time.monotonic()
-        self._ticking = self.set_interval(TICK_S, self._tick)
-        self._tick()
+        self._countdown_timer = self.set_interval(UPDATE_INTERVAL_S, self._update_countdown)
+        self._update_countdown()
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        # Until the rest is over Enter does nothing, so the footer does not name it.
+        # Enter has no effect before the end of the rest; the footer does not list it until then.
         return action != "go_on" or self._has_ended()
 
     def action_go_on(self) -> None:
         if self._has_ended():
-            dismiss_screen(self, self._seconds_rested())
+            dismiss_screen(self, self._measure_elapsed_s())
 
-    def _tick(self) -> None:
-        remaining_s = max(0, math.ceil(self._notice.seconds - self._seconds_rested()))
+    def _update_countdown(self) -> None:
+        remaining_s = max(0, math.ceil(self._notice.seconds - self._measure_elapsed_s()))
         self.query_one(Digits).update(f"{remaining_s // 60}:{remaining_s % 60:02d}")
         self.query_one("#message", LiteralText).update(
             self.words["rest_ready" if self._has_ended() else "rest_resting"]
         )
         if self._has_ended():
-            self._ticking.stop()
+            self._countdown_timer.stop()
             self.refresh_bindings()
 
-    def _seconds_rested(self) -> float:
+    def _measure_elapsed_s(self) -> float:
         return time.monotonic() - self._began_s
 
     def _has_ended(self) -> bool:
-        return self._seconds_rested() >= self._notice.seconds
+        return self._measure_elapsed_s() >= self._notice.seconds

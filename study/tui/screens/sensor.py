@@ -14,7 +14,7 @@ from textual.screen import Screen
 from textual.widgets import Footer, Input, Label, Static
 
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.engine.from_engine import Calibrated, CalibrationStored, LayDown
+from study.tui.engine.from_engine import CalibrationComputed, CalibrationStored, PlacementRequest
 from study.tui.engine.to_engine import CalibrateSensor, KeepSensor, LetGo, Reply
 from study.tui.home_messages import CommandWanted
 
@@ -67,7 +67,7 @@ class SensorScreen(Screen[None]):
 
     def __init__(self) -> None:
         super().__init__()
-        self._waits_for: LayDown | None = None
+        self._waits_for: PlacementRequest | None = None
         """Position that the user must confirm; None where none is requested."""
         self._under_way = False
         """Whether a calibration is running."""
@@ -88,15 +88,15 @@ class SensorScreen(Screen[None]):
     def on_mount(self) -> None:
         self.query_one("#port", Input).focus()
 
-    def handle_message(self, message: LayDown | Calibrated | CalibrationStored) -> None:
+    def handle_message(self, message: PlacementRequest | CalibrationComputed | CalibrationStored) -> None:
         """Handle a message of the engine: show the next position, the result, or that the result was written."""
         match message:
-            case LayDown(number=number, position=position, previous_reading=readings):
+            case PlacementRequest(number=number, position=position, previous_reading=readings):
                 self._waits_for = message
                 if readings is not None:
                     self._note(f"✓ read {', '.join(f'{value:.0f}' for value in readings)}")
                 self._show_line(f"{number} of {STEPS}: lay the sensor down with {position}, let go of it, press Enter.")
-            case Calibrated(table=table, file=file):
+            case CalibrationComputed(table=table, file=file):
                 self._under_way, self._table = False, table
                 self.query_one("#seen", Static).update(table)
                 self._show_line(f"Enter writes this into {file}; Esc leaves it.")

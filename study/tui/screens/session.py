@@ -21,12 +21,12 @@ from study.tui.engine.to_engine import Analyze, Withdraw
 from study.tui.home_messages import CommandWanted, HomeWanted, ResumeWanted, WatchWanted
 from study.tui.screens.diagnose_form import DiagnoseForm
 from study.tui.screens.withdraw_prompt import WithdrawPrompt
-from study.tui.session_status import STYLES, describe, status_text
+from study.tui.session_status import STYLES, describe_session, format_status
 from study.tui.widgets.long_text import LongText
 from study.tui.widgets.staircase_plot import StaircasePlot
 from study.tui.widgets.text_table import TextTable
 
-TABS = ("overview", "thresholds", "staircases", "log", "report")
+PAGES = ("overview", "thresholds", "staircases", "log", "report")
 """Pages, in the order of the keys 1 to 5."""
 
 HELP = """\
@@ -74,7 +74,7 @@ class SessionScreen(Screen[None]):
         Binding("o", "open_report", "Open report"),
         Binding("d", "diagnose", "Diagnose"),
         Binding("x", "withdraw", "Withdraw"),
-        *(Binding(str(n), f"page('{tab}')", tab, show=False) for n, tab in enumerate(TABS, start=1)),
+        *(Binding(str(n), f"page('{tab}')", tab, show=False) for n, tab in enumerate(PAGES, start=1)),
     ]
 
     def __init__(self, view: SessionView) -> None:
@@ -95,15 +95,15 @@ class SessionScreen(Screen[None]):
 
     def compose(self) -> ComposeResult:
         view = self._view
-        yield Static(_head(view), id="head")
+        yield Static(_make_title_line(view), id="head")
         with TabbedContent(initial="overview"):
             with TabPane("1 Overview", id="overview"), VerticalScroll():
-                yield Static(describe(view.line), markup=False)
-                yield Static(_facts(view.facts), classes="part")
+                yield Static(describe_session(view.line), markup=False)
+                yield Static(_make_facts_table(view.facts), classes="part")
                 yield Static("[b]To know[/b]", classes="part")
-                yield Static(_bullets(view.warnings))
+                yield Static(_make_warning_list(view.warnings))
             with TabPane("2 Thresholds", id="thresholds"), VerticalScroll(id="wide-table"):
-                yield from _thresholds(view)
+                yield from _compose_thresholds(view)
             with TabPane("3 Staircases", id="staircases"):
                 yield Static(LEGEND if view.staircases else "No run has an answer yet.", id="legend", markup=False)
                 with VerticalScroll(), ItemGrid(min_column_width=56, id="staircase-list"):
@@ -112,7 +112,7 @@ class SessionScreen(Screen[None]):
             with TabPane("4 Log", id="log"):
                 yield LongText(view.events or ("Nothing can be read.",))
             with TabPane("5 Report", id="report"), VerticalScroll():
-                yield Static(_report(view), markup=False)
+                yield Static(_make_report_text(view), markup=False)
         yield Footer(show_command_palette=False)
 
     def on_tabbed_content_tab_activated(self) -> None:
@@ -125,10 +125,10 @@ class SessionScreen(Screen[None]):
 
     def _focus_page(self) -> None:
         """Focus the part of the selected page that scrolls."""
-        pane = self.query_one(TabbedContent).active_pane
-        if pane is not None:
-            for scrolled in pane.query("VerticalScroll, LongText"):
-                scrolled.focus()
+        page = self.query_one(TabbedContent).active_pane
+        if page is not None:
+            for scrollable in page.query("VerticalScroll, LongText"):
+                scrollable.focus()
 
     def action_back(self) -> None:
         self.post_message(HomeWanted())
@@ -173,8 +173,8 @@ class SessionScreen(Screen[None]):
         return True
 
 
-def file_url(path: str) -> str:
-    """URL of a file for a browser on this machine."""
+def make_file_url(path: str) -> str:
+    """Make the file URL of a path, for a browser on this machine."""
     return Path(path).absolute().as_uri()
 
 
@@ -189,23 +189,23 @@ def open_report(app: App[object], path: str) -> None:
             explanation = f"{problem.strerror or problem}: {path}. Make it anew, or open it where it is now."
             app.notify(explanation, title="The report cannot be opened", severity="error", markup=False)
     else:
-        app.open_url(file_url(path))
+        app.open_url(make_file_url(path))
 
 
-def _head(view: SessionView) -> Content:
-    """First line of the screen: name, status and protocol of the session."""
+def _make_title_line(view: SessionView) -> Content:
+    """Make the first line of the screen: name, status and protocol of the session."""
     line = view.line
     parts: list[Content | str | tuple[str, str]] = [
         (line.name, "bold"),
         "   ",
-        (status_text(line.standing), STYLES[line.standing]),
+        (format_status(line.standing), STYLES[line.standing]),
         f"   {line.protocol}",
     ]
     return Content.assemble(*parts)
 
 
-def _facts(facts: tuple[tuple[str, str], ...]) -> Table:
-    """Facts as a table of two columns, of which the second wraps."""
+def _make_facts_table(facts: tuple[tuple[str, str], ...]) -> Table:
+    """Make a table of two columns from facts (name, value), of which the second wraps."""
     table = Table.grid(padding=(0, 2, 0, 0))
     table.add_column(style="dim", no_wrap=True)
     table.add_column()
@@ -214,16 +214,16 @@ def _facts(facts: tuple[tuple[str, str], ...]) -> Table:
     return table
 
 
-def _bullets(sentences: tuple[str, ...]) -> Table:
-    """Warnings as a bulleted list; a sentence where there are none."""
+def _make_warning_list(sentences: tuple[str, ...]) -> Table:
+    """Make a bulleted list of warnings; the sentence "Nothing stands out." where there are none."""
     table = Table.grid(padding=(0, 1, 0, 0))
     for sentence in sentences or ("Nothing stands out.",):
         table.add_row("•", Text(sentence))
     return table
 
 
-def _thresholds(view: SessionView) -> ComposeResult:
-    """The table of thresholds and its explanation; a sentence where no run is complete."""
+def _compose_thresholds(view: SessionView) -> ComposeResult:
+    """Compose the table of thresholds and its explanation; a sentence where no run is complete."""
     if not view.thresholds:
         yield Static("No test run is complete, so there is no threshold yet.", markup=False)
         return
@@ -238,8 +238,8 @@ def _thresholds(view: SessionView) -> ComposeResult:
     )
 
 
-def _report(view: SessionView) -> str:
-    """Text of the report page: paths of report and figures, and the warnings."""
+def _make_report_text(view: SessionView) -> str:
+    """Make the text of the report page: paths of report and figures, and the warnings."""
     if not view.report:
         lines = ["No report was written yet."]
         if view.line.standing in ("finished", "unfinished") and view.line.answers:

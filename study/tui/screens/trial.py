@@ -1,7 +1,7 @@
 """Screen of a trial: a two-alternative forced choice between two directions, or two intervals, by the keys 1 and 2.
 
 Nothing on it depends on level or frequency. Whether an answer was right is shown only where the protocol gives
-feedback.
+feedback. `study.tui.app.sitting_screens` arms the screen for each question and forwards its replies to the engine.
 """
 
 import time
@@ -22,7 +22,7 @@ from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.keys.key_presses import KeyPresses, arrival_s
 from study.tui.translated_screen import TranslatedScreen
 from study.tui.trial_replies import LEAVING, PAUSE, REPEAT, TIME_OVER, repeat_words
-from study.tui.trial_words import heading, run_key
+from study.tui.trial_words import choose_run_text, format_heading
 from study.tui.widgets.direction_panel import DirectionPanel, Mark
 from study.tui.widgets.literal_text import LiteralText
 from study.tui.widgets.session_bar import SessionBar
@@ -37,10 +37,10 @@ REPLY_TEXTS = {
     TIME_OVER: "time_over",
 }
 """Key of the text shown after a reply. REPEAT has none: its text states the number of repeats left."""
-WANTED_FOR_S = 3.0
+REQUEST_VALID_S = 3.0
 """A request to pause or leave made between two questions is kept for this time (s): the next question, if it comes
 within it, is answered with the request at once."""
-NUM_LOCK = {"end", "down", "kp_begin"}
+NUM_LOCK_OFF_KEYS = {"end", "down", "kp_begin"}
 """Names of the keys that a numeric keypad sends while Num Lock is off, in place of digits."""
 
 
@@ -80,7 +80,7 @@ class TrialScreen(TranslatedScreen[None]):
         self._repeats_left: int | None = None
         self._armed_s: float | None = None
         self._accepted_answer = 0
-        self._limit: Timer | None = None
+        self._time_limit_timer: Timer | None = None
         self._trouble = ""
         self._trouble_is_old = False
         self._verdict: bool | None = None
@@ -98,31 +98,33 @@ class TrialScreen(TranslatedScreen[None]):
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        self._show()
+        self._show_question()
 
     def arm(self, question: Question) -> None:
         """Show a question and accept one reply to it. Starts its time limit (s), where it has one."""
-        self._drop_limit()
-        if self._question is not None and run_key(question) != run_key(self._question):
+        self._stop_time_limit()
+        if self._question is not None and choose_run_text(question) != choose_run_text(self._question):
             self._verdict = None  # another kind of run begins, which may give no feedback
         self._question, self._repeats_left, self._accepted_answer = question, question.repeats_left, 0
         # Feedback is repeated with the next question: the trial that it belongs to ends too soon to read it.
-        last, self._verdict = self._verdict, None
+        previous_verdict, self._verdict = self._verdict, None
         if self._trouble_is_old:
             self.show_trouble("")
         self._trouble_is_old = True
         if question.time_limit_s > 0:
-            self._limit = self.set_timer(question.time_limit_s, self._time_over)
-        self._show("" if last is None else f"{self.words['last_right' if last else 'last_wrong']} ")
+            self._time_limit_timer = self.set_timer(question.time_limit_s, self._end_at_time_limit)
+        self._show_question(
+            "" if previous_verdict is None else f"{self.words['last_right' if previous_verdict else 'last_wrong']} "
+        )
         self._armed_s = time.monotonic()
-        if self._pending_request is not None and self._armed_s - self._pending_request[1] < WANTED_FOR_S:
-            self._reply(self._pending_request[0])
+        if self._pending_request is not None and self._armed_s - self._pending_request[1] < REQUEST_VALID_S:
+            self._post_reply(self._pending_request[0])
         self._pending_request = None
 
     def disarm(self) -> None:
         """Accept no further reply until `arm` is called again."""
         self._armed_s = None
-        self._drop_limit()
+        self._stop_time_limit()
         if not self._accepted_answer:
             self._show_message(self.words["wait"])
 
@@ -130,19 +132,19 @@ class TrialScreen(TranslatedScreen[None]):
         """Show that the answer was written to the log on disk."""
         if self._accepted_answer:
             self._show_mark("saved")
-            saved = f"{self.words.fill('answer_saved', {'answer': self._accepted_answer})} {self.words['wait']}"
-            self._show_message(self._verdict_sentence() or saved)
+            saved_text = f"{self.words.fill('answer_saved', {'answer': self._accepted_answer})} {self.words['wait']}"
+            self._show_message(self._describe_verdict() or saved_text)
 
     def show_feedback(self, correct: bool) -> None:
         """Show whether the answer was right, now and again with the next question."""
         self._verdict = correct
-        self._show_message(self._verdict_sentence())
+        self._show_message(self._describe_verdict())
 
     def show_trouble(self, sentence: str) -> None:
         """Show a problem below the answers. It stays during the next trial, so that there is time to read it."""
         self._trouble = sentence
         self._trouble_is_old = False
-        if self._composed:
+        if self._is_composed:
             self.query_one("#trouble", LiteralText).update(sentence)
 
     def on_key(self, event: Key) -> None:
@@ -152,19 +154,19 @@ class TrialScreen(TranslatedScreen[None]):
             event.stop()
             self._take_answer(answer, arrival_time_s)
         elif self._armed_s is not None and event.key not in self.active_bindings:
-            self._refuse(event)
+            self._explain_refused_key(event)
 
     def on_paste(self, event: Paste) -> None:
         event.stop()
         if self._armed_s is not None:
-            self._show_message(f"{self.words['pasted']} {self._press()}")
+            self._show_message(f"{self.words['pasted']} {self._describe_answer_keys()}")
 
-    def action_reply(self, name: str) -> None:
-        reply = REPLIES[name]
+    def action_reply(self, reply_name: str) -> None:
+        reply = REPLIES[reply_name]
         if self._armed_s is not None and reply is REPEAT and self._repeats_left == 0:
-            self._show_message(f"{self.words['no_repeats']} {self._press()}")
+            self._show_message(f"{self.words['no_repeats']} {self._describe_answer_keys()}")
         elif self._armed_s is not None:
-            self._reply(reply)
+            self._post_reply(reply)
         elif reply.pause:
             self._pending_request = reply, time.monotonic()
             self._show_message(self.words["pause_comes"])
@@ -180,47 +182,51 @@ class TrialScreen(TranslatedScreen[None]):
         if armed_s is None or arrival_time_s < armed_s:
             return
         if not is_press:
-            self._show_message(f"{self.words['key_held']} {self._press()}")
+            self._show_message(f"{self.words['key_held']} {self._describe_answer_keys()}")
             return
         self._armed_s = None
         self.post_message(self.Replied(Answered(answer, arrival_time_s)))
-        self._drop_limit()
+        self._stop_time_limit()
         self._accepted_answer = answer
         self._show_mark("taken")
         self._show_message(self.words.fill("answer_taken", {"answer": answer}))
 
-    def _reply(self, reply: Unanswered) -> None:
+    def _post_reply(self, reply: Unanswered) -> None:
+        """Post a reply other than an answer, accept no further reply, and show a text about it."""
         self._armed_s = None
         self.post_message(self.Replied(reply))
-        self._drop_limit()
+        self._stop_time_limit()
         self._show_message(
             self.words[REPLY_TEXTS[reply]] if reply in REPLY_TEXTS else repeat_words(self._repeats_left, self.words)
         )
 
-    def _time_over(self) -> None:
+    def _end_at_time_limit(self) -> None:
+        """Reply `TIME_OVER` if the question is still unanswered."""
         if self._armed_s is not None:
-            self._reply(TIME_OVER)
+            self._post_reply(TIME_OVER)
 
-    def _drop_limit(self) -> None:
-        if self._limit is not None:
-            self._limit.stop()
-            self._limit = None
+    def _stop_time_limit(self) -> None:
+        """Stop the timer of the question's time limit, if there is one."""
+        if self._time_limit_timer is not None:
+            self._time_limit_timer.stop()
+            self._time_limit_timer = None
 
-    def _refuse(self, event: Key) -> None:
-        """Say why a key that is no reply has no effect; keys without a character are ignored."""
-        if event.key in NUM_LOCK:
+    def _explain_refused_key(self, event: Key) -> None:
+        """Show why a key that is no reply has no effect; keys without a character are ignored."""
+        if event.key in NUM_LOCK_OFF_KEYS:
             self._show_message(self.words["num_lock"])
         elif event.is_printable or event.key == "enter":
-            key = {"enter": "enter_key", "space": "space_key"}.get(event.key)
-            key_text = f"'{event.character}'" if key is None else self.words[key]
-            self._show_message(f"{self.words.fill('no_answer', {'typed': key_text})} {self._press()}")
+            text_key = {"enter": "enter_key", "space": "space_key"}.get(event.key)
+            key_text = f"'{event.character}'" if text_key is None else self.words[text_key]
+            self._show_message(f"{self.words.fill('no_answer', {'typed': key_text})} {self._describe_answer_keys()}")
 
-    def _verdict_sentence(self) -> str:
+    def _describe_verdict(self) -> str:
+        """Describe whether the last answer was right; empty without feedback."""
         return "" if self._verdict is None else self.words["right" if self._verdict else "wrong"]
 
-    def _show(self, last: str = "") -> None:
+    def _show_question(self, feedback_text: str = "") -> None:
         """Redraw the screen for the current question. last: feedback on the previous answer, put before the message."""
-        if not self._composed:
+        if not self._is_composed:
             return
         self.query_one("#trouble", LiteralText).update(self._trouble)
         question = self._question
@@ -228,25 +234,28 @@ class TrialScreen(TranslatedScreen[None]):
             self._show_message(self.words["wait"])
             return
         bar = self.query_one(SessionBar)
-        bar.heading, bar.progress = heading(question, self.words), question.progress
+        bar.heading, bar.progress = format_heading(question, self.words), question.progress
         self.query_one("#asked", LiteralText).update(self.words[QUESTION_TEXTS[question.task]])
         for panel in self.query(DirectionPanel):
             panel.picture = question.picture if question.task is Task.DIRECTION else None
             panel.mark = ""
-        self._show_message(f"{last}{self._press()} {self.words['guess']}")
+        self._show_message(f"{feedback_text}{self._describe_answer_keys()} {self.words['guess']}")
 
     @property
-    def _composed(self) -> bool:
+    def _is_composed(self) -> bool:
         """Whether the widgets exist; the screen may be armed before its first frame."""
         return bool(self.query("#message"))
 
     def _show_mark(self, mark: Mark) -> None:
+        """Show the mark on the panel of the accepted answer, and none on the other."""
         for panel in self.query(DirectionPanel):
             panel.mark = mark if panel.number == self._accepted_answer else ""
 
-    def _press(self) -> str:
+    def _describe_answer_keys(self) -> str:
+        """Describe the keys that answer."""
         return self.words.fill("press", {"keys": self._keys.choice(self.words)})
 
     def _show_message(self, sentence: str) -> None:
-        if self._composed:
+        """Show a sentence below the answers; nothing before the widgets exist."""
+        if self._is_composed:
             self.query_one("#message", LiteralText).update(sentence)

@@ -1,6 +1,6 @@
 """Screen of `hapteq watch`: the experimenter's view of a running session, without the direction of the open trial.
 
-It reads the session's files; it can request a stop or a pause, and add notes.
+It reads the session's files; it can request a stop or a pause, and add notes. Shown by `watch_app` and `watch_in_app`.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ from study.session.watching.watch_view import RUNNING_STATUSES, Alarm, WatchView
 from study.tui.screens.note_prompt import NotePrompt
 from study.tui.screens.watch_help import GUIDE, HELP
 from study.tui.screens.watch_style import STYLE
+from study.tui.watch import watch_panels
 from study.tui.watch.level_history import LevelHistory
-from study.tui.watch.watch_panels import alarm_lines, describe_standing, details, gauges, runs_lines, trials_lines
 from study.tui.watch.watch_source import WatchSource
-from study.tui.watch.watch_words import staircase_title
+from study.tui.watch.watch_words import format_staircase_title
 
 BELL_INTERVAL_S = 4.0
 """Interval at which the bell repeats while an urgent alarm is not acknowledged (s)."""
 SAME_ALARM_WITHIN_S = 10.0
-"""An alarm that returns within this time (s) counts as the same alarm; later it is new."""
+"""An alarm that recurs within this time (s) counts as the same alarm; later it is new."""
 
 AlarmKey = tuple[str, str]
-"""An alarm's kind and when it began."""
+"""An alarm's kind and, for an event, its start time (UTC); the start time of a lasting state is not used: empty."""
 
 
 class AlarmBook:
-    """Which alarms were acknowledged, and when the bell rings. It reads no clock: the time is an argument."""
+    """Which alarms were acknowledged, and whether the bell must ring. Times are arguments, by a monotonic clock (s)."""
 
     def __init__(self) -> None:
         self._alarms: tuple[Alarm, ...] = ()
@@ -50,27 +50,27 @@ class AlarmBook:
 
     @property
     def new_alarms(self) -> tuple[Alarm, ...]:
-        """Current alarms that were not acknowledged."""
+        """Current alarms that are not acknowledged."""
         return tuple(alarm for alarm in self._alarms if _identify_alarm(alarm) not in self._acknowledged)
 
     @property
-    def seen_alarms(self) -> tuple[Alarm, ...]:
-        """Current alarms that were acknowledged."""
+    def acknowledged_alarms(self) -> tuple[Alarm, ...]:
+        """Current alarms that are acknowledged."""
         return tuple(alarm for alarm in self._alarms if _identify_alarm(alarm) in self._acknowledged)
 
     def update(self, alarms: Sequence[Alarm], now_s: float) -> bool:
-        """Update with the current alarms. Returns whether the bell is to ring."""
+        """Replace the current alarms. Returns whether the bell rings: for a new alarm, or again for an urgent one."""
         self._alarms = tuple(alarms)
         present_keys = {_identify_alarm(alarm) for alarm in alarms}
         for last_present_s in (self._acknowledged, self._rung):
             last_present_s.update({key: now_s for key in last_present_s if key in present_keys})
             for key in [key for key, last_s in last_present_s.items() if now_s - last_s > SAME_ALARM_WITHIN_S]:
                 del last_present_s[key]
-        new = [_identify_alarm(alarm) for alarm in self.new_alarms if _identify_alarm(alarm) not in self._rung]
-        repeats_bell = any(alarm.urgent for alarm in self.new_alarms) and now_s - self._last_ring_s >= BELL_INTERVAL_S
-        if not new and not repeats_bell:
+        new_keys = [_identify_alarm(alarm) for alarm in self.new_alarms if _identify_alarm(alarm) not in self._rung]
+        is_bell_due = any(alarm.urgent for alarm in self.new_alarms) and now_s - self._last_ring_s >= BELL_INTERVAL_S
+        if not new_keys and not is_bell_due:
             return False
-        self._rung.update(dict.fromkeys(new, now_s))
+        self._rung.update(dict.fromkeys(new_keys, now_s))
         self._last_ring_s = now_s
         return True
 
@@ -88,11 +88,11 @@ def _identify_alarm(alarm: Alarm) -> AlarmKey:
 POLL_EVERY_S = 0.1
 """Interval at which the session's files are read (s)."""
 STOP_TIMEOUT_S = 2.0
-"""Time (s) after which a stop without effect is an alarm; a session checks for requests twenty times a second."""
+"""Time (s) after which a requested stop without effect is an alarm; a session reads requests twenty times a second."""
 STALE_AFTER_S = 3.0
 """Time without a new view (s) after which an alarm says that the view is out of date."""
 MESSAGE_DURATION_S = 8.0
-"""Time for which a message stays (s)."""
+"""Time for which a message is shown (s)."""
 
 
 class WatchMessage(Message):
@@ -104,9 +104,9 @@ class WatchMessage(Message):
 
 
 class WatchScreen(Screen[None]):
-    """The experimenter's view: standing and alarms, the staircase, last trials, runs, exposure and device; redrawn with
+    """The experimenter's view: status and alarms, the staircase, last trials, runs, exposure and device; redrawn with
     each new view. S or F8 stops the session, p pauses it, n and e write a note and an adverse event, a acknowledges
-    alarms, d shows details, q leaves."""
+    alarms, d shows details, q closes the view."""
 
     HELP = HELP
     HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (126, "-wide")]  # noqa: RUF012 - as in the base class
@@ -124,17 +124,17 @@ class WatchScreen(Screen[None]):
     view: reactive[WatchView | None] = reactive(None)
 
     class Left(Message):
-        """The viewer wants to leave; the session goes on."""
+        """The experimenter closes the view; the session continues."""
 
     def __init__(
-        self, source: WatchSource, ask: Callable[[Request], object], clock_s: Callable[[], float] = time.monotonic
+        self, source: WatchSource, deliver: Callable[[Request], object], clock_s: Callable[[], float] = time.monotonic
     ) -> None:
-        """ask: hands a request to the session. Raises StudyError where it cannot. clock_s: time of alarms, seconds."""
+        """deliver: passes a request to the session, or raises StudyError. clock_s: monotonic clock, seconds."""
         super().__init__()
         self._clock_s = clock_s
         self._source = source
-        self._ask = ask
-        self._book = AlarmBook()
+        self._deliver = deliver
+        self._alarm_book = AlarmBook()
         self._latest_view: WatchView | None = None
         self._last_update_s = self._clock_s()
         self._stop_sent_s: float | None = None
@@ -166,7 +166,7 @@ class WatchScreen(Screen[None]):
         self.poll()
 
     def poll(self) -> None:
-        """Every `POLL_EVERY_S`: check for a new view, alarms, and whether a stop was received."""
+        """Called every `POLL_EVERY_S`: check for a new view, for alarms, and whether a stop was executed."""
         view = self._source.latest()
         if view is not None and view is not self._latest_view:
             self._latest_view = view
@@ -183,12 +183,12 @@ class WatchScreen(Screen[None]):
         if view is None:
             return
         self._redraw()
-        self.query_one("#standing", Static).update(describe_standing(view))
-        self.query_one("#levels").border_title = staircase_title(view)
+        self.query_one("#standing", Static).update(watch_panels.describe_standing(view))
+        self.query_one("#levels").border_title = format_staircase_title(view)
         self.query_one(LevelHistory).show(view.points, view.next_level_n, view.cap_n)
-        self.query_one("#details", Static).update(details(view))
-        self.query_one("#gauges", Static).update(gauges(view))
-        # Alarms above may just have taken room from the tables.
+        self.query_one("#details", Static).update(watch_panels.format_details(view))
+        self.query_one("#gauges", Static).update(watch_panels.format_gauges(view))
+        # A change of the alarms panel above changes the height of the tables.
         self.call_after_refresh(self._fill_tables)
 
     def on_resize(self) -> None:
@@ -198,13 +198,13 @@ class WatchScreen(Screen[None]):
         if self.view is None:
             return
         runs, trials = self.query_one("#runs", Static), self.query_one("#trials", Static)
-        runs.update(runs_lines(self.view, runs.content_size.height))
-        trials.update(trials_lines(self.view, trials.content_size.height, trials.content_size.width))
+        runs.update(watch_panels.format_runs(self.view, runs.content_size.height))
+        trials.update(watch_panels.format_trials(self.view, trials.content_size.height, trials.content_size.width))
 
     def _redraw(self) -> None:
         now_s = self._clock_s()
         alarms = (*self._find_view_alarms(now_s), *self._filter_session_alarms())
-        if self._book.update(alarms, now_s):
+        if self._alarm_book.update(alarms, now_s):
             self.app.bell()
         self._show_alarms()
         if now_s - self._message_shown_s > MESSAGE_DURATION_S:
@@ -216,15 +216,15 @@ class WatchScreen(Screen[None]):
         return tuple(alarm for alarm in alarms if not (self._stopped_here and alarm.kind == "ended"))
 
     def _find_view_alarms(self, now_s: float) -> list[Alarm]:
-        """Alarms about the view itself: the log is not read any more, or a stop was not received."""
+        """Alarms about this view itself: no new data, or a requested stop that had no effect."""
         since_utc = self.view.utc if self.view is not None else ""
         alarms = []
         if self._stop_sent_s is not None and self.view is not None and self.view.standing not in RUNNING_STATUSES:
             self._stop_sent_s, self._stopped_here = None, True
             self._show_message(f"The session has stopped: {self.view.reason}.")
         if self._stop_sent_s is not None and now_s - self._stop_sent_s > STOP_TIMEOUT_S:
-            unheard = "The session has not answered the stop. Hand off the handle; switch the device off."
-            alarms.append(Alarm("stop unheard", unheard, since_utc))
+            sentence = "The session has not answered the stop. Hand off the handle; switch the device off."
+            alarms.append(Alarm("stop unheard", sentence, since_utc))
         if self._source.problem:
             alarms.append(Alarm("no reader", f"This view receives no more data: {self._source.problem}", since_utc))
         elif self.view is not None and now_s - self._last_update_s > STALE_AFTER_S:
@@ -234,12 +234,12 @@ class WatchScreen(Screen[None]):
         return alarms
 
     def _show_alarms(self) -> None:
-        new_alarms, seen_alarms = self._book.new_alarms, self._book.seen_alarms
+        new_alarms, acknowledged_alarms = self._alarm_book.new_alarms, self._alarm_book.acknowledged_alarms
         panel = self.query_one("#alarms", Static)
-        panel.set_class(bool(new_alarms or seen_alarms), "any")
+        panel.set_class(bool(new_alarms or acknowledged_alarms), "any")
         panel.set_class(not new_alarms, "seen")
         panel.border_title = "! ALARM: press a when you have seen it" if new_alarms else "Alarms that you have seen"
-        panel.update(alarm_lines(new_alarms, seen_alarms))
+        panel.update(watch_panels.format_alarms(new_alarms, acknowledged_alarms))
 
     def action_stop(self) -> None:
         self._stop_sent_s = self._clock_s()
@@ -252,16 +252,16 @@ class WatchScreen(Screen[None]):
         self._send_request(PauseAsked("experimenter"), "Pause sent. The participant continues at their own screen.")
 
     def action_note(self, adverse: bool) -> None:
-        def write(text: str | None) -> None:
+        def send_note(text: str | None) -> None:
             if text:
                 self._send_request(
                     NoteAsked("experimenter", text, adverse), "Sent: the session writes it into the log."
                 )
 
-        self.app.push_screen(NotePrompt(adverse, self.action_stop), write)
+        self.app.push_screen(NotePrompt(adverse, self.action_stop), send_note)
 
     def action_acknowledge(self) -> None:
-        count = self._book.acknowledge(self._clock_s())
+        count = self._alarm_book.acknowledge(self._clock_s())
         self._show_message(
             f"{count} alarm{'' if count == 1 else 's'} seen." if count else "There is no alarm to be seen."
         )
@@ -281,7 +281,7 @@ class WatchScreen(Screen[None]):
 
     def _send_request(self, request: Request, text: str) -> None:
         try:
-            self._ask(request)
+            self._deliver(request)
         except StudyError as error:
             self._show_message(f"NOT sent: {error.happened} {error.do_now}")
             self.app.bell()

@@ -1,6 +1,6 @@
-"""Port between the experimenter's screen and the source of its views of a running session.
+"""Interface from which the experimenter's screen (`hapteq watch`) gets its views of a running session.
 
-The screen depends on this protocol alone, so that tests can give it views without a session.
+`watch_screen` and `watch_app` depend on this protocol alone, so that tests can supply views without a session.
 """
 
 from typing import Protocol
@@ -12,11 +12,11 @@ class WatchSource(Protocol):
     """Source of views of a session; implemented by `study.tui.engine.watch_feed.WatchFeed`."""
 
     def latest(self) -> WatchView | None:
-        """The latest view, None before the first. Must not block: the screen's event loop calls it ten times a
-        second."""
+        """The latest view; None before the first. Must not block: the screen's event loop calls it ten times per second
+        (`watch_screen.POLL_EVERY_S`)."""
         ...
 
     @property
     def problem(self) -> str:
-        """Sentence that says why no further views come; empty while they come."""
+        """Why the source has stopped supplying views, as a sentence; empty while it supplies them."""
         ...

@@ -1,13 +1,13 @@
 """Texts of the experimenter's view, shared by its screen (`watch_panels`) and `hapteq watch --plain` (`watch_lines`).
 
-Each function turns a value of a `WatchView` into words or a number with its unit.
+Each function formats a value of a `WatchView` as words or as a number with its unit.
 """
 
 from study.local_clock import machine_zone
-from study.session.views.local_time import local_parts
+from study.session.views.local_time import split_time_in_zone
 from study.session.watching.watch_view import ClosedTrial, Exposure, SittingStatus, WatchedRun, WatchView
 
-SYMBOLS: dict[SittingStatus, str] = {
+STATUS_SYMBOLS: dict[SittingStatus, str] = {
     "running": "●",
     "paused": "‖",
     "resting": "◌",
@@ -21,19 +21,19 @@ SYMBOLS: dict[SittingStatus, str] = {
 
 
 NOT_MEASURED_MARK = "n.m."
-"""Stands in a table for an acceleration that was not measured."""
-NOT_MEASURED = "answered too early to measure; counts"
-"""Legend of the mark, short enough for a terminal of 80 columns."""
+"""Text in place of an acceleration that was not measured, in the table of trials."""
+NOT_MEASURED_LEGEND = "answered too early to measure; counts"
+"""Explanation of `NOT_MEASURED_MARK`, short enough for a terminal of 80 columns."""
 
 
-def clock_time(utc: str) -> str:
-    """Local time of a UTC time stamp, without the date: "14:05:10 +01:00"; without an offset, the first part as
-    `local_parts` gives it."""
-    date, time, offset = local_parts(utc, machine_zone)
+def format_local_time(utc: str) -> str:
+    """Local time of a UTC time stamp, without the date: "14:05:10 +01:00". A stamp that is no valid time is returned as
+    it is."""
+    date, time, offset = split_time_in_zone(utc, machine_zone)
     return f"{time} {offset}" if offset else date
 
 
-def duration(seconds: float) -> str:
+def format_duration(seconds: float) -> str:
     """A duration in words, rounded down: "4 s", "2 min 05 s", "1 h 02 min"."""
     whole_s = int(seconds)
     if whole_s < 60:
@@ -45,33 +45,33 @@ def duration(seconds: float) -> str:
 
 
 def describe_activity(view: WatchView) -> str:
-    """What happens now, in words, such as "trial 12 at 0.5 N: waiting for the answer, 4 s"; the reason, where the
-    session does not run."""
+    """Present activity in words, such as "trial 12 at 0.5 N: waiting for the answer, 4 s". Where the session does not
+    run, the reason."""
     if view.reason:
         return view.reason
     trial, run = view.open_trial, view.present_run
     if trial is None or run is None:
-        return f"{view.activity}, {duration(view.activity_s)}"
+        return f"{view.activity}, {format_duration(view.activity_s)}"
     attempt_text = f", attempt {trial.attempt + 1}" if trial.attempt else ""
     catch_text = ", a catch trial" if trial.catch else ""
     return (
         f"trial {trial.trial + 1}{attempt_text} at {trial.level_n:.3g} N{catch_text}: {view.activity}, "
-        f"{duration(view.activity_s)}"
+        f"{format_duration(view.activity_s)}"
     )
 
 
-def run_name(view: WatchView, run: WatchedRun) -> str:
+def format_run_name(view: WatchView, run: WatchedRun) -> str:
     """Name of a run, numbered within its phase: "test 2"."""
     return f"{run.phase} {1 + [r.run for r in view.runs if r.phase == run.phase].index(run.run)}"
 
 
-def reversals(run: WatchedRun) -> str:
+def format_reversals(run: WatchedRun) -> str:
     """Number of reversals so far and number that ends the run, such as "3/8"; a dash for a run without reversals."""
     return f"{run.reversals}/{run.reversals_needed}" if run.reversals_needed else "–"
 
 
-def staircase_title(view: WatchView) -> str:
-    """Title of the drawn staircase: run, frequency (Hz), reversals, next level (N)."""
+def format_staircase_title(view: WatchView) -> str:
+    """Title of the plot of the staircase: run, frequency (Hz), reversals, next level (N)."""
     shown_run = next((run for run in view.runs if run.run == view.shown_run), None)
     if shown_run is None:
         return "Staircase: nothing answered yet"
@@ -79,10 +79,10 @@ def staircase_title(view: WatchView) -> str:
     reversals = (
         f", {shown_run.reversals} of {shown_run.reversals_needed} reversals" if shown_run.reversals_needed else ""
     )
-    return f"{run_name(view, shown_run)}, {shown_run.frequency_hz:g} Hz{reversals}{level}"
+    return f"{format_run_name(view, shown_run)}, {shown_run.frequency_hz:g} Hz{reversals}{level}"
 
 
-def verdict(trial: ClosedTrial) -> str:
+def name_verdict(trial: ClosedTrial) -> str:
     """Result of a trial: right, wrong, void, or "…" while it is not known; a catch trial answered wrongly is a
     lapse."""
     if trial.status == "spoiled":
@@ -94,29 +94,29 @@ def verdict(trial: ClosedTrial) -> str:
     return "LAPSE" if trial.phase == "catch" else "wrong"
 
 
-def not_measured(trial: ClosedTrial) -> bool:
+def is_unmeasured(trial: ClosedTrial) -> bool:
     """Whether the trial counts although its acceleration was not measured."""
     return trial.correct is not None and trial.delivered_mps2 is None
 
 
-def time_words(exposure: Exposure) -> str:
+def describe_elapsed_time(exposure: Exposure) -> str:
     """Elapsed time of the sitting and its limit (min)."""
     return f"{exposure.elapsed_min:.0f} of {exposure.limit_min:g} min"
 
 
-def dose_words(exposure: Exposure) -> str:
+def describe_dose(exposure: Exposure) -> str:
     """Vibration dose A(8) and its limit (m/s²)."""
     return f"{exposure.dose_a8_mps2:.2f} of {exposure.dose_limit_mps2:g} m/s²"
 
 
-def catch_words(view: WatchView) -> str:
-    """Number of lapses, and of catch trials given."""
+def describe_catch_trials(view: WatchView) -> str:
+    """Number of lapses (catch trials answered wrongly), and number of catch trials that count."""
     lapses = f"{view.catch_lapses} {'lapse' if view.catch_lapses == 1 else 'lapses'}"
     return f"{lapses} in {view.catch_given}" if view.catch_given else "none so far"
 
 
-def handle_words(view: WatchView) -> str:
-    """Distance of the handle from its place (mm), and the distance within which a trial may start."""
+def describe_handle(view: WatchView) -> str:
+    """Distance of the handle from its start position (mm), and the largest distance at which a trial may start (mm)."""
     live = view.live
     if live is None or live.offset_mm is None:
         return "not read now"
@@ -126,8 +126,8 @@ def handle_words(view: WatchView) -> str:
     return f"{live.offset_mm:.1f} mm off{allowed}"
 
 
-def sensor_words(view: WatchView) -> str:
-    """Reading of the accelerometer (m/s²), and whether it clips."""
+def describe_sensor(view: WatchView) -> str:
+    """Acceleration measured by the accelerometer (m/s²), and whether its signal is clipped."""
     live = view.live
     if live is None or live.acceleration_mps2 is None:
         return "not read now"
@@ -135,8 +135,9 @@ def sensor_words(view: WatchView) -> str:
     return f"{live.acceleration_mps2:.1f} m/s²{clipped}"
 
 
-def device_words(view: WatchView) -> str:
-    """Fault of the device, or the number of ticks that its loop missed."""
+def describe_device(view: WatchView) -> str:
+    """Fault of the device; without a fault, the number of ticks that its control loop missed, and whether it is
+    simulated."""
     if view.live is None:
         return "not read now"
     if view.live.fault:
@@ -145,8 +146,9 @@ def device_words(view: WatchView) -> str:
     return ", ".join(parts) or "no fault"
 
 
-def drift_words(view: WatchView) -> str:
-    """Number of responses that changed between probes, and how many changed more than allowed; empty without probes."""
+def describe_drifts(view: WatchView) -> str:
+    """Number of drifts that the probes show (friction, gain, delay, grip), and how many exceed their limits; empty
+    without probes."""
     if not view.probes:
         return ""
     over_limit = sum(drift.beyond for drift in view.drifts)

@@ -1,4 +1,7 @@
-"""Selection of a single choice among a few (radio buttons), side by side if they fit, otherwise listed vertically."""
+"""Selection of a single choice among a few (radio buttons), side by side if they fit, otherwise listed vertically.
+
+Used by the forms (`form_question`) and the note screen.
+"""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -13,7 +16,7 @@ from textual.widget import Widget
 
 from study.session.views.form_entry import find_choice, move_mark
 
-GAP = 3
+CHOICE_GAP_CELLS = 3
 """Character cells between two choices that are side by side."""
 
 
@@ -39,7 +42,7 @@ class ChoiceRow(Widget, can_focus=True):
     """Index of the choice under the cursor, from 0; None: no choice."""
     chosen: reactive[int | None] = reactive[int | None](None)
     """Index of the selected choice, from 0; None: no choice."""
-    at: reactive[bool] = reactive(False)
+    is_current: reactive[bool] = reactive(False)
     """Whether the cursor of a form is on this row: then the row shows its cursor although the form's screen has the
     focus."""
 
@@ -50,7 +53,7 @@ class ChoiceRow(Widget, can_focus=True):
         row: "ChoiceRow"
 
     @dataclass
-    class Left(Message):
+    class Submitted(Message):
         """Enter was pressed with a choice selected: the next question follows."""
 
         row: "ChoiceRow"
@@ -76,21 +79,21 @@ class ChoiceRow(Widget, can_focus=True):
             self._choose(index)
 
     def on_click(self, event: Click) -> None:
-        index = self.choice_at(event.x, event.y)
+        index = self.find_choice_at(event.x, event.y)
         if index is not None:
             self._choose(index)
 
-    def choice_at(self, x: int, y: int) -> int | None:
-        """Index of the choice drawn in the cell at column x and row y; None between choices."""
-        for index, (column, row) in enumerate(self._places(self.size.width)):
-            if row == y and column <= x < column + len(self._label(index)):
+    def find_choice_at(self, x: int, y: int) -> int | None:
+        """Find the index of the choice drawn in the cell at column x and row y; None between choices."""
+        for index, (column, row) in enumerate(self._place_choices(self.size.width)):
+            if row == y and column <= x < column + len(self._format_label(index)):
                 return index
         return None
 
     @property
     def stacked(self) -> bool:
         """Whether the choices are listed vertically at this width."""
-        return len({y for _, y in self._places(self.size.width)}) > 1
+        return len({y for _, y in self._place_choices(self.size.width)}) > 1
 
     def action_move(self, step: int) -> None:
         self.cursor = move_mark(self.cursor, step, len(self._choices))
@@ -102,38 +105,40 @@ class ChoiceRow(Widget, can_focus=True):
     def action_choose_and_leave(self) -> None:
         self.action_choose()
         if self.chosen is not None:
-            self.post_message(self.Left(self))
+            self.post_message(self.Submitted(self))
 
     def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
-        return max((y for _, y in self._places(width)), default=0) + 1
+        return max((y for _, y in self._place_choices(width)), default=0) + 1
 
     def render(self) -> Text:
         text = Text(no_wrap=True)
-        x = y = 0
-        for index, place in enumerate(self._places(self.size.width)):
-            if place[1] > y:
+        column = row = 0
+        for index, position in enumerate(self._place_choices(self.size.width)):
+            if position[1] > row:
                 text.append("\n")
-                x, y = 0, place[1]
-            text.append(" " * (place[0] - x))
-            text.append(self._label(index), self._style(index))
-            x = place[0] + len(self._label(index))
+                column, row = 0, position[1]
+            text.append(" " * (position[0] - column))
+            text.append(self._format_label(index), self._choose_style(index))
+            column = position[0] + len(self._format_label(index))
         return text
 
-    def _style(self, index: int) -> str:
-        if (self.has_focus or self.at) and index == self.cursor:
+    def _choose_style(self, index: int) -> str:
+        """Choose the style of a choice: under the cursor, selected, or plain."""
+        if (self.has_focus or self.is_current) and index == self.cursor:
             return str(self.get_component_rich_style("choice-row--cursor"))
         return "bold" if index == self.chosen else ""
 
-    def _label(self, index: int) -> str:
+    def _format_label(self, index: int) -> str:
+        """Format a choice with its number, where choices are numbered, and its radio button."""
         number = f"{index + 1} " if self._numbered else ""
         return f" {number}{'●' if index == self.chosen else '○'} {self._choices[index]} "
 
-    def _places(self, width: int) -> list[tuple[int, int]]:
-        """Column and row of each choice at this width, in cells."""
-        lengths = [len(self._label(index)) for index in range(len(self._choices))]
-        if sum(lengths) + GAP * (len(lengths) - 1) > width:
+    def _place_choices(self, width: int) -> list[tuple[int, int]]:
+        """Compute column and row of each choice at this width, in character cells."""
+        lengths = [len(self._format_label(index)) for index in range(len(self._choices))]
+        if sum(lengths) + CHOICE_GAP_CELLS * (len(lengths) - 1) > width:
             return [(0, index) for index in range(len(lengths))]
-        return [(sum(lengths[:index]) + GAP * index, 0) for index in range(len(lengths))]
+        return [(sum(lengths[:index]) + CHOICE_GAP_CELLS * index, 0) for index in range(len(lengths))]
 
     def _move_within(self, step: int) -> bool:
         """Move the cursor through vertically listed choices. Returns False beyond their ends and for choices side by
@@ -145,5 +150,6 @@ class ChoiceRow(Widget, can_focus=True):
         return True
 
     def _choose(self, index: int) -> None:
+        """Select the choice, and post `Chosen`."""
         self.cursor = self.chosen = index
         self.post_message(self.Chosen(self))

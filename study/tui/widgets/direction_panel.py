@@ -1,6 +1,7 @@
 """Panel of one of the two answers of a trial: its number, its direction as a thick line, and its description in words.
 
 Number, words and the heavier frame carry the same information as the colour, so that colour is not needed.
+Used by the screens of trials and of the demonstration.
 """
 
 import textwrap
@@ -15,12 +16,12 @@ from textual.widget import Widget
 
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.views import DirectionPicture
-from study.tui.drawing.direction_picture import draw_large_direction, sentence
+from study.tui.drawing.direction_picture import describe_direction, draw_large_direction
 from study.tui.drawing.number_picture import large_number
 
-NUMBERS = {1: ("╺┓ ", " ┃ ", "╺┻╸"), 2: ("┏━┓", "┏━┛", "┗━╸")}
+LARGE_DIGITS = {1: ("╺┓ ", " ┃ ", "╺┻╸"), 2: ("┏━┓", "┏━┛", "┗━╸")}
 """Large digits, three lines each."""
-NUMBER_COLUMNS = 5
+DIGIT_MARGIN_COLUMNS = 5
 """Columns kept free for the number, left of the drawing, and as many on its right."""
 
 Mark = Literal["", "taken", "saved", "now", "felt"]
@@ -63,42 +64,46 @@ class DirectionPanel(Widget):
     def render_line(self, y: int) -> Strip:
         width, height = self.size
         base_style = self.rich_style
-        coloured = base_style + self.get_component_rich_style(
+        digit_style = base_style + self.get_component_rich_style(
             "direction-panel--one" if self.number == 1 else "direction-panel--two", partial=True
         )
-        words = self._lines()
-        above = height - len(words)
-        if y >= above:
-            return Strip([Segment(words[y - above].center(width)[:width], base_style + Style(bold=True))], width)
+        description_lines = self._wrap_description()
+        drawing_height = height - len(description_lines)
+        if y >= drawing_height:
+            return Strip(
+                [Segment(description_lines[y - drawing_height].center(width)[:width], base_style + Style(bold=True))],
+                width,
+            )
         drawing, margin = self._make_drawing()
-        row = y - (above - len(drawing)) // 2
-        row_text = drawing[row] if 0 <= row < len(drawing) else ""
-        number = NUMBERS[self.number][y] if y < 3 and self.picture is not None else ""
-        text = f" {number}".ljust(margin) + row_text
-        return Strip([Segment(text.ljust(width)[:width], coloured)], width)
+        drawing_row = y - (drawing_height - len(drawing)) // 2
+        row_text = drawing[drawing_row] if 0 <= drawing_row < len(drawing) else ""
+        digit_row = LARGE_DIGITS[self.number][y] if y < 3 and self.picture is not None else ""
+        text = f" {digit_row}".ljust(margin) + row_text
+        return Strip([Segment(text.ljust(width)[:width], digit_style)], width)
 
     def _make_drawing(self) -> tuple[tuple[str, ...], int]:
-        """Rows of the drawing, and the number of free columns to their left."""
-        room = _room(Size(self.size.width, self.size.height - len(self._lines())))
+        """Draw the direction or the number. Returns the rows, and the number of free columns to their left."""
+        drawing_size = _fit_square(Size(self.size.width, self.size.height - len(self._wrap_description())))
         if self.picture is None:
-            drawing = large_number(self.number, room.width, room.height)
+            drawing = large_number(self.number, drawing_size.width, drawing_size.height)
         else:
-            drawing = draw_large_direction(self.picture, self.number, room.width, room.height)
-        return drawing, (self.size.width - room.width) // 2
+            drawing = draw_large_direction(self.picture, self.number, drawing_size.width, drawing_size.height)
+        return drawing, (self.size.width - drawing_size.width) // 2
 
-    def _lines(self) -> list[str]:
-        """The description, wrapped into as many lines as it needs: it is never cut, because the missing word could be
+    def _wrap_description(self) -> list[str]:
+        """Wrap the description into as many lines as it needs: it is never cut, because the missing word could be
         the one in which the two directions differ."""
-        return textwrap.wrap(self._direction_text(), max(1, self.size.width), break_on_hyphens=False) or [""]
+        return textwrap.wrap(self._describe_answer(), max(1, self.size.width), break_on_hyphens=False) or [""]
 
-    def _direction_text(self) -> str:
+    def _describe_answer(self) -> str:
+        """Describe the direction, or the interval where there is no picture."""
         if self.picture is None:
             return self._texts["interval_first" if self.number == 1 else "interval_second"]
-        return sentence(self.picture, self.number, self._texts)
+        return describe_direction(self.picture, self.number, self._texts)
 
 
-def _room(size: Size) -> Size:
-    """Largest area within `size`, less the columns of the numbers, that looks square: cells are taken as twice as high
-    as wide."""
-    rows = max(1, min(size.height, (size.width - 2 * NUMBER_COLUMNS) // 2))
+def _fit_square(available_size: Size) -> Size:
+    """Compute the largest area within `available_size` (cells), less the columns of the numbers, that looks square:
+    cells are taken as twice as high as wide."""
+    rows = max(1, min(available_size.height, (available_size.width - 2 * DIGIT_MARGIN_COLUMNS) // 2))
     return Size(2 * rows, rows)

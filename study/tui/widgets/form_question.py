@@ -8,7 +8,7 @@ from textual.widgets import Static
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.form_entry import FieldEntry
 from study.session.views.form_views import FormField
-from study.tui.trial_words import limits_words
+from study.tui.trial_words import describe_number_limits
 from study.tui.widgets.choice_row import ChoiceRow
 from study.tui.widgets.literal_text import LiteralText
 
@@ -53,7 +53,7 @@ class FormQuestion(Vertical):
         self.set_class(at, "-at")
         if self.field.choices:
             row = self.query_one(ChoiceRow)
-            row.cursor, row.at = entry.marked, at
+            row.cursor, row.is_current = entry.marked, at
             row.chosen = self.field.choices.index(entry.answer) if entry.answer in self.field.choices else None
         else:
             self.query_one(".written", Static).update(self._answer_text(entry, at))
@@ -63,7 +63,7 @@ class FormQuestion(Vertical):
         if not entry.answer:
             hint = self._texts["form_type" if self.field.needed else "form_type_or_not"]
             if self.field.limits is not None:
-                hint = f"{hint} ({limits_words(self.field.limits, self._texts)})"
+                hint = f"{hint} ({describe_number_limits(self.field.limits, self._texts)})"
             text = Text(hint, "dim")
             if at:
                 text.stylize("reverse", 0, 1)

@@ -43,16 +43,16 @@ BOLD = Style(bold=True)
 def _draw_target(view: HandleView, columns: int, rows: int) -> list[str]:
     """The drawing as lines of braille characters. columns, rows: size in cells."""
     canvas = Canvas(columns, rows)
-    x, y = canvas.middle
+    x, y = canvas.centre
     edge = min(x, y)
     dots_per_mm = 0.4 * edge / max(view.radius_mm, 1e-9)
     for radius in (dots_per_mm * view.radius_mm, dots_per_mm * view.radius_mm + 1):
-        canvas.circle((x, y), radius)
-    canvas.line((x - 3, y), (x + 3, y))
-    canvas.line((x, y - 3), (x, y + 3))
+        canvas.draw_circle((x, y), radius)
+    canvas.draw_line((x - 3, y), (x + 3, y))
+    canvas.draw_line((x, y - 3), (x, y + 3))
     right_mm, up_mm = view.offset_mm
     size = max(2.0, edge / 14)
     distance = dots_per_mm * math.hypot(right_mm, up_mm)
     shrink = min(1.0, (edge - size) / distance) if distance > 0 else 1.0
-    canvas.disc((x + shrink * dots_per_mm * right_mm, y - shrink * dots_per_mm * up_mm), size)
-    return canvas.lines()
+    canvas.draw_disc((x + shrink * dots_per_mm * right_mm, y - shrink * dots_per_mm * up_mm), size)
+    return canvas.render_lines()

@@ -10,15 +10,17 @@ from textual import on
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
+from textual.content import Content
 from textual.widgets import Button, Input, Label, Select, Static
 
 from study.session.views.archive_views import HomeView, SessionLine
 from study.session.views.participant_codes import code_problem, is_code, suggest_code
+from study.session.views.printable import replace_unprintable
 from study.tui.home_messages import BeginWanted
 
-SIMULATED = "simulated"
+SIMULATED_DEVICE = "simulated"
 """Name of the simulated device; the list of devices adds that nothing moves."""
-PLACEHOLDER = [("…", "")]
+PLACEHOLDER_OPTIONS = [("…", "")]
 """Entry of a list whose choices are not known yet; the list is disabled."""
 
 
@@ -51,24 +53,24 @@ class NewSessionForm(Vertical):
             yield Input(placeholder="code, such as P01", compact=True, id="code", max_length=64)
         with Horizontal(classes="field"):
             yield Label("Protocol")
-            yield Select[str](PLACEHOLDER, allow_blank=False, compact=True, id="protocol", disabled=True)
+            yield Select[str](PLACEHOLDER_OPTIONS, allow_blank=False, compact=True, id="protocol", disabled=True)
         with Horizontal(classes="field"):
             yield Label("Device")
-            yield Select[str](PLACEHOLDER, allow_blank=False, compact=True, id="device", disabled=True)
+            yield Select[str](PLACEHOLDER_OPTIONS, allow_blank=False, compact=True, id="device", disabled=True)
         with Horizontal(classes="field", id="equalizer"):
             yield Label("Model")
-            yield Select[str](PLACEHOLDER, allow_blank=False, compact=True, id="model", disabled=True)
+            yield Select[str](PLACEHOLDER_OPTIONS, allow_blank=False, compact=True, id="model", disabled=True)
         yield Static("", id="about", markup=False)
         yield Button("Begin (F5)", variant="primary", compact=True, id="begin", disabled=True)
 
     def show(self, home: HomeView) -> None:
         """Show the choices of `home`; earlier selections are kept where they are still available."""
         self._home = home
-        self._set_options("#protocol", [(_protocol_prompt(p.name, p.locked), p.name) for p in home.protocols])
-        self._set_options("#device", [(_device_prompt(name), name) for name in home.devices])
-        self._set_options("#model", [(_model_prompt(path, home), path) for path in home.models])
-        proposed = suggest_code(tuple(line.subject for line in home.sessions if line.observer is None))
-        self.query_one("#code", Input).placeholder = f"code, such as {proposed}"
+        self._set_options("#protocol", [(_format_protocol_option(p.name, p.locked), p.name) for p in home.protocols])
+        self._set_options("#device", [(_format_device_option(name), name) for name in home.devices])
+        self._set_options("#model", [(_format_model_option(path, home), path) for path in home.models])
+        suggested_code = suggest_code(tuple(line.subject for line in home.sessions if line.observer is None))
+        self.query_one("#code", Input).placeholder = f"code, such as {suggested_code}"
         self.query_one("#begin", Button).disabled = not (home.protocols and home.devices)
         self._show_problem()
 
@@ -78,109 +80,124 @@ class NewSessionForm(Vertical):
     @on(Input.Submitted, "#code")
     @on(Button.Pressed, "#begin")
     def _submit(self) -> None:
+        """Post `BeginWanted`, or show the problem and focus its field."""
         if self._home is None or self.query_one("#begin", Button).disabled:
             return
         code = self._code
-        problem = code_problem(code) or self._find_standing_problem(code)
+        problem = code_problem(code) or self._find_withdrawal_problem(code)
         if problem or self._model_problem:
             self._show_about(problem or self._model_problem, "-problem")
             self.query_one("#code" if problem else "#protocol").focus()
             return
-        model = self._read_selected("#model") if self._equalized else ""
+        model = self._read_selected("#model") if self._is_equalized else ""
         self.post_message(BeginWanted(code, self._read_selected("#protocol"), self._read_selected("#device"), model))
 
     @on(Input.Changed, "#code")
     @on(Select.Changed)
     def _show_problem(self) -> None:
+        """Show the problem of the present entries, a notice on the code, or the protocol's title."""
         if self._home is None:
             return
         code = self._code
-        self.set_class(self._equalized, "-equalized")
+        self.set_class(self._is_equalized, "-equalized")
         if code and not is_code(code):
             self._show_about(code_problem(code), "-problem")
-        elif problem := self._find_standing_problem(code):
+        elif problem := self._find_withdrawal_problem(code):
             self._show_about(problem, "-problem")
         elif self._model_problem:
             self._show_about(self._model_problem, "-problem")
-        elif notice := self._notice(code):
+        elif notice := self._find_code_notice(code):
             self._show_about(notice, "-notice")
         else:
             protocol = self._read_selected("#protocol")
             self._show_about(next((p.title for p in self._home.protocols if p.name == protocol), ""), "")
 
     @property
-    def _equalized(self) -> bool:
-        chosen = self._read_selected("#protocol")
-        return self._home is not None and any(p.equalized for p in self._home.protocols if p.name == chosen)
+    def _is_equalized(self) -> bool:
+        """Whether the selected protocol equalizes its stimuli, and so needs a model."""
+        protocol_name = self._read_selected("#protocol")
+        return self._home is not None and any(p.equalized for p in self._home.protocols if p.name == protocol_name)
 
     @property
     def _model_problem(self) -> str:
-        if not self._equalized or self._read_selected("#model"):
+        """Problem of a missing model, in words; empty if there is none."""
+        if not self._is_equalized or self._read_selected("#model"):
             return ""
         return "This protocol needs a model, next to the data: hapteq record, hapteq identify."
 
     @property
     def _code(self) -> str:
+        """The entered code of the participant, without spaces around it."""
         return self.query_one("#code", Input).value.strip()
 
-    def _find_standing_problem(self, code: str) -> str:
-        """Problem of a code that the list of sessions shows: its participant withdrew. Empty if there is none."""
-        return next((f"{code} withdrew: this code is not given again." for line in self._sessions(code)
+    def _find_withdrawal_problem(self, code: str) -> str:
+        """Describe the problem of a code whose participant withdrew; empty if there is none."""
+        return next((f"{code} withdrew: this code is not given again." for line in self._list_sessions_of(code)
                      if line.standing == "withdrawn"), "")  # fmt: skip
 
-    def _notice(self, code: str) -> str:
-        """Remark on a valid code that is in use: an unfinished session of this protocol, or other sessions."""
-        lines, protocol = self._sessions(code), self._read_selected("#protocol")
+    def _find_code_notice(self, code: str) -> str:
+        """Describe where a valid code is in use: an unfinished session of this protocol, or other sessions."""
+        lines, protocol = self._list_sessions_of(code), self._read_selected("#protocol")
         for line in lines:
-            if line.standing == "unfinished" and line.protocol == _name(protocol, self._home):
+            if line.standing == "unfinished" and line.protocol == _extract_protocol_name(protocol, self._home):
                 return (
                     f"{line.name} of this protocol is not finished. Beginning makes another one; r in the list resumes."
                 )
         if lines:
-            count = "a session" if len(lines) == 1 else f"{len(lines)} sessions"
-            return f"{code} has {count} here already. Is it the same person?"
+            count_text = "a session" if len(lines) == 1 else f"{len(lines)} sessions"
+            return f"{code} has {count_text} here already. Is it the same person?"
         return ""
 
-    def _sessions(self, code: str) -> list[SessionLine]:
+    def _list_sessions_of(self, code: str) -> list[SessionLine]:
+        """List the sessions of the participant with this code."""
         return [line for line in self._home.sessions if line.subject == code] if self._home and code else []
 
     def _read_selected(self, selector: str) -> str:
+        """Read the selected value of a list; empty without a selection."""
         value = self.query_one(selector, Select).value
         return value if isinstance(value, str) else ""
 
     def _set_options(self, selector: str, options: list[tuple[str, str]]) -> None:
+        """Set the options (text, value) of a list; the selection is kept where it is still available. The texts contain
+        names of files: brackets in them are no markup, and control characters are not printed."""
         select: Select[str] = self.query_one(selector, Select)
         previous_value = select.value
-        values = [value for _, value in options or PLACEHOLDER]
-        select.set_options(options or PLACEHOLDER)
+        values = [value for _, value in options or PLACEHOLDER_OPTIONS]
+        prompts = [Content(replace_unprintable(text).replace("\n", " ")) for text, _ in options or PLACEHOLDER_OPTIONS]
+        select.set_options(zip(prompts, values, strict=True))
         select.disabled = not options
         select.value = previous_value if previous_value in values else values[0]
 
-    def _show_about(self, text: str, kind: str) -> None:
+    def _show_about(self, text: str, css_class: str) -> None:
+        """Show a text below the fields. css_class: -problem, -notice, or empty for a description."""
         about_line = self.query_one("#about", Static)
-        about_line.set_class(kind == "-problem", "-problem")
-        about_line.set_class(kind == "-notice", "-notice")
-        about_line.update(f"! {text}" if kind else text)
+        about_line.set_class(css_class == "-problem", "-problem")
+        about_line.set_class(css_class == "-notice", "-notice")
+        about_line.update(f"! {text}" if css_class else text)
 
 
-def _protocol_prompt(name: str, locked: bool) -> str:
+def _format_protocol_option(name: str, locked: bool) -> str:
+    """Format a protocol in the list; locked: its file may not be changed any more."""
     return f"{name} (locked)" if locked else name
 
 
-def _device_prompt(name: str) -> str:
-    return f"{name} (nothing moves)" if name == SIMULATED else name
+def _format_device_option(name: str) -> str:
+    """Format a device in the list."""
+    return f"{name} (nothing moves)" if name == SIMULATED_DEVICE else name
 
 
-def _model_prompt(path: str, home: HomeView) -> str:
+def _format_model_option(path: str, home: HomeView) -> str:
+    """Format a model in the list: its file name, and its quality where that is known."""
     quality = home.quality_of(path)
-    return f"{_file_name(path)} ({quality})" if quality else _file_name(path)
+    return f"{_extract_file_name(path)} ({quality})" if quality else _extract_file_name(path)
 
 
-def _file_name(path: str) -> str:
+def _extract_file_name(path: str) -> str:
+    """Extract the last part of a path of either system."""
     return path.replace("\\", "/").rpartition("/")[2]
 
 
-def _name(protocol: str, home: HomeView | None) -> str:
-    """Name of a protocol that is given by name or path. Assumes that a file is named after its protocol; for other
-    files the notice about an unfinished session is not shown."""
+def _extract_protocol_name(protocol: str, home: HomeView | None) -> str:
+    """Extract the name of a protocol that is given by name or path. Assumes that a file is named after its protocol;
+    for other files the notice about an unfinished session is not shown."""
     return protocol.replace("\\", "/").rpartition("/")[2].removesuffix(".toml")

@@ -15,10 +15,10 @@ from textual.widgets import DataTable
 
 from study.local_clock import machine_zone
 from study.session.views.archive_views import SessionLine
-from study.session.views.local_time import local_column
+from study.session.views.local_time import format_times_in_zone
 from study.tui.engine.to_engine import ShowSession
 from study.tui.home_messages import CommandWanted, ResumeWanted, WatchWanted
-from study.tui.session_status import STYLES, status_text
+from study.tui.session_status import STYLES, format_status
 
 _NAME, _STATUS, _START, _RUNS, _ANSWERS, _PROTOCOL = (
     "Session",
@@ -68,7 +68,7 @@ class SessionTable(DataTable[Content | str]):
         """Replace the sessions; the cursor stays on its session if that is still listed."""
         chosen = self._chosen
         self._lines = lines
-        offset, self._start_times = local_column([line.begun_utc for line in lines], machine_zone)
+        offset, self._start_times = format_times_in_zone([line.begun_utc for line in lines], machine_zone)
         self._widths = self._fit_columns(f"{_START} ({offset})" if offset else _START)
         self.clear(columns=True)
         for title, width in self._widths.items():
@@ -150,5 +150,5 @@ class SessionTable(DataTable[Content | str]):
         has_counts = line.standing in ("finished", "unfinished", "running")
         runs = (f"{line.runs_done}/{line.runs}" if has_counts else "",) if _RUNS in self._widths else ()
         answers = (f"{line.answers:>7}" if has_counts else "",) if _ANSWERS in self._widths else ()
-        status = Content.styled(status_text(line.standing), STYLES[line.standing])
+        status = Content.styled(format_status(line.standing), STYLES[line.standing])
         return Content(line.name), status, start_time, *runs, *answers, Content(protocol)

@@ -15,8 +15,8 @@ from study.tui.drawing.staircase_drawing import (
     RIGHT_MARK,
     VALLEY_MARK,
     WRONG_MARK,
-    staircase_lines,
-    summary,
+    draw_staircase,
+    summarize_staircase,
 )
 
 _STYLES = {
@@ -25,8 +25,8 @@ _STYLES = {
     PEAK_MARK: "bold",
     VALLEY_MARK: "bold $text-error",
 }
-"""Style of each mark."""
-MUTED = "$foreground 65%"
+"""Style of each mark of a trial."""
+MUTED_STYLE = "$foreground 65%"
 """Style of labels and of the summary."""
 _TEXT_LINES = 2
 """Number of lines of title and summary, which the plot leaves free."""
@@ -43,21 +43,21 @@ class StaircasePlot(Widget):
 
     def render(self) -> Content:
         width, height = self.content_size.width, self.content_size.height
-        lines = staircase_lines(self._staircase, width, height - _TEXT_LINES)
+        lines = draw_staircase(self._staircase, width, height - _TEXT_LINES)
         return Content("\n").join(
             [
                 Content.styled(self._staircase.title, "bold"),
                 *map(_apply_styles, lines),
-                Content.styled(summary(self._staircase), MUTED),
+                Content.styled(summarize_staircase(self._staircase), MUTED_STYLE),
             ]
         )
 
 
 def _apply_styles(line: str) -> Content:
-    """A line of the plot with the styles of its marks. Neighbouring characters of equal style form one piece, because
-    fewer pieces are drawn faster."""
-    parts: list[Content | str | tuple[str, str]] = [(line[:LABEL_COLUMNS], MUTED)]
+    """A line of the plot with the styles of its marks. Neighbouring characters of equal style form one span, because
+    fewer spans are drawn faster."""
+    styled_parts: list[Content | str | tuple[str, str]] = [(line[:LABEL_COLUMNS], MUTED_STYLE)]
     for style, characters in itertools.groupby(line[LABEL_COLUMNS:], key=_STYLES.get):
         text = "".join(characters)
-        parts.append((text, style) if style else text)
-    return Content.assemble(*parts)
+        styled_parts.append((text, style) if style else text)
+    return Content.assemble(*styled_parts)

@@ -1,8 +1,8 @@
-"""Reference for the timing of a device's loop: an empty real-time loop in C (`bare_loop.c`), run at the same time.
+"""Reference for the timing of a device's control loop: an empty real-time loop in C (`bare_loop.c`), run in parallel.
 
-It shows how many late ticks this computer causes at best under the same load. The program is compiled for each
-measurement, by the system's compiler or that of the extra `compiler`; without a compiler, and on Windows, the report
-says that nothing was compared.
+It gives the least number of late ticks that this computer can reach under the same load. The program is compiled for
+each measurement, by the system's compiler or that of the optional dependency `compiler`; without a compiler, and on
+Windows, the finding states that no comparison was made. Called by `examine_setup` (`hapteq doctor`).
 """
 
 import contextlib
@@ -19,121 +19,128 @@ from pathlib import Path
 from study.session.views.views import DeviceFinding
 
 SOURCE = Path(__file__).with_name("bare_loop.c")
-"""Source of the loop, compiled for each measurement."""
+"""Source of the C loop."""
 COMPILERS = ("cc", "gcc", "clang")
-"""C compilers that are searched for in the path, in this order."""
+"""C compilers, in the order in which they are looked up on the search path."""
 PRIORITY = 40
-"""Real-time priority (SCHED_FIFO) of the C loop, if one is requested; that of a device's loop."""
+"""Real-time priority (SCHED_FIFO) of the C loop, if requested: that of a device's loop
+(`study.devices.drive.real_time_class.PRIORITY`)."""
 
-WORSE_BY = 1.5
-"""Accepted ratio of the late ticks of the device's loop, which has more work (safety layer), to those of the C loop.
-Heuristic."""
-CHANCE = 3.0
-"""Number of standard errors within which a difference of the two counts is taken as chance, with late ticks as
-independent events (Poisson)."""
+ACCEPTED_RATIO = 1.5
+"""Accepted ratio of the late ticks of the device's loop to those of the C loop: the device's loop has more work (safety
+layer). Heuristic."""
+STANDARD_ERRORS = 3.0
+"""Number of standard errors within which a difference of the two counts is attributed to chance; late ticks are taken
+as independent events (Poisson)."""
 
-COMPILING_S = 120.0
+COMPILE_TIMEOUT_S = 120.0
 """Time limit of the compilation (s)."""
-OVERTIME_S = 30.0
-"""Time (s) beyond the duration of the C loop after which it is taken to have failed."""
+EXTRA_TIMEOUT_S = 30.0
+"""Time (s) after the planned end of the C loop at which it is taken to have failed."""
 NAME = "Bare C loop"
-"""Name of the finding."""
+"""Name of the finding in the report."""
 ADVICE = (
     "The computer can do better than this loop did: close other programs, measure again, and report it if it persists."
 )
-"""Advice where the device's loop has too many late ticks."""
+"""Advice in the finding if the device's loop has too many late ticks."""
 
 
 @dataclass(frozen=True, slots=True)
-class BareLoop:
-    """Timing of the C loop, with which the device's loop is compared."""
+class BareLoopTiming:
+    """Measured timing of the C loop, with which the device's loop is compared."""
 
     ticks: int
     late_ticks: int
-    """Ticks whose work ended after the next was due, missed ones included."""
+    """Ticks whose work ended after the next tick was due, missed ticks included."""
     latest_s: float
-    """Largest delay of a tick's end after the time at which the tick was due (s)."""
+    """Largest time from a tick's due time to the end of its work (s)."""
     raised_priority: bool
-    """Whether the system granted real-time priority."""
+    """Whether the operating system granted real-time priority."""
 
 
 @dataclass(slots=True)
-class BareRun:
-    """A C loop that runs, or has run, at the same time as the device's loop. result: None until it has ended, or if it
-    failed; why: the reason, if it failed."""
+class BareLoopRun:
+    """A run of the C loop in parallel with the device's loop."""
 
-    result: BareLoop | None = None
+    result: BareLoopTiming | None = None
+    """Timing; None until the loop has ended, and if it failed."""
     failure_reason: str = ""
+    """Why the loop gave no timing; empty if it did not fail."""
 
 
 @contextlib.contextmanager
-def run_bare_loop_beside(seconds: float, rate_hz: float, raised_priority: bool) -> Iterator[BareRun]:
-    """Run the C loop while the block is executed; after the block its end is awaited, and the result is available.
+def run_bare_loop_in_parallel(seconds: float, rate_hz: float, raised_priority: bool) -> Iterator[BareLoopRun]:
+    """Context manager that runs the C loop while the `with` block is executed. At the end of the block it waits for the
+    end of the loop and stores the result in the `BareLoopRun`.
 
-    seconds: its duration; rate_hz: its rate; raised_priority: whether real-time priority is requested. A missing
-    compiler or a failed start raises nothing: `BareRun.why` says so.
+    seconds: duration of the loop. rate_hz: its tick rate. raised_priority: whether to request real-time priority. A
+    missing compiler or a failed start raises no exception: `BareLoopRun.failure_reason` states it.
     """
-    run = BareRun()
+    run = BareLoopRun()
     with tempfile.TemporaryDirectory() as folder:
-        program = _compile(Path(folder), run)
+        program = _compile_loop(Path(folder), run)
         if program is None:
             yield run
             return
-        words = [str(program), f"{seconds:g}", f"{rate_hz:g}", str(PRIORITY if raised_priority else 0)]
+        command = [str(program), f"{seconds:g}", f"{rate_hz:g}", str(PRIORITY if raised_priority else 0)]
         try:
-            process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE)
-        except OSError as problem:
-            run.failure_reason = f"it could not be started ({problem.strerror})"
+            process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE)
+        except OSError as error:
+            run.failure_reason = f"it could not be started ({error.strerror})"
             yield run
             return
         with process:
             try:
                 yield run
-                _read(process, seconds, run)
+                _read_timing(process, seconds, run)
             finally:
                 process.kill()
 
 
-def _read(process: "subprocess.Popen[bytes]", seconds: float, run: BareRun) -> None:
-    """Wait for the end of the C loop and read the four numbers that it prints."""
+def _read_timing(process: "subprocess.Popen[bytes]", seconds: float, run: BareLoopRun) -> None:
+    """Wait for the end of the C loop and read what it prints: ticks, late ticks, largest lateness (s), and priority
+    (0 = not granted)."""
     try:
-        output, _ = process.communicate(timeout=seconds + OVERTIME_S)
+        output, _ = process.communicate(timeout=seconds + EXTRA_TIMEOUT_S)
         ticks, late, latest_s, granted = output.split()
-        run.result = BareLoop(int(ticks), int(late), float(latest_s), int(granted) > 0)
+        run.result = BareLoopTiming(int(ticks), int(late), float(latest_s), int(granted) > 0)
     except (subprocess.TimeoutExpired, ValueError):
         run.failure_reason = "it gave no result"
 
 
-def compare_with_bare_loop(late_ticks: int, ticks: int, run: BareRun) -> DeviceFinding:
-    """Compare the late ticks of the device's loop with those of the C loop. late_ticks, ticks: of the device's loop,
-    missed ticks included. Too many late ticks are a warning, not an obstacle."""
+def compare_with_bare_loop(late_ticks: int, ticks: int, run: BareLoopRun) -> DeviceFinding:
+    """Compare the late ticks of the device's loop with those of the C loop. late_ticks, ticks: counts of the device's
+    loop, missed ticks included. Too many late ticks give a warning, which prevents no session."""
     if run.result is None:
         return DeviceFinding(NAME, f"not compared: {run.failure_reason}", fine=True)
     reference = run.result
-    max_late = _most_late(WORSE_BY * reference.late_ticks * ticks / max(reference.ticks, 1))
-    fine = late_ticks <= max_late
+    late_limit = _compute_late_limit(ACCEPTED_RATIO * reference.late_ticks * ticks / max(reference.ticks, 1))
+    fine = late_ticks <= late_limit
     value = (
         f"{reference.late_ticks} of {reference.ticks} late "
         f"({reference.late_ticks / max(reference.ticks, 1):.2%}) at the same time, the latest by "
         f"{1000 * reference.latest_s:.1f} ms; this loop: {late_ticks} of {ticks} "
-        f"({late_ticks / max(ticks, 1):.2%}), where up to {max_late} are fine ({WORSE_BY:g} times as many, and chance)"
+        f"({late_ticks / max(ticks, 1):.2%}), where up to {late_limit} are fine ({ACCEPTED_RATIO:g} times as many, and "
+        "chance)"
     )
     return DeviceFinding(NAME, value, fine, "" if fine else ADVICE, warning=not fine)
 
 
-def _most_late(expected: float) -> int:
-    """Largest count n that is compatible with `expected` = r k, where r = WORSE_BY and k is a count too.
+def _compute_late_limit(expected: float) -> int:
+    """Largest accepted count n of late ticks of the device's loop, if `expected` = r k, with r = ACCEPTED_RATIO and the
+    count k of the C loop.
 
-    n is the larger root of (n - r k)² = CHANCE² (n + r² k): the variance of a Poisson count is estimated by the count
-    itself, and that of r k by r² k = r expected.
+    n is the larger root of (n - r k)² = STANDARD_ERRORS² (n + r² k): the variance of a Poisson count is estimated by
+    the count itself, and that of r k by r² k = r expected, for loops of equal length.
     """
-    spread = math.sqrt((1.0 + WORSE_BY) * expected + CHANCE**2 / 4.0)
-    return math.floor(expected + CHANCE**2 / 2.0 + CHANCE * spread)
+    root_term = math.sqrt((1.0 + ACCEPTED_RATIO) * expected + STANDARD_ERRORS**2 / 4.0)
+    return math.floor(expected + STANDARD_ERRORS**2 / 2.0 + STANDARD_ERRORS * root_term)
 
 
-def _compile(folder: Path, run: BareRun) -> Path | None:
-    """Path of the compiled program; None, with the reason in `run.why`, if it could not be compiled."""
-    compiler = _compiler()
+def _compile_loop(folder: Path, run: BareLoopRun) -> Path | None:
+    """Compile the C loop into a folder. Returns the program's path; None, with the reason in `run.failure_reason`, if
+    it cannot be compiled."""
+    compiler = _find_compiler()
     if sys.platform == "win32" or compiler is None:
         run.failure_reason = (
             "no C compiler is here (pip install '.[compiler]')" if compiler is None else "not on Windows"
@@ -145,16 +152,16 @@ def _compile(folder: Path, run: BareRun) -> Path | None:
             [*compiler, "-std=c11", "-O2", "-o", str(program), str(SOURCE)],
             check=True,
             capture_output=True,
-            timeout=COMPILING_S,
+            timeout=COMPILE_TIMEOUT_S,
         )
-    except (OSError, subprocess.SubprocessError) as problem:
-        run.failure_reason = f"it could not be compiled ({type(problem).__name__})"
+    except (OSError, subprocess.SubprocessError) as error:
+        run.failure_reason = f"it could not be compiled ({type(error).__name__})"
         return None
     return program
 
 
-def _compiler() -> list[str] | None:
-    """Command of a C compiler; the Python package `ziglang` contains one."""
+def _find_compiler() -> list[str] | None:
+    """Command of a C compiler: of the system, else of the Python package `ziglang`; None without either."""
     compiler_path = next((path for name in COMPILERS if (path := shutil.which(name))), None)
     if compiler_path is not None:
         return [compiler_path]

@@ -20,17 +20,17 @@ from packaging.specifiers import SpecifierSet
 
 import study
 from study.session.views.views import DeviceFinding
-from study.store.disk.privacy import privacy_warning
+from study.store.disk.privacy import format_privacy_warning
 
 HAPTEQ = "hapteq"
 """Name of the installed distribution."""
 IMPORT_NAMES = ("study", "analysis", "equalizer", "protocols")
 """Top-level packages of hapteq, whose generic names another distribution or file could shadow."""
 
-SMALLEST = (80, 24)
+MIN_TERMINAL_SIZE = (80, 24)
 """Columns and rows of a terminal in which every screen fits."""
 
-ROOM_BYTES = 10**9
+MIN_FREE_BYTES = 10**9
 """Free disk space (bytes) that is enough for about ten sessions with all recordings."""
 
 
@@ -46,20 +46,20 @@ class Terminal:
 
 
 def check_installation(data: Path, terminal: Terminal | None) -> tuple[DeviceFinding, ...]:
-    """All findings. data: folder of the sessions. terminal: from `this_terminal()`. Writes a temporary empty file into
-    `data`, or into its nearest existing parent."""
-    owners, home = packages_distributions(), Path(study.__file__).parents[1]
+    """Run all checks, for `hapteq doctor`. data: folder of the sessions. terminal: from `detect_terminal()`. Writes a
+    temporary empty file into `data`, or into its nearest existing parent."""
+    distributions_by_package, package_folder = packages_distributions(), Path(study.__file__).parents[1]
     return (
         *check_packages(),
-        *(check_name(name, owners, home) for name in IMPORT_NAMES),
+        *(check_import_name(name, distributions_by_package, package_folder) for name in IMPORT_NAMES),
         *check_terminal(terminal),
-        check_folder(data),
+        check_data_folder(data),
         check_privacy(data),
     )
 
 
 def check_packages() -> tuple[DeviceFinding, ...]:
-    """Versions of Python and of the installed packages, against the requirements of the installed hapteq."""
+    """Check the versions of Python and of the installed packages, against the requirements of the installed hapteq."""
     try:
         python_requirement, package_requirements = metadata(HAPTEQ)["Requires-Python"], requires(HAPTEQ) or []
     except PackageNotFoundError:
@@ -71,48 +71,53 @@ def check_packages() -> tuple[DeviceFinding, ...]:
         *(
             check_requirement(requirement)
             for requirement in map(Requirement, package_requirements)
-            if _always(requirement)
+            if _is_applicable(requirement)
         ),
     )
 
 
 def check_requirement(requirement: Requirement) -> DeviceFinding:
-    """Whether the installed package, if there is one, satisfies a requirement."""
+    """Check whether the installed package, if there is one, satisfies a requirement."""
     try:
         return check_version(requirement.name, version(requirement.name), requirement.specifier)
     except PackageNotFoundError:
-        return DeviceFinding(requirement.name, "not installed", fine=False, advice=_INSTALL)
+        return DeviceFinding(requirement.name, "not installed", fine=False, advice=_INSTALL_ADVICE)
 
 
 def check_version(name: str, installed: str, required: SpecifierSet) -> DeviceFinding:
-    """Whether a version satisfies a specifier; prereleases count."""
-    fine = required.contains(installed, prereleases=True)
-    needs = f" (needs {required})" if str(required) else ""
-    return DeviceFinding(name, f"{installed}{needs}", fine, "" if fine else _INSTALL)
+    """Check whether a version satisfies a specifier; prereleases count."""
+    is_satisfied = required.contains(installed, prereleases=True)
+    requirement_text = f" (needs {required})" if str(required) else ""
+    return DeviceFinding(name, f"{installed}{requirement_text}", is_satisfied, "" if is_satisfied else _INSTALL_ADVICE)
 
 
-def check_name(name: str, owners: Mapping[str, Sequence[str]], home: Path) -> DeviceFinding:
-    """Whether `import name` gives hapteq's own package. owners: distributions by the top-level names that they install.
-    home: folder that contains hapteq's packages."""
-    other_distributions = sorted(set(owners.get(name, ())) - {HAPTEQ})
+def check_import_name(
+    package_name: str, distributions_by_package: Mapping[str, Sequence[str]], package_folder: Path
+) -> DeviceFinding:
+    """Check whether `import package_name` gives hapteq's own package. owners: distributions by the top-level names that
+    they install. home: folder that contains hapteq's packages."""
+    other_distributions = sorted(set(distributions_by_package.get(package_name, ())) - {HAPTEQ})
     if other_distributions:
         advice = (
             "Install hapteq into an environment of its own: "
             f"{', '.join(other_distributions)} must not share one with it."
         )
         return DeviceFinding(
-            f"import {name}", f"belongs to {' and '.join(other_distributions)} as well", fine=False, advice=advice
+            f"import {package_name}",
+            f"belongs to {' and '.join(other_distributions)} as well",
+            fine=False,
+            advice=advice,
         )
-    spec = importlib.util.find_spec(name)
-    if spec is None or spec.origin is None or Path(spec.origin) != home / name / "__init__.py":
+    spec = importlib.util.find_spec(package_name)
+    if spec is None or spec.origin is None or Path(spec.origin) != package_folder / package_name / "__init__.py":
         origin = "nowhere to be found" if spec is None or spec.origin is None else f"taken from {spec.origin}"
         advice = "Rename that file, or start hapteq without its folder on PYTHONPATH."
-        return DeviceFinding(f"import {name}", origin, fine=False, advice=advice)
-    return DeviceFinding(f"import {name}", "hapteq's own", fine=True)
+        return DeviceFinding(f"import {package_name}", origin, fine=False, advice=advice)
+    return DeviceFinding(f"import {package_name}", "hapteq's own", fine=True)
 
 
-def this_terminal() -> Terminal | None:
-    """The terminal of stdout, else that of stderr; None if neither is a terminal."""
+def detect_terminal() -> Terminal | None:
+    """Read the properties of the terminal of stdout, else that of stderr; None if neither is a terminal."""
     for stream in (sys.stdout, sys.stderr):
         if stream is not None and stream.isatty():
             size = os.get_terminal_size(stream.fileno())
@@ -122,59 +127,73 @@ def this_terminal() -> Terminal | None:
 
 
 def check_terminal(terminal: Terminal | None) -> tuple[DeviceFinding, ...]:
-    """Encoding, size and colours of the terminal. No terminal is fine: the check may run in a script."""
+    """Check encoding, size and colours of the terminal. No terminal is fine: the check may run in a script."""
     if terminal is None:
         return (DeviceFinding("Terminal", "none here, so it was not checked", fine=True),)
-    unicode = terminal.encoding.lower().replace("-", "") == "utf8"
-    size = (terminal.columns, terminal.rows)
-    large = all(actual >= minimum for actual, minimum in zip(size, SMALLEST, strict=True))
-    able = terminal.kind not in ("", "dumb")
-    smallest = f"{SMALLEST[0]} x {SMALLEST[1]}"
+    is_utf8 = terminal.encoding.lower().replace("-", "") == "utf8"
+    terminal_size = (terminal.columns, terminal.rows)
+    is_large_enough = all(actual >= minimum for actual, minimum in zip(terminal_size, MIN_TERMINAL_SIZE, strict=True))
+    has_colours = terminal.kind not in ("", "dumb")
+    minimum_text = f"{MIN_TERMINAL_SIZE[0]} x {MIN_TERMINAL_SIZE[1]}"
     return (
-        DeviceFinding("Characters", terminal.encoding, unicode, "" if unicode else f"Set LANG=C.UTF-8, {_OR_PLAIN}"),
+        DeviceFinding(
+            "Characters", terminal.encoding, is_utf8, "" if is_utf8 else f"Set LANG=C.UTF-8, {_PLAIN_ADVICE}"
+        ),
         DeviceFinding(
             "Terminal size",
-            f"{size[0]} x {size[1]} (needs {smallest})",
-            large,
-            "" if large else f"Make the window larger, {_OR_PLAIN}",
+            f"{terminal_size[0]} x {terminal_size[1]} (needs {minimum_text})",
+            is_large_enough,
+            "" if is_large_enough else f"Make the window larger, {_PLAIN_ADVICE}",
         ),
-        DeviceFinding("Colours", _colours(terminal.kind), able, "" if able else f"Take another terminal, {_OR_PLAIN}"),
+        DeviceFinding(
+            "Colours",
+            _describe_colours(terminal.kind),
+            has_colours,
+            "" if has_colours else f"Take another terminal, {_PLAIN_ADVICE}",
+        ),
     )
 
 
-def check_folder(data: Path) -> DeviceFinding:
-    """Whether sessions can be written below `data`, and whether `ROOM_BYTES` are free. A missing folder is fine: the
-    first session creates it."""
-    name = "Data folder"
-    folder = next(place for place in (data.absolute(), *data.absolute().parents) if place.exists())
+def check_data_folder(data: Path) -> DeviceFinding:
+    """Check whether sessions can be written below `data`, and whether `MIN_FREE_BYTES` are free. A missing folder is
+    fine: the first session creates it."""
+    finding_name = "Data folder"
+    folder = next(
+        existing_folder for existing_folder in (data.absolute(), *data.absolute().parents) if existing_folder.exists()
+    )
     try:
         with tempfile.TemporaryFile(dir=folder):
             free_bytes = shutil.disk_usage(folder).free
     except OSError as problem:
         advice = "Choose another folder with --data, or change the rights of this one."
-        return DeviceFinding(name, f"{data}: {problem.strerror}", fine=False, advice=advice)
-    fine = free_bytes >= ROOM_BYTES
-    value = f"{data}: can be written, {free_bytes / 1e9:.1f} GB free"
-    return DeviceFinding(name, value, fine, "" if fine else "Make room, or choose another folder with --data.")
+        return DeviceFinding(finding_name, f"{data}: {problem.strerror}", fine=False, advice=advice)
+    has_enough_space = free_bytes >= MIN_FREE_BYTES
+    value_text = f"{data}: can be written, {free_bytes / 1e9:.1f} GB free"
+    return DeviceFinding(
+        finding_name,
+        value_text,
+        has_enough_space,
+        "" if has_enough_space else "Make room, or choose another folder with --data.",
+    )
 
 
 def check_privacy(data: Path) -> DeviceFinding:
-    """Whether other accounts of this computer can read the data folder."""
-    name = "Data rights"
+    """Check whether other accounts of this computer can read the data folder."""
+    finding_name = "Data rights"
     if not data.exists():
-        return DeviceFinding(name, f"{data}: not there yet; it will be for this account alone", fine=True)
-    warning = privacy_warning(data)
-    value = f"{data}: open to other accounts" if warning else f"{data}: for this account alone"
-    return DeviceFinding(name, value, not warning, warning)
+        return DeviceFinding(finding_name, f"{data}: not there yet; it will be for this account alone", fine=True)
+    warning = format_privacy_warning(data)
+    value_text = f"{data}: open to other accounts" if warning else f"{data}: for this account alone"
+    return DeviceFinding(finding_name, value_text, not warning, warning)
 
 
-def _always(requirement: Requirement) -> bool:
+def _is_applicable(requirement: Requirement) -> bool:
     """Whether a requirement applies on this computer, without any optional extra."""
     return requirement.marker is None or requirement.marker.evaluate({"extra": ""})
 
 
-def _colours(kind: str) -> str:
-    """Number of colours of a terminal in words, by the environment. kind: value of TERM."""
+def _describe_colours(kind: str) -> str:
+    """Describe the number of colours of a terminal, by the environment. kind: value of TERM."""
     if os.environ.get("NO_COLOR"):
         return "switched off by NO_COLOR; no information is given by colour alone"
     if os.environ.get("COLORTERM") in ("truecolor", "24bit"):
@@ -182,5 +201,5 @@ def _colours(kind: str) -> str:
     return "256" if "256color" in kind else f"few (TERM={kind or 'not set'})"
 
 
-_OR_PLAIN = "or use `hapteq study --plain`."
-_INSTALL = "Run `make study` in hapteq's folder, or install hapteq again."
+_PLAIN_ADVICE = "or use `hapteq study --plain`."
+_INSTALL_ADVICE = "Run `make study` in hapteq's folder, or install hapteq again."

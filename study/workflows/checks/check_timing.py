@@ -2,6 +2,7 @@
 
 Two measures: the ticks that the loop itself counts as late or missed, and the lateness of its readings or, where there
 is no telemetry, of this program's wake-ups. `study.session.stimulus.timing_verdict` holds the limits.
+`check_timing` is part of `hapteq doctor`, `check_computer` of each sitting.
 """
 
 from collections.abc import Callable
@@ -25,14 +26,14 @@ from study.session.stimulus.timing_verdict import (
 )
 from study.session.views.views import DeviceFinding
 
-LOOP_S = 0.1
+ZERO_FORCE_PERIOD_S = 0.1
 """Length of the period of zero forces that is repeated (s)."""
 FADE_S = 0.05
 """Duration of fade-in and fade-out of the held stimulus (s)."""
-SIGN_OF_LIFE_EVERY = 50
+KEEP_ALIVE_TICKS = 50
 """Number of ticks between two signs of life to the safety layer."""
 
-SITTING_S = 1.0
+COMPUTER_CHECK_S = 1.0
 """Duration of the check before a sitting (s). At 1 kHz it has a thousand wake-ups, enough for a 99th percentile: about
 ten are later."""
 
@@ -62,30 +63,31 @@ def check_timing(
     only if the device was opened without a centring spring. Raises DeviceError for a lost device.
     """
     rate_hz = device.info.sample_rate_hz
-    zeros = Signal(np.zeros((round(LOOP_S * rate_hz), 3)), rate_hz, "force", "N", ("fx", "fy", "fz"))
+    zeros = Signal(np.zeros((round(ZERO_FORCE_PERIOD_S * rate_hz), 3)), rate_hz, "force", "N", ("fx", "fy", "fz"))
     device.hold(HeldStimulus(zeros, FADE_S, FADE_S, "linear"))
     try:
-        late_s = _lateness_s(device, clock, seconds, partial(_attend, device, on_progress))
+        late_s = _measure_loop_lateness_s(device, clock, seconds, partial(_keep_device_alive, device, on_progress))
     finally:
         health = device.release().health
     lateness = measure_lateness(late_s, rate_hz)
-    return Timing(seconds, health, lateness, _findings(device, seconds, health, lateness, load_per_processor))
+    return Timing(seconds, health, lateness, _judge_timing(device, seconds, health, lateness, load_per_processor))
 
 
 def check_computer(
     clock: Clock, rate_hz: float, simulated: bool, load_per_processor: float | None
 ) -> tuple[DeviceFinding, ...]:
-    """Findings about the computer before a sitting: wake-ups at rate_hz, load, priority of the loop. Takes `SITTING_S`,
+    """Check the computer before a sitting: wake-ups at rate_hz, load, priority of the loop. Takes `COMPUTER_CHECK_S`,
     commands nothing. load_per_processor: None if unknown."""
-    late_s = wake_at_every_tick(clock, rate_hz, SITTING_S, lambda done_s: True)
+    late_s = measure_wake_lateness_s(clock, rate_hz, COMPUTER_CHECK_S, lambda done_s: True)
     lateness = judge_lateness(measure_lateness(np.array(late_s), rate_hz), simulated)
     return (lateness, judge_load(load_per_processor), *(() if simulated else (check_loop_priority(),)))
 
 
-def wake_at_every_tick(
+def measure_wake_lateness_s(
     clock: Clock, rate_hz: float, seconds: float, should_continue: Callable[[float], bool]
 ) -> list[float]:
-    """Lateness of each wake-up (s), not negative. `should_continue(done_s)` is called every `SIGN_OF_LIFE_EVERY`
+    """Sleep until each tick (1 / rate_hz) for `seconds`. Returns the lateness of each wake-up (s), not negative.
+    `should_continue(done_s)` is called every `KEEP_ALIVE_TICKS`
     wake-ups; the measurement stops if it returns False."""
     late_s: list[float] = []
     tick_s = 1.0 / rate_hz
@@ -94,39 +96,41 @@ def wake_at_every_tick(
         due_s = started_s + (len(late_s) + 1) * tick_s
         clock.sleep(due_s - clock.now_s())
         late_s.append(max(0.0, clock.now_s() - due_s))
-        if len(late_s) % SIGN_OF_LIFE_EVERY == 0 and not should_continue(len(late_s) * tick_s):
+        if len(late_s) % KEEP_ALIVE_TICKS == 0 and not should_continue(len(late_s) * tick_s):
             break
     return late_s
 
 
-def _lateness_s(device: Device, clock: Clock, seconds: float, should_continue: Callable[[float], bool]) -> FloatArray:
-    """(n,), s: lateness of the readings of a real device's loop, from the time stamps of its telemetry; without
-    telemetry, and for a simulated device, of this program's wake-ups.
+def _measure_loop_lateness_s(
+    device: Device, clock: Clock, seconds: float, should_continue: Callable[[float], bool]
+) -> FloatArray:
+    """Measure (n,), s: the lateness of the readings of a real device's loop, from the time stamps of its telemetry;
+    without telemetry, and for a simulated device, of this program's wake-ups.
 
     The lateness of tick k is its time stamp minus k / rate, relative to the smallest such difference. After missed
     ticks it is counted from the time at which the first of them was due.
     """
     rate_hz = device.info.sample_rate_hz
     if device.info.simulated or not device.telemetry:
-        return np.array(wake_at_every_tick(clock, rate_hz, seconds, should_continue))
-    reader, after_due_s, missed = open_telemetry(device.telemetry), [], []
+        return np.array(measure_wake_lateness_s(clock, rate_hz, seconds, should_continue))
+    reader, after_due_s, missed_counts = open_telemetry(device.telemetry), [], []
     started_s = clock.now_s()
     while should_continue(done_s := clock.now_s() - started_s) and done_s < seconds:
-        clock.sleep(SIGN_OF_LIFE_EVERY / rate_hz)
+        clock.sleep(KEEP_ALIVE_TICKS / rate_hz)
         ticks = reader.read()
         after_due_s.append(ticks.time_s - ticks.tick / rate_hz)
-        missed.append(ticks.missed)
+        missed_counts.append(ticks.missed)
     raw_lateness_s = np.concatenate(after_due_s or [np.zeros(0)])
     if not len(raw_lateness_s):
         return np.array([seconds])  # no tick was read: late by the whole time
-    missed_so_far: FloatArray = np.concatenate(missed)
+    missed_total: FloatArray = np.concatenate(missed_counts)
     late_s: FloatArray = (
-        raw_lateness_s - raw_lateness_s.min() + np.diff(missed_so_far, prepend=missed_so_far[:1]) / rate_hz
+        raw_lateness_s - raw_lateness_s.min() + np.diff(missed_total, prepend=missed_total[:1]) / rate_hz
     )
     return late_s
 
 
-def _attend(device: Device, on_progress: Callable[[float], None], done_s: float) -> bool:
+def _keep_device_alive(device: Device, on_progress: Callable[[float], None], done_s: float) -> bool:
     """Give a sign of life to the safety layer. Returns False after a fault of the device, which ends the
     measurement."""
     device.keep_alive()
@@ -134,21 +138,23 @@ def _attend(device: Device, on_progress: Callable[[float], None], done_s: float)
     return device.fault() is Fault.NONE
 
 
-def _findings(
+def _judge_timing(
     device: Device, seconds: float, health: Health, lateness: Lateness, load_per_processor: float | None
 ) -> tuple[DeviceFinding, ...]:
+    """Judge loop, missed and late ticks, lateness, and that no force was commanded."""
     simulated, late_ticks = device.info.simulated, health.late_ticks + health.missed_ticks
-    late = judge_late(late_ticks, 1000 * health.latest_s, health.ticks, load_per_processor)
+    late_finding = judge_late(late_ticks, 1000 * health.latest_s, health.ticks, load_per_processor)
     return (
-        _loop(seconds, health),
+        _judge_loop(seconds, health),
         judge_missed(health.missed_ticks, health.ticks, simulated, load_per_processor),
-        *(() if simulated else (late,)),
+        *(() if simulated else (late_finding,)),
         judge_lateness(lateness, simulated),
         DeviceFinding("Force", f"{health.peak_command_n:g} N commanded", fine=health.peak_command_n == 0.0),
     )
 
 
-def _loop(seconds: float, health: Health) -> DeviceFinding:
+def _judge_loop(seconds: float, health: Health) -> DeviceFinding:
+    """Judge whether the loop held the zero force to the end, without a fault of the device."""
     if health.fault is not Fault.NONE:
         advice = "Check the device's power and cable and what else runs on this computer, then measure again."
         return DeviceFinding("Loop", f"it let go: {health.fault.value}", fine=False, advice=advice)

@@ -1,4 +1,7 @@
-"""The daily check: the free device plays the excitation of its acceptance, and both recordings are compared."""
+"""Daily check of a device: play the excitation of its acceptance without a hand, and compare both recordings.
+
+`hapteq doctor` carries it out; each sitting reads the last result (`judge_last_check`).
+"""
 
 import contextlib
 import math
@@ -16,7 +19,7 @@ from study.devices.device import Device, DeviceInfo
 from study.devices.opening import device_folder, find_accepted_baseline, needs_real_time, open_device
 from study.errors import DeviceError, StudyError, WrongUseError
 from study.local_clock import machine_zone
-from study.session.views.local_time import local_parts, local_time
+from study.session.views.local_time import format_time_in_zone, split_time_in_zone
 from study.session.views.views import DeviceFinding
 from study.store.disk.provenance import sha256_of
 from study.store.formats.daily_check_file import DailyCheck, read_daily_check, write_daily_check
@@ -29,9 +32,9 @@ if TYPE_CHECKING:
     from analysis.device_change.compare_devices import Change
     from analysis.device_change.measure_device import NotMeasurableError
 
-PROTOCOL = "daily_check"
+PROTOCOL_NAME = "daily_check"
 """Shipped recording protocol of the check, and of the acceptance."""
-BASELINES, CHECKS = "baselines", "daily_checks"
+BASELINE_FOLDER, CHECK_FOLDER = "baselines", "daily_checks"
 """Folders beside the acceptance."""
 
 
@@ -46,66 +49,71 @@ class MotionCallbacks:
 
 
 @dataclass(frozen=True, slots=True)
-class CheckedToday:
+class DailyCheckResult:
     """Findings of today's check, and the file to which they were written."""
 
     findings: tuple[DeviceFinding, ...]
     file: Path
 
 
-def seconds_of_play() -> float:
-    """Total duration (s) of what a baseline or daily check plays."""
-    return RecordingPlan(_protocol(), "", (0.0, 0.0, 0.0), 1, Path()).total_s
+def compute_play_duration_s() -> float:
+    """Compute the total duration (s) of the excitation of a baseline or daily check."""
+    return RecordingPlan(_read_protocol(), "", (0.0, 0.0, 0.0), 1, Path()).total_s
 
 
 def record_baseline(name: str, motion_callbacks: MotionCallbacks) -> tuple[str, str]:
     """Record the baseline of the daily checks. Returns its name in `device_folder` and its SHA-256. Raises StudyError,
     also where the recording is not good enough for a comparison."""
-    plan = _plan(name, BASELINES)
+    plan = _plan_recording(name, BASELINE_FOLDER)
     with contextlib.closing(_open_free_device(plan)) as device:
         return _record_baseline_on(device, plan, motion_callbacks)
 
 
 def _record_baseline_on(device: Device, plan: RecordingPlan, motion_callbacks: MotionCallbacks) -> tuple[str, str]:
-    """As `record_baseline`, on an open device."""
+    """Record the baseline on an open device, and refuse it where sensor or force was at its limit, or where it is too
+    inaccurate. Returns and raises as `record_baseline`."""
     record_on_device(device, plan, motion_callbacks.show, motion_callbacks.announce)
-    recorded = read_recording(plan.out)
-    facts = recorded.meta["segments"]
-    limited = [
+    recording = read_recording(plan.out)
+    segments = recording.meta["segments"]
+    limited_segments = [
         segment
-        for segment in facts
+        for segment in segments
         if segment["played_amplitude_n"] < segment["requested_amplitude_n"]
         or segment["sensor_clipped"]
         or segment["total_clipped"]
     ]
-    problems = [f"Sensor or force was at its limit in {len(limited)} of {len(facts)} pieces."] if limited else []
+    problems = (
+        [f"Sensor or force was at its limit in {len(limited_segments)} of {len(segments)} pieces."]
+        if limited_segments
+        else []
+    )
     # A recording compared with itself does not differ: a finding means that it is too inaccurate to detect a later
     # change.
     inaccurate_findings = [
-        finding for finding in change_findings(compare_recordings(recorded, recorded)) if not finding.fine
+        finding for finding in change_findings(compare_recordings(recording, recording)) if not finding.fine
     ]
     problems += [f"Too inaccurate to compare with: {finding.name}, {finding.value}." for finding in inaccurate_findings]
     if problems:
         advice = "Look for what holds the handle, disturbs the sensor or shakes the table; then accept it again."
         raise DeviceError("The device was not accepted", " ".join(problems), advice, f"The recording is {plan.out}.")
-    return f"{BASELINES}/{plan.out.name}", sha256_of(plan.out)
+    return f"{BASELINE_FOLDER}/{plan.out.name}", sha256_of(plan.out)
 
 
-def require_real(name: str) -> None:
+def require_acceptable_device(name: str) -> None:
     """Require a device that can be accepted. Raises WrongUseError for a device that is never accepted."""
     if not needs_real_time(name):
         raise WrongUseError("There is nothing to compare with", f"{name!r} is never accepted.", "Leave --daily out.")
 
 
-def check_today(name: str, motion_callbacks: MotionCallbacks) -> CheckedToday:
+def check_today(name: str, motion_callbacks: MotionCallbacks) -> DailyCheckResult:
     """Play the excitation of the baseline and write what changed. Raises StudyError."""
-    plan = _plan(name, CHECKS)
+    plan = _plan_recording(name, CHECK_FOLDER)
     with contextlib.closing(_open_free_device(plan)) as device:
-        return check_on(device, plan, motion_callbacks)
+        return check_on_device(device, plan, motion_callbacks)
 
 
-def check_on(device: Device, plan: RecordingPlan, motion_callbacks: MotionCallbacks) -> CheckedToday:
-    """Carry out the check of `check_today` on an open device."""
+def check_on_device(device: Device, plan: RecordingPlan, motion_callbacks: MotionCallbacks) -> DailyCheckResult:
+    """Carry out the check of `check_today` on an open device. A check that breaks off is written as not passed."""
     baseline, digest = _read_baseline(device.info, plan.protocol)
     notices: list[str] = []
 
@@ -125,7 +133,7 @@ def check_on(device: Device, plan: RecordingPlan, motion_callbacks: MotionCallba
     findings = change_findings(changes)
     passed = all(finding.fine for finding in findings)
     sentences = tuple(f"{finding.name}: {finding.value}. {finding.advice}".strip() for finding in findings)
-    return CheckedToday(findings, _write_check(device.info, plan, digest, passed, sentences, changes))
+    return DailyCheckResult(findings, _write_check(device.info, plan, digest, passed, sentences, changes))
 
 
 def _write_check(
@@ -136,6 +144,7 @@ def _write_check(
     sentences: tuple[str, ...],
     changes: tuple["Change", ...],
 ) -> Path:
+    """Write the result of a check beside its recording. Returns the path of the JSON file."""
     check = DailyCheck(
         device=info.name,
         details=info.details,
@@ -153,8 +162,8 @@ def _write_check(
 
 
 def compare_recordings(baseline: Recording, todays_recording: Recording) -> tuple["Change", ...]:
-    """Changes of friction, gain, response and noise between the accepted recording and today's. Raises DeviceError
-    where one of the recordings does not allow to measure them."""
+    """Compute the changes of friction, gain, response and noise between the accepted recording and today's. Raises
+    DeviceError where one of the recordings does not allow to measure them."""
     # Imported here: every sitting reads the last check, but only a check needs the comparison, which is slow to import.
     from analysis.device_change.compare_devices import compare_devices
     from analysis.device_change.measure_device import NotMeasurableError
@@ -162,13 +171,13 @@ def compare_recordings(baseline: Recording, todays_recording: Recording) -> tupl
     try:
         return compare_devices(baseline, todays_recording)
     except NotMeasurableError as refusal:
-        raise _not_comparable_error(refusal) from refusal
+        raise _make_not_comparable_error(refusal) from refusal
 
 
-def last_check(info: DeviceInfo, required: bool = False) -> DeviceFinding:
-    """Whether this device passed today, as a line of the check before a sitting: a warning where it did not.
+def judge_last_check(info: DeviceInfo, required: bool = False) -> DeviceFinding:
+    """Judge whether this device passed its check today, as a finding before a sitting: a warning where it did not.
 
-    required: as the protocol asks; then it is a DeviceError.
+    required: whether the protocol requires a passed check; then DeviceError is raised instead of the warning.
     """
     finding = _find_last_check(info)
     if required and not finding.fine:
@@ -178,23 +187,23 @@ def last_check(info: DeviceInfo, required: bool = False) -> DeviceFinding:
 
 
 def _find_last_check(info: DeviceInfo) -> DeviceFinding:
-    """The newest check of this device as a finding; unreadable files are passed over."""
-    day = local_parts(datetime.now(UTC).isoformat(), machine_zone)[0]
-    option = info.name.replace(".", "")
-    advice = f"With no hand on the handle: hapteq doctor --device {option} --daily."
-    for path in sorted((device_folder() / CHECKS).glob("*.json"), reverse=True):
+    """Find the newest check of this device and describe it as a finding; unreadable files are skipped."""
+    today = split_time_in_zone(datetime.now(UTC).isoformat(), machine_zone)[0]
+    device_option = info.name.replace(".", "")
+    advice = f"With no hand on the handle: hapteq doctor --device {device_option} --daily."
+    for path in sorted((device_folder() / CHECK_FOLDER).glob("*.json"), reverse=True):
         try:
             check = read_daily_check(path)
         except StudyError:
             continue
         if (check.device, check.details) != (info.name, info.details):
             continue
-        time_and_path = f"{local_time(check.utc, machine_zone)}, {path}"
-        if local_parts(check.utc, machine_zone)[0] != day:
+        time_and_path = f"{format_time_in_zone(check.utc, machine_zone)}, {path}"
+        if split_time_in_zone(check.utc, machine_zone)[0] != today:
             return DeviceFinding(
                 "Daily check", f"none today; the last one was {time_and_path}", False, advice, warning=True
             )
-        if check.baseline_sha256 != _digest_of_baseline(info):
+        if check.baseline_sha256 != _find_baseline_digest(info):
             text = f"none since it was accepted anew; the last one was {time_and_path}"
             return DeviceFinding("Daily check", text, False, advice, warning=True)
         if not check.changes:
@@ -211,8 +220,8 @@ def _find_last_check(info: DeviceInfo) -> DeviceFinding:
     return DeviceFinding("Daily check", "none yet", False, advice, warning=True)
 
 
-def _digest_of_baseline(info: DeviceInfo) -> str:
-    """SHA-256 of the baseline of this device's acceptance; empty where it is not accepted now."""
+def _find_baseline_digest(info: DeviceInfo) -> str:
+    """Find the SHA-256 of the baseline of this device's acceptance; empty where it is not accepted now."""
     try:
         return find_accepted_baseline(info, datetime.now(UTC).date())[1]
     except DeviceError:
@@ -220,8 +229,8 @@ def _digest_of_baseline(info: DeviceInfo) -> str:
 
 
 def _read_baseline(info: DeviceInfo, protocol: RecordingProtocol) -> tuple[Recording, str]:
-    """The recording of this device's acceptance, and its SHA-256. Raises DeviceError where there is none, or it is not
-    comparable with a recording by this protocol."""
+    """Read the recording of this device's acceptance, and its SHA-256. Raises DeviceError where there is none, or it is
+    not comparable with a recording by this protocol."""
     name, digest = find_accepted_baseline(info, datetime.now(UTC).date())
     acceptance_advice = (
         f"Accept it anew: hapteq doctor --device {info.name.replace('.', '')} --timing 60 --accept 'NAME'."
@@ -244,31 +253,37 @@ def _read_baseline(info: DeviceInfo, protocol: RecordingProtocol) -> tuple[Recor
     return baseline, digest
 
 
-def _not_comparable_error(refusal: "NotMeasurableError") -> DeviceError:
+def _make_not_comparable_error(refusal: "NotMeasurableError") -> DeviceError:
+    """Make the error for a recording from which the device's response cannot be measured."""
     explanation = f"The recording does not show how the device responds: {refusal}."
     return DeviceError("The device was not compared", explanation, "Check accelerometer and handle, and try again.")
 
 
-def _plan(name: str, folder: str) -> RecordingPlan:
-    place = device_folder() / folder
-    place.mkdir(parents=True, exist_ok=True)
-    return RecordingPlan(_protocol(), name, (0.0, 0.0, 0.0), 1, place / f"{name}_{_time_stamp()}.h5")
+def _plan_recording(name: str, folder: str) -> RecordingPlan:
+    """Plan a recording by the shipped protocol, with a new file in this folder beside the acceptance."""
+    recording_folder = device_folder() / folder
+    recording_folder.mkdir(parents=True, exist_ok=True)
+    return RecordingPlan(
+        _read_protocol(), name, (0.0, 0.0, 0.0), 1, recording_folder / f"{name}_{_format_time_stamp()}.h5"
+    )
 
 
-def _protocol() -> RecordingProtocol:
-    return read_recording_protocol(PROTOCOL).protocol
+def _read_protocol() -> RecordingProtocol:
+    """Read the shipped recording protocol of the check."""
+    return read_recording_protocol(PROTOCOL_NAME).protocol
 
 
-def _time_stamp() -> str:
-    """UTC as text, so that names sort by time."""
+def _format_time_stamp() -> str:
+    """Format the present UTC time (YYYYMMDDTHHMMSSZ), so that file names sort by time."""
     return datetime.now(UTC).strftime("%Y%m%dT%H%M%SZ")
 
 
 def _open_free_device(plan: RecordingPlan) -> Device:
+    """Open the device with the settings of a recording, without a hand on the handle."""
     return open_device(plan.device, make_recording_settings(plan), RealClock(), plan.seed)
 
 
 def _as_json(change: "Change") -> dict[str, Any]:
-    # JSON has no NaN.
-    unknown = {name: None for name in ("accepted", "today", "error") if math.isnan(getattr(change, name))}
-    return asdict(change) | unknown
+    """Convert a change to JSON values; NaN becomes None, because JSON has no NaN."""
+    missing_values = {name: None for name in ("accepted", "today", "error") if math.isnan(getattr(change, name))}
+    return asdict(change) | missing_values

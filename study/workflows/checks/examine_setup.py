@@ -14,10 +14,10 @@ from study.devices.device import Device, DeviceSettings
 from study.devices.opening import accept_device, examine_device, limit_test_force_n, needs_real_time, open_device
 from study.errors import DeviceError, ExitCode, WrongUseError
 from study.session.stimulus.timing_verdict import judge_load
-from study.session.views.handle_notice import limit_test_notice
+from study.session.views.handle_notice import format_limit_test_notice
 from study.session.views.views import DeviceFinding, DeviceReport
 from study.store.formats.protocol_files import read_study_protocol
-from study.workflows.checks.bare_loop import compare_with_bare_loop, run_bare_loop_beside
+from study.workflows.checks.bare_loop import compare_with_bare_loop, run_bare_loop_in_parallel
 from study.workflows.checks.check_device import check_device
 from study.workflows.checks.check_installation import Terminal, check_installation
 from study.workflows.checks.check_timing import Timing, check_timing
@@ -101,7 +101,7 @@ def _examine_device(
 def _time(device: Device, clock: Clock, seconds: float, on_progress: Callable[[float], None]) -> Timing:
     """Measure the timing for `seconds`, and compare it with a bare loop that runs at the same time."""
     load, simulated = load_per_processor(), device.info.simulated
-    with run_bare_loop_beside(seconds, device.info.sample_rate_hz, raised_priority=not simulated) as run:
+    with run_bare_loop_in_parallel(seconds, device.info.sample_rate_hz, raised_priority=not simulated) as run:
         timing = check_timing(device, clock, seconds, on_progress, load)
     # The loop of a simulated device is never late: for such a device, the wake-ups of this program are compared.
     late, ticks = timing.health.late_ticks + timing.health.missed_ticks, timing.health.ticks
@@ -149,7 +149,7 @@ def accept(name: str, examination: Examination, operator: str, motion_callbacks:
         )
     sensed = examination.sensed
     baseline = record_baseline(name, motion_callbacks) if sensed else ("", "")
-    motion_callbacks.announce(limit_test_notice(name, limit_test_force_n()))
+    motion_callbacks.announce(format_limit_test_notice(name, limit_test_force_n()))
     settings = replace(_settings(name, 0.0), with_sensor=sensed)
     sentence = accept_device(name, settings, RealClock(), operator, baseline)
     return sentence if sensed else f"{sentence}. Without an accelerometer no daily check will be possible."

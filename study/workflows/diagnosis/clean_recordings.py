@@ -10,7 +10,7 @@ from pathlib import Path
 from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_comparable
 from analysis.diagnosis.prepare_recordings import keep_common_signals
 from study.errors import StudyError
-from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, not_diagnosable_error, read_input
+from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, make_not_diagnosable_error, read_input
 
 INCOMPARABLE_ADVICE = (
     "Give clean recordings of the same device, with the same channels, units and rate, or leave --clean out."
@@ -50,7 +50,7 @@ def read_clean_reference(
             "one says nothing of the other",
         )
     except NothingToDiagnose as refusal:
-        raise not_diagnosable_error(refusal.problems, INCOMPARABLE_ADVICE) from refusal
+        raise make_not_diagnosable_error(refusal.problems, INCOMPARABLE_ADVICE) from refusal
     diagnosed_count = len(diagnosis_input.recordings)
     common_signals = keep_common_signals((*diagnosis_input.recordings, *clean_input.recordings))
     return InputWithReference(

@@ -23,7 +23,7 @@ from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.types import Mapper, Progress, TimeBudget
 from equalizer.effects.law_entry import LawEntry
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
-from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, suggest_word
 from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
@@ -31,17 +31,17 @@ from study.store.disk.new_folder import new_folder, require_new_folder
 from study.workflows.crash_guard import crash_guard
 from study.workflows.diagnosis.diagnosis_input import (
     DiagnosisInput,
-    not_diagnosable_error,
+    make_not_diagnosable_error,
     read_given_model,
     read_input,
 )
-from study.workflows.forked_map import map_forked, processor_s
+from study.workflows.forked_map import map_forked, measure_processor_s
 
 if TYPE_CHECKING:
     from analysis.diagnosis.balance.judge_laws import Balance
 
 
-READ, FITTED, DIAGNOSED = 0.02, 0.2, 0.92
+READ_SHARE, FITTED_SHARE, DIAGNOSED_SHARE = 0.02, 0.2, 0.92
 """Share of the progress (0 to 1) after reading, after fitting a model where none was given, and after the diagnosis."""
 
 TWIN_REMARK = (
@@ -120,38 +120,38 @@ def diagnose_recordings(plan: DiagnosePlan, on_progress: Progress, engine: Engin
 def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diagnose) -> Answer:
     """First part of `diagnose_recordings`: the diagnosis without writing, so that its answer can be shown before the
     figures are drawn. Raises StudyError."""
-    check_names(plan.excluded_effects)
+    check_effect_names(plan.excluded_effects)
     require_new_folder(plan.out)
     on_progress("reading", 0.0)
-    for_balance = plan.model is None and not plan.clean
-    inputs, clean = _add_clean(plan, read_input(plan.sources, plan.seed, for_balance, plan.force_constants))
-    on_progress("reading", READ)
-    time_left = _time_budget(plan)
+    for_force_balance = plan.model is None and not plan.clean
+    inputs, clean = _add_clean(plan, read_input(plan.sources, plan.seed, for_force_balance, plan.force_constants))
+    on_progress("reading", READ_SHARE)
+    has_time_left = _start_time_budget(plan)
     guard = crash_guard()
-    first = _model(plan, inputs, clean, (time_left, guard), on_progress)
+    first_model = _choose_model(plan, inputs, clean, (has_time_left, guard), on_progress)
     # A model that was fitted to these recordings already contains the spring.
-    spring = inputs.spring_n_per_m if plan.model is not None or inputs.simulated else 0.0
-    model = with_spring(first.model, spring)
-    start = FITTED if plan.model is None else READ
+    spring_n_per_m = inputs.spring_n_per_m if plan.model is not None or inputs.simulated else 0.0
+    model = add_spring(first_model.model, spring_n_per_m)
+    start_share = FITTED_SHARE if plan.model is None else READ_SHARE
     _check_compared(plan, inputs, model)
-    settings = replace(_settings(plan, inputs, clean, first.balances), time_left=time_left, guard=guard)
+    settings = replace(_make_settings(plan, inputs, clean, first_model.balances), time_left=has_time_left, guard=guard)
     try:
         findings = engine(
-            inputs.recordings, model, settings, map_forked, _scale_progress(on_progress, start, DIAGNOSED)
+            inputs.recordings, model, settings, map_forked, _scale_progress(on_progress, start_share, DIAGNOSED_SHARE)
         )
     except NothingLearned as refusal:
-        raise not_diagnosable_error(
+        raise make_not_diagnosable_error(
             (str(refusal),), "Leave --clean out, or record the device in order in the same way."
         ) from refusal
     except np.linalg.LinAlgError as problem:
-        raise not_diagnosable_error(
+        raise make_not_diagnosable_error(
             (f"The fits broke down ({problem}): near the given parameters the simulation diverges",),
             "State narrower tolerances in the model, or give one that is nearer to the device.",
         ) from problem
     findings = replace(
         findings,
-        improved=with_spring(findings.improved, -spring),
-        remarks=(*inputs.remarks, *spring_remark(spring), *first.remarks, *findings.remarks),
+        improved=add_spring(findings.improved, -spring_n_per_m),
+        remarks=(*inputs.remarks, *describe_spring(spring_n_per_m), *first_model.remarks, *findings.remarks),
     )
     return Answer(
         findings, plan, (*inputs.parents, *(() if clean is None else clean.parents), *filter(None, [plan.model]))
@@ -159,7 +159,7 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
 
 
 def _add_clean(plan: DiagnosePlan, inputs: DiagnosisInput) -> tuple[DiagnosisInput, DiagnosisInput | None]:
-    """The recordings, and those of the intact device in the same form; None where the plan has none."""
+    """Read the recordings of the intact device in the same form as `inputs`; None where the plan has none."""
     if not plan.clean:
         return inputs, None
     # Imported here: most diagnoses have no recordings of the intact device.
@@ -174,7 +174,7 @@ def write_answer(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
     # Imported here because plotting is slow to import, and the answer comes first.
     from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
 
-    on_progress("writing the report", DIAGNOSED)
+    on_progress("writing the report", DIAGNOSED_SHARE)
     plan = answer.plan
     for session in (source for source in (*plan.sources, *plan.clean) if source.is_dir()):
         from study.store.sessions.written_elsewhere import note_written_folder
@@ -186,15 +186,16 @@ def write_answer(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
     return DiagnosedRecordings(findings, plan.out)
 
 
-def _time_budget(plan: DiagnosePlan) -> TimeBudget:
-    """Whether processor time is left, counted from now; always True without a limit."""
-    start_s = processor_s()
-    return lambda: plan.seconds is None or processor_s() - start_s < plan.seconds
+def _start_time_budget(plan: DiagnosePlan) -> TimeBudget:
+    """Make the test whether processor time is left, counted from now; always True without a limit."""
+    start_s = measure_processor_s()
+    return lambda: plan.seconds is None or measure_processor_s() - start_s < plan.seconds
 
 
-def _settings(
+def _make_settings(
     plan: DiagnosePlan, inputs: DiagnosisInput, clean: DiagnosisInput | None, balances: "tuple[Balance, ...] | None"
 ) -> DiagnosisSettings:
+    """Make the settings of the diagnosis from the plan and its inputs."""
     return DiagnosisSettings(
         without=plan.excluded_effects,
         names=inputs.names,
@@ -228,7 +229,7 @@ def _check_compared(plan: DiagnosePlan, inputs: DiagnosisInput, model: Mechanica
     )
 
 
-def check_names(excluded_effects: Sequence[str]) -> None:
+def check_effect_names(excluded_effects: Sequence[str]) -> None:
     """Check the names of effects to leave out. Raises WrongUseError for a name that no effect has."""
     for name in excluded_effects:
         if name not in EFFECTS_BY_NAME:
@@ -240,32 +241,32 @@ def check_names(excluded_effects: Sequence[str]) -> None:
             )
 
 
-def _model(
+def _choose_model(
     plan: DiagnosePlan,
     inputs: DiagnosisInput,
     clean: DiagnosisInput | None,
     bounds: tuple[TimeBudget, Guard],
     on_progress: Progress,
 ) -> FirstModel:
-    """The model to compare with: the given one; for a session on the simulated device, its twin; with clean recordings,
-    a linear model of these; otherwise a model fitted to the recordings themselves."""
-    fit_progress = _scale_progress(on_progress, READ, FITTED)
+    """Choose the model to compare with: the given one; for a session on the simulated device, its twin; with clean
+    recordings, a linear model of these; otherwise a model fitted to the recordings themselves."""
+    fit_progress = _scale_progress(on_progress, READ_SHARE, FITTED_SHARE)
     if plan.model is not None:
         return FirstModel(read_given_model(plan.model, inputs), ())
     if inputs.simulated:
-        return FirstModel(_twin(fit_progress), (TWIN_REMARK,))
+        return FirstModel(_identify_twin(fit_progress), (TWIN_REMARK,))
     # Imported here: a given model needs no fit of a first one.
     from study.workflows.diagnosis.fit_without_model import first_model_of, fit_linear_model
 
     if clean is None:
         return first_model_of(inputs, plan.excluded_effects, bounds, fit_progress)
     step = "fitting a linear model, as none was given"
-    on_progress(step, READ)
+    on_progress(step, READ_SHARE)
     return FirstModel(*fit_linear_model(clean, lambda share: fit_progress(step, share), "the clean recordings"))
 
 
-def _twin(on_progress: Progress) -> MechanicalModel:
-    """The linear model of the simulated device, identified anew and not kept."""
+def _identify_twin(on_progress: Progress) -> MechanicalModel:
+    """Identify a linear model of the simulated device; its file is temporary."""
     from study.workflows.diagnosis.write_twin import TwinPlan, write_twin
 
     step = "identifying the simulated device's twin"
@@ -276,21 +277,21 @@ def _twin(on_progress: Progress) -> MechanicalModel:
 
 
 def _scale_progress(on_progress: Progress, start_share: float, end_share: float) -> Callable[[str, float], None]:
-    """Progress of a step whose share 0 to 1 becomes `start_share` to `end_share` of the whole."""
+    """Make the progress callback of a step whose share 0 to 1 becomes `start_share` to `end_share` of the whole."""
     return lambda step, share: on_progress(step, start_share + (end_share - start_share) * min(max(share, 0.0), 1.0))
 
 
-def with_spring(model: MechanicalModel, spring_n_per_m: float) -> MechanicalModel:
-    """The model with the stiffness matrix K + k A A', where k = spring_n_per_m (negative: subtracted) and the columns
-    of A are the driven axes."""
+def add_spring(model: MechanicalModel, spring_n_per_m: float) -> MechanicalModel:
+    """Return the model with the stiffness matrix K + k A A', where k = spring_n_per_m (negative: subtracted) and the
+    columns of A are the driven axes."""
     if spring_n_per_m == 0:
         return model
-    axes = driven_axes(model)
+    axes = compute_driven_axes(model)
     return replace(model, stiffness=model.stiffness + spring_n_per_m * axes @ axes.T)
 
 
-def spring_remark(spring_n_per_m: float) -> tuple[str, ...]:
-    """Remark that a virtual spring was added to the model; empty for a stiffness of 0."""
+def describe_spring(spring_n_per_m: float) -> tuple[str, ...]:
+    """Describe the virtual spring that was added to the model; empty for a stiffness of 0."""
     if spring_n_per_m == 0:
         return ()
     return (

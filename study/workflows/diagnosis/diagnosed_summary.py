@@ -6,7 +6,7 @@ from typing import Any
 from analysis.diagnosis.document import FORMAT, VERSION, Errors, diagnosis_to_json
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.result.wording import write_summary_lines
-from analysis.diagnosis.unit_wording import error_text
+from analysis.diagnosis.unit_wording import format_error
 from study.store.formats.diagnosis_file import MODEL_NAME, PAGE_NAME
 
 
@@ -41,8 +41,8 @@ def format_paths(folder: Path) -> tuple[str, ...]:
 def _format_errors(data_part: str, errors: Errors, has_effects: bool) -> str:
     """Line with the errors of the given model, of the re-tuned model, with the named effects, and of noise alone.
     data_part: "fitted" or "held out"."""
-    effects_text = f", with the effects {error_text(errors.after)}" if has_effects else ""
+    effects_text = f", with the effects {format_error(errors.after)}" if has_effects else ""
     return (
-        f"  {data_part:<9} as given {error_text(errors.before)}, re-tuned {error_text(errors.retuned)}"
-        f"{effects_text}; noise alone {error_text(errors.noise)}"
+        f"  {data_part:<9} as given {format_error(errors.before)}, re-tuned {format_error(errors.retuned)}"
+        f"{effects_text}; noise alone {format_error(errors.noise)}"
     )

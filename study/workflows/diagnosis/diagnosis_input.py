@@ -2,6 +2,7 @@
 
 Recordings are checked for consistent channels, units and rates, converted to forces where a force constant is given,
 and brought into the form in which they can be compared. Refusals of the analysis become StudyErrors.
+Called by `diagnose_recordings` and `fit_first_model`.
 """
 
 from collections.abc import Callable, Sequence
@@ -49,19 +50,19 @@ def read_input(
     `with_force_constant`. Raises StudyError."""
     folders = [source for source in sources if source.is_dir()]
     if folders and len(sources) > 1:
-        raise not_diagnosable_error(
+        raise make_not_diagnosable_error(
             (f"{folders[0]} is a folder: a session is diagnosed alone",), "Give recordings, or one session."
         )
     if folders:
         # Imported here, because the modules that read sessions take long to import.
-        from study.workflows.diagnosis.session_as_recordings import session_recordings
+        from study.workflows.diagnosis.join_session_trials import join_session_trials
         from study.workflows.diagnosis.session_references import find_references
 
         if (references := find_references(folders[0])) is not None:
-            free = read_input(references.paths, seed, for_force_balance)
-            parents, remarks = (references.log, *references.paths), (*references.remarks, *free.remarks)
-            return replace(free, parents=parents, remarks=remarks)
-        session = session_recordings(folders[0], seed)
+            reference_input = read_input(references.paths, seed, for_force_balance)
+            parents, remarks = (references.log, *references.paths), (*references.remarks, *reference_input.remarks)
+            return replace(reference_input, parents=parents, remarks=remarks)
+        session = join_session_trials(folders[0], seed)
         comparable_trials = _translate_refusal(
             lambda: prepare_comparison((session.recording,), (session.name,), for_force_balance)
         )
@@ -70,26 +71,27 @@ def read_input(
             (*session.remarks, *comparable_trials.remarks), session.simulated, session.spring_n_per_m,
         )  # fmt: skip
     recordings_with_notes = [read_any_recording(source) for source in sources]
-    read, names = tuple(recording for recording, _ in recordings_with_notes), _names(sources)
-    _translate_refusal(lambda: require_comparable(read, names))
-    forces, constant_remarks = _as_forces(read, constants)
-    ready = _translate_refusal(lambda: prepare_recordings(forces, names, for_force_balance))
-    remarks = (*_notes(recordings_with_notes), *constant_remarks, *ready.remarks)
-    return DiagnosisInput(ready.recordings, names, tuple(sources), remarks, constants=constants)
+    recordings, names = tuple(recording for recording, _ in recordings_with_notes), _name_sources(sources)
+    _translate_refusal(lambda: require_comparable(recordings, names))
+    force_recordings, constant_remarks = _convert_to_forces(recordings, constants)
+    prepared = _translate_refusal(lambda: prepare_recordings(force_recordings, names, for_force_balance))
+    remarks = (*_collect_notes(recordings_with_notes), *constant_remarks, *prepared.remarks)
+    return DiagnosisInput(prepared.recordings, names, tuple(sources), remarks, constants=constants)
 
 
-def _translate_refusal(checked: Callable[[], Checked]) -> Checked:
-    """The result of the function `checked`. Raises StudyError where the function raises NothingToDiagnose."""
+def _translate_refusal(check: Callable[[], Checked]) -> Checked:
+    """Call `check` and return its result. Raises StudyError where it raises NothingToDiagnose."""
     try:
-        return checked()
+        return check()
     except NothingToDiagnose as refusal:
-        raise not_diagnosable_error(refusal.problems) from refusal
+        raise make_not_diagnosable_error(refusal.problems) from refusal
 
 
-def _as_forces(
+def _convert_to_forces(
     recordings: tuple[Recording, ...], constants: Sequence[float]
 ) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
-    """The recordings with commands converted to forces, and remarks. Raises WrongUseError for a wrong constant."""
+    """Multiply commands by the force constants. Returns the recordings and remarks; unchanged without constants. Raises
+    WrongUseError for a wrong constant."""
     if not constants:
         return recordings, ()
     from analysis.diagnosis.data.force_constant import NoForceConstant, with_force_constant
@@ -105,8 +107,8 @@ def _as_forces(
     return tuple(recording for recording, _ in converted), (converted[0][1],)
 
 
-def _notes(recordings_with_notes: Sequence[tuple[Recording, tuple[str, ...]]]) -> tuple[str, ...]:
-    """Remarks on the import of all recordings, each only once."""
+def _collect_notes(recordings_with_notes: Sequence[tuple[Recording, tuple[str, ...]]]) -> tuple[str, ...]:
+    """Collect the remarks on the import of all recordings, each only once."""
     return tuple(dict.fromkeys(note for _, notes in recordings_with_notes for note in notes))
 
 
@@ -118,7 +120,7 @@ def read_given_model(path: Path, diagnosis_input: DiagnosisInput) -> MechanicalM
     except NothingToDiagnose as refusal:
         raise StudyError(
             "Model and recording do not belong together",
-            _sentences(refusal.problems),
+            _join_sentences(refusal.problems),
             f"Correct {path.name}, or give the model of the device that was recorded; without --model a linear one is "
             "fitted first.",
             saved="Nothing was written.",
@@ -126,20 +128,20 @@ def read_given_model(path: Path, diagnosis_input: DiagnosisInput) -> MechanicalM
     return model
 
 
-def not_diagnosable_error(problems: Sequence[str], advice: str = "Correct them, or record again.") -> StudyError:
-    """The error for input that cannot be diagnosed."""
+def make_not_diagnosable_error(problems: Sequence[str], advice: str = "Correct them, or record again.") -> StudyError:
+    """Make the error for input that cannot be diagnosed. problems: sentence fragments."""
     return StudyError(
-        "These recordings cannot be diagnosed", _sentences(problems), advice, saved="Nothing was written."
+        "These recordings cannot be diagnosed", _join_sentences(problems), advice, saved="Nothing was written."
     )
 
 
-def _sentences(problems: Sequence[str]) -> str:
-    """Problems as sentences, each with a capital and a full stop."""
+def _join_sentences(problems: Sequence[str]) -> str:
+    """Join problems as sentences, each with a capital and a full stop."""
     return " ".join(f"{begin_sentence(problem).rstrip('.')}." for problem in problems)
 
 
-def _names(sources: Sequence[Path]) -> tuple[str, ...]:
-    """File names; with folder and number where two files have the same name."""
+def _name_sources(sources: Sequence[Path]) -> tuple[str, ...]:
+    """Name the sources by their file names; with folder and number where two files have the same name."""
     names = tuple(source.name for source in sources)
     if len(set(names)) == len(names):
         return names

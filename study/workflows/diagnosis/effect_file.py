@@ -11,7 +11,7 @@ from pathlib import Path
 
 from analysis.diagnosis.document import Diagnosis
 from equalizer.effects.law_entry import LawEntry
-from equalizer.laws.law import Law, law_of
+from equalizer.laws.law import Law, parse_law
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME
 from study.errors import StudyError
 from study.store.disk.text_file import write_text
@@ -102,7 +102,7 @@ def _laws(source: Path) -> list[Law]:
         return [effect.law for effect in read_mechanical_model(source).effects if effect.law is not None]
     document: Diagnosis = read_diagnosis(source / "diagnosis.json" if source.is_dir() else source)
     laws = [effect.law for effect in document.effects] + [candidate.law for candidate in document.candidates]
-    return [law_of(law.expression, law.acts_on, law.axis) for law in laws if law is not None]
+    return [parse_law(law.expression, law.acts_on, law.axis) for law in laws if law is not None]
 
 
 def _refusal(explanation: str, advice: str) -> StudyError:

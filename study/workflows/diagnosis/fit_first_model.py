@@ -12,7 +12,7 @@ from typing import Any
 from analysis.diagnosis.data.recorded_conditions import as_recorded, has_carried_weight
 from analysis.diagnosis.first_model.choose_structure import Choice, choose_structure
 from analysis.diagnosis.first_model.model_structures import KINDS, Kind, ParameterEstimate, StructureRefused
-from analysis.diagnosis.result.unit_doubt import constant_sentence
+from analysis.diagnosis.result.unit_doubt import describe_unknown_units
 from analysis.wording import typeset
 from equalizer.plant.mechanical_model import suggest_word
 from study.errors import StudyError, WrongUseError
@@ -21,7 +21,7 @@ from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.workflows.diagnosis.diagnosis_input import read_input
 from study.workflows.free_name import require_free
 
-TITLE = "The model was not made"
+ERROR_TITLE = "The model was not made"
 """Title of each error message of this command."""
 
 
@@ -51,15 +51,16 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
     """Fit a model and write it. `on_progress(share)`, 0 to 1. Raises StudyError for a folder, for recordings with an
     added weight, and where no structure fits; nothing is written then."""
     requested_kind = _parse_structure(plan.structure)
-    require_free(plan.out, title=TITLE, kind="models")
+    require_free(plan.out, title=ERROR_TITLE, kind="models")
     if folders := [path for path in plan.recordings if path.is_dir()]:
         raise StudyError(
-            TITLE, f"{folders[0]} is a folder, and a model is fitted to recordings.", "Give its recordings, REC.h5.",
+            ERROR_TITLE, f"{folders[0]} is a folder, and a model is fitted to recordings.",
+            "Give its recordings, REC.h5.",
             saved="Nothing was written.",
         )  # fmt: skip
     diagnosis_input = read_input(plan.recordings, 1, True, plan.force_constants)
     if has_carried_weight(diagnosis_input.recordings):
-        raise _refusal(
+        raise _make_refusal_error(
             "A recording was made with a weight on the handle, and a model fitted to it would include the weight."
         )
     try:
@@ -68,8 +69,8 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
         subject, verb = (
             ("No structure", "can") if requested_kind is None else (f"The structure {requested_kind}", "cannot")
         )
-        raise _refusal(f"{subject} {verb} be fitted to these recordings: {refusal}.") from refusal
-    origin = {
+        raise _make_refusal_error(f"{subject} {verb} be fitted to these recordings: {refusal}.") from refusal
+    provenance = {
         **gather_provenance(parents=diagnosis_input.parents).as_dict(),
         "structure": choice.fit.kind,
         "reason": choice.reason,
@@ -77,37 +78,44 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
         "held_out_error": max(choice.fit.held_out),
     }
     write_mechanical_model(
-        plan.out, replace(as_recorded(choice.fit.model, diagnosis_input.recordings[0]), provenance=origin)
+        plan.out, replace(as_recorded(choice.fit.model, diagnosis_input.recordings[0]), provenance=provenance)
     )
     on_progress(1.0)
     return FirstModel(
         plan,
         choice,
-        (*diagnosis_input.remarks, *filter(None, [constant_sentence(choice.fit.model)]), *choice.fit.remarks),
+        (*diagnosis_input.remarks, *filter(None, [describe_unknown_units(choice.fit.model)]), *choice.fit.remarks),
     )
 
 
-def first_model_lines(done: FirstModel) -> tuple[str, ...]:
-    """Lines for the terminal: the chosen structure and the reason, errors of the structures tried, parameters with 95 %
-    intervals, held-out error of each channel (%), and a sentence on the error that remains."""
-    choice, fit = done.choice, done.choice.fit
-    rows = [_row(parameter) for parameter in fit.parameters]
-    errors = [
+def format_first_model(first_model: FirstModel) -> tuple[str, ...]:
+    """Format lines for the terminal: the chosen structure and the reason, errors of the structures tried, parameters
+    with 95 % intervals, held-out error of each channel (%), and a sentence on the error that remains."""
+    choice, fit = first_model.choice, first_model.choice.fit
+    parameter_lines = [_format_parameter(parameter) for parameter in fit.parameters]
+    error_lines = [
         f"Held-out error at {name}: {100 * error:.3g} % of the {fit.compared}"
         for name, error in zip(fit.channels, fit.held_out, strict=True)
     ]
-    attempts = [
+    attempt_lines = [
         f"  {attempt.kind}: " + (attempt.refusal if attempt.error is None else f"{100 * attempt.error:.3g} %")
         for attempt in choice.tried
     ]
-    return (str(done.plan.out), f"Structure: {fit.kind}. {choice.reason}", *attempts, *rows, *errors, choice.remains)
+    return (
+        str(first_model.plan.out),
+        f"Structure: {fit.kind}. {choice.reason}",
+        *attempt_lines,
+        *parameter_lines,
+        *error_lines,
+        choice.remains,
+    )
 
 
-def first_model_summary(done: FirstModel) -> dict[str, Any]:
-    """The fitted model as plain values, for one JSON document."""
-    choice, fit = done.choice, done.choice.fit
+def summarize_first_model(first_model: FirstModel) -> dict[str, Any]:
+    """Summarize the fitted model as plain values, for the JSON document of `hapteq model --json`."""
+    choice, fit = first_model.choice, first_model.choice.fit
     return {
-        "model": str(done.plan.out),
+        "model": str(first_model.plan.out),
         "structure": fit.kind,
         "reason": choice.reason,
         "numbers": [
@@ -119,21 +127,21 @@ def first_model_summary(done: FirstModel) -> dict[str, Any]:
         "held_out": dict(zip(fit.channels, fit.held_out, strict=True)),
         "tried": [{"structure": t.kind, "error": t.error, "why_not": t.refusal} for t in choice.tried],
         "remains": choice.remains,
-        "remarks": list(done.remarks),
+        "remarks": list(first_model.remarks),
     }  # fmt: skip
 
 
-def _row(estimate: ParameterEstimate) -> str:
-    """A parameter with its unit and, where it is known, its 95 % interval."""
-    value = typeset(f"{estimate.value:.4g}")
+def _format_parameter(estimate: ParameterEstimate) -> str:
+    """Format a parameter with its unit and, where it is known, its 95 % interval."""
+    value_text = typeset(f"{estimate.value:.4g}")
     if estimate.half_width is None:
-        return f"  {estimate.name}: {value} {estimate.unit}"
-    low, high = (typeset(f"{estimate.value + sign * estimate.half_width:.4g}") for sign in (-1, 1))
-    return f"  {estimate.name}: {value} {estimate.unit} (95 %: {low} to {high})"
+        return f"  {estimate.name}: {value_text} {estimate.unit}"
+    low_text, high_text = (typeset(f"{estimate.value + sign * estimate.half_width:.4g}") for sign in (-1, 1))
+    return f"  {estimate.name}: {value_text} {estimate.unit} (95 %: {low_text} to {high_text})"
 
 
 def _parse_structure(structure: str) -> Kind | None:
-    """The requested structure; None for "auto". Raises WrongUseError."""
+    """Find the requested structure; None for "auto". Raises WrongUseError for an unknown name."""
     if structure == "auto":
         return None
     for kind in KINDS:
@@ -147,8 +155,9 @@ def _parse_structure(structure: str) -> Kind | None:
     )
 
 
-def _refusal(explanation: str) -> StudyError:
+def _make_refusal_error(explanation: str) -> StudyError:
+    """Make the error for recordings to which no first model can be fitted."""
     return StudyError(
-        TITLE, explanation, "Choose another --structure, or record positions or velocities along every command.",
+        ERROR_TITLE, explanation, "Choose another --structure, or record positions or velocities along every command.",
         saved="Nothing was written.",
     )  # fmt: skip

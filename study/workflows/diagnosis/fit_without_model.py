@@ -13,7 +13,7 @@ from analysis.diagnosis.first_model.first_model import FirstModel
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.plant.mechanical_model import MechanicalModel
-from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, not_diagnosable_error
+from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, make_not_diagnosable_error
 from study.workflows.forked_map import map_forked
 
 GIVE_A_MODEL = "Give a model of the device alone with --model, or a recording that carries one."
@@ -31,7 +31,7 @@ def first_model_of(
     time_left, guard = bounds
 
     def fit_by_balance() -> FirstModel | None:
-        return fit_without_model.first_model_of(
+        return fit_without_model.fit_first_model(
             diagnosis_input.recordings, excluded_effects, time_left, on_progress, map_forked
         )
 
@@ -57,4 +57,4 @@ def _translate_refusals() -> Iterator[None]:
     try:
         yield
     except NothingToDiagnose as refusal:
-        raise not_diagnosable_error(refusal.problems, GIVE_A_MODEL) from refusal
+        raise make_not_diagnosable_error(refusal.problems, GIVE_A_MODEL) from refusal

@@ -30,7 +30,7 @@ def find_references(session: Path) -> SessionReferences | None:
     Raises StudyError where the session cannot be read."""
     folder = find_session(str(session), session.absolute().parent)
     folded_session = fold_session(folder)
-    if not folded_session.state.protocol.probes.played:
+    if not folded_session.state.protocol.probes.is_enabled:
         return None
     events = folded_session.log_contents.events
     kinds = {event.number: event.kind for event in events if isinstance(event, ProbePlayed)}
@@ -61,5 +61,5 @@ def _drifts(folder: SessionFolder, folded_session: FoldedSession) -> tuple[str, 
     watched = begin_watching(folded_session.state.opened, folded_session.state.protocol)
     for event in folded_session.log_contents.events[1:]:
         watched = apply_followed_event(watched, event)
-    text = "; ".join(drift.sentence for drift in DriftReader(folder).look(watched.probes))
+    text = "; ".join(drift.sentence for drift in DriftReader(folder).update(watched.probes))
     return (f"In its {len(watched.probes)} probes {f'there changed: {text}' if text else 'no change was detected'}.",)

@@ -1,7 +1,7 @@
-"""Summary of `hapteq twin`, which writes the nominal mechanical model of a device: its parameters and prediction error.
+"""Summary of the mechanical model that `hapteq twin` wrote: its parameters and its prediction error.
 
-The same figures as lines for the terminal and as plain values for JSON. Errors are relative (rms over that of the
-channel).
+`study.cli.twin` prints it, as lines of text or as plain values in JSON. Errors are rms errors relative to the rms of
+the measured channel.
 """
 
 from dataclasses import asdict
@@ -15,8 +15,9 @@ from equalizer.signals.signal import FloatArray
 from study.workflows.diagnosis.write_twin import WrittenTwin
 
 
-def twin_summary(twin: WrittenTwin) -> dict[str, Any]:
-    """The written model as plain values, for one JSON document."""
+def summarise_twin(twin: WrittenTwin) -> dict[str, Any]:
+    """Parameters, tolerances and errors of the written model as plain values, for a JSON document; units by the suffix
+    of a key."""
     model, fit, tolerance = twin.model, twin.fit, twin.model.tolerance
     return {
         "model": str(twin.plan.out),
@@ -27,7 +28,7 @@ def twin_summary(twin: WrittenTwin) -> dict[str, Any]:
             "damping_n_s_per_m": twin.rigid_body.damping.tolist(),
             "of_friction_n_s_per_m": twin.rigid_body.of_friction.tolist(),
         },
-        "modes_hz": _modes_hz(twin),
+        "modes_hz": _compute_modes_hz(twin),
         "tolerance": None if tolerance is None else asdict(tolerance),
         "band_hz": list(fit.band_hz),
         "held_out": fit.held_out,
@@ -37,41 +38,44 @@ def twin_summary(twin: WrittenTwin) -> dict[str, Any]:
     }
 
 
-def twin_lines(twin: WrittenTwin) -> tuple[str, ...]:
-    """Lines for the terminal: the rigid body, its modes, and the error of each channel."""
+def format_twin_lines(twin: WrittenTwin) -> tuple[str, ...]:
+    """The same as lines of text for the terminal: the rigid body, its modes, and the error of each channel."""
     model, fit, tolerance = twin.model, twin.fit, twin.model.tolerance
-    rigid_body, mass_open = twin.rigid_body, _range(tolerance, "mass_kg")
+    rigid_body, mass_tolerance_text = twin.rigid_body, _format_deviation(tolerance, "mass_kg")
     lines = [
-        f"As one rigid body, up to {rigid_body.up_to_hz:.3g} Hz: mass {_values(rigid_body.mass)} kg{mass_open}, "
-        f"damping {_values(rigid_body.damping)} N s/m, {_values(rigid_body.of_friction)} N s/m of it from friction and "
-        f"subtracted{_range(tolerance, 'damping_n_s_per_m')}",
+        f"As one rigid body, up to {rigid_body.up_to_hz:.3g} Hz: mass {_format_values(rigid_body.mass)} "
+        f"kg{mass_tolerance_text}, damping {_format_values(rigid_body.damping)} N s/m, "
+        f"{_format_values(rigid_body.of_friction)} N s/m of it "
+        f"from friction and subtracted{_format_deviation(tolerance, 'damping_n_s_per_m')}",
     ]
-    if modes := _modes_hz(twin):
-        swing = ", ".join(f"{frequency_hz:.3g}" for frequency_hz in modes)
-        lines.append(f"{model.coordinates} coordinates; modes of the bodies on the driven axes: {swing} Hz")
+    if modes_hz := _compute_modes_hz(twin):
+        modes_text = ", ".join(f"{frequency_hz:.3g}" for frequency_hz in modes_hz)
+        lines.append(f"{model.coordinates} coordinates; modes of the bodies on the driven axes: {modes_text} Hz")
     for error in fit.errors:
         held_out_text = "" if error.held_out is None else f", {error.held_out:.1%} on held-out samples"
-        noise = "" if error.noise is None else f" (noise {error.noise:.1%})"
+        noise_text = "" if error.noise is None else f" (noise {error.noise:.1%})"
         lines.append(
-            f"{error.channel}: error {error.fit:.1%}{held_out_text}{noise}, {fit.band_hz[0]:g} to {fit.band_hz[1]:g} Hz"
+            f"{error.channel}: error {error.fit:.1%}{held_out_text}{noise_text}, {fit.band_hz[0]:g} to "
+            f"{fit.band_hz[1]:g} Hz"
         )
     return tuple(lines)
 
 
-def _modes_hz(twin: WrittenTwin) -> list[float]:
-    """Natural frequencies (Hz), ascending, of the bodies behind the driven axes with these held still:
-    sqrt(k / m) / 2 pi of each, exact where no two bodies are joined to each other."""
-    model, m = twin.model, twin.model.inputs
-    ratio = np.diag(model.stiffness)[m:] / np.diag(model.mass)[m:]
-    return sorted(float(frequency) for frequency in np.sqrt(np.maximum(ratio, 0.0)) / (2 * np.pi))
+def _compute_modes_hz(twin: WrittenTwin) -> list[float]:
+    """Natural frequencies (Hz), ascending, of the bodies coupled to the driven axes, with the driven axes fixed: sqrt(k
+    / m) / (2 pi) for each body, which is exact where no two of the bodies are coupled to each other."""
+    model, input_count = twin.model, twin.model.inputs
+    stiffness_per_mass = np.diag(model.stiffness)[input_count:] / np.diag(model.mass)[input_count:]
+    return sorted(float(frequency_hz) for frequency_hz in np.sqrt(np.maximum(stiffness_per_mass, 0.0)) / (2 * np.pi))
 
 
-def _values(values: FloatArray) -> str:
-    """Three digits each, separated by commas."""
+def _format_values(values: FloatArray) -> str:
+    """Values with three significant digits, separated by commas."""
     return ", ".join(typeset(f"{value:.3g}") for value in values)
 
 
-def _range(tolerance: Tolerance | None, name: str) -> str:
-    """The standard deviation of a parameter in brackets; empty where it is not known."""
-    value = None if tolerance is None else getattr(tolerance, name)
-    return "" if value is None else f" (± {value:.2g})"
+def _format_deviation(tolerance: Tolerance | None, parameter_name: str) -> str:
+    """The standard deviation of a parameter as text in brackets; empty where it is not known. parameter_name: field of
+    `Tolerance`."""
+    deviation = None if tolerance is None else getattr(tolerance, parameter_name)
+    return "" if deviation is None else f" (± {deviation:.2g})"

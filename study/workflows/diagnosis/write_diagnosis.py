@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from analysis.diagnosis.result.findings import Findings
-from analysis.figures.diagnosis.diagnosis_pictures import diagnosis_drawings
+from analysis.figures.diagnosis.diagnosis_pictures import list_drawings
 from analysis.figures.picture import Picture
 from analysis.reports.diagnosis_report import render_diagnosis_report
 from study.local_clock import local_now
@@ -30,7 +30,7 @@ def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Pat
     improved = replace(findings.improved, provenance=origin.as_dict())
     write_mechanical_model(folder / MODEL_NAME, improved)
     guard = crash_guard()
-    parts = [replace(part, work=partial(_draw_pictures, part.work)) for part in diagnosis_drawings(findings)]
+    parts = [replace(part, work=partial(_draw_pictures, part.work)) for part in list_drawings(findings)]
     drawn_pictures = [
         drawn_picture for part_pictures in guard.run_parts(map_forked, parts) for drawn_picture in part_pictures
     ]

@@ -1,4 +1,5 @@
-"""Identification of a device's nominal mechanical model (digital twin) from recordings made for this purpose.
+"""Identification of a device's nominal mechanical model (digital twin) from recordings made for this purpose; the
+workflow of `hapteq twin`.
 
 Steps: record multisines at two amplitudes well above friction; fit masses, dampings, stiffnesses and modes to the
 stronger recording; estimate the equivalent viscous damping of dry friction from the increase of damping at the lower
@@ -32,20 +33,20 @@ from study.store.formats.calibration_file import read_calibration
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
-from study.workflows.diagnosis.twin_calibration import calibration_notes, check_same_device, inertia_effects
+from study.workflows.diagnosis.twin_calibration import check_same_device, describe_calibration, make_inertia_effects
 from study.workflows.free_name import require_free
 from study.workflows.recording.record_device import RecordingPlan, record_device
 
 TITLE = "The model was not made"
 """Title of the errors of this workflow."""
-STANDARD_GRAVITY = 9.80665
+STANDARD_GRAVITY_MPS2 = 9.80665
 """Standard acceleration of free fall (m/s²), exact by definition (CGPM 1901)."""
-SENSOR = SensorLimits(bandwidth_hz=500.0, range=3 * STANDARD_GRAVITY)
+SENSOR = SensorLimits(bandwidth_hz=500.0, range=3 * STANDARD_GRAVITY_MPS2)
 """Bandwidth (Hz) and range (m/s²) of the accelerometer ADXL335, by its data sheet; the bandwidth follows from the
 filter capacitors of its board."""
 ACTUATOR = ActuatorLimits(bandwidth_hz=600.0)
-"""Assumed bandwidth (Hz) of the motors' current loops; typical, not measured."""
-LOWER_LEVEL = 0.6
+"""Assumed bandwidth (Hz) of the motors' current loops: a typical value, not measured."""
+WEAKER_AMPLITUDE_RATIO = 0.6
 """Amplitude of the second recording relative to the first: the equivalent viscous damping of dry friction is inversely
 proportional to the amplitude of motion, true viscous damping does not depend on it."""
 
@@ -57,10 +58,11 @@ class TwinPlan:
     out: Path
     device: str = "simulated"
     seed: int = 1
+    """Seed of the simulated device's noise."""
     protocol: str = "multisine"
     """Recording protocol with multisines along x, y and z: name of a shipped protocol, or a file."""
     band_hz: tuple[float, float] = (3.0, 60.0)
-    """Fitted band: the study's frequencies with a margin. Modes above it would slow down every simulation."""
+    """Fitted band: the frequencies of the shipped study with a margin. Modes above it would slow down simulations."""
     calibration: Path | None = None
     """Calibration of the device's linkage, if any. The model then states how the inertia changes along each axis; a
     simulated device is given the calibration's linkage and masses."""
@@ -91,7 +93,7 @@ def write_twin(
     on_progress: Callable[[float], None],
     before_moving: BeforeMoving = refuse_unannounced,
 ) -> WrittenTwin:
-    """Record, fit and write the model. on_progress: called with the share done, 0 to 1. before_moving: as for
+    """Record, fit and write the model. on_progress: called with the fraction done, 0 to 1. before_moving: as for
     `record_device`. Raises StudyError, and then writes no model."""
     check_output_and_band(plan)
     calibration = None if plan.calibration is None else read_calibration(plan.calibration)
@@ -107,11 +109,11 @@ def write_twin(
             check_same_device(calibration, stronger.device, TITLE)
         weaker = _record_and_read(recording_plans[1], lambda share: on_progress(0.15 + 0.15 * share), before_moving)
     fit, rigid_body = _fit_models(plan, stronger, weaker, lambda share: on_progress(0.3 + 0.6 * share))
-    linear = remove_friction_damping(fit.model, rigid_body.of_friction)
+    frictionless_model = remove_friction_damping(fit.model, rigid_body.of_friction)
     model = replace(
-        linear,
+        frictionless_model,
         name=f"{stronger.device}, as identified",
-        effects=() if calibration is None else inertia_effects(linear, calibration),
+        effects=() if calibration is None else make_inertia_effects(frictionless_model, calibration),
         tolerance=rigid_body.tolerance,
         provenance=_gather_model_provenance(plan, protocol, stronger, fit),
     )
@@ -119,14 +121,14 @@ def write_twin(
     on_progress(1.0)
     notes = _describe_assumptions(stronger, fit, rigid_body)
     if calibration is not None:
-        notes += calibration_notes(model, rigid_body.mass, calibration)
+        notes += describe_calibration(model, rigid_body.mass, calibration)
     return WrittenTwin(plan, model, fit, rigid_body, notes)
 
 
 def _fit_models(
     plan: TwinPlan, stronger: Recording, weaker: Recording, on_progress: Callable[[float], None]
 ) -> tuple[MechanicalFit, RigidBody]:
-    """Fit of the whole band, and rigid-body fit of both recordings. Raises StudyError where a fit is refused."""
+    """Fit the whole band, and a rigid body to both recordings. Raises StudyError where a fit is refused."""
     settings = MechanicalFitSettings(
         band_hz=plan.band_hz, sensor=SENSOR, actuator=ACTUATOR, joint=True, fit_delay=False
     )
@@ -145,11 +147,11 @@ def _fit_models(
 def check_output_and_band(plan: TwinPlan) -> None:
     """Check the output path and the band, before anything moves. Raises StudyError."""
     require_free(plan.out, title=TITLE, kind="models", saved="Nothing moved and nothing was written.")
-    low, high = plan.band_hz
-    if not (math.isfinite(low) and math.isfinite(high) and 0 < low < high):
+    low_hz, high_hz = plan.band_hz
+    if not (math.isfinite(low_hz) and math.isfinite(high_hz) and 0 < low_hz < high_hz):
         raise WrongUseError(
             "There is no such band",
-            f"--band is {low:g} to {high:g} Hz; it must rise, from above zero.",
+            f"--band is {low_hz:g} to {high_hz:g} Hz; it must rise, from above zero.",
             "Correct --band.",
             saved="Nothing moved and nothing was written.",
         )
@@ -169,17 +171,19 @@ def _require_three_axes(plan: TwinPlan, protocol: RecordingProtocol) -> None:
 
 
 def _reduce_amplitudes(protocol: RecordingProtocol) -> RecordingProtocol:
-    """The protocol with all amplitudes multiplied by `LOWER_LEVEL`."""
-    segments = tuple(replace(segment, amplitude_n=LOWER_LEVEL * segment.amplitude_n) for segment in protocol.segments)
-    return replace(protocol, segments=segments)
+    """The protocol with all amplitudes multiplied by `WEAKER_AMPLITUDE_RATIO`."""
+    weaker_segments = tuple(
+        replace(segment, amplitude_n=WEAKER_AMPLITUDE_RATIO * segment.amplitude_n) for segment in protocol.segments
+    )
+    return replace(protocol, segments=weaker_segments)
 
 
 def _record_and_read(
     plan: RecordingPlan, on_progress: Callable[[float], None], before_moving: BeforeMoving
 ) -> Recording:
-    """Record by the plan and read the recording back. on_progress: share done, 0 to 1."""
-    total = max(plan.total_s, 1e-9)
-    record_device(plan, lambda seconds: on_progress(min(seconds / total, 1.0)), before_moving)
+    """Record by the plan and read the recording back. on_progress: called with the fraction done, 0 to 1."""
+    total_s = max(plan.total_s, 1e-9)
+    record_device(plan, lambda seconds: on_progress(min(seconds / total_s, 1.0)), before_moving)
     return _assign_test_roles(read_recording(plan.out))
 
 
@@ -223,16 +227,16 @@ def _gather_model_provenance(
 def _describe_assumptions(stronger: Recording, fit: MechanicalFit, rigid_body: RigidBody) -> tuple[str, ...]:
     """Sentences for the user on the assumptions of the model and on the damping that was subtracted."""
     feedback = stronger.meta.get("feedback") or {}
-    stiffness = float(feedback.get("stiffness_n_per_m", 0.0))
+    stiffness_n_per_m = float(feedback.get("stiffness_n_per_m", 0.0))
     return (
-        f"The model is from the whole command to the acceleration: the virtual spring of {stiffness:.0f} N/m pushed as "
-        "a part of the command, so it is not in the model's stiffness.",
+        f"The model is from the whole command to the acceleration: the virtual spring of {stiffness_n_per_m:.0f} N/m "
+        "pushed as a part of the command, so it is not in the model's stiffness.",
         "The sensor's bandwidth and range are those of its data sheet; for the current loops "
         f"{ACTUATOR.bandwidth_hz:g} Hz are assumed.",
         "Cables lie between drives and handle. Force and acceleration do not determine how the mass is divided "
         "between the two sides of a cable: half on each side is assumed.",
         "Dry friction is no part of a linear model: it appears as additional damping, which decreases as the force "
-        f"increases. From the change when the force was lowered to {LOWER_LEVEL:.0%}, "
+        f"increases. From the change when the force was lowered to {WEAKER_AMPLITUDE_RATIO:.0%}, "
         f"{', '.join(f'{damping:.3g}' for damping in rigid_body.of_friction)} N s/m were attributed to friction and "
         "subtracted.",
         fit.reason,

@@ -16,12 +16,12 @@ from equalizer.tracking.bands.narrow_and_wide_models import BandFacts, solve_ban
 from equalizer.tracking.compensation.effect_compensation import Compensation, compensate
 from equalizer.tracking.feedforward.feedforward import Feedforward, FeedforwardSettings
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY, Trajectory, require_rate
-from equalizer.tracking.lqr.limits import ForceLimitError, Peaks, require_under_cap
+from equalizer.tracking.lqr.limits import ForceLimitError, ForcePeaks, require_under_cap
 from equalizer.tracking.workspace.feedforward_at_place import feedforward_at
 from study.errors import StudyError, WrongUseError
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
-from study.workflows.equalizer.playback_models import PlaybackModels, Vector, peak_gain, read_playback_models
+from study.workflows.equalizer.playback_models import PlaybackModels, Vector, compute_peak_gain, read_playback_models
 from study.workflows.free_name import require_free
 
 HIGHEST_MPS2 = 1e4
@@ -61,7 +61,7 @@ class EqualizedTrajectory:
     models: PlaybackModels
     feedforward: Feedforward
     """Feedforward from the linear models alone."""
-    peaks: Peaks
+    peaks: ForcePeaks
     """Force peaks of `forces`."""
     bands: BandFacts | None
     compensation: Compensation | None
@@ -82,7 +82,7 @@ def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
     physics = None if plan.physics is None else read_mechanical_model(plan.physics)
     amplitude_n = None if physics is None else _amplitude_n(models.nearest)
     try:
-        require_rate(reference, models.largest.sample_rate_hz)
+        require_rate(reference, models.most_weighted.sample_rate_hz)
         feedforward, bands = _solve(plan, reference, models)
     except ForceLimitError as limit:
         raise StudyError(
@@ -97,7 +97,7 @@ def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
     _require_reached(plan, feedforward, in_bands=bands is not None)
     compensation = None
     if physics is not None:
-        compensation = _compensate(plan, feedforward, models.largest, physics, amplitude_n)
+        compensation = _compensate(plan, feedforward, models.most_weighted, physics, amplitude_n)
     samples = feedforward.forces.samples if compensation is None else compensation.forces
     forces = replace(feedforward.forces, samples=samples)
     peaks = require_under_cap(samples, plan.cap_n, forces.sample_rate_hz)
@@ -132,7 +132,7 @@ def _read_reference(path: Path) -> Trajectory:
 
 
 def _require_weight(plan: EqualizePlan, models: PlaybackModels) -> None:
-    if math.sqrt(plan.weight) < LEAST_WEIGHT_RATIO * max(peak_gain(model) for model in models.all_models):
+    if math.sqrt(plan.weight) < LEAST_WEIGHT_RATIO * max(compute_peak_gain(model) for model in models.all_models):
         raise StudyError(
             "The forces were not computed",
             f"--weight {plan.weight:g} is too small to keep forces finite where the model hardly moves.",
@@ -167,7 +167,7 @@ def _require_reached(plan: EqualizePlan, feedforward: Feedforward, in_bands: boo
 def _solve(plan: EqualizePlan, reference: Trajectory, models: PlaybackModels) -> tuple[Feedforward, BandFacts | None]:
     settings = FeedforwardSettings(plan.weight, plan.cap_n, plan.constrain)
     if models.two_bands is None:
-        return feedforward_at(models.at, reference.signal, settings), None
+        return feedforward_at(models.at_place, reference.signal, settings), None
     banded = solve_banded_feedforward(models.two_bands, reference.signal, settings)
     return banded.feedforward, banded.facts
 

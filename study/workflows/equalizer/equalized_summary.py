@@ -1,36 +1,37 @@
-"""Summary of `hapteq equalize`: how well the computed forces are expected to produce the wanted accelerations.
+"""Summary of `hapteq equalize`: predicted accuracy of the accelerations that the computed forces produce.
 
-The same figures as lines for the terminal and as plain values for JSON. Prediction errors are relative to
-the wanted signal (rms).
+`study.cli.equalize` prints it, as lines of text or as plain values in JSON; `repeat_trajectory` extends it by measured
+errors. Predicted errors are rms errors relative to the rms of the reference trajectory, the accelerations that the
+device is to reproduce.
 """
 
 from typing import Any
 
 import numpy as np
 
-from equalizer.plant.model_quality import quality_document, quality_sentence
+from equalizer.plant.model_quality import convert_quality_to_json, write_quality_sentence
 from equalizer.tracking.feedforward.feedforward import extract_band
 from study.workflows.equalizer.equalize_trajectory import EqualizedTrajectory
 
-WORTH_SAYING = 0.01
-"""Fraction (rms) of the wanted signal, or of the forces, outside the band above which it is mentioned."""
+MIN_REPORTED_SHARE = 0.01
+"""Smallest fraction (rms) of the reference trajectory, or of the forces, outside the band that is reported."""
 
 
-def summary(done: EqualizedTrajectory) -> dict[str, Any]:
-    """The figures as plain values; units by the suffix of a key, errors as fractions."""
-    feedforward, bands, compensation = done.feedforward, done.bands, done.compensation
+def summarise_equalization(equalized: EqualizedTrajectory) -> dict[str, Any]:
+    """The results as plain values, for a JSON document; units by the suffix of a key, errors as fractions."""
+    feedforward, bands, compensation = equalized.feedforward, equalized.bands, equalized.compensation
     values: dict[str, Any] = {
-        "forces": str(done.plan.out),
-        "quality": quality_document(done.models.quality),
-        "quality_of_models": [quality_document(model.quality) for model in done.models.all_models],
-        "band_hz": list(done.models.band_hz),
-        "predicted_error": predicted_error(done),
+        "forces": str(equalized.plan.out),
+        "quality": convert_quality_to_json(equalized.models.quality),
+        "quality_of_models": [convert_quality_to_json(model.quality) for model in equalized.models.all_models],
+        "band_hz": list(equalized.models.band_hz),
+        "predicted_error": get_predicted_error(equalized),
         "left_out": feedforward.out_of_band_share,
-        "peak_n": done.peaks.peak_n,
-        "cap_n": done.peaks.cap_n,
+        "peak_n": equalized.peaks.peak_n,
+        "cap_n": equalized.peaks.cap_n,
         "capped": None,
-        "place_m": list(done.models.at.place_m),
-        "remarks": [*done.models.held_out, *done.models.remarks],
+        "place_m": list(equalized.models.at_place.place_m),
+        "remarks": [*equalized.models.held_out_remarks, *equalized.models.remarks],
     }
     if feedforward.loss is not None:
         values["capped"] = {
@@ -38,7 +39,7 @@ def summary(done: EqualizedTrajectory) -> dict[str, Any]:
             "error_capped": feedforward.loss.error_capped,
             "error_clipped": feedforward.loss.error_clipped,
         }
-    values |= _interpolation_facts(done)
+    values |= _summarise_interpolation(equalized)
     if bands is not None:
         values["bands"] = {
             "edges_hz": list(bands.edges_hz),
@@ -55,9 +56,10 @@ def summary(done: EqualizedTrajectory) -> dict[str, Any]:
     return values
 
 
-def _interpolation_facts(done: EqualizedTrajectory) -> dict[str, Any]:
-    """How the models were interpolated, and the errors of both methods at held-out places; empty without a choice."""
-    choice = done.models.choice
+def _summarise_interpolation(equalized: EqualizedTrajectory) -> dict[str, Any]:
+    """Method that interpolates models of several places, and the errors of both methods at places left out of the
+    interpolation (cross-validation). Empty where the models are of a single place."""
+    choice = equalized.models.choice
     if choice is None:
         return {}
     return {
@@ -73,80 +75,94 @@ def _interpolation_facts(done: EqualizedTrajectory) -> dict[str, Any]:
     }
 
 
-def summary_lines(done: EqualizedTrajectory) -> tuple[str, ...]:
-    """The figures as terminal lines."""
-    feedforward = done.feedforward
-    lines = [*_quality_lines(done), *done.models.held_out, _prediction_line(done), *done.models.remarks]
-    lines += _band_lines(done)
-    if feedforward.out_of_band_share > WORTH_SAYING:
+def format_equalization_lines(equalized: EqualizedTrajectory) -> tuple[str, ...]:
+    """The results as lines of text for the terminal."""
+    feedforward = equalized.feedforward
+    lines = [
+        *_format_quality_lines(equalized),
+        *equalized.models.held_out_remarks,
+        _format_prediction_line(equalized),
+        *equalized.models.remarks,
+    ]
+    lines += _format_band_lines(equalized)
+    if feedforward.out_of_band_share > MIN_REPORTED_SHARE:
         lines.append(
             f"{100 * feedforward.out_of_band_share:.0f} % of the wanted acceleration (rms) lies outside the "
-            f"{'bands' if done.bands else 'band'} and is not played."
+            f"{'bands' if equalized.bands else 'band'} and is not played."
         )
-    if feedforward.loss is not None and done.bands is None and (outside := _force_outside(done)) > WORTH_SAYING:
+    if (
+        feedforward.loss is not None
+        and equalized.bands is None
+        and (force_share := _compute_out_of_band_force_share(equalized)) > MIN_REPORTED_SHARE
+    ):
         lines.append(
-            f"Forces that are held at the cap have corners: {100 * outside:.0f} % of them (rms) lies outside the "
+            f"Forces that are held at the cap have corners: {100 * force_share:.0f} % of them (rms) lies outside the "
             "band, where the model does not describe the device's response."
         )
-    lines += _physics_lines(done)
-    lines.append(_spring_line(done))
+    lines += _format_compensation_lines(equalized)
+    lines.append(_describe_spring_force(equalized))
     return tuple(lines)
 
 
-def _quality_lines(done: EqualizedTrajectory) -> list[str]:
-    """Measured quality of the models, before their own prediction."""
-    models = done.models
+def _format_quality_lines(equalized: EqualizedTrajectory) -> list[str]:
+    """Lines on the measured quality of the models: of a single model, or of the nearest (of two bands, the narrow) and
+    the worst."""
+    models = equalized.models
     worst_quality = models.quality
     if len(models.all_models) == 1:
-        return [quality_sentence(worst_quality), *(worst_quality.remarks if worst_quality else ())]
-    position = "narrower" if models.two_bands is not None else "nearest"
-    nearest, worst = models.nearest.quality, worst_quality
-    lines = [f"Of the {position} model: {quality_sentence(nearest)}"]
-    if worst != nearest:
-        lines.append(f"Of the worst of the {len(models.all_models)} models: {quality_sentence(worst)}")
-    return [*lines, *dict.fromkeys(remark for quality in (nearest, worst) if quality for remark in quality.remarks)]
+        return [write_quality_sentence(worst_quality), *(worst_quality.remarks if worst_quality else ())]
+    model_role = "narrower" if models.two_bands is not None else "nearest"
+    nearest_quality, worst = models.nearest.quality, worst_quality
+    lines = [f"Of the {model_role} model: {write_quality_sentence(nearest_quality)}"]
+    if worst != nearest_quality:
+        lines.append(f"Of the worst of the {len(models.all_models)} models: {write_quality_sentence(worst)}")
+    return [
+        *lines,
+        *dict.fromkeys(remark for quality in (nearest_quality, worst) if quality for remark in quality.remarks),
+    ]
 
 
-def predicted_error(done: EqualizedTrajectory) -> float:
-    """Relative error as the model predicts it. Under an active cap it includes the corners of the capped forces, so
-    that it can be compared with the error without a cap."""
-    loss = done.feedforward.loss
-    return done.feedforward.error if loss is None else loss.error_capped
+def get_predicted_error(equalized: EqualizedTrajectory) -> float:
+    """Relative rms error that the model predicts. Under an active cap this is `TrackingLoss.error_capped`, the error of
+    the capped forces, so that it can be compared with the error without a cap."""
+    loss = equalized.feedforward.loss
+    return equalized.feedforward.error if loss is None else loss.error_capped
 
 
-def _prediction_line(done: EqualizedTrajectory) -> str:
-    """Predicted error, what the cap adds to it, and the highest force."""
-    loss, (low, high) = done.feedforward.loss, done.models.band_hz
-    subject = "the model itself predicts" if len(done.models.all_models) == 1 else "the models themselves predict"
-    cost = ""
+def _format_prediction_line(equalized: EqualizedTrajectory) -> str:
+    """Line on the predicted error, on what the cap adds to it, and on the peak force (N)."""
+    loss, (low_hz, high_hz) = equalized.feedforward.loss, equalized.models.band_hz
+    subject = "the model itself predicts" if len(equalized.models.all_models) == 1 else "the models themselves predict"
+    cap_text = ""
     if loss is not None:
-        cost = (
+        cap_text = (
             f" under the cap, {100 * loss.error_free:.2f} % without it (clipping would have given "
             f"{100 * loss.error_clipped:.2f} %)"
         )
     return (
-        f"As {subject}: error {100 * predicted_error(done):.2f} % of the wanted acceleration within {low:g} to "
-        f"{high:g} Hz{cost}; highest force {done.peaks.peak_n:.3g} N of {done.peaks.cap_n:g} N."
+        f"As {subject}: error {100 * get_predicted_error(equalized):.2f} % of the wanted acceleration within "
+        f"{low_hz:g} to {high_hz:g} Hz{cap_text}; highest force {equalized.peaks.peak_n:.3g} N of "
+        f"{equalized.peaks.cap_n:g} N."
     )
 
 
-def _force_outside(done: EqualizedTrajectory) -> float:
+def _compute_out_of_band_force_share(equalized: EqualizedTrajectory) -> float:
     """Fraction (rms) of the forces outside the model's band."""
-    forces = done.forces.signal.samples
-    outside = forces - extract_band(done.models.nearest, forces)
-    return float(np.linalg.norm(outside) / np.linalg.norm(forces))
+    forces = equalized.forces.signal.samples
+    out_of_band_forces = forces - extract_band(equalized.models.nearest, forces)
+    return float(np.linalg.norm(out_of_band_forces) / np.linalg.norm(forces))
 
 
-def _band_lines(done: EqualizedTrajectory) -> list[str]:
-    """Edges and errors of the three bands; empty where a single band was solved for."""
-    bands, two_bands = done.bands, done.models.two_bands
+def _format_band_lines(equalized: EqualizedTrajectory) -> list[str]:
+    """Lines on the edges (Hz) and errors of the three bands; empty where a single band was solved for."""
+    bands, two_bands = equalized.bands, equalized.models.two_bands
     if bands is None or two_bands is None:
         return []
-    low, high = bands.edges_hz
+    low_hz, high_hz = bands.edges_hz
     lines = [
-        f"Bands: a rigid model below {low:g} Hz (the handle travels {1e3 * bands.travel_m:.1f} mm), the narrower "
-        f"model up to {high:g} Hz, from there to {two_bands.wide.band_hz[1]:g} Hz only the loudness is reproduced, all "
-        "along one direction.",
+        f"Bands: a rigid model below {low_hz:g} Hz (the handle travels {1e3 * bands.travel_m:.1f} mm), the narrower "
+        f"model up to {high_hz:g} Hz, from there to {two_bands.wide.band_hz[1]:g} Hz only the loudness is reproduced, "
+        "all along one direction.",
         "The bands begin before the table's first row and end after its last; only its rows are written, and the "
         f"middle band is solved for them. Its error would be {100 * bands.whole_error:.2f} % if all rows were "
         f"played, and {100 * bands.cut_error:.2f} % if the other rows were simply cut off.",
@@ -158,19 +174,20 @@ def _band_lines(done: EqualizedTrajectory) -> list[str]:
     return lines
 
 
-def _physics_lines(done: EqualizedTrajectory) -> list[str]:
-    """Nonlinear effects that were compensated, and those that were not, with the reason."""
-    compensation = done.compensation
+def _format_compensation_lines(equalized: EqualizedTrajectory) -> list[str]:
+    """Lines on the nonlinear effects that the forces compensate, and on those that they do not, with the reason."""
+    compensation = equalized.compensation
     if compensation is None:
         return []
-    share = f"; {100 * compensation.share:.0f} % of it fits under the cap" if compensation.share < 1 else ""
-    used = ", ".join(effect.kind for effect in compensation.used) or "nothing"
-    lines = [f"Compensated: {used}{share}."]
+    share_text = f"; {100 * compensation.share:.0f} % of it fits under the cap" if compensation.share < 1 else ""
+    compensated_kinds = ", ".join(effect.kind for effect in compensation.used) or "nothing"
+    lines = [f"Compensated: {compensated_kinds}{share_text}."]
     return lines + [f"Not compensated: {effect.kind}: {reason}." for effect, reason in compensation.not_used]
 
 
-def _spring_line(done: EqualizedTrajectory) -> str:
-    """Whether the forces include those of a virtual spring, which depends on the model's input."""
-    if done.models.nearest.provenance.get("input") == "excitation":
+def _describe_spring_force(equalized: EqualizedTrajectory) -> str:
+    """Sentence on whether the forces act together with the virtual spring. For a model from the excitation alone, the
+    recording's spring is part of the model; else the forces are all that enters the device."""
+    if equalized.models.nearest.provenance.get("input") == "excitation":
         return "These forces are for the device under the spring that it was recorded with."
     return "These forces are all that enters the device: a spring that holds the handle is not counted."

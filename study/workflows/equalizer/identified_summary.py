@@ -2,26 +2,26 @@
 
 from typing import Any
 
-from equalizer.plant.model_quality import quality_document, quality_sentence
+from equalizer.plant.model_quality import convert_quality_to_json, write_quality_sentence
 from study.workflows.equalizer.identify_model import IdentifiedDevice
 
 
 def summary(device: IdentifiedDevice) -> dict[str, Any]:
     """Quality, order, band and errors of the identified model as JSON values; errors are relative to the response."""
-    model, tested = device.model, device.tested
+    model, held_out_test = device.model, device.held_out_test
     low, high = model.band_hz
     return {
         "model": str(device.plan.out),
-        "quality": quality_document(model.quality),
+        "quality": convert_quality_to_json(model.quality),
         "order": model.order,
         "band_hz": [low, high],
         "spectral_radius": model.spectral_radius,
         "lines": device.identified.lines,
         "rms_relative_error": device.identified.rms_relative_error,
         "worst_relative_error": device.identified.worst_relative_error,
-        "held_out_error": tested.error if tested else None,
-        "held_out_noise": tested.noise if tested else None,
-        "held_out_s": tested.seconds if tested else None,
+        "held_out_error": held_out_test.error if held_out_test else None,
+        "held_out_noise": held_out_test.noise if held_out_test else None,
+        "held_out_s": held_out_test.seconds if held_out_test else None,
         "freed_of": model.provenance["freed_of"],
         "remarks": list(device.remarks),
     }
@@ -32,7 +32,7 @@ def summary_lines(device: IdentifiedDevice) -> tuple[str, ...]:
     values = summary(device)
     low, high = values["band_hz"]
     lines = [
-        quality_sentence(device.model.quality),
+        write_quality_sentence(device.model.quality),
         f"Order {values['order']}, {low:g} to {high:g} Hz, stable (slowest pole {values['spectral_radius']:.5f}), "
         f"from {values['lines']} lines.",
         f"Model against estimate: {100 * values['rms_relative_error']:.2f} % rms, worst line "

@@ -36,8 +36,8 @@ from study.store.formats.trajectory_file import read_trajectory, write_trajector
 from study.workflows.equalizer.play_forces import (
     announce_motion,
     find_acting_spring,
+    make_playback_settings,
     play_forces,
-    playback_settings,
     read_measured_acceleration,
     require_device_alone,
 )
@@ -224,7 +224,7 @@ def _play_both(
 
 def _make_settings(plan: ContactPlan, models: PlaybackModels, forces: tuple[FloatArray, FloatArray]) -> DeviceSettings:
     """Settings of the device. The slew limit allows the initial step: forces begin at the contact without fade-in."""
-    settings, rate_hz = playback_settings(plan.cap_n, models), models.nearest.sample_rate_hz
+    settings, rate_hz = make_playback_settings(plan.cap_n, models), models.nearest.sample_rate_hz
     steps = [np.linalg.norm(np.diff(command, axis=0, prepend=0, append=0), axis=1).max() for command in forces]
     slew_n_per_s = max(settings.limits.slew_n_per_s, float(max(steps)) * rate_hz + SPRING_SLEW_N_PER_S)
     return replace(settings, limits=replace(settings.limits, slew_n_per_s=slew_n_per_s))

@@ -2,7 +2,7 @@
 
 Three cases: a single model; models of several places, between which the forces or the models are interpolated
 (`equalizer.tracking.workspace`); a narrow and a wide model of the same place (`equalizer.tracking.bands`). Models that
-cannot play a table are refused.
+cannot play a table of accelerations are refused. Used by `equalize_trajectory` and the workflows that play forces.
 """
 
 import hashlib
@@ -14,7 +14,7 @@ import numpy as np
 
 from analysis.wording import format_sentence, typeset
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.plant.model_quality import ModelQuality, worst_quality
+from equalizer.plant.model_quality import ModelQuality, find_worst_quality
 from equalizer.plant.model_response import model_response
 from equalizer.tracking.bands.narrow_and_wide_models import TwoModels
 from equalizer.tracking.feedforward.trajectory import FORCES, TRAJECTORY
@@ -29,11 +29,11 @@ from study.store.formats.identified_model_file import read_identified_model
 
 SAME_PLACE_M = 0.001
 """Largest distance (m) of two places that count as the same: files of the same place may differ by rounding."""
-GAIN_LINES = 100
+GAIN_FREQUENCY_COUNT = 100
 """Number of frequencies in the band, in a geometric series, at which the largest gain is searched."""
-HIGHEST_GAIN = 1e6
-"""Largest plausible gain (m/s^2 per N): no handle weighs a milligram."""
-FAR_M = 0.005
+MAX_PLAUSIBLE_GAIN = 1e6
+"""Largest plausible gain (m/s^2 per N): that of a mass of 1 mg, less than any handle has."""
+WARNING_DISTANCE_M = 0.005
 """Distance (m) from the place of a single model beyond which the user is warned."""
 
 Vector = tuple[float, float, float]
@@ -46,7 +46,7 @@ class PlaybackModels:
 
     all_models: tuple[IdentifiedModel, ...]
     """The models as read, in the order of the files."""
-    at: ModelsAtPlace
+    at_place: ModelsAtPlace
     """Models and weights at the place of playback; for two bands the narrow model only."""
     two_bands: TwoModels | None
     """The narrow and the wide model of two bands; None otherwise."""
@@ -54,7 +54,7 @@ class PlaybackModels:
     """How models of several places are interpolated; None for models of a single place."""
     remarks: tuple[str, ...]
     """Sentences for the user, such as a place far from that of the model."""
-    held_out: tuple[str, ...]
+    held_out_remarks: tuple[str, ...]
     """Sentences on the errors at places that were left out and interpolated from the others (cross-validation)."""
     sha256: str
     """SHA-256 of all files, and of the place where it affects the forces (several places)."""
@@ -62,25 +62,25 @@ class PlaybackModels:
     @property
     def quality(self) -> ModelQuality | None:
         """Quality of the model with the largest error; None if a model states none."""
-        return worst_quality(tuple(model.quality for model in self.all_models))
+        return find_worst_quality(tuple(model.quality for model in self.all_models))
 
     @property
     def nearest(self) -> IdentifiedModel:
         """The given model nearest to the place; for two bands the narrow one."""
         if self.two_bands is not None:
             return self.two_bands.narrow
-        place_m = self.at.place_m
+        place_m = self.at_place.place_m
         return min(self.all_models, key=lambda model: math.dist(model.place_m or place_m, place_m))
 
     @property
     def band_hz(self) -> tuple[float, float]:
         """Band for which an error is predicted: common to all models used."""
-        return select_used_models(self.at)[0][1].band_hz
+        return select_used_models(self.at_place)[0][1].band_hz
 
     @property
-    def largest(self) -> IdentifiedModel:
+    def most_weighted(self) -> IdentifiedModel:
         """The model with the largest weight at the place."""
-        return self.at.models[int(np.argmax(self.at.weights))]
+        return self.at_place.models[int(np.argmax(self.at_place.weights))]
 
 
 def read_playback_models(paths: tuple[Path, ...], at_m: Vector | None, weight: float) -> PlaybackModels:
@@ -89,57 +89,69 @@ def read_playback_models(paths: tuple[Path, ...], at_m: Vector | None, weight: f
     if at_m is not None and not all(map(math.isfinite, at_m)):
         raise WrongUseError(
             "There is no such place",
-            f"--at is {', '.join(f'{part:g}' for part in at_m)}; a place is three numbers, in metres.",
+            f"--at is {', '.join(f'{coordinate_m:g}' for coordinate_m in at_m)}; a place is three numbers, in metres.",
             "Such as --at 0.02 0 0.",
             saved="Nothing was written.",
         )
-    models = tuple(_readable(path) for path in paths)
+    models = tuple(_read_checked_model(path) for path in paths)
     if len(models) == 1:
-        return _single_model(paths, models[0], at_m)
-    if _of_one_place(models):
-        return _two_bands(paths, models, at_m)
+        return _combine_single_model(paths, models[0], at_m)
+    if _are_at_same_place(models):
+        return _combine_two_bands(paths, models, at_m)
     try:
-        return _several_places(paths, WorkspaceModels(models), at_m, weight)
+        return _combine_places(paths, WorkspaceModels(models), at_m, weight)
     except WorkspaceError as problem:
         numbered_files = ", ".join(f"{number}: {path.name}" for number, path in enumerate(paths, start=1))
-        raise _unfit_error(
+        raise _make_unfit_error(
             f"{format_sentence(str(problem))} Models are {numbered_files}.", "Give models that belong together."
         ) from problem
 
 
-def _single_model(paths: tuple[Path, ...], model: IdentifiedModel, at_m: Vector | None) -> PlaybackModels:
-    at = ModelsAtPlace(at_m or model.place_m or (0.0, 0.0, 0.0), (model,), (1.0,))
-    return PlaybackModels((model,), at, None, None, _distance_warning(paths[0], model, at_m), (), _sha256(paths))
+def _combine_single_model(paths: tuple[Path, ...], model: IdentifiedModel, at_m: Vector | None) -> PlaybackModels:
+    """Playback models of one file; the place defaults to that of the model, then to the centre."""
+    models_at_place = ModelsAtPlace(at_m or model.place_m or (0.0, 0.0, 0.0), (model,), (1.0,))
+    return PlaybackModels(
+        (model,), models_at_place, None, None, _warn_of_distance(paths[0], model, at_m), (), _compute_sha256(paths)
+    )
 
 
-def _two_bands(paths: tuple[Path, ...], models: tuple[IdentifiedModel, ...], at_m: Vector | None) -> PlaybackModels:
+def _combine_two_bands(
+    paths: tuple[Path, ...], models: tuple[IdentifiedModel, ...], at_m: Vector | None
+) -> PlaybackModels:
+    """Playback models of a narrow and a wide model of the same place; the wide one has the higher upper band edge.
+    Raises StudyError for more than two models, different sample rates, or models that do not fit together."""
     if len(models) > 2:
-        raise _unfit_error(
+        raise _make_unfit_error(
             f"{len(models)} models are of one place.", "Give one of them, or a narrow and a wide one for bands."
         )
     narrow, wide = sorted(models, key=lambda model: model.band_hz[1])
     if narrow.sample_rate_hz != wide.sample_rate_hz:
-        raise _unfit_error(
+        raise _make_unfit_error(
             f"They run at {narrow.sample_rate_hz:g} and {wide.sample_rate_hz:g} Hz.", "Identify both at one rate."
         )
     try:
         two_bands = TwoModels(narrow, wide)
     except ValueError as problem:
-        raise _unfit_error(
+        raise _make_unfit_error(
             f"Both models are of one place, but {problem}.",
             "Give one of them, or identify both alike (with or without --with-spring), such as --band 5 35 and "
             "--band 5 400 --order 40.",
         ) from problem
-    at = ModelsAtPlace(at_m or narrow.place_m or (0.0, 0.0, 0.0), (narrow,), (1.0,))
-    return PlaybackModels(models, at, two_bands, None, _distance_warning(paths[0], narrow, at_m), (), _sha256(paths))
+    models_at_place = ModelsAtPlace(at_m or narrow.place_m or (0.0, 0.0, 0.0), (narrow,), (1.0,))
+    return PlaybackModels(
+        models, models_at_place, two_bands, None, _warn_of_distance(paths[0], narrow, at_m), (), _compute_sha256(paths)
+    )
 
 
-def _several_places(
+def _combine_places(
     paths: tuple[Path, ...], workspace: WorkspaceModels, at_m: Vector | None, weight: float
 ) -> PlaybackModels:
+    """Playback models of several places: the method of interpolation is chosen by cross-validation. Raises
+    WrongUseError without a place of playback, WorkspaceError for models that do not fit together."""
     if at_m is None:
         places = "; ".join(
-            f"{path.name} {_mm(model.place_m)}" for path, model in zip(paths, workspace.models, strict=True)
+            f"{path.name} {_format_place_mm(model.place_m)}"
+            for path, model in zip(paths, workspace.models, strict=True)
         )
         raise WrongUseError(
             "At which place shall it be played?",
@@ -150,66 +162,74 @@ def _several_places(
     if len({model.provenance.get("input", "command") for model in workspace.models}) > 1:
         raise WorkspaceError("some models include the spring they were recorded under and some do not")
     choice = choose_interpolation(workspace, weight=weight)
-    at = choice.at(at_m)
+    models_at_place = choice.at(at_m)
     remarks = [format_sentence(choice.reason)]
-    outside = place_weights(workspace.places_m, at_m).remark
-    remarks += [format_sentence(remark) for remark in dict.fromkeys((*at.remarks, *([outside] if outside else [])))]
+    outside_remark = place_weights(workspace.places_m, at_m).remark
+    remarks += [
+        format_sentence(remark)
+        for remark in dict.fromkeys((*models_at_place.remarks, *([outside_remark] if outside_remark else [])))
+    ]
     if not choice.checks:
         remarks.append("No place could be held out: what the error is between the models' places is not known.")
-    held_out = tuple(_held_out_sentence(check) for check in choice.checks)
-    return PlaybackModels(workspace.models, at, None, choice, tuple(remarks), held_out, _sha256(paths, at_m))
-
-
-def _held_out_sentence(check: PlaceCheck) -> str:
-    modal = "not possible" if check.modal_error is None else f"{100 * check.modal_error:.1f} %"
-    return (
-        f"Held out {_mm(check.place_m)}: error {100 * check.blended_error:.1f} % (rms over lines) with blended forces, "
-        f"{modal} with resonances interpolated."
+    held_out_remarks = tuple(_describe_held_out_error(check) for check in choice.checks)
+    return PlaybackModels(
+        workspace.models, models_at_place, None, choice, tuple(remarks), held_out_remarks, _compute_sha256(paths, at_m)
     )
 
 
-def _readable(path: Path) -> IdentifiedModel:
+def _describe_held_out_error(check: PlaceCheck) -> str:
+    """Sentence on the errors at a place whose model was left out, with interpolated forces and with interpolated
+    modes."""
+    modal = "not possible" if check.modal_error is None else f"{100 * check.modal_error:.1f} %"
+    return (
+        f"Held out {_format_place_mm(check.place_m)}: error {100 * check.blended_error:.1f} % (rms over lines) with "
+        f"blended forces, {modal} with resonances interpolated."
+    )
+
+
+def _read_checked_model(path: Path) -> IdentifiedModel:
     """Read a model from fx, fy, fz (N) to ax, ay, az (m/s²) and give its channels these names; files may use others
     that end in x, y, z, or numbers. Raises StudyError for other channels or units, an unstable model, or a gain above
-    `HIGHEST_GAIN`."""
+    `MAX_PLAUSIBLE_GAIN`."""
     model = read_identified_model(path)
-    in_order = all(_in_order(names) for names in (model.input_channels, model.output_channels))
-    if not in_order or (model.input_unit, model.output_unit) != (FORCES.unit, TRAJECTORY.unit):
-        raise _unfit_error(
+    has_axis_order = all(_are_axes_in_order(names) for names in (model.input_channels, model.output_channels))
+    if not has_axis_order or (model.input_unit, model.output_unit) != (FORCES.unit, TRAJECTORY.unit):
+        raise _make_unfit_error(
             f"{path.name} goes from {', '.join(model.input_channels)} in {model.input_unit} to "
             f"{', '.join(model.output_channels)} in {model.output_unit}; a table needs a model from fx, fy, fz in N to "
             "ax, ay, az in m/s^2, in this order.",
             "Identify one from recordings of all three axes, with channel names that end in x, y and z.",
         )
     if model.spectral_radius >= 1:
-        raise _unfit_error(
+        raise _make_unfit_error(
             f"The model in {path.name} is not stable (slowest pole {model.spectral_radius:.5f}).",
             "Identify it again with hapteq identify, which makes stable ones only.",
         )
-    if not (gain := peak_gain(model)) <= HIGHEST_GAIN:
-        raise _unfit_error(
-            f"By {path.name} 1 N accelerates the handle with up to {gain:.2g} m/s^2; models up to {HIGHEST_GAIN:g} "
-            "m/s^2 are accepted.",
+    if not (gain := compute_peak_gain(model)) <= MAX_PLAUSIBLE_GAIN:
+        raise _make_unfit_error(
+            f"By {path.name} 1 N accelerates the handle with up to {gain:.2g} m/s^2; models up to "
+            f"{MAX_PLAUSIBLE_GAIN:g} m/s^2 are accepted.",
             "Check the units of the recording that it was made from, and identify it again.",
         )
     return replace(model, input_channels=FORCES.header[1:], output_channels=TRAJECTORY.header[1:])
 
 
-def _in_order(names: tuple[str, ...]) -> bool:
-    """Whether there are three names that end in x, y, z in this order, or none of which ends in these letters."""
+def _are_axes_in_order(names: tuple[str, ...]) -> bool:
+    """Whether there are three names that end in x, y, z in this order, or three names none of which ends in x, y or
+    z."""
     letters = [name[-1:].lower() for name in names]
     return len(names) == 3 and (letters == ["x", "y", "z"] or not set(letters) & set("xyz"))
 
 
-def peak_gain(model: IdentifiedModel) -> float:
-    """Largest magnitude of the response of an output to an input in the band (m/s² per N); NaN or infinity if it
-    overflows."""
+def compute_peak_gain(model: IdentifiedModel) -> float:
+    """Largest magnitude of the response of an output to an input in the band (m/s² per N), over `GAIN_FREQUENCY_COUNT`
+    frequencies; NaN or infinity where the response overflows."""
     with np.errstate(over="ignore", invalid="ignore"):
-        return float(np.abs(model_response(model, np.geomspace(*model.band_hz, GAIN_LINES))).max())
+        return float(np.abs(model_response(model, np.geomspace(*model.band_hz, GAIN_FREQUENCY_COUNT))).max())
 
 
-def _of_one_place(models: tuple[IdentifiedModel, ...]) -> bool:
-    """Whether all models are of the same place; also True where no model states its place."""
+def _are_at_same_place(models: tuple[IdentifiedModel, ...]) -> bool:
+    """Whether all models are of the same place within `SAME_PLACE_M`; also True where no model states its place."""
     places = [model.place_m for model in models]
     if all(place is None for place in places):
         return True
@@ -219,14 +239,15 @@ def _of_one_place(models: tuple[IdentifiedModel, ...]) -> bool:
     )
 
 
-def _distance_warning(path: Path, model: IdentifiedModel, at_m: Vector | None) -> tuple[str, ...]:
-    """A warning where the place of playback is far from that of the model, or that of the model is not known."""
+def _warn_of_distance(path: Path, model: IdentifiedModel, at_m: Vector | None) -> tuple[str, ...]:
+    """A warning where the place of playback is further than `WARNING_DISTANCE_M` from that of the model, or the model
+    states no place; else empty."""
     if at_m is None:
         return ()
     if model.place_m is None:
         return (f"{path.name} does not say where it was identified; it is used as if it were at the place.",)
     distance_m = math.dist(model.place_m, at_m)
-    if distance_m <= FAR_M:
+    if distance_m <= WARNING_DISTANCE_M:
         return ()
     return (
         f"{path.name} was identified {1e3 * distance_m:.0f} mm from the place: the coupling between axes that remains "
@@ -235,20 +256,24 @@ def _distance_warning(path: Path, model: IdentifiedModel, at_m: Vector | None) -
     )
 
 
-def _sha256(paths: tuple[Path, ...], at_m: Vector | None = None) -> str:
-    """SHA-256 of the files in any order, and of the place. For a single file it is that of the file, so that it can be
-    compared by hand."""
+def _compute_sha256(paths: tuple[Path, ...], at_m: Vector | None = None) -> str:
+    """SHA-256 of the files in any order, and of the place of playback. Of a single file it is the plain hash of the
+    file, without the place, so that it can be compared with the output of other programs."""
     digests = [sha256_of(path) for path in paths]
     if len(digests) == 1:
         return digests[0]
     return hashlib.sha256(" ".join([*sorted(digests), repr(at_m)]).encode()).hexdigest()
 
 
-def _mm(place_m: Vector | None) -> str:
+def _format_place_mm(place_m: Vector | None) -> str:
+    """The place in millimetres, as text."""
     return (
-        "(place not known)" if place_m is None else f"({', '.join(typeset(f'{1e3 * part:g}') for part in place_m)}) mm"
+        "(place not known)"
+        if place_m is None
+        else f"({', '.join(typeset(f'{1e3 * coordinate_m:g}') for coordinate_m in place_m)}) mm"
     )
 
 
-def _unfit_error(explanation: str, advice: str) -> StudyError:
+def _make_unfit_error(explanation: str, advice: str) -> StudyError:
+    """Error for models that cannot be used for the table of accelerations."""
     return StudyError("These models cannot equalize the table", explanation, advice, saved="Nothing was written.")

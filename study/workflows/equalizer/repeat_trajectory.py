@@ -1,4 +1,4 @@
-"""Iterative learning control of a trajectory on a device (`hapteq equalize --repeat N`).
+"""Iterative learning control of a trajectory on a device (`hapteq equalize --repeat N`, `study.cli.equalize`).
 
 `solve_trajectory` computes forces from the model; the convergence test of `equalizer.tracking.learning.convergence`
 limits the gain of the corrections; `repeat_playback` then plays the forces, measures the error of the acceleration and
@@ -28,18 +28,19 @@ from study.workflows.equalizer.equalize_trajectory import (
     check_free,
     solve_trajectory,
 )
-from study.workflows.equalizer.equalized_summary import summary, summary_lines
+from study.workflows.equalizer.equalized_summary import format_equalization_lines, summarise_equalization
 from study.workflows.equalizer.play_forces import (
     find_acting_spring,
-    playback_settings,
+    make_playback_settings,
     require_device_alone,
 )
 from study.workflows.equalizer.playback_models import PlaybackModels
 from study.workflows.equalizer.repeat_playback import OnProgress, not_repeated, repeat_playback
 from study.workflows.equalizer.repeat_results import RepeatPlan, RepeatResult, read_earlier_forces
 
-SAFE_SHARE = 0.9
-"""Ratio of the gain that is used to the largest gain with which every error decreases (`Convergence.safe_beta`)."""
+SAFE_GAIN_FRACTION = 0.9
+"""Ratio of the gain that is used to the largest gain with which every error decreases (`Convergence.safe_beta`);
+chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,15 +90,15 @@ def repeat_trajectory(
     gain, convergence = _test_gain(equalized, spring)
     repeat_plan = RepeatPlan(
         reference=equalized.reference,
-        inverse=inverse_at(equalized.models.at, plan.weight),
+        inverse=inverse_at(equalized.models.at_place, plan.weight),
         band_hz=equalized.models.band_hz,
         model_sha256=equalized.models.sha256,
-        settings=playback_settings(plan.cap_n, equalized.models),
+        settings=make_playback_settings(plan.cap_n, equalized.models),
         device=order.device,
         repeats=order.repeats,
         first_gain=gain,
         spring=spring,
-        first=_initial_forces(equalized, order, spring),
+        first=_choose_initial_forces(equalized, order, spring),
         seed=order.seed,
         out=plan.out,
     )
@@ -106,59 +107,64 @@ def repeat_trajectory(
     )
 
 
-def repeat_summary(done: RepeatedTrajectory) -> dict[str, Any]:
-    """Results as plain values. `errors`, `noise_floor`: relative to the wanted signal; `peak_n` in N."""
-    repeated = done.repeated
+def summarise_repeats(result: RepeatedTrajectory) -> dict[str, Any]:
+    """Results as plain values, for a JSON document. `errors`, `noise_floor`: rms relative to that of the reference
+    trajectory; `peak_n` in N; `surviving_error`: largest fraction of an error that remains after a correction, by the
+    convergence test."""
+    repeated = result.repeated
     return {
-        **summary(done.equalized),
-        "peak_n": _peak_n(repeated),
-        "repeats": str(repeats_path(done.equalized.plan.out)),
+        **summarise_equalization(result.equalized),
+        "peak_n": _compute_peak_n(repeated),
+        "repeats": str(repeats_path(result.equalized.plan.out)),
         "errors": list(repeated.errors),
         "noise_floor": repeated.noise_floor,
         "kept": repeated.best_play,
         "verdict": repeated.verdict.name.lower(),
         "remark": repeated.remark,
-        "gain": done.gain,
-        "surviving_error": None if done.convergence is None else float(done.convergence.surviving.max()),
+        "gain": result.gain,
+        "surviving_error": None if result.convergence is None else float(result.convergence.surviving.max()),
     }
 
 
-def repeat_lines(done: RepeatedTrajectory) -> tuple[str, ...]:
+def format_repeat_lines(result: RepeatedTrajectory) -> tuple[str, ...]:
     """Results as lines of text for the terminal."""
-    repeated = done.repeated
-    *equalized_lines, _ = summary_lines(done.equalized)  # the last line states the spring of the solved forces
-    lines = [*equalized_lines, _convergence_line(done)]
-    for number, error in enumerate(repeated.errors):
-        kept_text = ", kept" if number == repeated.best_play else ""
-        lines.append(f"Play {number}: error {100 * error:.2f} % as measured{kept_text}.")
-    lines.append(f"Noise alone: {100 * repeated.noise_floor:.2f} %. {_verdict(done)}")
+    repeated = result.repeated
+    *equalized_lines, _ = format_equalization_lines(
+        result.equalized
+    )  # the last line states the spring of the solved forces
+    lines = [*equalized_lines, _describe_convergence(result)]
+    for play_index, error in enumerate(repeated.errors):
+        kept_text = ", kept" if play_index == repeated.best_play else ""
+        lines.append(f"Play {play_index}: error {100 * error:.2f} % as measured{kept_text}.")
+    lines.append(f"Noise alone: {100 * repeated.noise_floor:.2f} %. {_describe_verdict(result)}")
     if repeated.remark:
         lines.append(f"{capitalise(repeated.remark)}.")
-    strongest = f"The highest of the kept forces is {_peak_n(repeated):.3g} N"
-    return (*lines, f"{strongest}; they are for the device under the spring that they were played under.")
+    peak_text = f"The highest of the kept forces is {_compute_peak_n(repeated):.3g} N"
+    return (*lines, f"{peak_text}; they are for the device under the spring that they were played under.")
 
 
-def _peak_n(repeated: RepeatResult) -> float:
-    """Largest magnitude of the force vector in a row, N."""
+def _compute_peak_n(repeated: RepeatResult) -> float:
+    """Largest magnitude of the force vector over the samples, N."""
     return float(np.linalg.norm(repeated.forces.signal.samples, axis=1).max())
 
 
-def _verdict(done: RepeatedTrajectory) -> str:
-    """Sentence on why the repeats ended."""
-    repeated = done.repeated
-    if repeated.verdict is Verdict.BEST_KEPT and len(repeated.errors) > done.order.repeats:
+def _describe_verdict(result: RepeatedTrajectory) -> str:
+    """Sentence on why the corrections ended."""
+    repeated = result.repeated
+    if repeated.verdict is Verdict.BEST_KEPT and len(repeated.errors) > result.order.repeats:
         return "All repeats were played; the best forces are kept."
     return f"{capitalise(repeated.verdict.value)}."
 
 
-def _convergence_line(done: RepeatedTrajectory) -> str:
-    """Sentence on the convergence test: worst-case share of the error that remains, and its frequency."""
-    if done.convergence is None:
+def _describe_convergence(result: RepeatedTrajectory) -> str:
+    """Sentence on the convergence test: largest fraction of the error that remains after a correction, and its
+    frequency (Hz)."""
+    if result.convergence is None:
         return "Convergence was not tested before playing: the model does not contain its uncertainty."
     return (
         "If the device is linear and within the models' uncertainty, at most "
-        f"{100 * done.convergence.surviving.max():.1f} % of an error remains after a repeat "
-        f"({done.convergence.worst_hz:.1f} Hz); with friction more remains. Gain {done.gain:.2f}."
+        f"{100 * result.convergence.surviving.max():.1f} % of an error remains after a repeat "
+        f"({result.convergence.worst_hz:.1f} Hz); with friction more remains. Gain {result.gain:.2f}."
     )
 
 
@@ -174,13 +180,14 @@ def _require_repeatable(models: PlaybackModels) -> None:
 
 
 def _test_gain(equalized: EqualizedTrajectory, spring: VirtualSpring) -> tuple[float, Convergence | None]:
-    """Gain of the corrections: `SAFE_SHARE` of the largest gain that converges, at most 1; 1 without a test. And the
-    convergence test with this gain. Raises StudyError for a gain below `LOWEST_GAIN`."""
-    at, weight = equalized.models.at, equalized.plan.weight
-    convergence = convergence_at(at, weight, spring)
+    """Gain of the corrections, and the convergence test with this gain: `SAFE_GAIN_FRACTION` of the largest gain with
+    which every error decreases, at most 1. (1, None) where a single model does not state its uncertainty. Raises
+    StudyError for a gain below `LOWEST_GAIN`."""
+    models_at_place, weight = equalized.models.at_place, equalized.plan.weight
+    convergence = convergence_at(models_at_place, weight, spring)
     if convergence is None:
         return 1.0, None
-    gain = min(1.0, SAFE_SHARE * convergence.safe_beta)
+    gain = min(1.0, SAFE_GAIN_FRACTION * convergence.safe_beta)
     if gain < LOWEST_GAIN:
         raise not_repeated(
             f"Repeats would not converge: at {convergence.worst_hz:.1f} Hz {convergence.surviving.max():.2f} of an "
@@ -188,12 +195,15 @@ def _test_gain(equalized: EqualizedTrajectory, spring: VirtualSpring) -> tuple[f
             f"{LOWEST_GAIN:g}.",
             "Record and identify at the place itself, or with more sweeps.",
         )
-    return gain, convergence if gain == 1.0 else convergence_at(at, weight, spring, gain)
+    return gain, convergence if gain == 1.0 else convergence_at(models_at_place, weight, spring, gain)
 
 
-def _initial_forces(equalized: EqualizedTrajectory, order: RepeatOrder, spring: VirtualSpring) -> FloatArray | None:
-    """(N, 3): initial forces in N, from an earlier run, or from the solution with compensated effects plus the
-    compensation of the spring. None: the first play computes them from the model."""
+def _choose_initial_forces(
+    equalized: EqualizedTrajectory, order: RepeatOrder, spring: VirtualSpring
+) -> FloatArray | None:
+    """Forces of the first playback, (N, 3) in N: those of an earlier run, or the solution with compensated nonlinear
+    effects plus the compensation of the spring. None where neither applies: `repeat_playback` then computes them from
+    the model."""
     if order.earlier is not None:
         return read_earlier_forces(order.earlier, equalized.reference, equalized.models.sha256)
     if equalized.compensation is None:

@@ -1,6 +1,7 @@
 """Generates docs/formats.md, docs/importing.md and docs/schemas/*.json from the code that reads and writes the files.
 
-`python -m study.workflows.files.format_docs docs` updates them; a test fails if they differ from the code.
+`python -m study.workflows.files.format_docs docs` updates them; `tests/study/workflows/files/test_format_docs.py` fails
+where they differ from the code.
 """
 
 import json
@@ -24,7 +25,7 @@ from protocols.trial import Trial
 from study.session.facts import log_chain
 from study.session.facts.events import EVENTS
 from study.session.watching.live import Live
-from study.store.disk.csv_rows import column_names, describe_type
+from study.store.disk.csv_rows import describe_type, list_columns
 from study.store.disk.layout import Entry
 from study.store.disk.text_file import write_text
 from study.store.formats import identified_model_file, mechanical_model_file, recording_layout, repeats_file
@@ -33,11 +34,12 @@ from study.store.formats.calibration_file import LAYOUT as CALIBRATION_LAYOUT
 from study.store.sessions import live_file, log_seal
 from study.store.sessions.request_inbox import KINDS, REQUEST_FORMAT, REQUEST_VERSION
 from study.workflows.files import format_text
-from study.workflows.files.importing_docs import write_importing_page
+from study.workflows.files.importing_docs import compose_importing_page
 
 
-def event_schema() -> dict[str, Any]:
-    """JSON schema of an event of the session log; each may have the checksum field `chain` that the log adds."""
+def make_event_schema() -> dict[str, Any]:
+    """JSON schema of an event of the session log. Each event may have the field `chain`, the checksum that the log
+    adds."""
     schema = EVENTS.json_schema()
     for event in schema["$defs"].values():
         if "event" in event.get("properties", {}):
@@ -45,23 +47,24 @@ def event_schema() -> dict[str, Any]:
     return schema
 
 
-def session_log_markdown() -> Iterable[str]:
-    """Paragraphs of docs/formats.md on the session log and its seal."""
+def format_session_log() -> Iterable[str]:
+    """Heading and paragraphs of docs/formats.md on the session log and its seal."""
     yield "## Session log (`events.jsonl`) and its seal (`seal.json`)"
     yield from format_text.SESSION_LOG
 
 
 @dataclass(frozen=True, slots=True)
 class Schema:
-    """A file of docs/schemas: its name, what it describes, and the function that generates its JSON schema."""
+    """A file of docs/schemas: its name, the document that it describes, and the function that generates the schema."""
 
     file: str
     describes: str
     make: Callable[[], dict[str, Any]]
 
 
-def document_schema(payload: Mapping[str, Any], format_name: str, version: int) -> dict[str, Any]:
-    """The schema of a whole JSON document: that of its own fields, with format, version and provenance added."""
+def make_document_schema(payload: Mapping[str, Any], format_name: str, version: int) -> dict[str, Any]:
+    """JSON schema of a complete JSON document. payload: schema of its own fields; format, version and provenance are
+    added."""
     format_fields = {"format": {"const": format_name}, "version": {"const": version}}
     return {
         **payload,
@@ -70,154 +73,167 @@ def document_schema(payload: Mapping[str, Any], format_name: str, version: int) 
     }
 
 
-def request_schema() -> dict[str, Any]:
+def make_request_schema() -> dict[str, Any]:
     """JSON schema of a request to a running session, with one alternative for each kind of request."""
     schemas = {kind: TypeAdapter(request_type).json_schema() for kind, request_type in KINDS.items()}
     for kind, schema in schemas.items():
         schema["properties"]["request"] = {"const": kind}
         schema["required"].append("request")
-    return {"oneOf": [document_schema(schema, REQUEST_FORMAT, REQUEST_VERSION) for schema in schemas.values()]}
+    return {"oneOf": [make_document_schema(schema, REQUEST_FORMAT, REQUEST_VERSION) for schema in schemas.values()]}
 
 
 SCHEMAS: tuple[Schema, ...] = (
     Schema("study_protocol.json", "study protocols, read from TOML", lambda: protocol_schema("study")),
-    Schema("session_event.json", "one line of `events.jsonl`", event_schema),
+    Schema("session_event.json", "one line of `events.jsonl`", make_event_schema),
     Schema(
         "seal.json",
         "`seal.json`, next to the log of a closed session",
-        lambda: document_schema(log_seal.SEAL.json_schema(), log_seal.SEAL_FORMAT, log_seal.SEAL_VERSION),
+        lambda: make_document_schema(log_seal.SEAL.json_schema(), log_seal.SEAL_FORMAT, log_seal.SEAL_VERSION),
     ),
     Schema("recording_protocol.json", "recording protocols, read from TOML", lambda: protocol_schema("recording")),
     Schema(
         "diagnosis.json",
         "`diagnosis.json`",
-        lambda: document_schema(document.diagnosis_schema(), document.FORMAT, document.VERSION),
+        lambda: make_document_schema(document.build_diagnosis_schema(), document.FORMAT, document.VERSION),
     ),
     Schema(
         "real_answer.json",
         "`answer.json`, the result of `hapteq real` for one recording",
-        lambda: document_schema(real_answer.real_answer_schema(), real_answer.FORMAT, real_answer.VERSION),
+        lambda: make_document_schema(real_answer.make_real_answer_schema(), real_answer.FORMAT, real_answer.VERSION),
     ),
     Schema(
         "repeats.json",
         f"`*{repeats_file.SUFFIX}`, {format_text.REPEATS}",
-        lambda: document_schema(repeats_file.REPEATS.json_schema(), repeats_file.FORMAT, repeats_file.VERSION),
+        lambda: make_document_schema(repeats_file.REPEATS.json_schema(), repeats_file.FORMAT, repeats_file.VERSION),
     ),
     Schema(
         "reproduction.json",
         "`reproduction.json`, the results of `hapteq reproduce`, compared with those of the paper",
-        lambda: document_schema(
-            reproduction_document.reproduction_schema(), reproduction_document.FORMAT, reproduction_document.VERSION
+        lambda: make_document_schema(
+            reproduction_document.make_reproduction_schema(),
+            reproduction_document.FORMAT,
+            reproduction_document.VERSION,
         ),
     ),
     Schema(
         "live.json",
         format_text.LIVE,
-        lambda: document_schema(TypeAdapter(Live).json_schema(), live_file.LIVE_FORMAT, live_file.LIVE_VERSION),
+        lambda: make_document_schema(TypeAdapter(Live).json_schema(), live_file.LIVE_FORMAT, live_file.LIVE_VERSION),
     ),
-    Schema("request.json", format_text.REQUEST, request_schema),
+    Schema("request.json", format_text.REQUEST, make_request_schema),
 )
 """Schemas of all JSON formats and protocols. Each new JSON format must be added."""
 
 
-def formats_markdown() -> str:
-    """The text of docs/formats.md."""
+def compose_formats_page() -> str:
+    """Text of docs/formats.md, in Markdown."""
     parts = [
         "# File formats",
         *format_text.INTRODUCTION,
-        *_recordings(),
+        *_format_recordings(),
         "## Identified model (`.h5`)",
-        _table(identified_model_file.LAYOUT),
+        _format_layout(identified_model_file.LAYOUT),
         "## Calibration of a linkage (`.h5`)",
         CALIBRATION_ABOUT,
-        _table(CALIBRATION_LAYOUT),
-        *_mechanical_models(),
+        _format_layout(CALIBRATION_LAYOUT),
+        *_format_mechanical_models(),
         "## Effects",
         format_text.EFFECTS_NOTES,
-        _effects(),
+        _format_effects(),
         "## Laws without a name",
         format_text.LAWS,
-        *_tables(),
-        *session_log_markdown(),
+        *_format_csv_tables(),
+        *format_session_log(),
         "## JSON documents and protocols",
         "\n".join(f"* [`{schema.file}`](schemas/{schema.file}): {schema.describes}" for schema in SCHEMAS),
     ]
     return "\n\n".join(parts) + "\n"
 
 
-def documents() -> dict[str, str]:
-    """Text of every generated file, by its path below docs."""
+def generate_documents() -> dict[str, str]:
+    """Text of every generated file, by its path relative to docs."""
     schemas = {f"schemas/{schema.file}": json.dumps(schema.make(), indent=2) + "\n" for schema in SCHEMAS}
-    return {"formats.md": formats_markdown(), "importing.md": write_importing_page(), **schemas}
+    return {"formats.md": compose_formats_page(), "importing.md": compose_importing_page(), **schemas}
 
 
 def write_documents(folder: Path) -> None:
-    """Write all generated files into this folder (docs), replacing older ones. Raises CannotWriteError."""
-    for name, text in documents().items():
+    """Write all generated files into `folder`, the docs of the repository, replacing older ones. Raises
+    CannotWriteError."""
+    for name, text in generate_documents().items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         write_text(folder / name, text, overwrite=True)
 
 
-def _recordings() -> Iterable[str]:
+def _format_recordings() -> Iterable[str]:
+    """Section on the HDF5 file of a recording."""
     yield "## Recording (`.h5`)"
-    yield _table(recording_layout.LAYOUT)
+    yield _format_layout(recording_layout.LAYOUT)
     yield format_text.SIGNAL_ATTRIBUTES
-    yield _table(recording_layout.SIGNAL_ATTRIBUTES)
+    yield _format_layout(recording_layout.SIGNAL_ATTRIBUTES)
     yield format_text.SEGMENT_FIELDS
-    yield _table(recording_layout.SEGMENT_FIELDS)
+    yield _format_layout(recording_layout.SEGMENT_FIELDS)
     yield format_text.RECORDING_NOTES
 
 
-def _mechanical_models() -> Iterable[str]:
+def _format_mechanical_models() -> Iterable[str]:
+    """Section on the TOML file of a mechanical model."""
     yield "## Mechanical model (`.toml`)"
     yield format_text.MECHANICAL_MODEL_NOTES
-    yield _table(mechanical_model_file.LAYOUT)
+    yield _format_layout(mechanical_model_file.LAYOUT)
 
 
-_RESPONSE = "the response's unit"
+_RESPONSE_UNIT = "the response's unit"
 
 
-def _parameter(part: EffectParameter) -> str:
-    unit = part.unit_in(LINEAR, _RESPONSE)
-    return f"`{part.name}` ({unit}, optional)" if part.optional else f"`{part.name}` ({unit})"
+def _format_parameter(parameter: EffectParameter) -> str:
+    """Name and unit of an effect's parameter, for devices with linear axes."""
+    unit = parameter.find_unit(LINEAR, _RESPONSE_UNIT)
+    return f"`{parameter.name}` ({unit}, optional)" if parameter.optional else f"`{parameter.name}` ({unit})"
 
 
-def _effects() -> str:
+def _format_effects() -> str:
+    """Markdown table of the effects of a mechanical model, with the units of their parameters."""
     rows = []
     for effect in EFFECT_NAMES:
-        numbers = ", ".join(_parameter(part) for part in effect.parameters)
-        rotational_units = ", ".join(part.unit_in(ROTATIONAL, _RESPONSE) for part in effect.parameters)
-        rows.append((f"`{effect.name}`", effect.place, numbers, rotational_units))
-    return _rows(("effect", "place", "parameters", "rotational units"), rows)
+        parameters_text = ", ".join(_format_parameter(parameter) for parameter in effect.parameters)
+        rotational_units = ", ".join(parameter.find_unit(ROTATIONAL, _RESPONSE_UNIT) for parameter in effect.parameters)
+        rows.append((f"`{effect.name}`", effect.place, parameters_text, rotational_units))
+    return _format_markdown_table(("effect", "place", "parameters", "rotational units"), rows)
 
 
-_TABLES: tuple[tuple[str, type[Trial] | type[Threshold], str], ...] = (
+_CSV_TABLES: tuple[tuple[str, type[Trial] | type[Threshold], str], ...] = (
     ("trials.csv", Trial, format_text.TRIALS),
     ("thresholds.csv", Threshold, format_text.THRESHOLDS),
 )
 
 
-def _tables() -> Iterable[str]:
+def _format_csv_tables() -> Iterable[str]:
+    """Sections on the CSV tables: trajectories and forces, trials, thresholds."""
     yield "## Trajectory and forces (`.csv`)"
-    yield _rows(
+    yield _format_markdown_table(
         ("header", "holds"), [(f"`{','.join(kind.header)}`", f"{kind.quantity}, {kind.unit}") for kind in TABLE_KINDS]
     )
     yield format_text.TABLE_NOTES
-    for name, row_type, description in _TABLES:
+    for name, row_type, description in _CSV_TABLES:
         yield f"## `{name}`"
         yield description
-        hints = get_type_hints(row_type)
-        yield _rows(("column", "holds"), [(f"`{key}`", describe_type(hints[key])) for key in column_names(row_type)])
+        type_hints = get_type_hints(row_type)
+        yield _format_markdown_table(
+            ("column", "holds"),
+            [(f"`{column}`", describe_type(type_hints[column])) for column in list_columns(row_type)],
+        )
 
 
-def _table(entries: Iterable[Entry]) -> str:
+def _format_layout(entries: Iterable[Entry]) -> str:
+    """Markdown table of the entries of a file."""
     rows = [(f"`{entry.name}`", entry.holds, entry.meaning, "yes" if entry.required else "no") for entry in entries]
-    return _rows(("name", "holds", "meaning", "required"), rows)
+    return _format_markdown_table(("name", "holds", "meaning", "required"), rows)
 
 
-def _rows(heading: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
-    lines = [heading, tuple("---" for _ in heading), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+def _format_markdown_table(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    """A Markdown table. The cells must not contain a bar, which would end them."""
+    rows_with_header = [header, tuple("---" for _ in header), *rows]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in rows_with_header)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@
 files, so that page and code agree.
 """
 
-from equalizer.laws.parse import FUNCTIONS, LARGEST, LONGEST, MEMORY
+from equalizer.laws.parse import FUNCTIONS, MEMORY_OPERATORS, MOST_CHARACTERS, MOST_NODES
 from equalizer.laws.program import CELLS, STACK_SIZE
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW
 from equalizer.signals.units import ALLOWED
@@ -46,7 +46,7 @@ EFFECTS_NOTES = (
 )
 """Paragraph above the table of effects."""
 
-_FUNCTION_NAMES = ", ".join(f"`{name}`" for name in FUNCTIONS if name not in MEMORY)
+_FUNCTION_NAMES = ", ".join(f"`{name}`" for name in FUNCTIONS if name not in MEMORY_OPERATORS)
 
 LAWS = "\n\n".join(
     (
@@ -71,8 +71,8 @@ LAWS = "\n\n".join(
         "has another meaning. A law of a command may use commands and `t`; a law of a response may use responses and "
         "`t`.",
         "**Free parameters.** Numbers with a point or an exponent (`4.1`, `1e-3`) are free parameters: a fit may "
-        f"change them. Whole numbers (`2`) are part of the form. A formula has at most {LONGEST} characters, "
-        f"{LARGEST} parts, and {STACK_SIZE} numbers at once.",
+        f"change them. Whole numbers (`2`) are part of the form. A formula has at most {MOST_CHARACTERS} characters, "
+        f"{MOST_NODES} parts, and {STACK_SIZE} numbers at once.",
     )
 )
 """Section on laws without a name: syntax, functions, signals and parameters of their formulas."""

@@ -1,7 +1,7 @@
-"""Writes docs/importing.md: how recordings of other programs are imported, and every key of an import map.
+"""Composes docs/importing.md: how recordings of other programs are imported, and every key of an import map.
 
-The prose is in `importing_text`. The tables of keys, functions and shipped maps come from the schema and the
-functions of the code that reads a map, so that page and code agree.
+`format_docs` writes the page. The prose is in `importing_text`; the tables of keys, functions and shipped maps come
+from the schema and the functions of the code that reads a map, so that page and code agree.
 """
 
 from collections.abc import Iterable
@@ -13,47 +13,52 @@ from study.importing.map_library import list_shipped_maps, read_map
 from study.workflows.files import importing_text
 
 
-def write_importing_page() -> str:
-    """The text of docs/importing.md, in Markdown."""
-    parts = [
+def compose_importing_page() -> str:
+    """Text of docs/importing.md, in Markdown."""
+    sections = [
         importing_text.INTRODUCTION,
         f"```toml\n{importing_text.EXAMPLE}```",
         "## Expressions",
         *importing_text.EXPRESSIONS,
-        _rows(("function", "gives"), ((f"`{f.usage}`", f.meaning) for f in FUNCTIONS.values())),
+        _format_markdown_table(
+            ("function", "gives"), ((f"`{function.usage}`", function.meaning) for function in FUNCTIONS.values())
+        ),
         "## What is not read",
         importing_text.NOT_READ,
         "## Keys of a map",
-        _keys("At the top", MAP_SCHEMA),
-        *(_keys(_title(name, node), _table_of(node)) for name, node in _tables()),
+        _format_keys("At the top", MAP_SCHEMA),
+        *(_format_keys(_format_table_title(name, node), _resolve_table(node)) for name, node in _list_tables()),
         "## Maps that come with hapteq",
         importing_text.SHIPPED_MAPS,
-        _rows(("name", "files", "what"), (_map_row(name) for name in list_shipped_maps())),
+        _format_markdown_table(("name", "files", "what"), (_format_map_row(name) for name in list_shipped_maps())),
     ]
-    return "\n\n".join(parts) + "\n"
+    return "\n\n".join(sections) + "\n"
 
 
-def _tables() -> list[tuple[str, Node]]:
-    """Name and schema of each table of a map."""
-    return [(name, node) for name, node in MAP_SCHEMA["properties"].items() if _table_of(node)]
+def _list_tables() -> list[tuple[str, Node]]:
+    """Name and schema of each table of an import map (TOML tables and lists of tables)."""
+    return [(name, node) for name, node in MAP_SCHEMA["properties"].items() if _resolve_table(node)]
 
 
-def _table_of(node: Node) -> Node:
-    """Schema of a table, or of the entries of a list of tables; empty for a plain value."""
-    resolved = resolve_reference(MAP_SCHEMA, node)
-    entries = resolve_reference(MAP_SCHEMA, resolved["items"]) if resolved.get("type") == "array" else resolved
-    return entries if "properties" in entries else {}
+def _resolve_table(node: Node) -> Node:
+    """JSON schema of a TOML table, or of the entries of a list of tables, with references followed; empty for a plain
+    value."""
+    resolved_node = resolve_reference(MAP_SCHEMA, node)
+    entry_schema = (
+        resolve_reference(MAP_SCHEMA, resolved_node["items"]) if resolved_node.get("type") == "array" else resolved_node
+    )
+    return entry_schema if "properties" in entry_schema else {}
 
 
-def _title(name: str, node: Node) -> str:
-    """Header of a table as it is written in TOML: `[[name]]` for a list of tables, else `[name]`."""
+def _format_table_title(name: str, node: Node) -> str:
+    """Header of a table as it is written in TOML, in backticks: `[[name]]` for a list of tables, else `[name]`."""
     return f"`[[{name}]]`" if resolve_reference(MAP_SCHEMA, node).get("type") == "array" else f"`[{name}]`"
 
 
-def _keys(title: str, table: Node) -> str:
-    """Section about the plain keys of a table, as a Markdown table."""
+def _format_keys(title: str, table: Node) -> str:
+    """Section on the plain keys of a table: heading and Markdown table of key, allowed values and meaning."""
     plain_keys = [
-        (key, node) for key, node in table["properties"].items() if table is not MAP_SCHEMA or not _table_of(node)
+        (key, node) for key, node in table["properties"].items() if table is not MAP_SCHEMA or not _resolve_table(node)
     ]
     required = table.get("required", ())
     rows = (
@@ -64,16 +69,16 @@ def _keys(title: str, table: Node) -> str:
         )
         for key, node in plain_keys
     )
-    return f"### {title}\n\n{_rows(('key', 'holds', 'meaning'), rows)}"
+    return f"### {title}\n\n{_format_markdown_table(('key', 'holds', 'meaning'), rows)}"
 
 
-def _map_row(name: str) -> tuple[str, str, str]:
-    """Name, file patterns and title of a shipped map."""
+def _format_map_row(name: str) -> tuple[str, str, str]:
+    """Row of the table of shipped maps: name, file patterns and title."""
     import_map = read_map(name).map
     return f"`{name}`", ", ".join(f"`{pattern}`" for pattern in import_map.files), import_map.title
 
 
-def _rows(heading: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
-    """A Markdown table. A bar within a cell would end it and is replaced by a slash."""
-    lines = [heading, tuple("---" for _ in heading), *rows]
-    return "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in line)} |" for line in lines)
+def _format_markdown_table(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    """A Markdown table. A bar within a cell would end the cell; it is replaced by a slash."""
+    rows_with_header = [header, tuple("---" for _ in header), *rows]
+    return "\n".join(f"| {' | '.join(cell.replace('|', '/') for cell in cells)} |" for cells in rows_with_header)

@@ -9,8 +9,8 @@ from collections.abc import Callable
 from analysis.diagnosis.document import FORMAT as DIAGNOSIS_FORMAT
 from analysis.diagnosis.real_answer.real_answer import FORMAT as REAL_ANSWER_FORMAT
 from analysis.evaluation.reproduction.document import FORMAT as REPRODUCTION_FORMAT
-from analysis.look.driven_band import silent_segments
-from equalizer.plant.model_quality import quality_brief
+from analysis.look.driven_band import find_silent_segments
+from equalizer.plant.model_quality import write_quality_brief
 from equalizer.signals.recording import Recording
 from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, parse_unit
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY
@@ -46,12 +46,12 @@ if the file has this format but its content is wrong."""
 
 
 def recognise_recording(content: FileContent) -> str | None:
-    """An HDF5 recording, by its format attribute. Raises UnusableFileError also for segments that `silent_segments`
-    reports."""
+    """An HDF5 recording, by its format attribute. Raises UnusableFileError also for segments that
+    `find_silent_segments` reports."""
     if content.hdf5_format != recording_layout.FORMAT:
         return None
     recording = read_recording(content.path)
-    if silence_problems := silent_segments(recording):
+    if silence_problems := find_silent_segments(recording):
         raise UnusableFileError(content.path, recording_layout.KIND, silence_problems)
     return f"recording, {describe_recording(recording)}"
 
@@ -81,7 +81,7 @@ def recognise_identified_model(content: FileContent) -> str | None:
     return (
         f"identified model of order {model.order}, {model.band_hz[0]:g} to {model.band_hz[1]:g} Hz at "
         f"{model.sample_rate_hz:g} Hz, {_count(len(model.input_channels), 'input')}, "
-        f"{_count(len(model.output_channels), 'output')}, {stable}, {quality_brief(model.quality)}"
+        f"{_count(len(model.output_channels), 'output')}, {stable}, {write_quality_brief(model.quality)}"
     )
 
 

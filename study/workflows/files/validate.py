@@ -10,16 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.look.driven_band import silent_segments
+from analysis.look.driven_band import find_silent_segments
 from study.errors import StudyError
 from study.importing.arrays.arrays import FOREIGN, HDF5, RECORDS, TABLES
 from study.regular_file import DOCUMENT_BYTES
 from study.store.disk.file_errors import UnusableFileError
-from study.store.disk.privacy import privacy_warning
+from study.store.disk.privacy import format_privacy_warning
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import TOML_BYTES, too_long_key
 from study.store.formats.recording_file import read_recording
-from study.store.sessions.archive import FOLDER
+from study.store.sessions.archive import FOLDER_PATTERN
 from study.workflows.files.file_content import FileContent, open_content
 from study.workflows.files.recognisers import RECOGNISERS, Recogniser, describe_recording
 from study.workflows.files.session_recognisers import SESSION_RECOGNISERS
@@ -48,8 +48,8 @@ class Validation:
 def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = SESSION_RECOGNISERS + RECOGNISERS) -> Validation:
     """Validate one file or session folder. Wrong content and a missing file are reported as problems, never raised."""
     validation = _validate(path, recognisers)
-    folders = (path, path.absolute().parent) if FOLDER.fullmatch(path.absolute().name) else (path,)
-    warnings = (privacy_warning(folder) for folder in folders if _is_folder(folder))
+    folders = (path, path.absolute().parent) if FOLDER_PATTERN.fullmatch(path.absolute().name) else (path,)
+    warnings = (format_privacy_warning(folder) for folder in folders if _is_folder(folder))
     return replace(validation, notes=(*validation.notes, *filter(None, warnings), *_find_idle_commands(validation)))
 
 
@@ -117,7 +117,7 @@ def _validate_foreign(path: Path, kind: str = "", unknown: tuple[str, ...] = ())
         problem = f"{refused.title}: {refused.happened}"
         return Validation(path, kind or "recording of others", (*unknown, problem))
     text = f"recording of others, {describe_recording(imported.recording)}"
-    return Validation(path, text, tuple(silent_segments(imported.recording)), imported.notes)
+    return Validation(path, text, tuple(find_silent_segments(imported.recording)), imported.notes)
 
 
 def _describe_unknown(content: FileContent) -> tuple[str, str]:

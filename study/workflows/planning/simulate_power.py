@@ -1,4 +1,4 @@
-"""Statistical power by number of participants, from simulated studies.
+"""Statistical power by number of participants, from simulated studies (`hapteq power`).
 
 The studies are simulated and tested by `analysis.psychophysics.power` in chunks on any executor. Each finished chunk is
 appended to `studies.jsonl`, so that an interrupted simulation continues; power.json and a figure are written last.
@@ -14,10 +14,10 @@ from analysis.psychophysics.power.power_curve import (
     PowerPoint,
     Share,
     StudyVerdict,
+    compute_true_difference_db,
     find_judged_pair,
     judge_study,
-    power_point,
-    true_difference_db,
+    summarise_power,
 )
 from analysis.psychophysics.power.simulated_study import Crowd
 from analysis.threshold_words import REVERSALS, threshold_words
@@ -29,18 +29,18 @@ from study.store.disk.privacy import make_folder
 from study.store.disk.text_file import read_text, write_text
 from study.workflows.run_on_executor import run_tasks
 
-CHUNK = 10
-"""Number of studies in a piece of work: it takes some seconds, so that little is lost when a worker process dies."""
-HABITS_SINCE = ("guessers", "criterion_drift_sd", "unsure", "repeats", "delivery", "rove_db")
+STUDIES_PER_CHUNK = 10
+"""Number of studies in a task of a worker process: it takes some seconds, so that an interruption loses little."""
+LATER_CROWD_FIELDS = ("guessers", "criterion_drift_sd", "unsure", "repeats", "delivery", "rove_db")
 """Fields of `Crowd` that were added in later versions. They are left out of the stored plan while they have their
 defaults, so that a folder from an earlier version can be continued."""
-FINISHED_NAME, RESULT_NAME = "studies.jsonl", "power.json"
+PROGRESS_NAME, RESULT_NAME = "studies.jsonl", "power.json"
 """File with the plan in its first line and a finished chunk in each further line; file with the results."""
 
 
 @dataclass(frozen=True, slots=True)
 class PowerPlan:
-    """Order of `simulate_power`: simulated participants, staircase, sample sizes and number of studies."""
+    """Input of `simulate_power`: model of the participants, staircase rule, sample sizes and number of studies."""
 
     crowd: Crowd
     rule: StaircaseRule
@@ -67,9 +67,9 @@ StudyChunk = tuple[int, int]
 def simulate_power(
     plan: PowerPlan, folder: Path, executor: Executor, on_finished: Callable[[int], None]
 ) -> tuple[PowerPoint, ...]:
-    """Simulate and test all studies; write power.json and figures/power into `folder`. on_finished: called with the
-    number of finished studies. The same seed gives the same results on any executor; `folder` may hold an interrupted
-    run.
+    """Simulate and test all studies; write power.json and figures/power into `folder`, and return power by sample size.
+    on_finished: called with the number of finished studies. The same seed gives the same results on any executor;
+    `folder` may contain an interrupted run.
 
     Raises WrongUseError for a trial limit, StudyError where `folder` belongs to another plan, and CannotWriteError.
     """
@@ -79,21 +79,34 @@ def simulate_power(
             "Runs that it stops have no threshold, and the published analysis cannot be judged without them.",
             "Set staircase.trial_limit to 0 in the protocol.",
         )
-    path = folder / FINISHED_NAME
-    done = _read_finished(path, plan)
+    progress_path = folder / PROGRESS_NAME
+    verdicts_by_chunk = _read_finished(progress_path, plan)
     remaining_chunks = [
-        (n, first) for n in plan.people for first in range(0, plan.studies, CHUNK) if (n, first) not in done
+        (sample_size, first_study)
+        for sample_size in plan.people
+        for first_study in range(0, plan.studies, STUDIES_PER_CHUNK)
+        if (sample_size, first_study) not in verdicts_by_chunk
     ]
-    finished = sum(len(verdicts) for (people, _), verdicts in done.items() if people in plan.people)
-    on_finished(finished)
+    finished_count = sum(len(verdicts) for (people, _), verdicts in verdicts_by_chunk.items() if people in plan.people)
+    on_finished(finished_count)
     for chunk, verdicts in run_tasks(executor, judge_chunk, ((chunk, (plan, chunk)) for chunk in remaining_chunks)):
-        done[chunk] = verdicts
-        _append(path, {"piece": chunk, "verdicts": [asdict(v) for v in verdicts]})
-        finished += len(verdicts)
-        on_finished(finished)
+        verdicts_by_chunk[chunk] = verdicts
+        _append_line(progress_path, {"piece": chunk, "verdicts": [asdict(verdict) for verdict in verdicts]})
+        finished_count += len(verdicts)
+        on_finished(finished_count)
     # In the order of the plan, not in the order of finishing, so that rounding of sums is the same in every run.
-    points = tuple(power_point([v for key in sorted(done) if key[0] == n for v in done[key]]) for n in plan.people)
-    payload = {"plan": _plan_facts(plan), "judged_hz": plan.pair_hz, "points": [asdict(point) for point in points]}
+    points = tuple(
+        summarise_power(
+            [
+                verdict
+                for judged_chunk in sorted(verdicts_by_chunk)
+                if judged_chunk[0] == sample_size
+                for verdict in verdicts_by_chunk[judged_chunk]
+            ]
+        )
+        for sample_size in plan.people
+    )
+    payload = {"plan": _summarise_plan(plan), "judged_hz": plan.pair_hz, "points": [asdict(point) for point in points]}
     write_json(folder / RESULT_NAME, "hapteq-power", 1, payload, overwrite=True)
     _write_figure(folder / "figures", plan, points)
     return points
@@ -105,29 +118,32 @@ def _write_figure(folder: Path, plan: PowerPlan, points: Sequence[PowerPoint]) -
     from analysis.figures.power_curves import power_picture
     from study.workflows.picture_files import write_pictures
 
-    effect_db, means = true_difference_db(plan.crowd, plan.contrast_hz), threshold_words(plan.rule).means
-    write_pictures(folder, (power_picture(points, effect_db, plan.pair_hz, means),))
+    effect_db, threshold_name = (
+        compute_true_difference_db(plan.crowd, plan.contrast_hz),
+        threshold_words(plan.rule).means,
+    )
+    write_pictures(folder, (power_picture(points, effect_db, plan.pair_hz, threshold_name),))
 
 
 def judge_chunk(plan: PowerPlan, chunk: StudyChunk) -> list[StudyVerdict]:
     """Simulate and test the studies of one chunk. Runs in a worker process."""
-    people, first = chunk
-    last = min(first + CHUNK, plan.studies)
+    people, first_study = chunk
+    end_study = min(first_study + STUDIES_PER_CHUNK, plan.studies)
     return [
-        judge_study(plan.crowd, plan.rule, people, (plan.seed, people, number), plan.contrast_hz)
-        for number in range(first, last)
+        judge_study(plan.crowd, plan.rule, people, (plan.seed, people, study_number), plan.contrast_hz)
+        for study_number in range(first_study, end_study)
     ]
 
 
-def _plan_facts(plan: PowerPlan) -> dict[str, object]:
+def _summarise_plan(plan: PowerPlan) -> dict[str, object]:
     """The plan as plain values, without its sample sizes: further sizes may be added to a folder later."""
     from pydantic import TypeAdapter
 
     rule = TypeAdapter(StaircaseRule).dump_python(plan.rule, mode="json")
     crowd = json.loads(json.dumps(asdict(plan.crowd)))
-    for habit in HABITS_SINCE:
-        if not crowd[habit]:
-            del crowd[habit]
+    for field_name in LATER_CROWD_FIELDS:
+        if not crowd[field_name]:
+            del crowd[field_name]
     facts = {"crowd": crowd, "rule": rule, "studies": plan.studies, "seed": plan.seed}
     # The default pair is not stored, so that a folder from a version without a choice of the pair can be continued.
     is_default_pair = plan.pair_hz == find_judged_pair(plan.crowd.frequencies_hz, ())
@@ -135,10 +151,10 @@ def _plan_facts(plan: PowerPlan) -> dict[str, object]:
 
 
 def _read_finished(path: Path, plan: PowerPlan) -> dict[StudyChunk, list[StudyVerdict]]:
-    """Results of an interrupted run of the same plan, by piece. An incomplete line is ignored; where the first line,
-    the plan, is missing or incomplete, the file is begun anew. Raises StudyError for another plan."""
+    """Results of an interrupted run of the same plan, by chunk. An incomplete line is ignored; where the first line,
+    the plan, is missing or incomplete, the file is created anew. Raises StudyError for another plan."""
     text = read_text(path) if path.exists() else ""
-    if _first_row(plan).startswith(text):
+    if _format_plan_line(plan).startswith(text):
         _create_progress_file(path, plan)
         return {}
     rows = []
@@ -147,19 +163,21 @@ def _read_finished(path: Path, plan: PowerPlan) -> dict[StudyChunk, list[StudyVe
             rows.append(json.loads(line))
         except ValueError:
             continue
-    if not rows or rows[0].get("plan") != _plan_facts(plan):
+    if not rows or rows[0].get("plan") != _summarise_plan(plan):
         raise StudyError(
             "This folder holds another power simulation",
             f"{path} was begun with other people, another rule, contrast, seed or number of studies.",
             "Choose another folder with --out, or the same options to continue.",
             saved="Nothing was changed.",
         )
-    return {(row["piece"][0], row["piece"][1]): [StudyVerdict(**v) for v in row["verdicts"]] for row in rows[1:]}
+    return {
+        (row["piece"][0], row["piece"][1]): [StudyVerdict(**verdict) for verdict in row["verdicts"]] for row in rows[1:]
+    }
 
 
-def _first_row(plan: PowerPlan) -> str:
+def _format_plan_line(plan: PowerPlan) -> str:
     """First line of the file of finished studies: the plan in JSON."""
-    return json.dumps({"plan": _plan_facts(plan)})
+    return json.dumps({"plan": _summarise_plan(plan)})
 
 
 def _create_progress_file(path: Path, plan: PowerPlan) -> None:
@@ -168,12 +186,12 @@ def _create_progress_file(path: Path, plan: PowerPlan) -> None:
         make_folder(path.parent)
     except OSError as problem:
         raise CannotWriteError(path.parent, problem) from problem
-    write_text(path, _first_row(plan), overwrite=True)
+    write_text(path, _format_plan_line(plan), overwrite=True)
 
 
-def _append(path: Path, row: dict[str, object]) -> None:
-    """Append a line in JSON. It begins with the line break, so that an incomplete line before it stays separate. Raises
-    CannotWriteError."""
+def _append_line(path: Path, row: dict[str, object]) -> None:
+    """Append a JSON object as a line. It begins with the line break, so that an incomplete line before it remains
+    separate. Raises CannotWriteError."""
     try:
         with path.open("a", encoding="utf-8") as file:
             file.write("\n" * (file.tell() > 0) + json.dumps(row))
@@ -181,24 +199,25 @@ def _append(path: Path, row: dict[str, object]) -> None:
         raise CannotWriteError(path, problem) from problem
 
 
-def power_lines(points: Sequence[PowerPoint], means: str = REVERSALS.means) -> list[str]:
-    """A table for the terminal: power with its 95 % interval by analysis, in percent. means: name of the thresholds of
-    single runs, in the plural."""
-    paired = f"{means}, paired"
-    width = max(24, len(paired))
+def format_power_lines(points: Sequence[PowerPoint], threshold_name: str = REVERSALS.means) -> list[str]:
+    """Table for the terminal: power in percent with its 95 % interval, by sample size and analysis; coverage of the 95
+    % interval of the difference; bias in dB. threshold_name: name of the thresholds of single runs, in the plural."""
+    paired_heading = f"{threshold_name}, paired"
+    paired_width = max(24, len(paired_heading))
     lines = [
-        f"{'people':>6}  {'all answers in one model':>26}  {paired:>{width}}  "
+        f"{'people':>6}  {'all answers in one model':>26}  {paired_heading:>{paired_width}}  "
         f"{'as published (Tukey)':>24}  {'95 % interval covers':>22}  bias dB (model, means)"
     ]
     for point in points:
         shares = (point.primary, point.means, point.published, point.coverage)
-        texts = [_percent(share) for share in shares]
+        share_texts = [_format_percent(share) for share in shares]
         lines.append(
-            f"{point.people:6}  {texts[0]:>26}  {texts[1]:>{width}}  {texts[2]:>24}  {texts[3]:>22}  "
-            f"{point.primary_bias_db:+.2f}, {point.means_bias_db:+.2f}"
+            f"{point.people:6}  {share_texts[0]:>26}  {share_texts[1]:>{paired_width}}  {share_texts[2]:>24}  "
+            f"{share_texts[3]:>22}  {point.primary_bias_db:+.2f}, {point.means_bias_db:+.2f}"
         )
     return lines
 
 
-def _percent(share: Share) -> str:
+def _format_percent(share: Share) -> str:
+    """The share and its confidence interval in percent."""
     return f"{100 * share.value:.1f} % ({100 * share.lower:.1f} to {100 * share.upper:.1f})"

@@ -1,4 +1,9 @@
-"""Read a device's linkage over a grid of positions, check it, fill it in by its mirror lines, and write it."""
+"""Calibration of a device's linkage (`hapteq calibrate`): read it over a grid of positions, check it, complete it,
+write it.
+
+Positions that cannot be read are filled in from their mirror positions. The result is an HDF5 file, which `hapteq twin
+--calibration` reads.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,11 +17,17 @@ from equalizer.linkage.calibration import (
     CalibrationError,
     LinkageCalibration,
     LinkageReading,
+    check_difference,
     check_reading,
-    difference_problems,
 )
-from equalizer.linkage.grid import STEP_M, arm_azimuths, difference_error, difference_positions, symmetric_grid
-from equalizer.linkage.mirror_lines import asymmetry_words, complete_by_symmetry, line_asymmetry
+from equalizer.linkage.grid import (
+    DIFFERENCE_STEP_M,
+    compute_difference_error,
+    estimate_arm_azimuths,
+    list_difference_positions,
+    make_symmetric_grid,
+)
+from equalizer.linkage.mirror_lines import complete_by_symmetry, measure_line_asymmetry, write_asymmetry_warnings
 from equalizer.signals.signal import FloatArray
 from study.devices.opening import open_linkage
 from study.errors import DeviceError, WrongUseError
@@ -27,18 +38,18 @@ from study.workflows.free_name import require_free
 if TYPE_CHECKING:
     from study.devices.opening import LinkageSource
 
-TITLE = "The linkage was not calibrated"
+ERROR_TITLE = "The linkage was not calibrated"
 """Title of each error of this command."""
-SAVED = "Nothing moved and nothing was written."
-LARGEST_M = 0.2
-"""Largest radius and depth of the grid (m). By hand."""
-MAX_LISTED = 3
-"""Number of problems that an error lists; the others are counted."""
+NOTHING_DONE = "Nothing moved and nothing was written."
+MAX_GRID_SIZE_M = 0.2
+"""Largest radius and depth of the grid (m); chosen by hand."""
+MAX_LISTED_PROBLEMS = 3
+"""Number of problems that an error lists; of the others only the number is given."""
 
 
 @dataclass(frozen=True, slots=True)
 class CalibrationPlan:
-    """What `calibrate_linkage` does: file to write, device, and size of the grid of positions."""
+    """Input of `calibrate_linkage`: file to write, device, and size of the grid of positions."""
 
     out: Path
     device: str = "simulated"
@@ -50,46 +61,50 @@ class CalibrationPlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WrittenCalibration:
-    """A calibration of a device's linkage that was written to `plan.out`."""
+    """A calibration of a device's linkage that was written to `plan.out`, and warnings about its symmetry."""
 
     plan: CalibrationPlan
     calibration: LinkageCalibration
     warnings: tuple[str, ...]
-    unknown: int
+    unknown_count: int
     """Positions of the grid that could be neither read nor filled in."""
 
 
 def calibrate_linkage(plan: CalibrationPlan, on_progress: Callable[[float], None]) -> WrittenCalibration:
     """Read, check, complete and write the calibration. Nothing moves: the device's library computes Jacobian, inertia
-    and gravity. `on_progress(share)` counts the positions. Raises StudyError; nothing is written then."""
-    require_free(plan.out, title=TITLE, kind="calibrations", saved=SAVED)
-    if not (STEP_M < plan.radius_m <= LARGEST_M and STEP_M < plan.depth_m <= LARGEST_M):
+    and gravity. on_progress: called with the fraction of the positions that were read. Raises StudyError; nothing is
+    written then."""
+    require_free(plan.out, title=ERROR_TITLE, kind="calibrations", saved=NOTHING_DONE)
+    if not (
+        DIFFERENCE_STEP_M < plan.radius_m <= MAX_GRID_SIZE_M and DIFFERENCE_STEP_M < plan.depth_m <= MAX_GRID_SIZE_M
+    ):
         raise WrongUseError(
             "There is no such grid",
-            f"--radius is {plan.radius_m:g} m and --depth {plan.depth_m:g} m; each must be above {STEP_M:g} m and at "
-            f"most {LARGEST_M:g} m.",
+            f"--radius is {plan.radius_m:g} m and --depth {plan.depth_m:g} m; each must be above "
+            f"{DIFFERENCE_STEP_M:g} m and at "
+            f"most {MAX_GRID_SIZE_M:g} m.",
             "Correct --radius or --depth.",
-            saved=SAVED,
+            saved=NOTHING_DONE,
         )
     try:
         with open_linkage(plan.device) as linkage:
             linkage.check_frame()
             result = _read_grid(linkage, plan, on_progress)
     except CalibrationError as error:
-        raise _refusal(plan.device, error.problems) from error
+        raise _make_refusal(plan.device, error.problems) from error
     except DeviceError as error:
-        error.saved = SAVED
+        error.saved = NOTHING_DONE
         raise
     write_calibration(plan.out, result.calibration)
     on_progress(1.0)
     return result
 
 
-def calibration_summary(result: WrittenCalibration) -> dict[str, Any]:
-    """The calibration as plain values, for one JSON document."""
+def summarise_calibration(result: WrittenCalibration) -> dict[str, Any]:
+    """The calibration as plain values, for a JSON document; units by the suffix of a key."""
     calibration = result.calibration
-    centre = int(np.argmin(np.linalg.norm(calibration.position_m, axis=1)))
-    masses = np.linalg.eigvalsh(calibration.inertia_kg)
+    centre_index = int(np.argmin(np.linalg.norm(calibration.position_m, axis=1)))
+    masses_kg = np.linalg.eigvalsh(calibration.inertia_kg)
     return {
         "calibration": str(result.plan.out),
         "device": calibration.device,
@@ -97,111 +112,124 @@ def calibration_summary(result: WrittenCalibration) -> dict[str, Any]:
         "positions": {
             "read": int((calibration.filled == 0).sum()),
             "filled": int(calibration.filled.sum()),
-            "unknown": result.unknown,
+            "unknown": result.unknown_count,
         },
         "centre": {
-            "inertia_kg": calibration.inertia_kg[centre].tolist(),
-            "gravity_n": calibration.gravity_n[centre].tolist(),
+            "inertia_kg": calibration.inertia_kg[centre_index].tolist(),
+            "gravity_n": calibration.gravity_n[centre_index].tolist(),
         },
-        "mass_kg": [float(masses.min()), float(masses.max())],
+        "mass_kg": [float(masses_kg.min()), float(masses_kg.max())],
         "lines": [
-            {"azimuth_deg": float(azimuth), "asymmetry": float(share)}
-            for azimuth, share in zip(calibration.line_deg, calibration.asymmetry, strict=True)
+            {"azimuth_deg": float(azimuth_deg), "asymmetry": float(asymmetry)}
+            for azimuth_deg, asymmetry in zip(calibration.line_deg, calibration.asymmetry, strict=True)
         ],
         "difference": calibration.difference,
         "warnings": list(result.warnings),
     }
 
 
-def calibration_lines(result: WrittenCalibration) -> tuple[str, ...]:
-    """Lines for the terminal."""
-    values = calibration_summary(result)
-    positions, (least_kg, most_kg) = values["positions"], values["mass_kg"]
-    inertia_text = ", ".join(f"{values['centre']['inertia_kg'][axis][axis]:.3g}" for axis in range(3))
-    gravity_text = ", ".join(f"{force_n:.2g}" for force_n in values["centre"]["gravity_n"])
+def format_calibration_lines(result: WrittenCalibration) -> tuple[str, ...]:
+    """The same as lines of text for the terminal."""
+    summary = summarise_calibration(result)
+    positions, (least_kg, most_kg) = summary["positions"], summary["mass_kg"]
+    inertia_text = ", ".join(f"{summary['centre']['inertia_kg'][axis][axis]:.3g}" for axis in range(3))
+    gravity_text = ", ".join(f"{force_n:.2g}" for force_n in summary["centre"]["gravity_n"])
     return (
-        f"{values['device']}, {values['details']}: {positions['read']} positions read, {positions['filled']} filled in "
-        f"by mirror lines, {positions['unknown']} unknown",
+        f"{summary['device']}, {summary['details']}: {positions['read']} positions read, {positions['filled']} filled "
+        f"in by mirror lines, {positions['unknown']} unknown",
         f"Inertia at the centre along x, y, z: {inertia_text} kg; {least_kg:.3g} to {most_kg:.3g} kg over all "
         f"positions and directions; held against gravity by {gravity_text} N",
         "Mirror lines, largest difference of inertia: "
-        + "; ".join(f"{line['azimuth_deg']:.0f} degrees {line['asymmetry']:.2%}" for line in values["lines"]),
-        f"Jacobian against finite differences of its own positions: {values['difference']:.2%}",
+        + "; ".join(f"{line['azimuth_deg']:.0f} degrees {line['asymmetry']:.2%}" for line in summary["lines"]),
+        f"Jacobian against finite differences of its own positions: {summary['difference']:.2%}",
     )
 
 
 def _read_grid(
     linkage: "LinkageSource", plan: CalibrationPlan, on_progress: Callable[[float], None]
 ) -> WrittenCalibration:
-    """The calibration over the whole grid. All readings are checked before it is refused, so that an error can list the
+    """The calibration over the whole grid. All readings are checked before an error is raised, so that it can list all
     problems. Raises CalibrationError, DeviceError."""
-    azimuths = arm_azimuths(_centre_jacobian(linkage))
-    readings, unread, worst = [], [], 0.0
+    azimuths = estimate_arm_azimuths(_read_centre_jacobian(linkage))
+    readings, unread_positions_m, largest_error = [], [], 0.0
     problems: list[str] = []
-    grid = symmetric_grid(azimuths, plan.radius_m, plan.depth_m)
-    for number, position in enumerate(grid):
-        reading = linkage.at(position)
+    grid_m = make_symmetric_grid(azimuths, plan.radius_m, plan.depth_m)
+    for index, position_m in enumerate(grid_m):
+        reading = linkage.at(position_m)
         if reading is None:
-            unread.append(position)
+            unread_positions_m.append(position_m)
         else:
             readings.append(reading)
             problems += check_reading(reading)
-            worst = max(worst, _difference_error(linkage, reading))
-        on_progress(number / len(grid))
+            largest_error = max(largest_error, _compute_difference_error(linkage, reading))
+        on_progress(index / len(grid_m))
     if problems:
         raise CalibrationError(tuple(problems))
-    filled_readings, unknown = complete_by_symmetry(readings, azimuths, np.array(unread).reshape(-1, 3))
-    asymmetry, worst_position_m = line_asymmetry(readings, azimuths)
+    filled_readings, unknown_positions_m = complete_by_symmetry(
+        readings, azimuths, np.array(unread_positions_m).reshape(-1, 3)
+    )
+    asymmetry, worst_position_m = measure_line_asymmetry(readings, azimuths)
     line_deg = np.degrees(azimuths)
     calibration = LinkageCalibration(
         device=linkage.info.name,
         details=linkage.info.details,
         read_on=datetime.now(UTC).date().isoformat(),
-        **_arrays([*readings, *filled_readings]),
+        **_stack_readings([*readings, *filled_readings]),
         filled=np.array([0.0] * len(readings) + [1.0] * len(filled_readings)),
         line_deg=line_deg,
         asymmetry=asymmetry,
-        difference=worst,
+        difference=largest_error,
         provenance=gather_provenance().as_dict(),
     )
-    return WrittenCalibration(plan, calibration, asymmetry_words(asymmetry, worst_position_m, line_deg), len(unknown))
+    return WrittenCalibration(
+        plan, calibration, write_asymmetry_warnings(asymmetry, worst_position_m, line_deg), len(unknown_positions_m)
+    )
 
 
-def _centre_jacobian(linkage: "LinkageSource") -> FloatArray:
-    """(3, 3): the checked Jacobian at the centre, from which the azimuths of the arms follow. Raises CalibrationError,
-    DeviceError."""
+def _read_centre_jacobian(linkage: "LinkageSource") -> FloatArray:
+    """(3, 3): the checked Jacobian at the centre, from which the azimuths of the arms are computed. Raises
+    CalibrationError, DeviceError."""
     centre = linkage.at(np.zeros(3))
     if centre is None:
         raise CalibrationError(("the centre of the workspace is out of its reach",))
-    problems = tuple(check_reading(centre)) or tuple(difference_problems(_difference_error(linkage, centre)))
+    problems = tuple(check_reading(centre)) or tuple(check_difference(_compute_difference_error(linkage, centre)))
     if problems:
         raise CalibrationError(problems)
     return centre.jacobian
 
 
-def _difference_error(linkage: "LinkageSource", reading: LinkageReading) -> float:
-    """Difference between the device's Jacobian and finite differences of its own joint angles, relative to the
-    Jacobian. 0 where a neighbour is out of reach, or where a value is no number, which `check_reading` refuses."""
-    positions = difference_positions(reading.position_m)
-    rows = [angle for position in positions if (angle := linkage.angles_at(position)) is not None]
-    angles = np.array(rows)
-    if len(rows) < len(positions) or not np.isfinite(angles).all() or not np.isfinite(reading.jacobian).all():
+def _compute_difference_error(linkage: "LinkageSource", reading: LinkageReading) -> float:
+    """Difference between the device's Jacobian and that of its joint angles by central differences, relative to the
+    largest entry of the latter. 0 where a neighbouring position is out of reach, or where a value is not finite, which
+    `check_reading` rejects."""
+    positions_m = list_difference_positions(reading.position_m)
+    angle_rows = [angle_row for position_m in positions_m if (angle_row := linkage.angles_at(position_m)) is not None]
+    angles_rad = np.array(angle_rows)
+    if (
+        len(angle_rows) < len(positions_m)
+        or not np.isfinite(angles_rad).all()
+        or not np.isfinite(reading.jacobian).all()
+    ):
         return 0.0
-    return difference_error(reading.jacobian, positions, angles)
+    return compute_difference_error(reading.jacobian, positions_m, angles_rad)
 
 
-def _arrays(readings: list[LinkageReading]) -> dict[str, Any]:
-    """The readings' arrays, positions first, by the fields of `LinkageCalibration`."""
+def _stack_readings(readings: list[LinkageReading]) -> dict[str, Any]:
+    """Arrays of all readings, with the position along the first dimension, by the names of the fields of
+    `LinkageCalibration`."""
     names = ("position_m", "joint_angle_rad", "jacobian", "inertia_kg", "gravity_n")
     return {name: np.stack([getattr(reading, name) for reading in readings]) for name in names}
 
 
-def _refusal(name: str, problems: tuple[str, ...]) -> DeviceError:
-    remainder_text = f"; and {len(problems) - MAX_LISTED} more" if len(problems) > MAX_LISTED else ""
+def _make_refusal(device_name: str, problems: tuple[str, ...]) -> DeviceError:
+    """Error for a linkage with inconsistent readings; lists the first `MAX_LISTED_PROBLEMS` problems."""
+    remainder_text = f"; and {len(problems) - MAX_LISTED_PROBLEMS} more" if len(problems) > MAX_LISTED_PROBLEMS else ""
     return DeviceError(
-        TITLE,
-        f"The linkage that {name} reports is inconsistent: {'; '.join(problems[:MAX_LISTED])}{remainder_text}.",
-        f"Calibrate its handle anew (`hapteq doctor --device {name} --calibrate`), try a smaller grid (--radius, "
-        "--depth) and the vendor's newest SDK; if the report stays the same, do without: no other command needs it.",
-        saved=SAVED,
+        ERROR_TITLE,
+        f"The linkage that {device_name} reports is inconsistent: "
+        f"{'; '.join(problems[:MAX_LISTED_PROBLEMS])}{remainder_text}.",
+        f"Calibrate its handle anew (`hapteq doctor --device {device_name} --calibrate`), try a smaller grid "
+        "(--radius, --depth) and the vendor's newest SDK; if the report stays the same, do without: no other command "
+        "needs it.",
+        saved=NOTHING_DONE,
     )

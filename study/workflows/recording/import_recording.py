@@ -17,7 +17,7 @@ from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
 from study.importing.arrays.arrays import Arrays
 from study.importing.build_recording import build_recording
-from study.importing.header_map import header_map, header_notes, header_problems, read_without_map
+from study.importing.header_map import describe_header_choices, find_header_problems, make_header_map, read_without_map
 from study.importing.map_format.import_map import ImportMap
 from study.importing.map_format.map_errors import (
     NOTHING_WRITTEN,
@@ -26,7 +26,7 @@ from study.importing.map_format.map_errors import (
     MapNeededError,
 )
 from study.importing.map_library import NO_DATA, MapFile, find_map, map_by_header, map_of_files, read_map
-from study.importing.map_skeleton import map_skeleton
+from study.importing.map_skeleton import make_map_skeleton
 from study.store.disk.hdf5_file import is_hdf5, read_format
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.recording_file import read_recording, write_recording
@@ -177,14 +177,14 @@ def _import_by_header(files: Sequence[Path], on_progress: Progress) -> Foreign:
     """Import files by the header of the first file, else by the only shipped map that fits them. Raises MapNeededError
     with a draft of a map where neither suffices."""
     arrays = read_without_map(files[0])
-    import_map = header_map(arrays)
+    import_map = make_header_map(arrays)
     if import_map is None and (shipped := map_of_files(files)) is not None:
         imported = _import_by_map(shipped, files, on_progress)
         return replace(
             imported, notes=(f"Imported by our map '{shipped.name}', which fits these files.", *imported.notes)
         )
     if import_map is None:
-        raise MapNeededError(files[0].name, "; ".join(header_problems(arrays)), map_skeleton(arrays))
+        raise MapNeededError(files[0].name, "; ".join(find_header_problems(arrays)), make_map_skeleton(arrays))
     return _with_header(import_map, arrays, files, on_progress)
 
 
@@ -196,6 +196,6 @@ def _with_header(import_map: ImportMap, arrays: Arrays, files: Sequence[Path], o
     except ImportRefusedError as refused:
         if not isinstance(refused.__cause__, ImportProblemError):
             raise
-        raise MapNeededError(files[0].name, refused.happened, map_skeleton(arrays)) from refused
-    notes = (*header_notes(arrays, import_map), *built.notes)
+        raise MapNeededError(files[0].name, refused.happened, make_map_skeleton(arrays)) from refused
+    notes = (*describe_header_choices(arrays, import_map), *built.notes)
     return Foreign(built.recording, tuple(files), "header", "", notes)

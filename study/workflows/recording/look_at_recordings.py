@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.look.overview import Overview, overview
+from analysis.look.overview import Overview, make_overview
 from analysis.reports.look_report import pictures_of, render_look_report
 from study.local_clock import local_now
 from study.store.disk.text_file import write_text
@@ -34,7 +34,7 @@ def inspect_recordings(paths: Sequence[Path], on_progress: Progress = lambda sha
         recording, notes = read_any_recording(path)
         if notes:
             recording = replace(recording, meta={**recording.meta, "import": {"notes": list(notes)}})
-        overviews.append(overview(path.stem, recording))
+        overviews.append(make_overview(path.stem, recording))
         on_progress(count / len(paths))
     return tuple(overviews)
 

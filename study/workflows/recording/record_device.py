@@ -19,7 +19,7 @@ from study.devices.opening import needs_real_time, open_device
 from study.errors import DeviceError, UserInterruptError
 from study.session.stimulus.limits import make_recording_limits
 from study.session.stimulus.recording_pieces import make_pieces
-from study.session.views.handle_notice import BeforeMoving, handle_notice, refuse_unannounced
+from study.session.views.handle_notice import BeforeMoving, format_recording_notice, refuse_unannounced
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.recording_file import write_recording
 from study.workflows.free_name import require_free
@@ -87,7 +87,7 @@ def record_on_device(
     takes: list[RecordedTake] = []
     try:
         if not device.info.simulated:
-            before_moving(handle_notice(plan.protocol, device.info.name, plan.total_s))
+            before_moving(format_recording_notice(plan.protocol, device.info.name, plan.total_s))
         play_pieces(plan.protocol, device, takes, on_progress)
     except KeyboardInterrupt as interruption:
         _write_complete_takes(plan, device, takes)

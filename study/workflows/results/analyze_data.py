@@ -1,7 +1,7 @@
-"""Analysis of a folder of sessions: thresholds.csv, detection.csv, anova.json, figures and one HTML report.
+"""Analysis of a folder of sessions (`hapteq analyze`): thresholds.csv, detection.csv, anova.json, figures, HTML report.
 
 The sessions that belong together are selected (`collect_sessions`), analysed (`analyse_study`: thresholds, hierarchical
-model, analysis of variance) and written with their provenance.
+model, analysis of variance) and written with their provenance. `write_results` does this at the end of a session.
 """
 
 import errno
@@ -9,7 +9,7 @@ from pathlib import Path
 
 from analysis.figures.picture import Picture
 from analysis.figures.study_pictures import study_pictures
-from analysis.psychophysics.ellipsoid import EllipsoidResult, ellipsoids, sensor_frame
+from analysis.psychophysics.ellipsoid import EllipsoidResult, compute_ellipsoids, read_sensor_frame
 from analysis.psychophysics.study_analysis import StudyAnalysis, analyse_study, make_anova_document
 from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.reports.declared_section import describe_declared
@@ -28,7 +28,7 @@ from study.store.sessions.written_elsewhere import note_written_folder
 from study.workflows.picture_files import write_pictures
 from study.workflows.results.analysis_files import PAGE_NAME, analysis_outputs
 from study.workflows.results.collect_sessions import collect_sessions
-from study.workflows.results.collected import CollectedTrials
+from study.workflows.results.collected_trials import CollectedTrials
 from study.workflows.results.export_study import collect_exported, is_exported
 from study.workflows.results.written_analysis import WrittenAnalysis
 
@@ -44,73 +44,74 @@ def analyze_data(
     data, out_folder, ellipsoid = Path(data), Path(out_folder), None if ellipsoid is None else Path(ellipsoid)
     collected = collect_exported(data) if is_exported(data) else collect_sessions(data, protocol_name)
     try:
-        analysis = analyse_study(collected.trials, collected.protocol, collected.left_out)
+        analysis = analyse_study(collected.trials, collected.protocol, collected.exclusions)
     except ValueError as problem:
         raise StudyError(
             "The data contradict their protocol", f"{problem}.", "Nothing was written; look at the sessions named."
         ) from problem
-    found_ellipsoids = _ellipsoids(ellipsoid)
-    parents = [*collected.parents, *([ellipsoid] if ellipsoid else [])]
+    ellipses = _compute_ellipses(ellipsoid)
+    parents = [*collected.input_paths, *([ellipsoid] if ellipsoid else [])]
     provenance = gather_provenance(
         protocol_hash=collected.protocol_hash,
         seeds={folder.name: seed for folder, seed in zip(collected.sessions, collected.seeds, strict=True)},
         parents=parents,
     )
-    pictures = study_pictures(analysis, found_ellipsoids)
-    _make_private(out_folder, data)
+    pictures = study_pictures(analysis, ellipses)
+    _create_private_folder(out_folder, data)
     note_written_folder(data, out_folder)
-    _write(out_folder, analysis, pictures, found_ellipsoids, provenance, collected)
+    _write_files(out_folder, analysis, pictures, ellipses, provenance, collected)
     return WrittenAnalysis(
         thresholds=analysis.thresholds,
-        table=tuple(text_table(analysis)),
-        warnings=(*collected.finished, *collected.left_out, *analysis.warnings),
+        table=tuple(format_threshold_lines(analysis)),
+        warnings=(*collected.result_file_notes, *collected.exclusions, *analysis.warnings),
         report=out_folder / PAGE_NAME,
     )
 
 
-def text_table(analysis: StudyAnalysis) -> list[str]:
-    """Table of thresholds for the terminal: one line per frequency, means in N, with medians and declared contrast."""
+def format_threshold_lines(analysis: StudyAnalysis) -> list[str]:
+    """Table of thresholds for the terminal: one line per frequency, means in N, with medians and the declared
+    contrast."""
     lines = ["No complete test run: there is no threshold yet."]
     if any(row.complete for row in analysis.thresholds):
-        declared = describe_declared(analysis.declared_result)
-        lines = [*_lines(analysis.table, "threshold"), *_primary_lines(analysis), *declared]
+        declared_lines = describe_declared(analysis.declared_result)
+        lines = [*_format_frequency_lines(analysis.table, "threshold"), *_format_model_lines(analysis), *declared_lines]
     if any(row.complete for row in analysis.detection):
-        lines += _lines(analysis.detection_table, "felt from")
+        lines += _format_frequency_lines(analysis.detection_table, "felt from")
     return lines
 
 
-def _lines(table: ThresholdTable, heading: str) -> list[str]:
-    """One line per frequency: mean threshold over participants in N (values limited by the cap are included), number of
-    values limited by the cap, and number of participants."""
+def _format_frequency_lines(table: ThresholdTable, heading: str) -> list[str]:
+    """One line per frequency: mean threshold over participants in N (values limited by the force cap are included),
+    number of values limited by the cap, and number of participants. heading: of the column of means."""
     lines = [f"{'frequency':>10}  {heading:>10}  {'cut by cap':>10}  participants"]
     for column, frequency_hz in enumerate(table.frequencies_hz):
-        values = [value for row in table.values if (value := row[column]) is not None]
-        censored = sum(row[column] for row in table.censored)
-        mean = f"{sum(values) / len(values):.3f} N" if values else "-"
-        lines.append(f"{frequency_hz:7g} Hz  {mean:>10}  {censored:>10}  {len(values):>12}")
+        thresholds_n = [threshold_n for row in table.values if (threshold_n := row[column]) is not None]
+        censored_count = sum(row[column] for row in table.censored)
+        mean_text = f"{sum(thresholds_n) / len(thresholds_n):.3f} N" if thresholds_n else "-"
+        lines.append(f"{frequency_hz:7g} Hz  {mean_text:>10}  {censored_count:>10}  {len(thresholds_n):>12}")
     return lines
 
 
-def _primary_lines(analysis: StudyAnalysis) -> list[str]:
-    """Medians in N of the hierarchical model with their 95 % intervals; empty where it was not fitted."""
+def _format_model_lines(analysis: StudyAnalysis) -> list[str]:
+    """Lines on the medians (N) of the hierarchical model with their 95 % intervals; empty where it was not fitted."""
     if analysis.primary is None:
         return []
     lines = [f"{'frequency':>10}  {'median':>10}  95 % interval, all answers in one model"]
     for median in analysis.primary.medians:
-        value = "above cap" if median.above_cap else f"{median.newton:.3f} N"
-        unit = " N" if median.lower_n is not None else ""
-        interval = interval_words(median.lower_n, median.upper_n, median.above_cap, 3) + unit
-        lines.append(f"{median.frequency_hz:7g} Hz  {value:>10}  {interval}")
+        median_text = "above cap" if median.above_cap else f"{median.newton:.3f} N"
+        unit_text = " N" if median.lower_n is not None else ""
+        interval_text = interval_words(median.lower_n, median.upper_n, median.above_cap, 3) + unit_text
+        lines.append(f"{median.frequency_hz:7g} Hz  {median_text:>10}  {interval_text}")
     return [*lines, limit_words(analysis.primary), analysis.compared]
 
 
-def _ellipsoids(path: Path | None) -> tuple[EllipsoidResult, ...]:
-    """Acceleration ellipses of a recording; none without a path. Raises StudyError where they cannot be computed."""
+def _compute_ellipses(path: Path | None) -> tuple[EllipsoidResult, ...]:
+    """Acceleration ellipses of a recording; empty without a path. Raises StudyError where they cannot be computed."""
     if path is None:
         return ()
     recording = read_recording(path)
     try:
-        return ellipsoids(recording, sensor_frame(recording))
+        return compute_ellipsoids(recording, read_sensor_frame(recording))
     except ValueError as problem:
         raise StudyError(
             "No ellipsoids can be computed",
@@ -120,9 +121,9 @@ def _ellipsoids(path: Path | None) -> tuple[EllipsoidResult, ...]:
         ) from problem
 
 
-def _make_private(folder: Path, data: Path) -> None:
+def _create_private_folder(folder: Path, data: Path) -> None:
     """Create an output folder inside the folder of sessions, readable only by this account. An output folder elsewhere
-    is left to `_write`. Raises CannotWriteError."""
+    is created by `_write_files`. Raises CannotWriteError."""
     if not folder.resolve().is_relative_to(data.resolve()):
         return
     try:
@@ -133,47 +134,47 @@ def _make_private(folder: Path, data: Path) -> None:
         close_to_others(folder, recursive=True)
 
 
-def _write(
+def _write_files(
     folder: Path,
     analysis: StudyAnalysis,
     pictures: tuple[Picture, ...],
-    found_ellipsoids: tuple[EllipsoidResult, ...],
+    ellipses: tuple[EllipsoidResult, ...],
     provenance: Provenance,
     collected: CollectedTrials,
 ) -> None:
     """Remove figures and report of an earlier analysis, then write all files. Raises CannotWriteError."""
-    figures = folder / "figures"
+    figure_folder = folder / "figures"
     try:
-        make_folder(figures)
-        if figures.is_symlink():
+        make_folder(figure_folder)
+        if figure_folder.is_symlink():
             raise NotADirectoryError(errno.ENOTDIR, "it is a link, which is not followed")
         # The report is removed first and written last: while it is missing, the other files may be of different runs.
-        for stale in analysis_outputs(folder):
-            if stale.parent == figures or stale.name in (DETECTION_NAME, PAGE_NAME):
-                stale.unlink()
+        for outdated_path in analysis_outputs(folder):
+            if outdated_path.parent == figure_folder or outdated_path.name in (DETECTION_NAME, PAGE_NAME):
+                outdated_path.unlink()
     except OSError as problem:
-        raise CannotWriteError(figures, problem) from problem
+        raise CannotWriteError(figure_folder, problem) from problem
     write_thresholds(folder / THRESHOLDS_NAME, analysis.thresholds)
     if analysis.detection:
         write_thresholds(folder / DETECTION_NAME, analysis.detection)
     document = make_anova_document(analysis)
     format_name, version = document.pop("format"), document.pop("version")
     write_json(folder / "anova.json", format_name, version, document, provenance, overwrite=True)
-    write_pictures(figures, pictures)
-    origin = _origin_entries(provenance, collected)
-    page = render_study_report(analysis, pictures, origin, local_now(), found_ellipsoids, collected.qualities)
-    write_text(folder / PAGE_NAME, page, overwrite=True)
+    write_pictures(figure_folder, pictures)
+    origin = _list_origin(provenance, collected)
+    report_html = render_study_report(analysis, pictures, origin, local_now(), ellipses, collected.model_qualities)
+    write_text(folder / PAGE_NAME, report_html, overwrite=True)
 
 
-def _origin_entries(provenance: Provenance, collected: CollectedTrials) -> dict[str, str]:
-    """Entries of the report's last section, on the origin of the results."""
+def _list_origin(provenance: Provenance, collected: CollectedTrials) -> dict[str, str]:
+    """Label and text of the entries of the report's last section, on the origin of the results."""
     return {
         "protocol": f"{collected.protocol.name}, hash {collected.protocol_hash}",
-        "locked before the data": collected.locked,
+        "locked before the data": collected.lock_statement,
         "device": ", ".join(collected.devices) or "none",
         "participants": ", ".join(collected.observers) or "people",
         "sessions": ", ".join(folder.name for folder in collected.sessions) or "none",
-        "left out": " ".join(collected.left_out) or "nothing",
+        "left out": " ".join(collected.exclusions) or "nothing",
         "seeds": ", ".join(str(seed) for seed in collected.seeds) or "none",
         "versions": ", ".join(f"{name} {version}" for name, version in provenance.versions.items()),
         "command": " ".join(provenance.command),

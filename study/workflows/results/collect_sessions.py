@@ -1,7 +1,8 @@
-"""Selection of the sessions that one analysis takes: one protocol, one population, none withdrawn or contradictory.
+"""Selection of the sessions for one analysis: one protocol, one population, none withdrawn or unreadable.
 
-People, simulated participants, and people at a device that did not move are never analysed together (`Population`).
-Everything that is excluded is reported in words.
+Used by `analyze_data`, `hapteq export`, `hapteq power` and the reproduction of the paper. People, simulated
+participants, and people at a device that did not move are never analysed together (`Population`). Every exclusion is
+reported as a sentence.
 """
 
 from collections.abc import Sequence
@@ -18,7 +19,7 @@ from study.session.views.archive_views import INELIGIBILITY_REASONS
 from study.store.formats.answer_table import FORM_NAMES, FilledForm
 from study.store.sessions.archive import SessionFolder, list_session_folders
 from study.store.sessions.event_log import LOG_NAME
-from study.workflows.results.collected import CollectedTrials
+from study.workflows.results.collected_trials import CollectedTrials
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import finish_tables
 
@@ -27,40 +28,43 @@ def collect_sessions(data: Path, protocol_name: str | None = None) -> CollectedT
     """Sessions in `data` (or `data` itself, a session) that belong together. Of several protocols: the named one (name,
     or first 12 digits of its hash); else, of those with test or detection runs, the one with the most sessions. Of
     several populations: the first in the order of `Population`. Raises StudyError where there is nothing to analyse."""
-    folders = _folders(data)
-    usable_sessions, exclusions = _fold_all(folders)
+    folders = _list_folders(data)
+    usable_sessions, exclusions = _fold_sessions(folders)
     session_states = [(folder, session.state) for folder, session in usable_sessions]
     chosen_hash = _choose_protocol(session_states, protocol_name, data)
-    chosen = [(folder, state) for folder, state in session_states if state.opened.protocol_hash == chosen_hash]
+    chosen_sessions = [(folder, state) for folder, state in session_states if state.opened.protocol_hash == chosen_hash]
     exclusions += [
         f"{folder.name} follows another protocol ('{state.protocol.name}')."
         for folder, state in session_states
         if state.opened.protocol_hash != chosen_hash
     ]
-    parts = split_by_population([trial for _, state in chosen for trial in state.trials])
-    selected = next((selected for selected in Population if selected in parts), None)
+    trials_by_population = split_by_population([trial for _, state in chosen_sessions for trial in state.trials])
+    selected_population = next((candidate for candidate in Population if candidate in trials_by_population), None)
     exclusions += [
-        f"{len(parts[population])} trials of {population.value} are not analysed together with {selected.value}."
-        for population in parts
-        if selected is not None and population is not selected
+        f"{len(trials_by_population[population])} trials of {population.value} are not analysed together with "
+        f"{selected_population.value}."
+        for population in trials_by_population
+        if selected_population is not None and population is not selected_population
     ]
-    trials = parts[selected] if selected is not None else ()
-    names = {trial.session for trial in trials}
-    entering = [(folder, state) for folder, state in chosen if folder.name in names]
+    trials = trials_by_population[selected_population] if selected_population is not None else ()
+    analysed_names = {trial.session for trial in trials}
+    used_sessions = [(folder, state) for folder, state in chosen_sessions if folder.name in analysed_names]
     return CollectedTrials(
-        protocol=chosen[0][1].protocol,
+        protocol=chosen_sessions[0][1].protocol,
         protocol_hash=chosen_hash,
         trials=trials,
-        sessions=tuple(folder for folder, _ in entering),
-        seeds=tuple(state.opened.seed for _, state in entering),
-        devices=tuple(dict.fromkeys(state.opened.device.name for _, state in entering)),
-        observers=tuple(dict.fromkeys(state.opened.observer for _, state in entering if state.opened.observer)),
-        left_out=tuple(exclusions),
-        qualities=_qualities(entering),
-        locked=_lock_words([state for _, state in entering]),
-        finished=_finish(usable_sessions),
-        parents=tuple(folder.log for folder, _ in entering),
-        forms=_collect_filled_forms([(folder, session) for folder, session in usable_sessions if folder.name in names]),
+        sessions=tuple(folder for folder, _ in used_sessions),
+        seeds=tuple(state.opened.seed for _, state in used_sessions),
+        devices=tuple(dict.fromkeys(state.opened.device.name for _, state in used_sessions)),
+        observers=tuple(dict.fromkeys(state.opened.observer for _, state in used_sessions if state.opened.observer)),
+        exclusions=tuple(exclusions),
+        model_qualities=_group_model_qualities(used_sessions),
+        lock_statement=_describe_locks([state for _, state in used_sessions]),
+        result_file_notes=_finish_result_files(usable_sessions),
+        input_paths=tuple(folder.log for folder, _ in used_sessions),
+        forms=_collect_filled_forms(
+            [(folder, session) for folder, session in usable_sessions if folder.name in analysed_names]
+        ),
     )
 
 
@@ -74,25 +78,28 @@ def _collect_filled_forms(sessions: Sequence[tuple[SessionFolder, FoldedSession]
     )
 
 
-def _lock_words(states: Sequence[SessionState]) -> str:
-    """Whether the protocol was locked when the sessions were opened, in words."""
-    locked = sum(state.opened.protocol_locked for state in states)
-    if not locked:
+def _describe_locks(states: Sequence[SessionState]) -> str:
+    """Whether the protocol was locked when the sessions were opened, as text."""
+    locked_count = sum(state.opened.protocol_locked for state in states)
+    if not locked_count:
         return "no: what the protocol declares was not fixed by a lock"
-    return "yes" if locked == len(states) else f"for {locked} of {len(states)} sessions"
+    return "yes" if locked_count == len(states) else f"for {locked_count} of {len(states)} sessions"
 
 
-def _qualities(entering: Sequence[tuple[SessionFolder, SessionState]]) -> tuple[tuple[str, str], ...]:
-    """(names of sessions, sentence on the quality of their model); sessions that share a model are listed together."""
-    sessions: dict[tuple[str, str], list[str]] = {}
-    for folder, state in entering:
+def _group_model_qualities(
+    analysed_sessions: Sequence[tuple[SessionFolder, SessionState]],
+) -> tuple[tuple[str, str], ...]:
+    """Pairs (names of sessions, sentence on the quality of their model); sessions with the same model are listed
+    together, sessions without an equalizer are left out."""
+    names_by_model: dict[tuple[str, str], list[str]] = {}
+    for folder, state in analysed_sessions:
         if (equalized := state.opened.equalized) is not None:
-            key = (equalized.sha256, equalized.quality or NOT_STORED)
-            sessions.setdefault(key, []).append(folder.name)
-    return tuple((conjoin(names), sentence) for (_, sentence), names in sessions.items())
+            model_key = (equalized.sha256, equalized.quality or NOT_STORED)
+            names_by_model.setdefault(model_key, []).append(folder.name)
+    return tuple((conjoin(names), sentence) for (_, sentence), names in names_by_model.items())
 
 
-def _folders(data: Path) -> tuple[SessionFolder, ...]:
+def _list_folders(data: Path) -> tuple[SessionFolder, ...]:
     """Session folders in `data`, or `data` itself if it is a session. Raises WrongUseError where there are none."""
     if (data / LOG_NAME).exists():
         return (SessionFolder(data.resolve()),)
@@ -107,9 +114,9 @@ def _folders(data: Path) -> tuple[SessionFolder, ...]:
     return folders
 
 
-def _fold_all(folders: Sequence[SessionFolder]) -> tuple[list[tuple[SessionFolder, FoldedSession]], list[str]]:
-    """Usable sessions, replayed from their logs, and sentences on the others. Raises StudyError where none is
-    usable."""
+def _fold_sessions(folders: Sequence[SessionFolder]) -> tuple[list[tuple[SessionFolder, FoldedSession]], list[str]]:
+    """Usable sessions with their state, rebuilt from the log, and sentences on the excluded ones. Raises StudyError
+    where none is usable."""
     usable_sessions: list[tuple[SessionFolder, FoldedSession]] = []
     exclusions: list[str] = []
     for folder in folders:
@@ -130,21 +137,21 @@ def _fold_all(folders: Sequence[SessionFolder]) -> tuple[list[tuple[SessionFolde
     return usable_sessions, exclusions
 
 
-def _finish(sessions: Sequence[tuple[SessionFolder, FoldedSession]]) -> tuple[str, ...]:
-    """Write tables and seals that are missing or out of date; returns sentences on what was written. Problems are only
+def _finish_result_files(sessions: Sequence[tuple[SessionFolder, FoldedSession]]) -> tuple[str, ...]:
+    """Write tables and seals that are missing or out of date; returns sentences on what was written. Errors are only
     reported, because the analysis uses the logs alone."""
-    texts = []
+    sentences = []
     for folder, session in sessions:
         try:
             written_files = finish_tables(folder, session)
         except StudyError as problem:
-            texts.append(f"{folder.name}: its results are not whole and could not be written. {problem.happened}")
+            sentences.append(f"{folder.name}: its results are not whole and could not be written. {problem.happened}")
             continue
         if written_files:
-            texts.append(
+            sentences.append(
                 f"{folder.name}: written now from its log, because missing or out of date: {', '.join(written_files)}."
             )
-    return tuple(texts)
+    return tuple(sentences)
 
 
 def _choose_protocol(
@@ -155,21 +162,29 @@ def _choose_protocol(
     for _, state in session_states:
         states_by_hash.setdefault(state.opened.protocol_hash, []).append(state)
     candidates = {
-        key: states
-        for key, states in states_by_hash.items()
-        if protocol_name in (None, states[0].protocol.name, key[:12])
+        protocol_hash: states
+        for protocol_hash, states in states_by_hash.items()
+        if protocol_name in (None, states[0].protocol.name, protocol_hash[:12])
     }
     if not candidates:
-        available = ", ".join(f"{states[0].protocol.name} ({key[:12]})" for key, states in states_by_hash.items())
+        available = ", ".join(
+            f"{states[0].protocol.name} ({protocol_hash[:12]})" for protocol_hash, states in states_by_hash.items()
+        )
         raise WrongUseError(
             "No session follows that protocol",
             f"'{protocol_name}' was asked for; {data} holds sessions of {available}.",
             "Give one of these names, or the first twelve digits of its hash.",
         )
     # A protocol with training runs only has no thresholds; it is chosen only if there is no other.
-    return max(candidates, key=lambda key: (_measures(candidates[key][0].protocol), len(candidates[key])))
+    return max(
+        candidates,
+        key=lambda protocol_hash: (
+            _has_measured_runs(candidates[protocol_hash][0].protocol),
+            len(candidates[protocol_hash]),
+        ),
+    )
 
 
-def _measures(protocol: StudyProtocol) -> bool:
-    """Whether the protocol has test or detection runs."""
+def _has_measured_runs(protocol: StudyProtocol) -> bool:
+    """Whether the protocol has runs that give a threshold: test or detection runs."""
     return bool(protocol.stimulus.frequencies_hz or protocol.detection.frequencies_hz)

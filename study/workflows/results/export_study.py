@@ -33,7 +33,7 @@ from study.store.formats.psych_ds import (
 from study.store.formats.trials_mat import write_trials_mat
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.written_elsewhere import note_written_folder
-from study.workflows.results.collected import CollectedTrials
+from study.workflows.results.collected_trials import CollectedTrials
 
 MAX_LEFT_OUT = 10_000
 """Largest plausible number of excluded items in a dataset; a larger one is ignored as an error of editing."""
@@ -75,7 +75,7 @@ def export_study(
         )
         names = tuple(path.relative_to(folder).as_posix() for path in files)
     note_written_folder(data, out_folder, always=True)
-    return ExportResult(out_folder, names, len(collected.trials), collected.left_out)
+    return ExportResult(out_folder, names, len(collected.trials), collected.exclusions)
 
 
 def _gather_metadata(collected: CollectedTrials) -> dict[str, Any]:
@@ -87,10 +87,10 @@ def _gather_metadata(collected: CollectedTrials) -> dict[str, Any]:
         "seeds": dict(zip(names, collected.seeds, strict=True)),
         "devices": list(collected.devices),
         "observers": list(collected.observers),
-        "locked": collected.locked,
+        "locked": collected.lock_statement,
         # Only the number: the sentences would name sessions of people who withdrew.
-        "left_out_count": len(collected.left_out),
-        "model_qualities": [list(quality) for quality in collected.qualities],
+        "left_out_count": len(collected.exclusions),
+        "model_qualities": [list(quality) for quality in collected.model_qualities],
     }
 
 
@@ -173,9 +173,9 @@ def collect_exported(folder: Path) -> CollectedTrials:
         seeds=tuple(seeds.get(name, 0) for name in sessions),
         devices=_read_names(dataset.facts, "devices", facts_path, kind),
         observers=_read_names(dataset.facts, "observers", facts_path, kind),
-        left_out=_write_exclusion_sentences(dataset.facts),
-        qualities=_read_qualities(dataset.facts),
-        locked=str(dataset.facts.get("locked", "not known")),
-        finished=(),
-        parents=(*dataset.files, path),
+        exclusions=_write_exclusion_sentences(dataset.facts),
+        model_qualities=_read_qualities(dataset.facts),
+        lock_statement=str(dataset.facts.get("locked", "not known")),
+        result_file_notes=(),
+        input_paths=(*dataset.files, path),
     )

@@ -2,7 +2,8 @@
 
 A probe is a short periodic excitation between trials with the hand on the handle; a reference is a longer one with the
 handle free. Changes of friction, gain, delay, and of the hand's mass, damping and stiffness are estimated by
-`analysis.device_change.probe_drift`; this module reads the recordings and decides which are compared.
+`analysis.device_change.probe_drift`; this module reads the recordings and decides which are compared. `watch_session`
+shows the drifts while a session runs; `session_references` reports them with a diagnosis.
 """
 
 from collections.abc import Iterator
@@ -10,28 +11,29 @@ from dataclasses import dataclass, replace
 
 from analysis.device_change.compare_devices import ChangeLimits
 from analysis.device_change.probe_drift import Drift, TimedProbe, find_drifts
-from analysis.device_change.probe_lines import probe_lines
+from analysis.device_change.probe_lines import compute_probe_lines
 from equalizer.signals.recording import Recording
 from protocols.definition.probes import PERIOD_S
 from study.errors import StudyError
 from study.session.watching.followed_session import PlayedProbe
-from study.session.watching.watch_view import DriftLine
+from study.session.watching.watch_view import DriftRecord
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.archive import SessionFolder
 
-LIMITS = ChangeLimits()
+DAILY_LIMITS = ChangeLimits()
 """Limits of the daily device check."""
-ALLOWED = {
-    "friction": LIMITS.friction_n,
-    "gain": LIMITS.share,
+MAX_CHANGES = {
+    "friction": DAILY_LIMITS.friction_n,
+    "gain": DAILY_LIMITS.share,
     "delay": 1e-3,
     "mass": 0.05,
     "damping": 3.0,
     "stiffness": 75.0,
 }
-"""Changes above which a threshold may move by more than the finest step of a staircase: friction in N, relative gain,
-delay in s, and of the hand mass in kg, damping in N s/m, stiffness in N/m. Friction and gain as in the daily check;
-delay: one tick of the control loop; hand: about half of a light grip."""
+"""Largest changes that are not reported as exceeding a limit: friction in N, relative gain, delay in s, and of the hand
+mass in kg, damping in N s/m, stiffness in N/m. Beyond them a threshold may change by more than the finest step of a
+staircase. Friction and gain as in the daily check; delay: one tick of the control loop; hand: about half the values of
+a light grip."""
 
 WITHOUT_HAND = ("friction", "gain", "delay")
 """Quantities in which references, recorded without a hand, are compared."""
@@ -51,92 +53,105 @@ class DriftReader:
     """Estimates the drifts of one session. Results are cached: each update reads and compares new probes only."""
 
     def __init__(self, folder: SessionFolder) -> None:
+        """folder: the session, whose recordings of probes are read."""
         self._folder = folder
-        self._read: list[tuple[PlayedProbe, _ProbeLines]] = []
+        self._usable_probes: list[tuple[PlayedProbe, _ProbeLines]] = []
         self._read_count = 0
         self._since_s: dict[tuple[str, str, str], float] = {}
-        self._lines_by_kind: dict[str, tuple[DriftLine, ...]] = {}
+        self._records_by_kind: dict[str, tuple[DriftRecord, ...]] = {}
 
-    def look(self, probes: tuple[PlayedProbe, ...]) -> tuple[DriftLine, ...]:
+    def update(self, probes: tuple[PlayedProbe, ...]) -> tuple[DriftRecord, ...]:
         """The present drifts: of device and hand within the sitting, from probes; of the device alone over the session,
         from references. probes: all probes of the session so far, in their order."""
         for probe in probes[self._read_count :]:
-            read = self._read_probe(probe)
-            if read is not None and probe.kind in ("hand", "reference"):
-                self._read.append((probe, read))
-                self._lines_by_kind[probe.kind] = tuple(self._drift_lines(probe.kind, self._compare(probe)))
+            probe_lines = self._read_probe(probe)
+            if probe_lines is not None and probe.kind in ("hand", "reference"):
+                self._usable_probes.append((probe, probe_lines))
+                self._records_by_kind[probe.kind] = tuple(
+                    self._make_drift_records(probe.kind, self._compare_probe(probe))
+                )
         self._read_count = len(probes)
-        return tuple(line for lines in self._lines_by_kind.values() for line in lines)
+        return tuple(line for lines in self._records_by_kind.values() for line in lines)
 
-    def _compare(self, newest: PlayedProbe) -> tuple[Drift, ...]:
+    def _compare_probe(self, newest: PlayedProbe) -> tuple[Drift, ...]:
         """The newest probe compared with earlier ones: a reference with the session's first reference, a probe with a
-        hand with those of the same sitting. Empty where there are too few."""
+        hand with those of the same sitting. Empty where there is nothing to compare with."""
         if newest.kind == "reference":
-            references = [read for probe, read in self._read if probe.kind == "reference"]
-            first, last = references[0], references[-1]
+            reference_lines = [probe_lines for probe, probe_lines in self._usable_probes if probe.kind == "reference"]
+            first, last = reference_lines[0], reference_lines[-1]
             return (
-                find_drifts((*first.timed_probes, last.timed_probes[-1]), _period(last), WITHOUT_HAND)
+                find_drifts((*first.timed_probes, last.timed_probes[-1]), _compute_period(last), WITHOUT_HAND)
                 if last is not first
                 else ()
             )
-        same_sitting = [read for probe, read in self._read if (probe.kind, probe.sitting) == ("hand", newest.sitting)]
+        hand_probe_lines = [
+            probe_lines
+            for probe, probe_lines in self._usable_probes
+            if (probe.kind, probe.sitting) == ("hand", newest.sitting)
+        ]
         return find_drifts(
-            [timed_probes for read in same_sitting for timed_probes in read.timed_probes], _period(same_sitting[-1])
+            [timed_probes for probe_lines in hand_probe_lines for timed_probes in probe_lines.timed_probes],
+            _compute_period(hand_probe_lines[-1]),
         )
 
-    def _drift_lines(self, kind: str, present_drifts: tuple[Drift, ...]) -> Iterator[DriftLine]:
-        """Drifts as lines for the experimenter, each with the time at which it was first found."""
+    def _make_drift_records(self, kind: str, present_drifts: tuple[Drift, ...]) -> Iterator[DriftRecord]:
+        """Drifts as sentences for the experimenter, each with the time (s) at which it was first found."""
         drifts_by_key = {(kind, drift.number, drift.axis): drift for drift in present_drifts}
         # A drift that has disappeared is forgotten: if it returns, its time is that of its return.
-        self._since_s = {key: s for key, s in self._since_s.items() if key[0] != kind or key in drifts_by_key}
+        self._since_s = {
+            key: found_s for key, found_s in self._since_s.items() if key[0] != kind or key in drifts_by_key
+        }
         for key, drift in drifts_by_key.items():
             since_s = self._since_s.setdefault(key, drift.time_s)
-            words = sentence(replace(drift, time_s=since_s))
-            yield DriftLine(since_s, f"without a hand, {words}" if kind == "reference" else words, exceeds_limit(drift))
+            drift_text = describe_drift(replace(drift, time_s=since_s))
+            yield DriftRecord(
+                since_s, f"without a hand, {drift_text}" if kind == "reference" else drift_text, exceeds_limit(drift)
+            )
 
     def _read_probe(self, probe: PlayedProbe) -> _ProbeLines | None:
-        """Read a probe's recording; None where none was kept, or it cannot be used."""
+        """Spectral lines of a probe's recording; None where there is no recording, or it cannot be used."""
         if not probe.recording or probe.trouble:
             return None
         try:
             recording = read_recording(self._folder.path / probe.recording)
-            parts = _halves(recording) if probe.kind == "reference" else (recording,)
+            segment_recordings = _split_reference(recording) if probe.kind == "reference" else (recording,)
             timed_probes = tuple(
-                TimedProbe(probe.started_s, probe.level_n, probe_lines(part, PERIOD_S)) for part in parts
+                TimedProbe(probe.started_s, probe.level_n, compute_probe_lines(segment_recording, PERIOD_S))
+                for segment_recording in segment_recordings
             )
         except (StudyError, ValueError):
             return None
         return _ProbeLines(recording.sample_rate_hz, timed_probes)
 
 
-def sentence(drift: Drift) -> str:
-    """A drift in words with its unit and time, such as "friction along x 0.12 -> 0.20 N at minute 14"."""
-    minute = f"at minute {drift.time_s / 60:.0f}"
+def describe_drift(drift: Drift) -> str:
+    """A drift as text with its unit and time, such as "friction along x 0.12 -> 0.20 N at minute 14"."""
+    minute_text = f"at minute {drift.time_s / 60:.0f}"
     axis_text = f" along {drift.axis}" if drift.axis else ""
     rivals_text = f" (or {' or '.join(drift.rivals)}: the probes cannot distinguish them)" if drift.rivals else ""
     if drift.initial_value is not None:
         return (
             f"friction{axis_text} {drift.initial_value:.2f} -> {max(0.0, drift.initial_value + drift.change):.2f} N "
-            f"{minute}{rivals_text}"
+            f"{minute_text}{rivals_text}"
         )
     if drift.number == "gain":
-        return f"gain{axis_text} {100 * drift.change:+.0f} % {minute}{rivals_text}"
+        return f"gain{axis_text} {100 * drift.change:+.0f} % {minute_text}{rivals_text}"
     if drift.number == "delay":
-        return f"delay {1000 * drift.change:+.2f} ms {minute}{rivals_text}"
+        return f"delay {1000 * drift.change:+.2f} ms {minute_text}{rivals_text}"
     quantity = "friction" if drift.number == "friction" else f"grip: {drift.number}"
-    return f"{quantity}{axis_text} {drift.change:+.3g} {drift.unit} {minute}{rivals_text}"
+    return f"{quantity}{axis_text} {drift.change:+.3g} {drift.unit} {minute_text}{rivals_text}"
 
 
 def exceeds_limit(drift: Drift) -> bool:
-    """Whether the change exceeds its limit in `ALLOWED`."""
-    return abs(drift.change) > ALLOWED[drift.number]
+    """Whether the absolute change exceeds its limit in `MAX_CHANGES`."""
+    return abs(drift.change) > MAX_CHANGES[drift.number]
 
 
-def _halves(recording: Recording) -> tuple[Recording, Recording]:
-    """The two segments of a reference at full level, as two recordings."""
+def _split_reference(recording: Recording) -> tuple[Recording, Recording]:
+    """The fit and the test segment of a reference at full level, as two recordings."""
     return replace(recording, segments=recording.segments[:1]), replace(recording, segments=recording.segments[1:2])
 
 
-def _period(read: _ProbeLines) -> int:
+def _compute_period(probe_lines: _ProbeLines) -> int:
     """Period of the probe's excitation in samples."""
-    return round(PERIOD_S * read.rate_hz)
+    return round(PERIOD_S * probe_lines.rate_hz)

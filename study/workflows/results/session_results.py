@@ -10,8 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from analysis.psychophysics.detection import detection_thresholds
-from analysis.psychophysics.thresholds import Threshold, thresholds
+from analysis.psychophysics.detection import compute_detection_thresholds
+from analysis.psychophysics.thresholds import Threshold, compute_thresholds
 from protocols.trial import Trial
 from study.session.state.state import SessionState
 from study.store.disk.csv_rows import Row, drop_absent_columns
@@ -113,8 +113,10 @@ def _drop_absent_columns(path: Path, rows: tuple[Row, ...], row_type: type[Row])
 
 def _compute_tables(state: SessionState) -> dict[str, tuple[Threshold, ...]]:
     """Tables of thresholds of this session, by file name."""
-    tables = {THRESHOLDS_NAME: thresholds(state.trials, state.protocol.staircase, state.protocol.stimulus.rove_db)}
-    if detection := detection_thresholds(state.trials, state.protocol):
+    tables = {
+        THRESHOLDS_NAME: compute_thresholds(state.trials, state.protocol.staircase, state.protocol.stimulus.rove_db)
+    }
+    if detection := compute_detection_thresholds(state.trials, state.protocol):
         tables[DETECTION_NAME] = detection
     return tables
 

@@ -1,4 +1,4 @@
-"""All results of one session: its seal, tables and summary, then the analysis of this session alone."""
+"""Writes all results of one session, at its end or on request: seal, tables, summary, then its own analysis."""
 
 from study.store.sessions.archive import SessionFolder
 from study.workflows.results.analysis_files import ANALYSIS_NAME
@@ -7,7 +7,7 @@ from study.workflows.results.written_analysis import WrittenAnalysis
 
 
 def write_results(folder: SessionFolder) -> WrittenAnalysis:
-    """Write tables and analysis of a session into its folder; returns the analysis. Raises StudyError."""
+    """Write seal, tables, summary and analysis into the session's folder; returns the analysis. Raises StudyError."""
     # Imported here: statistics and plots load slowly, and beginning or checking a session must not wait for them.
     from study.workflows.results.analyze_data import analyze_data
 

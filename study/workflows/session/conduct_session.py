@@ -16,8 +16,8 @@ from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.device_settings import device_settings
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.equalize_stimuli import (
-    Equalized,
-    check_playable,
+    SessionEqualizer,
+    check_model_for_protocol,
     equalize_stimuli,
     load_equalizer,
     reload_equalizer,
@@ -80,7 +80,7 @@ class ConductedSitting:
 
 def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -> ConductedSitting:
     """Open the device, then a new session, and run it."""
-    check_playable(plan.protocol, plan.model)
+    check_model_for_protocol(plan.protocol, plan.model)
     settings = device_settings(plan.protocol)
     with (
         _pulses(participant.clock) as pulse,
@@ -141,7 +141,7 @@ class Equipment:
     device_name: str
     """As `open_device` takes it."""
     device: Device
-    equalized: Equalized
+    equalized: SessionEqualizer
     pulse: Callable[[], Pulse | None]
     sound: SoundOutput | None
 

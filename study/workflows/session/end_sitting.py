@@ -1,6 +1,7 @@
-"""End of a sitting, after the device was closed: write the results of a finished session, or raise why there are none.
+"""End of a sitting, after the device was closed: write the results of a finished session, or raise an error.
 
-An unfinished session gives an error that states how to resume it; a withdrawal erases the participant's data.
+For an unfinished session the error states how to resume it; a withdrawal of consent erases the participant's data.
+Called by the command line (`study.cli.conduct`) and by the engine of the screens (`engine_commands`).
 """
 
 from dataclasses import replace
@@ -19,71 +20,74 @@ from study.workflows.results.write_results import write_results
 from study.workflows.results.written_analysis import WrittenAnalysis
 from study.workflows.session.conduct_session import ConductedSitting
 from study.workflows.session.prepare_sitting import does_not_take_part
-from study.workflows.session.resume_session import already_finished
-from study.workflows.session.withdraw_participant import copies_elsewhere, plan_withdrawal, withdraw
+from study.workflows.session.resume_session import make_finished_error
+from study.workflows.session.withdraw_participant import list_remaining_copies, plan_withdrawal, withdraw
 
-DEVICE_FAULTS = frozenset(Fault) - {Fault.NONE, Fault.STALLED, Fault.HELD_TOO_LONG, Fault.STOPPED}
-"""Faults that `hapteq doctor` may explain: all except those due to the timing of the program or to a person."""
+FAULTS_FOR_DOCTOR = frozenset(Fault) - {Fault.NONE, Fault.STALLED, Fault.HELD_TOO_LONG, Fault.STOPPED}
+"""Faults for which `hapteq doctor` is recommended: all except those caused by the program's timing or by a person."""
 
-BUSY_ADVICE = "Close other programs, and measure with hapteq doctor whether that helps. "
-"""Remedy where a sitting ended because the computer was too busy, for messages."""
-
-
-def end_sitting(end: ConductedSitting, utc: str) -> WrittenAnalysis:
-    """Write and return the results. Raises StudyError after erasing the data of a participant who withdrew, for a
-    participant who does not take part, and for an unfinished session, with the command to continue."""
-    if end.withdrawn:
-        raise _erase_withdrawn(end, utc)
-    if end.state.is_finally_ineligible:
-        write_tables(end.folder)
-        raise does_not_take_part(end.state)
-    if end.end_reason:
-        raise _not_finished(end)
-    return write_results(end.folder)
+CLOSE_PROGRAMS_ADVICE = "Close other programs, and measure with hapteq doctor whether that helps. "
+"""Advice in the error of a sitting that ended because the computer was too busy."""
 
 
-def finish_closed(folder: SessionFolder, folded_session: FoldedSession) -> WrittenAnalysis:
-    """Write the results of a closed session that are missing or out of date, for example because the program was killed
-    after the last run. Raises StudyError where none is, or where they cannot be written."""
+def end_sitting(sitting: ConductedSitting, utc: str) -> WrittenAnalysis:
+    """Write and return the results of a finished session. Raises StudyError for a withdrawal (after erasing the
+    participant's data), for a participant who refused or was excluded, and for an unfinished session.
+
+    sitting: how the sitting ended. utc: date and time of a withdrawal, ISO 8601."""
+    if sitting.withdrawn:
+        raise _erase_participant(sitting, utc)
+    if sitting.state.is_finally_ineligible:
+        write_tables(sitting.folder)
+        raise does_not_take_part(sitting.state)
+    if sitting.end_reason:
+        raise _make_unfinished_error(sitting)
+    return write_results(sitting.folder)
+
+
+def write_missing_results(folder: SessionFolder, folded_session: FoldedSession) -> WrittenAnalysis:
+    """Write those results of a closed session that are missing or out of date, for example because the program was
+    killed after the last run. Raises StudyError if all results are up to date, if the participant refused or was
+    excluded, or if results cannot be written."""
     if folded_session.state.is_finally_ineligible:
         finish_tables(folder, folded_session)
         raise does_not_take_part(folded_session.state)
-    report = () if is_analysis_of(folder.path / ANALYSIS_NAME, folder.log) else (REPORT_NAME,)
-    due_files = (*list_due_results(folder, folded_session), *report)
+    due_report = () if is_analysis_of(folder.path / ANALYSIS_NAME, folder.log) else (REPORT_NAME,)
+    due_files = (*list_due_results(folder, folded_session), *due_report)
     if not due_files:
-        raise already_finished(folded_session.state, folder)
+        raise make_finished_error(folded_session.state, folder)
     with hold_session_lock(folder.path):
         analysis = write_results(folder)
-    text = (
+    remark = (
         f"{folder.name} had all its runs already; written now, because missing or out of date: {', '.join(due_files)}."
     )
-    return replace(analysis, warnings=(text, *analysis.warnings))
+    return replace(analysis, warnings=(remark, *analysis.warnings))
 
 
-def _not_finished(end: ConductedSitting) -> StudyError:
-    """Error for an unfinished session: UserInterruptError without a fault of the device, else DeviceError."""
-    kind = UserInterruptError if end.fault is Fault.NONE else DeviceError
+def _make_unfinished_error(sitting: ConductedSitting) -> StudyError:
+    """Error of an unfinished session: DeviceError if the device had a fault, otherwise UserInterruptError."""
+    error_type = UserInterruptError if sitting.fault is Fault.NONE else DeviceError
     device_advice = (
-        f"Run hapteq doctor --device {end.device_name}, which says what is wrong with it, and correct that. "
+        f"Run hapteq doctor --device {sitting.device_name}, which says what is wrong with it, and correct that. "
     )
-    advice = device_advice if end.fault in DEVICE_FAULTS else ""
-    if end.end_reason.startswith(TOO_BUSY):
-        advice = BUSY_ADVICE
-    option = "" if end.device_name == SIMULATED else f" --device {end.device_name}"
-    return kind(
+    advice = device_advice if sitting.fault in FAULTS_FOR_DOCTOR else ""
+    if sitting.end_reason.startswith(TOO_BUSY):
+        advice = CLOSE_PROGRAMS_ADVICE
+    option = "" if sitting.device_name == SIMULATED else f" --device {sitting.device_name}"
+    return error_type(
         "The session is not finished",
-        f"The sitting ended: {end.end_reason}."
-        f"{f' {end.fault_text[0].upper()}{end.fault_text[1:]}.' if end.fault_text else ''}",
-        f"{advice}Continue with: hapteq resume {end.folder.path}{option}",
-        saved=f"{answers_are(end.state.answers)} on disk.",
+        f"The sitting ended: {sitting.end_reason}."
+        f"{f' {sitting.fault_text[0].upper()}{sitting.fault_text[1:]}.' if sitting.fault_text else ''}",
+        f"{advice}Continue with: hapteq resume {sitting.folder.path}{option}",
+        saved=f"{answers_are(sitting.state.answers)} on disk.",
     )
 
 
-def _erase_withdrawn(end: ConductedSitting, utc: str) -> StudyError:
-    """Erase everything recorded of the participant; returns the error to raise, which lists the erased sessions."""
-    data, plan = end.folder.path.parent, plan_withdrawal(end.folder)
-    external_copies = copies_elsewhere(data, plan)
-    withdraw(data, plan, utc)
+def _erase_participant(sitting: ConductedSitting, utc: str) -> StudyError:
+    """Erase all data of the participant. Returns the error to raise, which lists the erased sessions."""
+    data_folder, plan = sitting.folder.path.parent, plan_withdrawal(sitting.folder)
+    external_copies = list_remaining_copies(data_folder, plan)
+    withdraw(data_folder, plan, utc)
     return UserInterruptError(
         "The participant withdrew",
         f"Everything recorded of {plan.subject} was erased: {', '.join(plan.sessions)}.",

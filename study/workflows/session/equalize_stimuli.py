@@ -1,8 +1,9 @@
-"""Equalizer of a session: its model is loaded, checked against protocol and device, and kept in the session folder.
+"""Equalizer of a session: load its model, check it against protocol and device, and copy it into the session folder.
 
-With the protocol's quantity "delivered_acceleration", forces are computed from wanted accelerations by a periodic
-inverse of the identified model (`ModelEqualizer`). Levels stay forces in N: `level_scales` states for each frequency
-the level that stands for 1 m/s² (see `study.session.facts.level_scale`).
+With the protocol's quantity "delivered_acceleration", forces are computed from required accelerations by a periodic
+inverse of the identified model (`ModelEqualizer`). Levels stay forces in N: `compute_level_scales` returns for each
+frequency the level that corresponds to 1 m/s² (see `study.session.facts.level_scale`). Called by `conduct_session`, and
+before a device is opened by `plan_sitting` and `hapteq rehearse`.
 """
 
 import math
@@ -12,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.plant.model_quality import quality_sentence
+from equalizer.plant.model_quality import write_quality_sentence
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.equalizer import Equalizer, Identity
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
@@ -23,45 +24,45 @@ from study.regular_file import read_regular
 from study.session.facts.level_scale import EqualizedFacts, LevelScale
 from study.session.state.state import SessionState
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, highest_level_n, make_study_limits
-from study.session.stimulus.stimulus import direction_vector, make_held_stimulus
+from study.session.stimulus.stimulus import compute_direction_vector, make_held_stimulus
 from study.store.disk.atomic_write import write_atomically
 from study.store.disk.provenance import sha256_of
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.sessions.archive import SessionFolder
-from study.workflows.equalizer.spring_not_in_model import spring_outside_model
+from study.workflows.equalizer.spring_to_compensate import find_spring_to_compensate
 
 MODEL_NAME = "model.h5"
 """File name of the copy of the model in the session folder."""
-NEAR_M = 0.02
+LARGEST_PLACE_DISTANCE_M = 0.02
 """Largest distance (m) of the place of identification from the centre of the workspace, where a study takes place.
-Farther away, the coupling between the axes grows to the published value without an equalizer."""
+Models identified farther away leave as much coupling between the axes as was published without an equalizer."""
 
-AXES = (("fx", "fy", "fz"), ("ax", "ay", "az"))
+REQUIRED_CHANNELS = (("fx", "fy", "fz"), ("ax", "ay", "az"))
 """Channels that a model of a study needs: forces, then accelerations, in this order."""
 IDENTIFY_AGAIN = "Identify it again with hapteq identify."
 """Remedy for an unusable model, for messages."""
-LARGEST_ERROR = 0.1
-"""Largest relative error of the acceleration that the model predicts for the equalized force of a stimulus. With a
-larger error a level would not stand for its acceleration."""
+LARGEST_RESPONSE_ERROR = 0.1
+"""Largest relative error of the acceleration that the model predicts for the equalized force of a stimulus: a level
+must correspond to its acceleration."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Equalized:
-    """Equalizer of the stimuli, and its description for the log."""
+class SessionEqualizer:
+    """Equalizer of a session's stimuli, with its description for the log."""
 
     equalizer: Equalizer
     facts: EqualizedFacts | None
-    """None where forces are commanded."""
+    """Model and level scales for the log; None where forces are commanded."""
     source: Path | None = None
     """Model file to copy into the session folder; None without a model and in a resumed session."""
 
 
-NOT_EQUALIZED = Equalized(Identity(), None)
+NO_EQUALIZER = SessionEqualizer(Identity(), None)
 """Identity equalizer of a study whose stimuli are commanded forces."""
 
 
-def check_playable(protocol: StudyProtocol, model: Path | None) -> None:
-    """Raise StudyError where protocol and model do not fit each other. Called before any device is opened."""
+def check_model_for_protocol(protocol: StudyProtocol, model: Path | None) -> None:
+    """Raise StudyError where protocol and model do not match. Called before a device is opened."""
     needs_model = protocol.stimulus.quantity == "delivered_acceleration"
     if needs_model and model is None:
         raise StudyError(
@@ -86,33 +87,33 @@ def load_equalizer() -> None:
     import equalizer.tracking.feedforward.model_equalizer  # noqa: F401
 
 
-def equalize_stimuli(protocol: StudyProtocol, model: Path | None, info: DeviceInfo) -> Equalized:
-    """Equalizer for a protocol and model that passed `check_playable`. Raises StudyError for a model that does not fit
-    the device: another sample rate or spring, or an onset that cannot be computed."""
+def equalize_stimuli(protocol: StudyProtocol, model: Path | None, info: DeviceInfo) -> SessionEqualizer:
+    """Equalizer for a protocol and a model that passed `check_model_for_protocol`. Raises StudyError where the model
+    does not match the device (another sample rate or spring), or the onset of a stimulus cannot be computed."""
     if model is None:
-        return NOT_EQUALIZED
+        return NO_EQUALIZER
     identified = read_identified_model(model)
-    equalizer = _equalizer(identified, protocol, info)
+    equalizer = _make_equalizer(identified, protocol, info)
     try:
-        scales = level_scales(protocol, equalizer, info.sample_rate_hz)
+        scales = compute_level_scales(protocol, equalizer, info.sample_rate_hz)
     except (ValueError, ArithmeticError) as error:  # numerical failure on an invalid model
-        raise _refusal(f"The onset of a stimulus cannot be computed ({error}).", IDENTIFY_AGAIN) from error
-    facts = EqualizedFacts(MODEL_NAME, sha256_of(model), scales, quality_sentence(identified.quality))
-    return Equalized(equalizer, facts, model)
+        raise _make_refusal(f"The onset of a stimulus cannot be computed ({error}).", IDENTIFY_AGAIN) from error
+    facts = EqualizedFacts(MODEL_NAME, sha256_of(model), scales, write_quality_sentence(identified.quality))
+    return SessionEqualizer(equalizer, facts, model)
 
 
-def keep_model(equalized: Equalized, folder: SessionFolder) -> None:
-    """Copy the model into the session folder, before the log names it. No effect where there is no file to copy."""
+def copy_model(equalized: SessionEqualizer, folder: SessionFolder) -> None:
+    """Copy the model into the session folder, before the log refers to it. No effect without a file to copy."""
     if equalized.source is not None:
         write_atomically(folder.path / MODEL_NAME, read_regular(equalized.source))
 
 
-def reload_equalizer(folder: SessionFolder, state: SessionState, info: DeviceInfo) -> Equalized:
+def reload_equalizer(folder: SessionFolder, state: SessionState, info: DeviceInfo) -> SessionEqualizer:
     """Equalizer of a resumed session, from the model in its folder. Raises StudyError where the model is missing or its
     SHA-256 differs from the log."""
     facts = state.opened.equalized
     if facts is None:
-        return NOT_EQUALIZED
+        return NO_EQUALIZER
     path = folder.path / facts.model
     if not path.exists() or sha256_of(path) != facts.sha256:
         raise StudyError(
@@ -121,112 +122,127 @@ def reload_equalizer(folder: SessionFolder, state: SessionState, info: DeviceInf
             "Put the original file back, or begin a new session.",
             saved="Nothing was changed.",
         )
-    return Equalized(_equalizer(read_identified_model(path), state.protocol, info), facts)
+    return SessionEqualizer(_make_equalizer(read_identified_model(path), state.protocol, info), facts)
 
 
-def level_scales(protocol: StudyProtocol, equalizer: Equalizer, rate_hz: float) -> tuple[LevelScale, ...]:
-    """Scale at each frequency: level (N) for 1 m/s^2, the larger of those of the two directions, onset included, and
-    the acceleration at the staircase's cap."""
+def compute_level_scales(protocol: StudyProtocol, equalizer: Equalizer, rate_hz: float) -> tuple[LevelScale, ...]:
+    """Scale at each frequency: the level (N) for 1 m/s^2, which is the larger of those of the two directions, and the
+    acceleration at the staircase's cap."""
     cap_n = protocol.staircase.cap_n
     scales = []
     for frequency_hz in protocol.all_frequencies_hz:
-        n_per_mps2 = max(_hardest(protocol, equalizer, direction, frequency_hz, rate_hz) for direction in (1, 2))
+        n_per_mps2 = max(
+            _compute_level_per_acceleration(protocol, equalizer, direction, frequency_hz, rate_hz)
+            for direction in (1, 2)
+        )
         scales.append(LevelScale(frequency_hz, n_per_mps2, cap_n / n_per_mps2))
     return tuple(scales)
 
 
-def _hardest(
+def _compute_level_per_acceleration(
     protocol: StudyProtocol, equalizer: Equalizer, direction: int, frequency_hz: float, rate_hz: float
 ) -> float:
-    """Level (N) for 1 m/s^2: the peak force or, if the slew limit is reached before the cap, the level that makes the
-    stimulus reach both together: (slew rate of the force / slew limit without the spring's share) x highest level."""
+    """Level (N) for 1 m/s^2 in a direction: the peak F of the force for 1 m/s^2, onset included, or, if larger,
+    S / S_max x (highest level).
+
+    S is the largest slope (N/s) of that force, and S_max the slew limit less the allowance for the spring. The second
+    value keeps the stimulus at the highest level within the slew limit.
+    """
     limits = make_study_limits(protocol)
-    vector = direction_vector(protocol.directions, direction)
-    stimulus = make_held_stimulus(protocol.stimulus, vector, frequency_hz, 1.0, equalizer, rate_hz)
-    forces = stimulus.played_once_then_loop
-    steps = np.diff(np.concatenate([np.zeros((1, 3)), forces, stimulus.loop.samples[:1]]), axis=0)
-    slewing_n = _largest(steps) * rate_hz / (limits.slew_n_per_s - SPRING_SLEW_N_PER_S) * highest_level_n(protocol)
-    return max(_largest(forces), slewing_n)
+    unit_vector = compute_direction_vector(protocol.directions, direction)
+    stimulus = make_held_stimulus(protocol.stimulus, unit_vector, frequency_hz, 1.0, equalizer, rate_hz)
+    forces = stimulus.onset_then_loop
+    force_steps = np.diff(np.concatenate([np.zeros((1, 3)), forces, stimulus.loop.samples[:1]]), axis=0)
+    slew_limited_n = (
+        _find_largest_norm(force_steps)
+        * rate_hz
+        / (limits.slew_n_per_s - SPRING_SLEW_N_PER_S)
+        * highest_level_n(protocol)
+    )
+    return max(_find_largest_norm(forces), slew_limited_n)
 
 
-def _largest(vectors: FloatArray) -> float:
+def _find_largest_norm(vectors: FloatArray) -> float:
     """Largest Euclidean norm of the rows (n, 3)."""
     return float(np.linalg.norm(vectors, axis=1).max())
 
 
-def _equalizer(model: IdentifiedModel, protocol: StudyProtocol, info: DeviceInfo) -> Equalizer:
+def _make_equalizer(model: IdentifiedModel, protocol: StudyProtocol, info: DeviceInfo) -> Equalizer:
     """Equalizer of a model, compensated for the spring of the protocol unless the model contains it. Raises StudyError
     for another sample rate than the device's, or another spring in the model."""
     from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
 
     if model.sample_rate_hz != info.sample_rate_hz:
-        raise _refusal(
+        raise _make_refusal(
             f"It runs at {model.sample_rate_hz:g} Hz, the device at {info.sample_rate_hz:g} Hz.",
             "Identify it from recordings of this device.",
         )
     stiffness = info.effective_mass_kg * (2 * math.pi * protocol.spring.natural_frequency_hz) ** 2
     spring = VirtualSpring(stiffness, protocol.spring.damping_n_s_per_m)
-    return ModelEqualizer(model, spring_outside_model(model, spring))
+    return ModelEqualizer(model, find_spring_to_compensate(model, spring))
 
 
 def _check_model(model: IdentifiedModel, protocol: StudyProtocol, path: Path) -> None:
-    """Raise StudyError for wrong units or channels, an unstable model, too narrow a band, or another place."""
+    """Raise StudyError for wrong units or channels, an unstable model, a band that lacks a frequency of the protocol, a
+    place of identification far from the centre, or a poor prediction."""
     shape = (model.D.shape, model.input_unit, model.output_unit)
     if shape != ((3, 3), "N", "m/s^2"):
-        raise _refusal(
+        raise _make_refusal(
             f"{path} goes from {model.D.shape[1]} inputs in {model.input_unit} to {model.D.shape[0]} outputs in "
             f"{model.output_unit}; a stimulus needs three forces in N and three accelerations in m/s^2.",
             "Identify a model from a recording of all three axes.",
         )
     if model.spectral_radius >= 1:
-        raise _refusal(f"The model in {path} is not stable.", IDENTIFY_AGAIN)
-    low, high = model.band_hz
-    outside = [f"{f:g}" for f in protocol.all_frequencies_hz if not low <= f <= high]
-    if outside:
-        raise _refusal(
-            f"{path} was made for {low:g} to {high:g} Hz; the protocol also plays {', '.join(outside)} Hz.",
+        raise _make_refusal(f"The model in {path} is not stable.", IDENTIFY_AGAIN)
+    low_hz, high_hz = model.band_hz
+    uncovered_hz = [f"{f:g}" for f in protocol.all_frequencies_hz if not low_hz <= f <= high_hz]
+    if uncovered_hz:
+        raise _make_refusal(
+            f"{path} was made for {low_hz:g} to {high_hz:g} Hz; the protocol also plays {', '.join(uncovered_hz)} Hz.",
             "Identify a model that covers the protocol, such as hapteq identify --band 5 50.",
         )
-    if model.place_m is not None and math.dist(model.place_m, (0.0, 0.0, 0.0)) > NEAR_M:
-        raise _refusal(
+    if model.place_m is not None and math.dist(model.place_m, (0.0, 0.0, 0.0)) > LARGEST_PLACE_DISTANCE_M:
+        raise _make_refusal(
             f"{path} was identified at {model.place_m} m, and the study is at the centre.",
             "Record and identify at the centre of the workspace.",
         )
     _check_axes(model, path)
-    _check_reach(model, protocol, path)
+    _check_predicted_response(model, protocol, path)
 
 
 def _check_axes(model: IdentifiedModel, path: Path) -> None:
-    """Raise StudyError for the channel names of `AXES` in another order, with which forces would act along wrong axes.
-    Other names are accepted."""
-    for names, required in zip((model.input_channels, model.output_channels), AXES, strict=True):
+    """Raise StudyError for the channel names of `REQUIRED_CHANNELS` in another order: forces would act along wrong
+    axes. Other names are accepted."""
+    for names, required in zip((model.input_channels, model.output_channels), REQUIRED_CHANNELS, strict=True):
         if set(names) == set(required) and names != required:
-            raise _refusal(
+            raise _make_refusal(
                 f"The channels of {path} are {', '.join(names)}; a stimulus has them in the order "
                 f"{', '.join(required)}.",
                 "Identify a model from a recording whose channels are in that order.",
             )
 
 
-def _check_reach(model: IdentifiedModel, protocol: StudyProtocol, path: Path) -> None:
-    """Raise StudyError where the model's response to the equalized force, G H w for the wanted unit vector w, differs
-    from w by more than `LARGEST_ERROR` at a frequency of the protocol."""
+def _check_predicted_response(model: IdentifiedModel, protocol: StudyProtocol, path: Path) -> None:
+    """Raise StudyError where the predicted acceleration G H w differs from w by more than `LARGEST_RESPONSE_ERROR` at a
+    frequency of the protocol. w: unit vector of a direction; G: response of the model; H: its regularised inverse."""
     from equalizer.plant.model_response import model_response
     from equalizer.tracking.feedforward.periodic_inverse import inverse_response
 
     frequency_hz = np.array(protocol.all_frequencies_hz)
-    unit_vectors = np.stack([direction_vector(protocol.directions, direction) for direction in (1, 2)], axis=1)
+    unit_vectors = np.stack([compute_direction_vector(protocol.directions, direction) for direction in (1, 2)], axis=1)
     with np.errstate(all="ignore"):
         predicted = model_response(model, frequency_hz) @ inverse_response(model, frequency_hz) @ unit_vectors
         errors = np.linalg.norm(predicted - unit_vectors, axis=1).max(axis=1)
-    unreachable = [f"{f:g}" for f, error in zip(frequency_hz, errors, strict=True) if not error <= LARGEST_ERROR]
+    unreachable = [
+        f"{f:g}" for f, error in zip(frequency_hz, errors, strict=True) if not error <= LARGEST_RESPONSE_ERROR
+    ]
     if unreachable:
-        raise _refusal(
+        raise _make_refusal(
             f"According to {path}, no reasonable force gives the wanted acceleration at {', '.join(unreachable)} Hz.",
             "Check units and axes of the recording it was made from, and identify it again.",
         )
 
 
-def _refusal(explanation: str, advice: str) -> StudyError:
+def _make_refusal(explanation: str, advice: str) -> StudyError:
     """Error for a model that cannot equalize the study, raised before anything moves."""
     return StudyError("This model cannot equalize the study", explanation, advice, saved="Nothing moved.")

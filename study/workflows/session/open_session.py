@@ -17,10 +17,10 @@ from study.session.facts.events import SESSION_FORMAT, SESSION_VERSION, DeviceFa
 from study.session.state.rules import LATEST
 from study.session.state.state import SessionState, begin_session
 from study.store.disk.provenance import list_versions
-from study.store.sessions.archive import SessionFolder, new_session_folder
+from study.store.sessions.archive import SessionFolder, create_session_folder
 from study.store.sessions.event_log import EventLog
 from study.store.sessions.session_lock import hold_session_lock
-from study.workflows.session.equalize_stimuli import Equalized, keep_model
+from study.workflows.session.equalize_stimuli import SessionEqualizer, copy_model
 from study.workflows.session.other_sessions import dose_before
 from study.workflows.session.participant_number import participant_number
 
@@ -58,13 +58,15 @@ def draw_seed() -> int:
 
 
 @contextmanager
-def open_session(plan: SessionPlan, device: DeviceInfo, equalized: Equalized, clock: Clock) -> Iterator[OpenedSession]:
+def open_session(
+    plan: SessionPlan, device: DeviceInfo, equalized: SessionEqualizer, clock: Clock
+) -> Iterator[OpenedSession]:
     """Create a session: its folder, a copy of the model, and its log with the first event. The session is locked, and
     the log open, while the context lasts."""
     number = plan.participant_number
     if number is None:
         number = participant_number(plan.data, plan.subject, plan.protocol.name, plan.observer is not None)
-    folder = new_session_folder(plan.data, plan.subject)
+    folder = create_session_folder(plan.data, plan.subject)
     utc = clock.utc()
     session_opened = SessionOpened(
         utc=utc,
@@ -87,7 +89,7 @@ def open_session(plan: SessionPlan, device: DeviceInfo, equalized: Equalized, cl
         rules=LATEST,
     )
     with hold_session_lock(folder.path):
-        keep_model(equalized, folder)
+        copy_model(equalized, folder)
         log = EventLog.create(folder.log)
         try:
             log.append(session_opened)

@@ -1,8 +1,9 @@
-"""Search for a participant's data in a data folder, for a withdrawal: proved data, which it erases, and doubtful data.
+"""Search for a participant's data in a data folder, for a withdrawal (`withdraw_participant`).
 
-Proved: a session folder whose log or tombstone names the participant; an analysis whose tables, statistics or figures
-name the participant; an unfinished file or folder (of an interrupted write) that names one of the participant's
-sessions. Doubtful data are reported and kept. Symbolic links are reported and never followed.
+Proved data, which the withdrawal erases: a session folder whose log or tombstone names the participant; an analysis
+whose tables, statistics or figures name the participant; an unfinished file or folder (of an interrupted write) that
+names one of the participant's sessions. Doubtful data are reported and kept. Symbolic links are reported and never
+followed.
 """
 
 import csv
@@ -17,26 +18,26 @@ from typing import Any
 from study.regular_file import open_regular, read_regular
 from study.store.disk.real_folder import is_real_file, is_real_folder
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
-from study.store.sessions.archive import FOLDER, TOMBSTONE_NAME, SessionFolder
+from study.store.sessions.archive import FOLDER_PATTERN, TOMBSTONE_NAME, SessionFolder
 from study.store.sessions.session_lock import LOCK_NAME
 from study.store.sessions.withdrawal_files import read_tombstone
 from study.store.sessions.written_elsewhere import WRITTEN_ELSEWHERE
 from study.workflows.results.analysis_files import ANALYSIS_NAME, analysis_outputs
 
-PART = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{8}\.part")
+UNFINISHED_PATTERN = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{8}\.part")
 """Name of an unfinished file or folder from an interrupted write."""
 
-LARGEST_BYTES = 1 << 24
+MAX_SEARCHED_BYTES = 1 << 24
 """Largest file (bytes) that is searched for a name; recordings and bitmaps are not searched."""
-LONGEST_LINE = 1 << 20
+MAX_FIRST_LINE_BYTES = 1 << 20
 """Largest number of bytes of a log's first line that are read."""
-TEXTS = (".json", ".csv", ".html", ".svg", ".toml", ".txt", ".md", ".jsonl", ".part")
-"""Extensions of files that are searched for names of a participant's sessions."""
+SEARCHED_EXTENSIONS = (".json", ".csv", ".html", ".svg", ".toml", ".txt", ".md", ".jsonl", ".part")
+"""Extensions of text files that are searched for names of a participant's sessions."""
 
 
 @dataclass(frozen=True, slots=True)
 class Traces:
-    """What was found of a participant in a data folder."""
+    """Data of a participant in a data folder: proved, which may be erased, and doubtful."""
 
     sessions: tuple[str, ...]
     """Names of the session folders proved to be the participant's."""
@@ -46,36 +47,40 @@ class Traces:
     """Sentences on data that may be the participant's and are not erased."""
 
 
-def find_traces(data: Path, subject: str, proved: Collection[str] = ()) -> Traces:
-    """Search `data`, a resolved path, without changing it. proved: names of session folders that were proved before an
-    interrupted withdrawal erased their logs."""
+def find_traces(data: Path, subject: str, proved_names: Collection[str] = ()) -> Traces:
+    """Search `data`, a resolved path, without changing it. proved_names: names of session folders that were proved
+    before an interrupted withdrawal erased their logs."""
     sessions, derived, doubtful = [], [], []
     for path in sorted(data.iterdir()):
-        match = FOLDER.fullmatch(path.name)
+        match = FOLDER_PATTERN.fullmatch(path.name)
         if match is not None and match["subject"] == subject:
             # A folder that was proved earlier counts only without new content, for which nothing is proved.
-            if is_session_of(path, subject) or (path.name in proved and _was_session(path)):
+            if is_session_of(path, subject) or (path.name in proved_names and _is_emptied_session(path)):
                 sessions.append(path.name)
             else:
-                doubtful.append(_no_session(path, subject))
-        elif is_real_folder(path) and PART.fullmatch(path.name) is None:
-            doubtful += _strange_folder(path, subject)
+                doubtful.append(_describe_unproved_session(path, subject))
+        elif is_real_folder(path) and UNFINISHED_PATTERN.fullmatch(path.name) is None:
+            doubtful += _describe_other_folder(path, subject)
         elif path.is_symlink() and path.name == ANALYSIS_NAME:
             doubtful.append(f"{path.name} is a link; what it leads to was not looked at.")
-    for folder in (data, *(p for p in sorted(data.iterdir()) if _may_hold_analysis(p))):
-        proved_paths, doubtful_paths = _analysis_traces(folder, subject, is_separate=folder != data)
+    for folder in (data, *(entry for entry in sorted(data.iterdir()) if _may_hold_analysis(entry))):
+        proved_paths, doubtful_paths = _find_analysis_traces(folder, subject, is_separate=folder != data)
         derived += [path.relative_to(data).as_posix() for path in proved_paths]
         doubtful += [f"{path.relative_to(data)} does not say whose numbers it holds." for path in doubtful_paths]
     doubtful += [
         f"{path.name} names {subject}."
         for path in sorted(data.iterdir())
-        if is_real_file(path) and path.name not in derived and _is_others_file(path, subject) and _names(path, subject)
+        if is_real_file(path)
+        and path.name not in derived
+        and _is_unmanaged_file(path, subject)
+        and _has_session_name(path, subject)
     ]
     return Traces(tuple(sessions), tuple(dict.fromkeys(derived)), tuple(doubtful))
 
 
 def is_session_of(path: Path, subject: str) -> bool:
-    """Whether a real folder holds a session of this subject, by the first line of its log or its tombstone."""
+    """Whether a real folder (no symbolic link) contains a session of this subject, by the first line of its log or by
+    its tombstone."""
     if not is_real_folder(path):
         return False
     folder = SessionFolder(path)
@@ -84,83 +89,89 @@ def is_session_of(path: Path, subject: str) -> bool:
     return is_real_file(folder.tombstone) and read_tombstone(folder).get("session") == path.name
 
 
-def _was_session(path: Path) -> bool:
-    """Whether a session folder was emptied by a withdrawal, which erases the log last: it holds nothing but its lock, a
+def _is_emptied_session(path: Path) -> bool:
+    """Whether a session folder was emptied by a withdrawal, which erases the log last: it contains only its lock, a
     tombstone, and unfinished files."""
     if not is_real_folder(path):
         return False
-    names = {entry.name for entry in path.iterdir() if PART.fullmatch(entry.name) is None}
+    names = {entry.name for entry in path.iterdir() if UNFINISHED_PATTERN.fullmatch(entry.name) is None}
     return names <= {LOCK_NAME, TOMBSTONE_NAME}
 
 
-def analysis_names(folder: Path, subject: str) -> bool | None:
-    """Whether the analysis in this folder contains this subject; None if that cannot be determined."""
-    results = [_rows_name(folder / name, subject) for name in (THRESHOLDS_NAME, DETECTION_NAME)]
-    results.append(_statistics_name(folder / "anova.json", subject))
-    if any(results):
+def is_subject_in_analysis(folder: Path, subject: str) -> bool | None:
+    """Whether the analysis in this folder contains this subject, by its tables, its statistics, or the names of its
+    figures; None where no file of it can be read."""
+    table_results = [_is_subject_in_table(folder / name, subject) for name in (THRESHOLDS_NAME, DETECTION_NAME)]
+    table_results.append(_is_subject_in_statistics(folder / "anova.json", subject))
+    if any(table_results):
         return True
-    figure = re.compile(rf"(staircases|psychometric)-\d+-{re.escape(subject)}\.(svg|png)")
-    if any(figure.fullmatch(path.name) for path in analysis_outputs(folder)):
+    figure_pattern = re.compile(rf"(staircases|psychometric)-\d+-{re.escape(subject)}\.(svg|png)")
+    if any(figure_pattern.fullmatch(path.name) for path in analysis_outputs(folder)):
         return True
-    return None if all(result is None for result in results) else False
+    return None if all(result is None for result in table_results) else False
 
 
 def _read_opening(folder: SessionFolder) -> tuple[Any, Any] | None:
-    """Session and subject by the first line of the log, which need not be a valid event; None if it cannot be read."""
+    """Session and subject in the first line of the log, which need not be a valid event; None if it cannot be read."""
     if not is_real_file(folder.log):
         return None
     try:
         with open_regular(folder.log) as file:
-            first_event = json.loads(file.readline(LONGEST_LINE))
+            first_event = json.loads(file.readline(MAX_FIRST_LINE_BYTES))
     except (OSError, ValueError, RecursionError):
         return None
     return (first_event.get("session"), first_event.get("subject")) if isinstance(first_event, dict) else None
 
 
-def _no_session(path: Path, subject: str) -> str:
+def _describe_unproved_session(path: Path, subject: str) -> str:
     """Sentence on a folder or link that is named like a session of the subject, but is not proved to be one."""
     if path.is_symlink():
         return f"{path.name} is a link; neither it nor what it leads to was touched."
     return f"{path.name} holds no log that says it is a session of {subject}."
 
 
-def _strange_folder(path: Path, subject: str) -> Iterator[str]:
-    """Sentence on a folder with another name that holds a log or a diagnosis of the subject."""
+def _describe_other_folder(path: Path, subject: str) -> Iterator[str]:
+    """Sentence on a folder not named like a session that contains a log, or a diagnosis, of the subject; empty
+    otherwise."""
     identity = _read_opening(SessionFolder(path))
     if identity is not None and identity[1] == subject:
         yield f"{path.name} holds a log of {subject} under another name: it was copied or renamed."
-    elif _names(path / "diagnosis.json", subject):
+    elif _has_session_name(path / "diagnosis.json", subject):
         yield f"{path.name} holds a diagnosis that names {subject}."
 
 
 def _may_hold_analysis(path: Path) -> bool:
-    """Whether the path is a folder that is neither a session nor unfinished."""
-    return is_real_folder(path) and FOLDER.fullmatch(path.name) is None and PART.fullmatch(path.name) is None
+    """Whether the path is a real folder that is neither named like a session nor unfinished."""
+    return (
+        is_real_folder(path)
+        and FOLDER_PATTERN.fullmatch(path.name) is None
+        and UNFINISHED_PATTERN.fullmatch(path.name) is None
+    )
 
 
-def _analysis_traces(folder: Path, subject: str, is_separate: bool) -> tuple[list[Path], list[Path]]:
+def _find_analysis_traces(folder: Path, subject: str, is_separate: bool) -> tuple[list[Path], list[Path]]:
     """Proved and doubtful paths among the files of the analysis in `folder` and its unfinished files. is_separate:
     `folder` is not the data folder itself, so that its unfinished files belong to the analysis."""
     files = list(analysis_outputs(folder))
-    names_subject = analysis_names(folder, subject) if files else False
+    names_subject = is_subject_in_analysis(folder, subject) if files else False
     proved_paths, doubtful_paths = (
         (files if names_subject else []),
         (files if names_subject is None and folder.name == ANALYSIS_NAME else []),
     )
-    places = [folder, *([folder / "figures"] if is_real_folder(folder / "figures") else [])]
-    for path in (path for place in places for path in sorted(place.iterdir())):
-        if PART.fullmatch(path.name) is None or path.is_symlink():
+    searched_folders = [folder, *([folder / "figures"] if is_real_folder(folder / "figures") else [])]
+    for path in (path for searched_folder in searched_folders for path in sorted(searched_folder.iterdir())):
+        if UNFINISHED_PATTERN.fullmatch(path.name) is None or path.is_symlink():
             continue
-        if (names_subject and is_separate) or _names(path, subject):
+        if (names_subject and is_separate) or _has_session_name(path, subject):
             proved_paths.append(path)
         else:
             doubtful_paths.append(path)
     return proved_paths, doubtful_paths
 
 
-def _rows_name(table: Path, subject: str) -> bool | None:
+def _is_subject_in_table(table: Path, subject: str) -> bool | None:
     """Whether a row of a table of thresholds is the subject's; None if the table cannot be read."""
-    text = _text(table)
+    text = _read_text_file(table)
     if text is None:
         return None
     try:
@@ -169,42 +180,46 @@ def _rows_name(table: Path, subject: str) -> bool | None:
         return None
 
 
-def _statistics_name(path: Path, subject: str) -> bool | None:
-    """Whether the document of statistics names the subject, as a participant or in the seeds of its sessions; None if
-    it cannot be read."""
-    text = _text(path)
+def _is_subject_in_statistics(path: Path, subject: str) -> bool | None:
+    """Whether anova.json names the subject, as a participant or in the seeds of its sessions; None if it cannot be
+    read."""
+    text = _read_text_file(path)
     try:
         document = json.loads(text) if text is not None else None
     except (ValueError, RecursionError):
         return None
     if not isinstance(document, dict):
         return None
-    origin = document.get("provenance")
-    seeds = origin.get("seeds") if isinstance(origin, dict) else None
-    sessions = [str(name).rpartition("_")[0] for name in seeds] if isinstance(seeds, dict) else []
-    people = document.get("participants")
-    return subject in sessions or (isinstance(people, list) and subject in people)
+    provenance = document.get("provenance")
+    seeds = provenance.get("seeds") if isinstance(provenance, dict) else None
+    seeded_subjects = [str(name).rpartition("_")[0] for name in seeds] if isinstance(seeds, dict) else []
+    participants = document.get("participants")
+    return subject in seeded_subjects or (isinstance(participants, list) and subject in participants)
 
 
-def _is_others_file(path: Path, subject: str) -> bool:
-    """Whether a file is none of those that the program keeps in the data folder: the record of a withdrawal, the note
-    of folders elsewhere, unfinished files."""
-    return path.name not in (f"{subject}.withdrawal.json", WRITTEN_ELSEWHERE) and PART.fullmatch(path.name) is None
+def _is_unmanaged_file(path: Path, subject: str) -> bool:
+    """Whether the program does not itself keep this file in the data folder: False for the record of the subject's
+    withdrawal, the list of analyses written elsewhere, and unfinished files."""
+    return (
+        path.name not in (f"{subject}.withdrawal.json", WRITTEN_ELSEWHERE)
+        and UNFINISHED_PATTERN.fullmatch(path.name) is None
+    )
 
 
-def _names(path: Path, subject: str) -> bool:
-    """Whether the name of a path, its text or, for a folder, any content names a session of this subject."""
-    session = re.compile(rf"(?<![A-Za-z0-9]){re.escape(subject)}(_\d{{3,}}|\.withdrawal\.json)(?!\d)")
-    if session.search(path.name):
+def _has_session_name(path: Path, subject: str) -> bool:
+    """Whether the name of a path, its text or, for a folder, the name or text of any file in it contains the name of a
+    session of this subject."""
+    session_pattern = re.compile(rf"(?<![A-Za-z0-9]){re.escape(subject)}(_\d{{3,}}|\.withdrawal\.json)(?!\d)")
+    if session_pattern.search(path.name):
         return True
     if is_real_folder(path):
-        return any(_names(entry, subject) for entry in sorted(path.iterdir()))
-    return path.suffix in TEXTS and session.search(_text(path) or "") is not None
+        return any(_has_session_name(entry, subject) for entry in sorted(path.iterdir()))
+    return path.suffix in SEARCHED_EXTENSIONS and session_pattern.search(_read_text_file(path) or "") is not None
 
 
-def _text(path: Path) -> str | None:
-    """Text of a file; None if it is not a regular file, cannot be read, or is larger than `LARGEST_BYTES`."""
+def _read_text_file(path: Path) -> str | None:
+    """Text of a file; None if it is not a regular file, cannot be read, or is larger than `MAX_SEARCHED_BYTES`."""
     try:
-        return read_regular(path, LARGEST_BYTES).decode("utf-8", errors="replace") if is_real_file(path) else None
+        return read_regular(path, MAX_SEARCHED_BYTES).decode("utf-8", errors="replace") if is_real_file(path) else None
     except OSError:
         return None

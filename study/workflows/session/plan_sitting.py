@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study.errors import StudyError, WrongUseError
-from study.store.disk.privacy import data_folder_warning
+from study.store.disk.privacy import format_data_folder_warning
 from study.store.formats.protocol_files import read_study_protocol
 from study.store.sessions.archive import SessionFolder, check_subject, list_session_folders
 from study.workflows.results.fold_session import fold_session
-from study.workflows.session.equalize_stimuli import check_playable
+from study.workflows.session.equalize_stimuli import check_model_for_protocol
 from study.workflows.session.open_session import SessionPlan, draw_seed
 from study.workflows.session.participant_number import read_begun_participant
 
@@ -23,7 +23,7 @@ def check_code(data: Path, subject: str, simulated: bool) -> None:
         if folder.withdrawn:
             raise WrongUseError(
                 f"{subject} withdrew",
-                f"The participant of {folder.name} withdrew, and {folder.erased_words}.",
+                f"The participant of {folder.name} withdrew, and {folder.erasure_status}.",
                 "Use a new code: this one is not given again.",
             )
         participant = read_begun_participant(folder)
@@ -82,10 +82,10 @@ def plan_sitting(
         data=data,
         model=model,
     )
-    check_playable(plan.protocol, model)
+    check_model_for_protocol(plan.protocol, model)
     check_code(data, plan.subject, simulated=observer is not None)
     unfinished_before = (
         f"{unfinished.name} is not finished; hapteq resume {unfinished.path} continues it."
         for unfinished in find_unfinished_sessions(data, plan.subject, source.protocol.name)
     )
-    return SittingPlan(plan, (*unfinished_before, *filter(None, [data_folder_warning(data)])))
+    return SittingPlan(plan, (*unfinished_before, *filter(None, [format_data_folder_warning(data)])))

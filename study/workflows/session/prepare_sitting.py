@@ -18,7 +18,7 @@ from study.session.watching.requests import NoteAsked
 from study.workflows.checks.check_device import check_device
 from study.workflows.checks.check_timing import check_computer
 from study.workflows.checks.computer_load import load_per_processor
-from study.workflows.checks.daily_check import last_check
+from study.workflows.checks.daily_check import judge_last_check
 from study.workflows.trial.sitting import Sitting, log_and_apply, write_notes
 
 
@@ -34,8 +34,8 @@ def prepare_sitting(state: SessionState, sitting: Sitting) -> tuple[SessionState
             case CheckDevice():
                 state = _check_device(state, sitting)
         state = write_notes(state, sitting)
-        if sitting.supervisor.stop_asked is not None:
-            return state, f"the {sitting.supervisor.stop_asked} stopped the session"
+        if sitting.supervisor.stop_requester is not None:
+            return state, f"the {sitting.supervisor.stop_requester} stopped the session"
     return state, ""
 
 
@@ -64,7 +64,7 @@ def present_form(state: SessionState, form: Form, sitting: Sitting) -> SessionSt
     state = log_and_apply(state, event, sitting)
     if outcome.reminder:
         sitting.display.trouble(outcome.reminder)
-        sitting.supervisor.note(NoteAsked("program", outcome.reminder))
+        sitting.supervisor.add_note(NoteAsked("program", outcome.reminder))
     return state
 
 
@@ -95,7 +95,7 @@ def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
     # In virtual time the load of the computer has no effect.
     load = None if clock.virtual else load_per_processor()
     computer = check_computer(clock, device.info.sample_rate_hz, device.info.simulated, load)
-    daily = () if device.info.simulated else (last_check(device.info, state.protocol.setup.daily_check_needed),)
+    daily = () if device.info.simulated else (judge_last_check(device.info, state.protocol.setup.daily_check_needed),)
     report = replace(report, findings=(*report.findings, *computer, *daily))
     is_accepted = sitting.display.device_checked(report)
     findings = tuple(f"{finding.name}: {finding.value}{_finding_text(finding)}" for finding in report.findings)

@@ -101,8 +101,8 @@ def _rehearse_on_executor(rehearsal: Rehearsal, executor: Executor, on_finished:
     )
     for finished_count, (_, (session, files, end_reason)) in enumerate(results, start=len(begun_numbers) + 1):
         make_folder(rehearsal.data, private=True)
-        with new_folder(rehearsal.data / session) as new_session_folder:
-            write_files(new_session_folder, files)
+        with new_folder(rehearsal.data / session) as create_session_folder:
+            write_files(create_session_folder, files)
         _require_finished(session, end_reason)
         on_finished(finished_count)
 

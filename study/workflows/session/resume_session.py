@@ -1,7 +1,8 @@
 """Resumption of a session after a crash or a pause: its state is rebuilt from the log, and an open trial is closed.
 
-An incomplete last line of the log is removed. A trial without an answer is void; a trial with an answer is judged from
-its recording or from the device's counters in the log, because answers that were seen must not be dropped.
+`conduct_session` calls it for `hapteq resume` and for the screen. An incomplete last line of the log is removed. A
+trial without an answer is void; a trial with an answer is judged from its recording or from the device's counters in
+the log, because dropping answers after they are known would bias the result.
 """
 
 from collections.abc import Iterator
@@ -25,7 +26,7 @@ from study.session.facts.sensor_facts import SensorFacts
 from study.session.state.fold import apply_event
 from study.session.state.state import SessionState
 from study.session.stimulus.delivered import measure_delivered
-from study.session.stimulus.stimulus import vector_at_angle
+from study.session.stimulus.stimulus import compute_vector_at_angle
 from study.session.views.count_text import answers_are
 from study.store.disk.privacy import close_data_folder, close_to_others
 from study.store.disk.provenance import list_versions
@@ -40,7 +41,7 @@ from study.workflows.results.session_results import write_tables
 from study.workflows.session.open_session import OpenedSession, collect_device_facts
 from study.workflows.session.other_sessions import dose_before
 from study.workflows.session.prepare_sitting import does_not_take_part
-from study.workflows.trial.judge_trial import Judgement, judge
+from study.workflows.trial.judge_trial import Judgement, judge_trial
 from study.workflows.trial.trial_facts import restore_health
 
 RECORDING_LOST = "its recording was lost when the program ended"
@@ -49,8 +50,8 @@ RECORDING_LOST = "its recording was lost when the program ended"
 
 @contextmanager
 def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> Iterator[OpenedSession]:
-    """An existing session, repaired, and locked while the context lasts. Raises StudyError where it cannot be resumed:
-    a damaged log, a finished session, another kind of device, a participant who does not take part."""
+    """Context with an existing session, repaired, and locked while the context lasts. Raises StudyError where it cannot
+    be resumed: a damaged log, a finished session, another kind of device, a participant who does not take part."""
     close_data_folder(folder.path.parent)
     close_to_others(folder.path, recursive=True)  # earlier versions wrote files that other accounts could read
     with hold_session_lock(folder.path):
@@ -62,7 +63,7 @@ def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> I
         try:
             folded_session = fold_session(folder)
             if folded_session.state.is_finally_ineligible:
-                _close_as_turned_away(folded_session, folder, log, clock)
+                _close_ineligible_session(folded_session, folder, log, clock)
                 raise does_not_take_part(folded_session.state)
             _check_resumable(folded_session.state, device, folder)
             remove_incomplete_line(folder.log, folded_session.log_contents)
@@ -84,9 +85,11 @@ def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> I
             log.close()
 
 
-def _close_as_turned_away(folded_session: FoldedSession, folder: SessionFolder, log: EventLog, clock: Clock) -> None:
-    """Close the session of a participant who refused or was excluded: last event, seal and tables, if a crash prevented
-    them."""
+def _close_ineligible_session(
+    folded_session: FoldedSession, folder: SessionFolder, log: EventLog, clock: Clock
+) -> None:
+    """Close the session of a participant who refused or was excluded: append the last event if a crash prevented it,
+    and write seal and tables."""
     if not folded_session.state.closed:
         remove_incomplete_line(folder.log, folded_session.log_contents)
         outcome = folded_session.state.sitting.ineligibility or "refused"
@@ -95,9 +98,9 @@ def _close_as_turned_away(folded_session: FoldedSession, folder: SessionFolder, 
 
 
 def _check_resumable(state: SessionState, device: DeviceInfo, folder: SessionFolder) -> None:
-    """Raise StudyError for a closed session, and for a real instead of a simulated device or the reverse."""
+    """Raise StudyError for a closed session, and for a simulated device in place of a real one or the reverse."""
     if state.closed:
-        raise already_finished(state, folder)
+        raise make_finished_error(state, folder)
     if device.simulated != state.opened.device.simulated:
         raise StudyError(
             "This session was begun on another kind of device",
@@ -108,8 +111,8 @@ def _check_resumable(state: SessionState, device: DeviceInfo, folder: SessionFol
         )
 
 
-def already_finished(state: SessionState, folder: SessionFolder) -> StudyError:
-    """Error for a closed session that cannot be resumed."""
+def make_finished_error(state: SessionState, folder: SessionFolder) -> StudyError:
+    """Error for a closed session, which cannot be resumed."""
     return StudyError(
         "This session is finished",
         f"{folder.name} has all its runs.",
@@ -121,8 +124,9 @@ def already_finished(state: SessionState, folder: SessionFolder) -> StudyError:
 def _close_open_trial(
     state: SessionState, folder: SessionFolder, log: EventLog, clock: Clock, interrupted: bool
 ) -> SessionState:
-    """Close the trial that was open when the program ended: an answered trial is judged late; an unanswered trial is
-    void, because the stimulus may have been felt. Returns the new state."""
+    """Close the trial that was open when the program ended: an answered trial is judged now; an unanswered trial is
+    void, because the participant may have felt the stimulus. Returns the new state. interrupted: the program was ended
+    by Ctrl-C."""
     presented = state.presented
     if presented is None:
         return state
@@ -148,28 +152,30 @@ def _judge_late(
     """Judge a trial where the program ended between answer and measurement.
 
     A recording exists only if the trial was judged to count. Without a usable recording, the trial is judged by the
-    device's counters that were logged with the answer. Without these (older logs) the answer counts as unmeasured: to
-    drop answers after they were seen would bias the result. If the protocol needs the accelerometer, a trial without a
-    usable recording is void.
+    device's counters that were logged with the answer. Without these (older logs) the answer counts as unmeasured:
+    dropping answers after they are known would bias the result. If the protocol requires the accelerometer, a trial
+    without a usable recording is void.
     """
     try:
-        late = _from_recording(state, presented, folder, clock)
+        measured_event = _measure_from_recording(state, presented, folder, clock)
     except (StudyError, ValueError):  # the answer is in the log; the damaged recording is kept for inspection
-        late = None
-    return late if late is not None else _without_recording(state, presented, clock)
+        measured_event = None
+    return measured_event if measured_event is not None else _judge_without_recording(state, presented, clock)
 
 
-def _without_recording(state: SessionState, presented: TrialPresented, clock: Clock) -> TrialMeasured | TrialSpoiled:
+def _judge_without_recording(
+    state: SessionState, presented: TrialPresented, clock: Clock
+) -> TrialMeasured | TrialSpoiled:
     """Event of an answered trial without a recording, judged by the counters that were logged with the answer."""
-    logged = state.answered.health if state.answered is not None else None
-    health = restore_health(logged) if logged is not None else None
+    counters = state.answered.health if state.answered is not None else None
+    health = restore_health(counters) if counters is not None else None
     verdict = Judgement("", ())
-    if health is not None and logged is not None:
-        verdict = judge(health, state.protocol.measurement, logged.felt_whole)
+    if health is not None and counters is not None:
+        verdict = judge_trial(health, state.protocol.measurement, counters.felt_whole)
     if state.protocol.measurement.accelerometer_needed and not verdict.void_reason:
         verdict = Judgement(RECORDING_LOST, (), VoidCause.NO_ACCELERATION)
     missed_ticks = health.missed_ticks if health is not None else None
-    late_ticks, latest_s = (logged.late_ticks, logged.latest_s) if logged is not None else (None, None)
+    late_ticks, latest_s = (counters.late_ticks, counters.latest_s) if counters is not None else (None, None)
     vibrated_s = health.ticks / state.opened.device.sample_rate_hz if health is not None else None
     if verdict.void_reason:
         return TrialSpoiled(
@@ -200,7 +206,7 @@ def _without_recording(state: SessionState, presented: TrialPresented, clock: Cl
     )
 
 
-def _from_recording(
+def _measure_from_recording(
     state: SessionState, presented: TrialPresented, folder: SessionFolder, clock: Clock
 ) -> TrialMeasured | None:
     """Event of an answered trial, measured from its recording; None if there is none. Raises StudyError or ValueError
@@ -208,12 +214,12 @@ def _from_recording(
     trial_recording = find_trial_recording(folder, recording_name(presented.run, presented.trial, presented.attempt))
     if trial_recording is None:
         return None
-    saved, recording = trial_recording
-    logged = state.answered.health if state.answered is not None else None
+    saved_file, recording = trial_recording
+    counters = state.answered.health if state.answered is not None else None
     # The angle that was played: of a detection trial, `direction` is the number of the interval.
-    vector = vector_at_angle(state.protocol.directions, presented.angle_deg)
-    trusted = recording.meta.get("acceleration_trusted", True)
-    values = measure_delivered(recording, vector, presented.frequency_hz) if trusted else None
+    unit_vector = compute_vector_at_angle(state.protocol.directions, presented.angle_deg)
+    is_trusted = recording.meta.get("acceleration_trusted", True)
+    delivered = measure_delivered(recording, unit_vector, presented.frequency_hz) if is_trusted else None
     return TrialMeasured(
         utc=clock.utc(),
         run=presented.run,
@@ -221,22 +227,22 @@ def _from_recording(
         attempt=presented.attempt,
         status="flagged",
         flags=("measured after a restart", *recording.meta.get("flags", ())),
-        recording=saved.name,
-        sha256=saved.sha256,
-        delivered_mps2=values.along_mps2 if values else None,
-        off_axis_mps2=values.off_axis_mps2 if values else None,
-        displacement_mm=values.displacement_mm if values else None,
-        harmonics_mps2=values.harmonics_mps2 if values else None,
+        recording=saved_file.name,
+        sha256=saved_file.sha256,
+        delivered_mps2=delivered.along_mps2 if delivered else None,
+        off_axis_mps2=delivered.off_axis_mps2 if delivered else None,
+        displacement_mm=delivered.displacement_mm if delivered else None,
+        harmonics_mps2=delivered.harmonics_mps2 if delivered else None,
         missed_ticks=recording.meta.get("missed_ticks"),
         late_ticks=recording.meta.get("late_ticks"),
         latest_s=recording.meta.get("latest_s"),
-        sensor=_sensor_of(recording.meta.get("sensor")),
-        vibrated_s=logged.ticks / state.opened.device.sample_rate_hz if logged is not None else None,
+        sensor=_read_sensor_facts(recording.meta.get("sensor")),
+        vibrated_s=counters.ticks / state.opened.device.sample_rate_hz if counters is not None else None,
         monotonic_s=clock.now_s(),
     )
 
 
-def _sensor_of(logged: object) -> SensorFacts | None:
+def _read_sensor_facts(stored_facts: object) -> SensorFacts | None:
     """Facts about the accelerometer in the metadata of a recording; None without them. Raises ValueError for other
     content."""
-    return None if logged is None else TypeAdapter(SensorFacts).validate_python(logged)
+    return None if stored_facts is None else TypeAdapter(SensorFacts).validate_python(stored_facts)

@@ -1,4 +1,7 @@
-"""Main loop of a session: ask the state machine for the next action, do it, log it, until nothing is left."""
+"""Main loop of a session: gets the next action from the state machine, performs and logs it, until none is left.
+
+`conduct_session` calls it for new and resumed sessions. The state machine is `study.session.state.machine`.
+"""
 
 import contextlib
 from dataclasses import dataclass, replace
@@ -29,14 +32,14 @@ from study.workflows.trial.present_trial import present_trial
 from study.workflows.trial.sitting import Sitting, log_and_apply, notify_experimenter, write_notes
 from study.workflows.trial.take_pause import take_pause
 
-VOID_TRIALS_IN_A_ROW = 3
+MAX_VOIDS_IN_A_ROW = 3
 """After this many unrequested void presentations the sitting ends: the participant has left, or the device is
 faulty. A stimulus must not play on an unattended handle."""
 
 
 @dataclass(frozen=True, slots=True)
 class SessionEnd:
-    """State at the end of a sitting, and why it ended."""
+    """State of the session at the end of a sitting, and why the sitting ended."""
 
     state: SessionState
     end_reason: str
@@ -50,34 +53,37 @@ class SessionEnd:
 
 
 def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
-    """Run until the session is finished or left.
+    """Run one sitting: until the session is finished, or the sitting ends early.
 
-    KeyboardInterrupt (Ctrl-C, a closed terminal) releases the device at once and becomes UserInterruptError. Any
-    StudyError is extended by the number of saved answers and how to continue.
+    KeyboardInterrupt (Ctrl-C, a closed terminal) releases the device at once and is raised as UserInterruptError. Any
+    StudyError is extended by the number of saved answers and the command that continues.
     """
     try:
-        end = _run_sitting(state, sitting)
+        session_end = _run_sitting(state, sitting)
     except KeyboardInterrupt as interruption:
         sitting.device.stop()
-        return _end_interrupted(sitting, interruption)
+        return _close_interrupted(sitting, interruption)
     except StudyError as error:
         sitting.device.stop()
-        raise _say_how_to_resume(error, sitting) from error
+        raise _add_resume_advice(error, sitting) from error
     except BaseException:
         sitting.device.stop()
         raise
     # The session is over: Ctrl-C only ends the goodbye.
     with contextlib.suppress(KeyboardInterrupt):
-        outcome = end.state.sitting.ineligibility if end.state.closed else ""
-        sitting.display.goodbye(Goodbye(not end.end_reason, end.state.answers, end.end_reason, outcome))
+        outcome = session_end.state.sitting.ineligibility if session_end.state.closed else ""
+        sitting.display.goodbye(
+            Goodbye(not session_end.end_reason, session_end.state.answers, session_end.end_reason, outcome)
+        )
     # Notes that were taken while the log was open are written before it is sealed.
-    end = replace(end, state=write_notes(end.state, sitting))
-    if end.state.closed:
+    session_end = replace(session_end, state=write_notes(session_end.state, sitting))
+    if session_end.state.closed:
         seal_log(sitting.folder.log)
-    return end
+    return session_end
 
 
 def _run_sitting(state: SessionState, sitting: Sitting) -> SessionEnd:
+    """Prepare the sitting (forms, device check), show the instructions and perform the actions."""
     state, refused = prepare_sitting(state, sitting)
     if state.is_finally_ineligible:
         return SessionEnd(turn_away(state, sitting), refused)
@@ -85,12 +91,14 @@ def _run_sitting(state: SessionState, sitting: Sitting) -> SessionEnd:
         return _end_sitting(AfterTrial(state, end_reason=refused), sitting)
     state = start_masking(take_place(state, sitting), sitting)
     sitting.supervisor.start_activity("instructions")
-    sitting.display.welcome(_welcome(state, sitting))
+    sitting.display.welcome(_make_welcome(state, sitting))
     return _run_actions(state, sitting)
 
 
-def _end_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEnd:
-    """End after an interruption. The log decides: a session whose last line was written is finished."""
+def _close_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEnd:
+    """End of a sitting after an interruption. A session whose last event is in the log is finished, and its end is
+    returned. Otherwise the interruption is logged, and UserInterruptError is raised; DeviceError where the force may
+    still be on."""
     state = fold_session(sitting.folder).state
     is_force_left = sitting.device.fault() is Fault.FORCE_LEFT
     if state.is_finally_ineligible:  # nothing was played; its last line may be missing
@@ -116,8 +124,8 @@ def _end_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> Sessi
     raise UserInterruptError("Interrupted", "The force was released.", resume_advice, saved) from interruption
 
 
-def _say_how_to_resume(error: StudyError, sitting: Sitting) -> StudyError:
-    """The same error with what is saved and how to continue."""
+def _add_resume_advice(error: StudyError, sitting: Sitting) -> StudyError:
+    """The same error, extended by the number of saved answers and the command that continues the session."""
     with contextlib.suppress(StudyError):
         state = fold_session(sitting.folder).state
         if not state.is_finally_ineligible:
@@ -127,42 +135,45 @@ def _say_how_to_resume(error: StudyError, sitting: Sitting) -> StudyError:
 
 
 def _run_actions(state: SessionState, sitting: Sitting) -> SessionEnd:
+    """Perform the actions of the state machine, pauses and stop requests until the session is finished or the sitting
+    ends."""
     voids: tuple[str, ...] = ()
     while True:
         state = write_notes(state, sitting)
         action = next_action(state, sitting.clock.utc(), sitting.clock.now_s())
         if isinstance(action, Finish):
-            state = stop_masking(_report_busy(state, sitting), sitting)
+            state = stop_masking(_report_busy_voids(state, sitting), sitting)
             closing_event = SessionClosed(utc=sitting.clock.utc(), outcome="completed")
             state = log_and_apply(state, closing_event, sitting)
             seal_log(sitting.folder.log)
             return SessionEnd(state, end_reason="")
-        outcome = _act(state, action, sitting)
+        outcome = _perform_action(state, action, sitting)
         if not isinstance(action, Probe | Reference):  # these neither void anything nor end a row of void trials
             voids = (*voids, outcome.void) if outcome.void else ()
-        if len(voids) >= VOID_TRIALS_IN_A_ROW:
+        if len(voids) >= MAX_VOIDS_IN_A_ROW:
             outcome = replace(outcome, end_reason=outcome.end_reason or explain_many_voids(voids))
-        pause = _pause_reason(outcome, sitting)
-        if pause and not outcome.end_reason:
-            pause_outcome = take_pause(stop_masking(outcome.state, sitting), pause, sitting)
-            continues = not pause_outcome.end_reason and not sitting.supervisor.stop_asked
+        pause_reason = _find_pause_reason(outcome, sitting)
+        if pause_reason and not outcome.end_reason:
+            pause_outcome = take_pause(stop_masking(outcome.state, sitting), pause_reason, sitting)
+            continues = not pause_outcome.end_reason and not sitting.supervisor.stop_requester
             state = start_masking(pause_outcome.state, sitting) if continues else pause_outcome.state
             outcome = replace(outcome, state=state, end_reason=pause_outcome.end_reason)
             if pause_outcome.withdrawn:
                 return replace(_end_sitting(outcome, sitting), withdrawn=True)
-        if requester := sitting.supervisor.stop_asked:
+        if requester := sitting.supervisor.stop_requester:
             outcome = replace(outcome, end_reason=outcome.end_reason or f"the {requester} stopped the session")
         if outcome.end_reason:
             return _end_sitting(outcome, sitting)
         state = outcome.state
 
 
-def _act(state: SessionState, action: Action, sitting: Sitting) -> AfterTrial:
+def _perform_action(state: SessionState, action: Action, sitting: Sitting) -> AfterTrial:
+    """Perform one action of the state machine; returns the new state and the reasons to pause or end."""
     match action:
         case EndSitting(reason=reason):
             return AfterTrial(state, end_reason=reason)
         case TakeRest(seconds=seconds):
-            return AfterTrial(_run_rest(state, seconds, sitting))
+            return AfterTrial(_take_rest(state, seconds, sitting))
         case FillIn(form=form):
             return AfterTrial(present_form(state, form, sitting))
         case Demonstrate():
@@ -183,38 +194,42 @@ def _act(state: SessionState, action: Action, sitting: Sitting) -> AfterTrial:
 
 
 def _end_sitting(outcome: AfterTrial, sitting: Sitting) -> SessionEnd:
-    state = stop_masking(_report_busy(write_notes(outcome.state, sitting), sitting), sitting)
+    """Log why the sitting ended before the session was finished."""
+    state = stop_masking(_report_busy_voids(write_notes(outcome.state, sitting), sitting), sitting)
     ending_event = SessionInterrupted(utc=sitting.clock.utc(), reason=outcome.end_reason)
     fault_text = sitting.device.health().why if outcome.fault is not Fault.NONE else ""
     return SessionEnd(log_and_apply(state, ending_event, sitting), outcome.end_reason, outcome.fault, fault_text)
 
 
-def _report_busy(state: SessionState, sitting: Sitting) -> SessionState:
-    """Report void trials of a busy computer at the end of a sitting, on the screen and in the log."""
+def _report_busy_voids(state: SessionState, sitting: Sitting) -> SessionState:
+    """Report the number of trials that were void because the computer was busy, on the screen and in the log."""
     if not state.sitting.busy_voids:
         return state
     notify_experimenter(describe_busy_voids(state.sitting.busy_voids), sitting)
     return write_notes(state, sitting)
 
 
-def _pause_reason(outcome: AfterTrial, sitting: Sitting) -> str:
+def _find_pause_reason(outcome: AfterTrial, sitting: Sitting) -> str:
+    """Why the sitting pauses: the reason of the last action, or a request; empty if there is none."""
     sitting.supervisor.listen()
-    requester = sitting.supervisor.pause_asked
+    requester = sitting.supervisor.pause_requester
     return outcome.pause or (f"the {requester} asked for a pause" if requester else "")
 
 
 def _finish_trial(outcome: AfterTrial, due_trial: PresentTrial, previous_state: SessionState, sitting: Sitting) -> None:
+    """Show feedback, the result of a finished practice, or why the trial was void; then wait until the next trial."""
     if outcome.void:
         sitting.display.await_return(outcome.void)
     if outcome.correct is not None:
-        if _feedback_wanted(previous_state, due_trial):
+        if _is_feedback_due(previous_state, due_trial):
             sitting.display.feedback(outcome.correct)
         if previous_state.runs[due_trial.run].practice and outcome.state.run > previous_state.run:
-            sitting.display.practice_over(_practice_result(previous_state, outcome.correct))
+            sitting.display.practice_over(_make_practice_result(previous_state, outcome.correct))
     sitting.clock.sleep(previous_state.protocol.trial.pause_between_s)
 
 
-def _practice_result(previous_state: SessionState, correct: bool) -> PracticeResult:
+def _make_practice_result(previous_state: SessionState, correct: bool) -> PracticeResult:
+    """Result of a practice run, of which the last answer was right (`correct`) or wrong."""
     settings, practice = previous_state.protocol.practice, add_answer(previous_state.practice, correct)
     question_count = min(settings.of_last, len(practice.correct))
     return PracticeResult(
@@ -222,18 +237,21 @@ def _practice_result(previous_state: SessionState, correct: bool) -> PracticeRes
     )
 
 
-def _run_rest(state: SessionState, seconds: float, sitting: Sitting) -> SessionState:
-    """A rest cut short by a pause or stop does not count and is due again."""
+def _take_rest(state: SessionState, seconds: float, sitting: Sitting) -> SessionState:
+    """Conduct a rest between runs and log it. A rest that a pause or stop request shortened does not count and is due
+    again."""
     sitting.supervisor.start_activity("rest")
     notice = RestNotice(seconds, len(state.runs) - state.run, estimate_progress(state))
-    rested_s = max(0.0, sitting.display.rest(notice, sitting.supervisor.sign_of_life))
-    if rested_s < seconds and (sitting.supervisor.stop_asked or sitting.supervisor.pause_asked):
+    rested_s = max(0.0, sitting.display.rest(notice, sitting.supervisor.keep_alive))
+    if rested_s < seconds and (sitting.supervisor.stop_requester or sitting.supervisor.pause_requester):
         return state
     event = RestTaken(utc=sitting.clock.utc(), run=state.run, trial=state.trial, rested_s=rested_s)
     return log_and_apply(state, event, sitting)
 
 
-def _feedback_wanted(state: SessionState, due_trial: PresentTrial) -> bool:
+def _is_feedback_due(state: SessionState, due_trial: PresentTrial) -> bool:
+    """Whether the protocol gives feedback after each answer of this trial: by its settings for practice, training or
+    test."""
     protocol, run = state.protocol, state.runs[due_trial.run]
     if run.practice:
         return protocol.practice.feedback == "after_answer"
@@ -241,13 +259,14 @@ def _feedback_wanted(state: SessionState, due_trial: PresentTrial) -> bool:
     return settings.feedback == "after_answer"
 
 
-def _welcome(state: SessionState, sitting: Sitting) -> Welcome:
-    training = sum(run.phase is Phase.TRAINING for run in state.runs)
+def _make_welcome(state: SessionState, sitting: Sitting) -> Welcome:
+    """Content of the instructions at the beginning of a sitting."""
+    training_run_count = sum(run.phase is Phase.TRAINING for run in state.runs)
     return Welcome(
         title=state.protocol.title,
         picture=make_direction_picture(state.protocol.directions, has_swapped_labels(state.protocol, state.opened)),
-        runs=len(state.runs) - training,
-        training_runs=training,
+        runs=len(state.runs) - training_run_count,
+        training_runs=training_run_count,
         device=sitting.device.info.name,
         device_moves=is_felt_by_person(state.opened) is not False,
         resumed_after=state.answers,

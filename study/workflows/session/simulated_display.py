@@ -1,7 +1,7 @@
-"""Display and hand of a simulated participant: implements the ports `Display` and `Hand` of `workflows.trial.display`.
+"""Simulated participant at a session: implements the protocols `Display` and `Hand` of `workflows.trial.display`.
 
-Questions are answered by an `Observer` after its response time; all waiting passes on the given clock, so that a
-session can run in virtual time.
+Questions are answered by an `Observer` after its response time; all waiting is done on the given clock, so that a
+session can run in virtual time. Methods that only return None continue at once.
 """
 
 from collections.abc import Callable
@@ -44,7 +44,8 @@ ENDED_EARLY = Unanswered("the stimulus ended early", ends_sitting=False)
 
 
 class SimulatedDisplay:
-    """Display of a simulated participant: answers come from the observer, and waiting passes on the clock."""
+    """Display and hand of a simulated participant: answers are those of the observer, and waiting is done on the
+    clock."""
 
     def __init__(
         self,
@@ -84,15 +85,18 @@ class SimulatedDisplay:
         return FormReply({field.key: _choose_first_answer(field) for field in form.fields})
 
     def device_checked(self, report: DeviceReport) -> bool:
+        """Continue without repeating the check."""
         return True
 
     def welcome(self, notice: Welcome) -> None:
         return None
 
     def choose_demo(self, menu: DemoMenu, sign_of_life: SignOfLife) -> DemoChoice:
+        """End the demonstration at once."""
         return DemoDone()
 
     def show_playing(self, notice: PlayingNotice, sign_of_life: SignOfLife) -> Unanswered | None:
+        """Wait until the stimulus or interval is over; `ENDED_EARLY` where `sign_of_life` ended the wait."""
         return None if self._wait(notice.seconds, sign_of_life) else ENDED_EARLY
 
     def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
@@ -106,8 +110,9 @@ class SimulatedDisplay:
         return None
 
     def ask(self, question: Question, sign_of_life: SignOfLife) -> Reply:
-        """Answer of the observer after its response time; no answer where that exceeds the time limit, or where the
-        observer asks for a repetition that is allowed. Raises RuntimeError before the first stimulus."""
+        """Answer of the observer after its response time. No answer where that exceeds the time limit, where
+        `sign_of_life` ended the wait, or where the observer asks for a repetition that is allowed. Raises RuntimeError
+        before the first stimulus."""
         if self._on_question is not None:
             self._on_question(question)
         if self._perceived is None:
@@ -146,11 +151,13 @@ class SimulatedDisplay:
         return None
 
     def rest(self, notice: RestNotice, sign_of_life: SignOfLife) -> float:
+        """Wait for the duration of the rest; returns the time (s) that passed."""
         started_s = self._clock.now_s()
         self._wait(notice.seconds, sign_of_life)
         return self._clock.now_s() - started_s
 
     def pause(self, notice: PauseNotice, sign_of_life: SignOfLife) -> AfterPause:
+        """Continue the sitting without waiting."""
         return AfterPause.CONTINUE_SITTING
 
     def goodbye(self, notice: Goodbye) -> None:
@@ -174,7 +181,7 @@ class SimulatedDisplay:
 
 
 def _choose_first_answer(field: FormField) -> str:
-    """First choice, lowest number, or a placeholder text where an answer is required."""
+    """First choice, lowest number, or a placeholder text where an answer is required; empty for an optional text."""
     if field.choices:
         return field.choices[0]
     if field.limits is not None:

@@ -14,7 +14,7 @@ from study.devices.clock import Clock
 from study.devices.device import Device
 from study.session.state.due_trial import PresentTrial
 from study.session.stimulus.delivered import Delivered, measure_delivered
-from study.session.stimulus.stimulus import direction_vector
+from study.session.stimulus.stimulus import compute_direction_vector
 from study.store.sessions.archive import SessionFolder
 from study.workflows.results.fold_session import fold_session
 from study.workflows.trial.display import SignOfLife
@@ -57,7 +57,7 @@ class SimulatedTouch:
         acceleration = np.array(rows, dtype=np.float64)
         if not covers_a_period(int(np.isfinite(acceleration).all(axis=1).sum()), rate_hz, stimulus.frequency_hz):
             return None
-        vector = direction_vector(self._directions, stimulus.direction)
+        vector = compute_direction_vector(self._directions, stimulus.direction)
         # A recording needs a command; its values do not enter the measurement.
         force = Signal(np.zeros_like(acceleration), rate_hz, "force", "N", ("fx", "fy", "fz"))
         response = Signal(acceleration, rate_hz, "acceleration", "m/s^2", ("ax", "ay", "az"))

@@ -1,8 +1,9 @@
 """Withdrawal of a participant: all data are erased permanently, and a tombstone replaces each session.
 
-The tombstone contains the names of session and protocol and the participant number, but no measured data. The list of
-what will be erased is written to the disk first, and the log of each session is erased last, so that the same command
-continues an interrupted withdrawal.
+Called by `hapteq withdraw`, by the screen, and by `end_sitting` after a participant withdrew in a pause. The tombstone
+contains the names of session and protocol and the participant number, but no measured data. The list of what will be
+erased is written to the disk first, and the log of each session is erased last, so that the same command continues an
+interrupted withdrawal.
 """
 
 import errno
@@ -13,13 +14,13 @@ from pathlib import Path, PurePosixPath
 
 from study.errors import StudyError, WrongUseError
 from study.store.disk.real_folder import RealFolder, is_real_file, is_real_folder, open_folder
-from study.store.sessions.archive import FOLDER, TOMBSTONE_NAME, SessionFolder, withdrawal_file
+from study.store.sessions.archive import FOLDER_PATTERN, TOMBSTONE_NAME, SessionFolder, locate_withdrawal_record
 from study.store.sessions.event_log import LOG_NAME, hold_log_lock
 from study.store.sessions.session_lock import LOCK_NAME, hold_session_lock
 from study.store.sessions.withdrawal_files import WithdrawalIntent, read_intent, write_intent, write_tombstone
 from study.store.sessions.written_elsewhere import read_written_folders
 from study.workflows.session.participant_number import read_begun_participant
-from study.workflows.session.participant_traces import analysis_names, find_traces
+from study.workflows.session.participant_traces import find_traces, is_subject_in_analysis
 
 COPIES_REMINDER = "Analyses written elsewhere with --out, and copies, still hold the numbers: erase them."
 """Reminder of copies that the program cannot find, for messages."""
@@ -27,7 +28,7 @@ COPIES_REMINDER = "Analyses written elsewhere with --out, and copies, still hold
 
 @dataclass(frozen=True, slots=True)
 class Withdrawal:
-    """Plan of a withdrawal: what is erased in the data folder, and what a person must check."""
+    """Plan of a withdrawal: the data that are erased in the data folder, and those that a person must check."""
 
     subject: str
     sessions: tuple[str, ...]
@@ -43,7 +44,7 @@ class Withdrawal:
         return tuple(dict.fromkeys(PurePosixPath(name).parts[0] for name in self.derived))
 
 
-def session_to_withdraw(session: str, data: Path) -> SessionFolder:
+def find_session_to_withdraw(session: str, data: Path) -> SessionFolder:
     """The session by the path of its folder or by its name in `data`. Raises WrongUseError for an unknown session, and
     for a symbolic link, which is not followed."""
     path = Path(session) if Path(session).is_dir() else data / session
@@ -55,7 +56,7 @@ def session_to_withdraw(session: str, data: Path) -> SessionFolder:
             "Give the session's real folder.",
             saved="Nothing was changed.",
         )
-    has_session_name = FOLDER.fullmatch(folder.name) is not None
+    has_session_name = FOLDER_PATTERN.fullmatch(folder.name) is not None
     if not has_session_name or not (is_real_folder(folder.path) or is_real_file(folder.withdrawal)):
         raise WrongUseError(
             "There is no such session", f"'{session}' was not found in {data}.", "Give its folder, or --data."
@@ -64,9 +65,8 @@ def session_to_withdraw(session: str, data: Path) -> SessionFolder:
 
 
 def plan_withdrawal(session: SessionFolder) -> Withdrawal:
-    """Plan of what is erased: every session of the session's participant, and the analyses made from them. Nothing is
-    changed. Raises StudyError where nothing is proved to be the participant's.
-    """
+    """Plan of the withdrawal: every session of the session's participant, and the analyses made from them. Nothing is
+    changed. Raises StudyError where no data are proved to be the participant's and no withdrawal was begun."""
     data, subject = session.path.parent.resolve(), session.subject
     intent = read_intent(data, subject)
     traces = find_traces(data, subject, intent.sessions if intent else ())
@@ -82,8 +82,8 @@ def plan_withdrawal(session: SessionFolder) -> Withdrawal:
 
 
 def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
-    """Erase what the plan lists and write the tombstones. utc: time of the withdrawal. Raises StudyError: before any
-    change if a session is running, or where the system does not allow to erase a file."""
+    """Erase the data of the plan and write the tombstones. utc: time of the withdrawal. Raises StudyError: before any
+    change if a session is running; at any time where the system does not allow to erase a file."""
     data, subject = data.resolve(), withdrawal.subject
     folders = tuple(SessionFolder(data / name) for name in withdrawal.sessions)
     try:
@@ -100,17 +100,17 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
                 _erase_session(data_folder, folder)
                 write_tombstone(folder, withdrawn_utc, participants[folder.name])
             data_folder.sync()
-            data_folder.erase(withdrawal_file(data, subject).name)
+            data_folder.erase(locate_withdrawal_record(data, subject).name)
             data_folder.sync()
     except OSError as problem:
-        raise _not_everything(data, withdrawal, problem) from problem
+        raise _make_incomplete_error(data, withdrawal, problem) from problem
 
 
-def copies_elsewhere(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:
-    """Sentences on analyses and exports outside the data folder, noted when they were written, that name or may name
-    the participant."""
+def list_remaining_copies(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:
+    """Sentences on analyses and exports outside the data folder that name or may name the participant, as far as they
+    were noted when they were written, and a reminder of copies that are not noted."""
     noted_paths = [path for path in read_written_folders(data) if path.exists()]
-    naming_paths = [path for path in noted_paths if analysis_names(path, withdrawal.subject) is not False]
+    naming_paths = [path for path in noted_paths if is_subject_in_analysis(path, withdrawal.subject) is not False]
     return (*(f"Written with --out, and not erased: {path}" for path in naming_paths), COPIES_REMINDER)
 
 
@@ -128,8 +128,8 @@ def _lock_for_erasing(folder: SessionFolder, locks: ExitStack) -> None:
 
 
 def _erase_session(data: RealFolder, folder: SessionFolder) -> None:
-    """Erase all files of the session but its lock and tombstone; the log last, after the rest was synced to the
-    disk."""
+    """Erase all files of the session except its lock and tombstone; the log last, after the other changes were synced
+    to the disk."""
     with open_folder(data, folder.name) as session_folder:
         for name in session_folder.names():
             if name not in (TOMBSTONE_NAME, LOCK_NAME, LOG_NAME):
@@ -142,26 +142,26 @@ def _erase_session(data: RealFolder, folder: SessionFolder) -> None:
 def _erase_derived(data: RealFolder, name: str) -> None:
     """Erase a file or folder, and those of its parent folders below the data folder that become empty. name: path
     relative to the data folder."""
-    *parents, last = PurePosixPath(name).parts
+    *parents, last_part = PurePosixPath(name).parts
     try:
         with open_folder(data, *parents) as parent_folder:
-            parent_folder.erase(last)
+            parent_folder.erase(last_part)
             parent_folder.sync()
     except (FileNotFoundError, NotADirectoryError):
         return  # already erased, or a folder was replaced by a link: links are not followed
     while parents:
-        *parents, last = parents
+        *parents, last_part = parents
         with open_folder(data, *parents) as parent_folder:
-            parent_folder.erase_if_empty(last)
+            parent_folder.erase_if_empty(last_part)
 
 
-def _not_everything(data: Path, withdrawal: Withdrawal, problem: OSError) -> StudyError:
+def _make_incomplete_error(data: Path, withdrawal: Withdrawal, problem: OSError) -> StudyError:
     """Error for a withdrawal that the system did not allow to complete, with the command that continues it."""
     file_text = f" ({problem.filename})" if problem.filename else ""
-    first = withdrawal.sessions[0] if withdrawal.sessions else f"{withdrawal.subject}_001"
+    session_name = withdrawal.sessions[0] if withdrawal.sessions else f"{withdrawal.subject}_001"
     return StudyError(
         "Not everything could be erased",
         f"Of {withdrawal.subject}: {problem.strerror or problem}{file_text}.",
-        f"Correct the permissions and continue with: hapteq withdraw {first} --data {data}",
+        f"Correct the permissions and continue with: hapteq withdraw {session_name} --data {data}",
         saved="What remains is no longer used as data once erasing has begun.",
     )

@@ -12,7 +12,7 @@ from study.session.facts.level_scale import equalizer_amplitude
 from study.session.state.due_trial import PresentTrial
 from study.session.state.state import SessionState
 from study.session.stimulus.held_stimulus import HeldStimulus
-from study.session.stimulus.stimulus import direction_vector, make_held_stimulus
+from study.session.stimulus.stimulus import compute_direction_vector, make_held_stimulus
 from study.session.views.views import Answered, PlayingNotice, Question, Reply, Unanswered
 from study.workflows.trial.sitting import Pulse, Sitting, release_device
 
@@ -89,9 +89,9 @@ def _reply_to(question: Question, sitting: Sitting) -> Reply:
     """Reply to the question. A request to repeat the trial beyond the allowed number is ignored: the question is asked
     again."""
     while True:
-        reply = sitting.supervisor.resolve(sitting.display.ask(question, sitting.supervisor.sign_of_life))
+        reply = sitting.supervisor.resolve(sitting.display.ask(question, sitting.supervisor.keep_alive))
         repeat = isinstance(reply, Unanswered) and reply.repeat_requested and not (reply.pause or reply.ends_sitting)
-        if not repeat or question.repeats_left != 0 or not sitting.supervisor.sign_of_life():
+        if not repeat or question.repeats_left != 0 or not sitting.supervisor.keep_alive():
             return reply
 
 
@@ -99,9 +99,9 @@ def _wait(title: str, number: int, seconds: float, sitting: Sitting) -> Unanswer
     """Wait `seconds` during an interval or gap. None when they have passed; else why the wait ended: a button pressed
     too early makes the trial void (`VoidCause.EARLY`)."""
     reply = sitting.display.show_playing(
-        PlayingNotice(title, number, seconds, picture=None), sitting.supervisor.sign_of_life
+        PlayingNotice(title, number, seconds, picture=None), sitting.supervisor.keep_alive
     )
-    if reply is None and sitting.supervisor.sign_of_life():
+    if reply is None and sitting.supervisor.keep_alive():
         return None
     resolved = sitting.supervisor.resolve(reply or Unanswered("the stimulus ended early", ends_sitting=False))
     return (
@@ -115,7 +115,7 @@ def _stimulus(state: SessionState, due_trial: PresentTrial, sitting: Sitting) ->
     """The stimulus of a trial, with its level converted to the quantity of the equalizer (N or m/s²)."""
     return make_held_stimulus(
         state.protocol.stimulus,
-        direction_vector(state.protocol.directions, due_trial.direction),
+        compute_direction_vector(state.protocol.directions, due_trial.direction),
         due_trial.frequency_hz,
         due_trial.polarity * equalizer_amplitude(state.opened.equalized, due_trial.level_n, due_trial.frequency_hz),
         sitting.equalizer,

@@ -1,13 +1,13 @@
 """Labelled demonstration before the trials: the participant chooses a direction and a frequency and feels the stimulus,
 as often as wanted. Every stimulus is logged before it is played."""
 
-from protocols.procedure.schedule import demo_level_n, label_direction
+from protocols.procedure.schedule import draw_demo_level_n, label_direction
 from study.devices.device import Fault
 from study.session.facts.events import DemoFinished, DemoPlayed
 from study.session.facts.level_scale import equalizer_amplitude
 from study.session.state.due_trial import has_swapped_labels
 from study.session.state.state import SessionState, is_felt_by_person
-from study.session.stimulus.stimulus import direction_angle_deg, direction_vector, make_held_stimulus
+from study.session.stimulus.stimulus import compute_direction_angle_deg, compute_direction_vector, make_held_stimulus
 from study.session.views.views import DemoDone, DemoMenu, PlayDemo, PlayingNotice, Unanswered, make_direction_picture
 from study.workflows.trial.after_trial import AfterTrial, check_end_request, early_end_result, reason_to_leave
 from study.workflows.trial.sitting import Sitting, log_and_apply
@@ -19,7 +19,7 @@ def demonstrate(state: SessionState, sitting: Sitting) -> AfterTrial:
     vibration = 1
     while True:
         sitting.supervisor.start_activity("demo")
-        choice = sitting.display.choose_demo(_menu(state, felt_stimuli, vibration), sitting.supervisor.sign_of_life)
+        choice = sitting.display.choose_demo(_menu(state, felt_stimuli, vibration), sitting.supervisor.keep_alive)
         ended = check_end_request(state, sitting)
         if ended is not None:
             return ended
@@ -48,24 +48,24 @@ def _menu(state: SessionState, felt_stimuli: tuple[tuple[int, int], ...], vibrat
 
 
 def _play_demonstration(state: SessionState, choice: PlayDemo, sitting: Sitting) -> AfterTrial:
-    """Log and play one stimulus at its roved level (`demo_level_n`); returns how the demonstration continues."""
+    """Log and play one stimulus at its roved level (`draw_demo_level_n`); returns how the demonstration continues."""
     protocol = state.protocol
     frequency_hz = protocol.all_frequencies_hz[choice.vibration - 1]
-    level_n = demo_level_n(protocol.demo, state.opened.seed, state.sitting.demos)
+    level_n = draw_demo_level_n(protocol.demo, state.opened.seed, state.sitting.demos)
     direction = label_direction(choice.number, has_swapped_labels(protocol, state.opened))
     demo_played = DemoPlayed(
         utc=sitting.clock.utc(),
         frequency_hz=frequency_hz,
         level_n=level_n,
         direction=1 if choice.number == 1 else 2,
-        angle_deg=direction_angle_deg(protocol.directions, direction),
+        angle_deg=compute_direction_angle_deg(protocol.directions, direction),
         seconds=protocol.demo.seconds,
     )
     state = log_and_apply(state, demo_played, sitting)
     sitting.device.hold(
         make_held_stimulus(
             protocol.stimulus,
-            direction_vector(protocol.directions, direction),
+            compute_direction_vector(protocol.directions, direction),
             frequency_hz,
             equalizer_amplitude(state.opened.equalized, level_n, frequency_hz),
             sitting.equalizer,
@@ -74,7 +74,7 @@ def _play_demonstration(state: SessionState, choice: PlayDemo, sitting: Sitting)
     )
     picture = make_direction_picture(protocol.directions, has_swapped_labels(protocol, state.opened))
     notice = PlayingNotice(f"Direction {choice.number}", choice.number, protocol.demo.seconds, picture)
-    reply = sitting.display.show_playing(notice, sitting.supervisor.sign_of_life)
+    reply = sitting.display.show_playing(notice, sitting.supervisor.keep_alive)
     fault = sitting.device.release().health.fault
     if end_reason := reason_to_leave(fault):
         return AfterTrial(state, end_reason=end_reason, fault=fault)

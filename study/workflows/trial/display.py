@@ -1,7 +1,8 @@
-"""Ports from a session to the participant: display (notices, forms, questions) and hand (what is felt).
+"""Interfaces from a session to the participant: display (notices, forms, questions) and hand (the felt stimulus).
 
-The display is implemented by line mode, by a screen and by a simulated participant. Any of its methods may raise
-KeyboardInterrupt to leave: the force is released at once, and the session can be resumed.
+The display is implemented by line mode (`study.tui.line_mode`), by the screen (`study.tui.engine.remote_display`) and
+by a simulated participant (`workflows.session.simulated_display`). Any method of a display may raise KeyboardInterrupt
+to leave: the force is released at once, and the session can be resumed.
 """
 
 from __future__ import annotations
@@ -100,7 +101,8 @@ class Display(Protocol):
 
 
 class Hand(Protocol):
-    """Interface of the hand on the handle. A person feels the device; a simulated hand receives the stimulus."""
+    """Interface of the hand on the handle. A person feels the device itself; a simulated hand receives the stimulus as
+    data."""
 
     def feel(self, stimulus: PresentTrial, answers_before: int) -> None:
         """Receive the stimulus: called as soon as it is held; in a detection trial before the first interval.
@@ -109,7 +111,7 @@ class Hand(Protocol):
 
 
 class PersonsHand:
-    """Hand of a person, who feels the device: `feel` does nothing."""
+    """Hand of a person, who feels the device itself: `feel` does nothing."""
 
     def feel(self, stimulus: PresentTrial, answers_before: int) -> None:
         return None

@@ -1,7 +1,8 @@
-"""Judge from the device's counters whether an answered trial counts.
+"""Judgement from the device's counters of whether an answered trial counts; `present_trial` and `resume_session` call
+it.
 
 A trial is void if the participant did not feel the stimulus as planned (a fault of the device, or missed or late ticks
-of its 1 kHz loop), or if a measurement that the protocol requires is missing. A void trial is repeated; its answer
+of its control loop), or if a measurement that the protocol requires is missing. A void trial is repeated; its answer
 stays in the log but is not used. The limits are those of the protocol (`MeasurementSettings`).
 """
 
@@ -27,54 +28,55 @@ class Judgement:
     """Whether enough of the acceleration was received to measure the stimulus."""
 
 
-def judge(
-    health: Health, settings: MeasurementSettings, felt_whole: bool, at_answer: Health | None = None
+def judge_trial(
+    health: Health, settings: MeasurementSettings, felt_whole: bool, health_at_answer: Health | None = None
 ) -> Judgement:
-    """Judge an answered trial. health: counters until the release; at_answer: counters at the answer, None if both are
-    equal. felt_whole: whether the stimulus was complete until the answer; a later fault is then only a remark.
+    """Judge an answered trial. health: counters until the release; health_at_answer: counters at the answer, None if
+    both are equal. felt_whole: whether the stimulus was complete until the answer; a later fault is then only a remark.
 
     Late ticks are judged until the answer, because later ones were not felt before it. Missed ticks are judged until
     the release, because they also falsify the recorded spectrum.
     """
     if health.fault is not Fault.NONE and not felt_whole:
-        return Judgement(health.fault.value, (), cause_of(health.fault))
+        return Judgement(health.fault.value, (), get_void_cause(health.fault))
     if health.missed_ticks > settings.missed_ticks_limit * max(health.ticks, 1):
         share = 100 * health.missed_ticks / max(health.ticks, 1)
         return Judgement(f"{share:.1f} % {TICKS_MISSED}", (), VoidCause.MISSED_TICKS)
-    if late := _too_late(at_answer or health, settings):
-        return Judgement(late, (), VoidCause.MISSED_TICKS)
-    missing = _acceleration_missing(health, settings)
-    if missing and settings.accelerometer_needed:
-        return Judgement(missing, (), VoidCause.NO_ACCELERATION)
-    observed = (
+    if late_text := _describe_lateness(health_at_answer or health, settings):
+        return Judgement(late_text, (), VoidCause.MISSED_TICKS)
+    missing_text = _describe_missing_acceleration(health, settings)
+    if missing_text and settings.accelerometer_needed:
+        return Judgement(missing_text, (), VoidCause.NO_ACCELERATION)
+    remarks = (
         (health.fault is not Fault.NONE, f"after the answer: {health.fault.value}"),
         (health.stimulus_clipped > 0, "stimulus clipped at its cap"),
         (health.feedback_clipped > 0, "leaned on the spring: its pull held at the feedback's cap"),
         (health.total_clipped > 0, "leaned on the spring: stimulus reduced at the total cap"),
         (health.slew_limited > 0, "slew limited"),
         (health.sensor_clipped > 0, "accelerometer clipped"),
-        (bool(missing), f"no trustworthy acceleration: {missing}"),
+        (bool(missing_text), f"no trustworthy acceleration: {missing_text}"),
     )
-    return Judgement("", tuple(text for is_so, text in observed if is_so), measured=not missing)
+    return Judgement("", tuple(remark for applies, remark in remarks if applies), measured=not missing_text)
 
 
-def _too_late(health: Health, settings: MeasurementSettings) -> str:
-    """Which limit for late ticks was exceeded, in words; empty if none was."""
-    share = (health.missed_ticks + health.late_ticks) / max(health.ticks, 1)
-    if share > settings.late_ticks_limit:
-        return f"{100 * share:.1f} % {TICKS_LATE}"
+def _describe_lateness(health: Health, settings: MeasurementSettings) -> str:
+    """Which limit for late ticks was exceeded (share of late and missed ticks, or delay of the latest in ms), as text;
+    empty if none was."""
+    late_share = (health.missed_ticks + health.late_ticks) / max(health.ticks, 1)
+    if late_share > settings.late_ticks_limit:
+        return f"{100 * late_share:.1f} % {TICKS_LATE}"
     latest_ms = 1000 * health.latest_s
     return f"{latest_ms:.1f} ms {TICK_HELD}" if latest_ms > settings.longest_late_ms else ""
 
 
-def _acceleration_missing(health: Health, settings: MeasurementSettings) -> str:
-    """Missing share of the acceleration, in words; empty within the protocol's limit, or where the device has no
+def _describe_missing_acceleration(health: Health, settings: MeasurementSettings) -> str:
+    """Missing share of the acceleration, as text; empty within the protocol's limit, or where the device has no
     accelerometer that sends packets."""
     if health.sensor is None or health.sensor.missing <= settings.lost_packets_limit:
         return ""
     return f"{100 * health.sensor.missing:.1f} % {ACCELERATION_MISSING}"
 
 
-def cause_of(fault: Fault) -> VoidCause:
+def get_void_cause(fault: Fault) -> VoidCause:
     """Cause of a trial that is void because of this fault: a stalled program counts as a late screen."""
     return VoidCause.SCREEN_LATE if fault is Fault.STALLED else VoidCause.FAULT

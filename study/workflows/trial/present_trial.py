@@ -2,8 +2,7 @@
 
 Order: wait until the handle rests at the centre; log the presentation; play the stimulus and ask; log the answer;
 release the force; measure the delivered acceleration and log it. A detection trial releases the force before the
-question. Each fact is on the disk before the program acts on
-it, so that a crash loses no trial and no answer.
+question. Each event is written to the disk before the next step, so that a crash loses no trial and no answer.
 """
 
 import math
@@ -20,11 +19,11 @@ from study.session.state.due_trial import PresentTrial, has_swapped_labels
 from study.session.state.progress import estimate_progress
 from study.session.state.state import SessionState, count_repeats_left
 from study.session.stimulus.delivered import has_hardly_moved, measure_delivered
-from study.session.stimulus.stimulus import AXES, direction_vector
+from study.session.stimulus.stimulus import PLANE_AXES, compute_direction_vector
 from study.session.views.views import HandleView, Question, Task, Unanswered, make_direction_picture
 from study.workflows.trial.after_trial import AfterTrial, early_end_result, reason_to_leave
 from study.workflows.trial.ask_participant import StimulusReply, ask_participant
-from study.workflows.trial.judge_trial import cause_of, judge
+from study.workflows.trial.judge_trial import get_void_cause, judge_trial
 from study.workflows.trial.masking import was_masked
 from study.workflows.trial.sitting import Pulse, Sitting, log_and_apply, release_device
 from study.workflows.trial.trial_facts import (
@@ -35,22 +34,22 @@ from study.workflows.trial.trial_facts import (
     record_measured_trial,
 )
 
-NOT_MASKED = Unanswered("the masking noise stopped during the trial", ends_sitting=False)
-"""Replaces an answer that was given without masking noise: the trial is void."""
+MASKING_STOPPED = Unanswered("the masking noise stopped during the trial", ends_sitting=False)
+"""Reply that replaces an answer that was given without masking noise: the trial is void."""
 
 
-def question_of(state: SessionState, due_trial: PresentTrial) -> Question:
-    """A due trial as it is shown to the participant, without anything that could reveal the right answer."""
+def make_question(state: SessionState, due_trial: PresentTrial) -> Question:
+    """The question of a due trial as shown to the participant, without information that could reveal the answer."""
     run = state.runs[due_trial.run]
-    same_kind_runs = [
+    phase_runs = [
         other_run.index
         for other_run in state.runs
         if (other_run.phase, other_run.practice) == (run.phase, run.practice)
     ]
     return Question(
         phase=run.phase,  # a catch trial looks like one of the test run on the screen
-        run_number=1 + same_kind_runs.index(due_trial.run),
-        runs_in_phase=len(same_kind_runs),
+        run_number=1 + phase_runs.index(due_trial.run),
+        runs_in_phase=len(phase_runs),
         trial_number=due_trial.trial + 1,
         repeated=due_trial.attempt > 0,
         time_limit_s=state.protocol.trial.time_limit_s,
@@ -63,18 +62,18 @@ def question_of(state: SessionState, due_trial: PresentTrial) -> Question:
 
 
 def await_handle(state: SessionState, sitting: Sitting) -> Unanswered | None:
-    """Wait until the handle has been within the protocol's gate for long enough. None when the trial may start;
-    otherwise why the wait ended early. Does not wait where the gate is off (radius 0)."""
+    """Wait until the handle has stayed within the gate, `gate.radius_mm` around the centre, for `gate.still_s`. Returns
+    None when the trial may start, otherwise why the wait ended early. Does not wait if the gate is off (radius 0)."""
     gate = state.protocol.gate
     if gate.radius_mm <= 0:
         return None
-    look = _make_look(gate, state.protocol.directions.plane, sitting)
-    if gate.still_s <= 0 and look().ready:
+    read_handle = _make_handle_reader(gate, state.protocol.directions.plane, sitting)
+    if gate.still_s <= 0 and read_handle().ready:
         return None
     sitting.supervisor.start_activity("waiting for the handle")
-    reply = sitting.display.await_handle(look, sitting.supervisor.sign_of_life)
-    sitting.supervisor.handle_is(True)
-    if reply is None and not look().ready:
+    reply = sitting.display.await_handle(read_handle, sitting.supervisor.keep_alive)
+    sitting.supervisor.set_handle_ready(True)
+    if reply is None and not read_handle().ready:
         reply = Unanswered("the wait for the handle ended early", ends_sitting=False)
     if reply is None:
         return None
@@ -82,43 +81,43 @@ def await_handle(state: SessionState, sitting: Sitting) -> Unanswered | None:
     return resolved if isinstance(resolved, Unanswered) else None
 
 
-def _make_look(gate: GateSettings, plane: Plane, sitting: Sitting) -> Callable[[], HandleView]:
-    """Function that reads the handle's position and returns whether it has been inside the gate for `gate.still_s`,
-    with the instruction for the participant and the offset in the plane (mm)."""
+def _make_handle_reader(gate: GateSettings, plane: Plane, sitting: Sitting) -> Callable[[], HandleView]:
+    """Make a function that reads the handle's position and returns whether it has been inside the gate for
+    `gate.still_s`, with the instruction for the participant and the offset in the plane (mm)."""
     inside_since_s: list[float] = []
 
-    def look() -> HandleView:
-        offset = sitting.supervisor.offset_m(sitting.device.look())
+    def read_handle() -> HandleView:
+        offset_m = sitting.supervisor.compute_offset_m(sitting.device.look())
         now_s = sitting.clock.now_s()
-        if offset is None:
+        if offset_m is None:
             inside_since_s.clear()
-            sitting.supervisor.handle_is(False)
+            sitting.supervisor.set_handle_ready(False)
             return HandleView(False, "The device does not say where its handle is.", (0.0, 0.0), gate.radius_mm)
-        distance_mm = 1000.0 * math.hypot(*offset)
-        is_inside = distance_mm <= gate.radius_mm
-        if not is_inside:
+        distance_mm = 1000.0 * math.hypot(*offset_m)
+        is_in_gate = distance_mm <= gate.radius_mm
+        if not is_in_gate:
             inside_since_s.clear()
         elif not inside_since_s:
             inside_since_s.append(now_s)
-        sitting.supervisor.handle_is(is_inside)
-        ready = is_inside and now_s - inside_since_s[0] >= gate.still_s
-        first, second = AXES[plane]
+        sitting.supervisor.set_handle_ready(is_in_gate)
+        ready = is_in_gate and now_s - inside_since_s[0] >= gate.still_s
+        first_axis, second_axis = PLANE_AXES[plane]
         return HandleView(
             ready,
-            "Hold it there." if is_inside else f"Bring the handle {distance_mm:.0f} mm back to the centre.",
-            (1000.0 * offset[first], 1000.0 * offset[second]),
+            "Hold it there." if is_in_gate else f"Bring the handle {distance_mm:.0f} mm back to the centre.",
+            (1000.0 * offset_m[first_axis], 1000.0 * offset_m[second_axis]),
             gate.radius_mm,
         )
 
-    return look
+    return read_handle
 
 
 def present_trial(state: SessionState, due_trial: PresentTrial, sitting: Sitting) -> AfterTrial:
-    """Run one trial: presentation, answer and measurement, or the reason why it is void. Everything is logged."""
-    hindrance = await_handle(state, sitting)
-    if hindrance is not None:
-        return early_end_result(state, hindrance)
-    question = question_of(state, due_trial)
+    """Run and log one trial: presentation, answer and measurement, or the reason why it is void."""
+    early_end = await_handle(state, sitting)
+    if early_end is not None:
+        return early_end_result(state, early_end)
+    question = make_question(state, due_trial)
     state = log_and_apply(state, make_presented_event(due_trial, sitting), sitting)
     stimulus_reply = ask_participant(state, due_trial, question, sitting)
     masked = was_masked(sitting)
@@ -127,7 +126,7 @@ def present_trial(state: SessionState, due_trial: PresentTrial, sitting: Sitting
     if isinstance(stimulus_reply.reply, Unanswered):
         return _log_void_trial(state, due_trial, stimulus_reply, stimulus_reply.reply, sitting)
     if not masked:
-        return _log_void_trial(state, due_trial, stimulus_reply, NOT_MASKED, sitting)
+        return _log_void_trial(state, due_trial, stimulus_reply, MASKING_STOPPED, sitting)
     answer = AnswerGiven(
         utc=sitting.clock.utc(),
         run=due_trial.run,
@@ -145,8 +144,8 @@ def present_trial(state: SessionState, due_trial: PresentTrial, sitting: Sitting
 
 
 def _log_pulse(state: SessionState, due_trial: PresentTrial, pulse: Pulse, sitting: Sitting) -> SessionState:
-    """Log the onset pulse, after the answer: no write to the disk may delay the question after the onset."""
-    fact = OnsetPulsed(
+    """Log the onset pulse. Called after the answer, because a write to the disk would delay the question."""
+    pulse_event = OnsetPulsed(
         utc=sitting.clock.utc(),
         run=due_trial.run,
         trial=due_trial.trial,
@@ -155,7 +154,7 @@ def _log_pulse(state: SessionState, due_trial: PresentTrial, pulse: Pulse, sitti
         pulsed_s=pulse.at_s,
         trouble=pulse.trouble,
     )
-    state = log_and_apply(state, fact, sitting)
+    state = log_and_apply(state, pulse_event, sitting)
     if pulse.trouble:
         sitting.display.trouble(f"The onset pulse of this trial was lost ({pulse.line}: {pulse.trouble}).")
     return state
@@ -168,11 +167,13 @@ def _log_answered_trial(
     stimulus_reply: StimulusReply,
     sitting: Sitting,
 ) -> AfterTrial:
-    """Judge an answered trial by the health of device and loop, and log it as measured, flagged or spoiled.
-    play_result: the stimulus until its release."""
+    """Judge an answered trial by the health of device and control loop, and log it as measured (with flags, if any) or
+    as void. play_result: recording and health of the stimulus, from its onset to its release."""
     correct = state.answered is not None and state.answered.answer == due_trial.label
-    vector = direction_vector(state.protocol.directions, due_trial.direction)
-    verdict = judge(play_result.health, state.protocol.measurement, stimulus_reply.felt_whole, stimulus_reply.health)
+    vector = compute_direction_vector(state.protocol.directions, due_trial.direction)
+    verdict = judge_trial(
+        play_result.health, state.protocol.measurement, stimulus_reply.felt_whole, stimulus_reply.health
+    )
     recording = play_result.recording if verdict.measured else None
     values = measure_delivered(recording, vector, due_trial.frequency_hz) if recording is not None else None
     fault = play_result.health.fault
@@ -197,14 +198,14 @@ def _log_answered_trial(
 def _log_void_trial(
     state: SessionState, due_trial: PresentTrial, stimulus_reply: StimulusReply, reply: Unanswered, sitting: Sitting
 ) -> AfterTrial:
-    """Release the force, log a trial without a valid answer as spoiled, and return how the sitting continues."""
+    """Release the force, log a trial without a valid answer as void, and return how the sitting continues."""
     play_result = release_device(sitting) if stimulus_reply.holding else stimulus_reply.play_result
     health = play_result.health if play_result is not None else None
     fault = health.fault if health is not None else Fault.NONE
     # An emergency stop is also a fault, but the reply names who pressed it, which is more informative.
-    faulty = fault is not Fault.NONE and not reply.ends_sitting
-    reason = fault.value if faulty else reply.reason
-    cause = cause_of(fault) if faulty else _cause_of(reply, sitting)
+    has_fault = fault is not Fault.NONE and not reply.ends_sitting
+    reason = fault.value if has_fault else reply.reason
+    cause = get_void_cause(fault) if has_fault else _find_void_cause(reply, sitting)
     state = log_and_apply(state, make_void_event(due_trial, (reason, cause), health, sitting), sitting)
     if reply.ends_sitting:
         return AfterTrial(state, end_reason=reply.reason, fault=Fault.NONE if fault is Fault.STOPPED else fault)
@@ -216,9 +217,9 @@ def _log_void_trial(
     return AfterTrial(state, void="" if is_requested else reason, fault=fault)
 
 
-def _cause_of(reply: Unanswered, sitting: Sitting) -> VoidCause:
-    """Why a trial without a fault of the device is void."""
-    requester = sitting.supervisor.stop_asked or sitting.supervisor.pause_asked
+def _find_void_cause(reply: Unanswered, sitting: Sitting) -> VoidCause:
+    """Cause of a void trial in which the device had no fault."""
+    requester = sitting.supervisor.stop_requester or sitting.supervisor.pause_requester
     if requester is not None and requester != "participant" and (reply.ends_sitting or reply.pause):
         return VoidCause.EXPERIMENTER
     if reply.ends_sitting:

@@ -1,4 +1,7 @@
-"""Background tasks while the session waits: the device's sign of life, requests, buttons, live state."""
+"""Background tasks of a session while it waits: keep-alive calls, requests, buttons of the device, live state.
+
+`conduct_session` makes one `SessionSupervisor` for each sitting.
+"""
 
 import math
 from collections.abc import Callable
@@ -10,15 +13,16 @@ from study.session.watching.live import Activity, Live
 from study.session.watching.requests import NoteAsked, PauseAsked, RequestSource, StopAsked
 from study.workflows.trial.requests_port import Requests
 
-LIVE_EVERY_S = 0.25
-"""Interval of the live state: often enough for a viewer, with little load on the disk."""
+LIVE_INTERVAL_S = 0.25
+"""Interval (s) at which the live state is published: often enough for a viewer, with little load on the disk."""
 
-PLAYING = ("trial", "demo", "probe", "reference")
+PLAYING_ACTIVITIES = ("trial", "demo", "probe", "reference")
 """Activities in which the device holds a stimulus: a fault ends their wait."""
 
 
 class SessionSupervisor:
-    """One per sitting. `sign_of_life` is the sign of life of every wait; `resolve` returns afterwards what ended it."""
+    """Supervisor of one sitting. `keep_alive` is the keep-alive callback (`SignOfLife`) of every wait; afterwards
+    `resolve` returns the reply of the wait: the answer, or why it ended without one."""
 
     def __init__(
         self,
@@ -29,72 +33,77 @@ class SessionSupervisor:
         buttons: tuple[int, ...] = (),
         place_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
+        """publish: called with the live state, for viewers. buttons: numbers of the device's buttons that answer 1, 2.
+        place_m: place of the handle (m), from which `compute_offset_m` measures."""
         self._device = device
         self._clock = clock
         self._requests = requests
         self._publish = publish
         self._buttons = buttons
         self._place_m = place_m
-        self._buttons_up = False
+        self._buttons_released = False
         self._published_s = float("-inf")
         self._activity: Activity = "preparing"
         self._since_utc = clock.utc()
         self._handle_ready = True
         self._notes: list[NoteAsked] = []
         self._answer: Answered | None = None
-        self.stop_asked: RequestSource | None = None
-        self.pause_asked: RequestSource | None = None
+        self.stop_requester: RequestSource | None = None
+        self.pause_requester: RequestSource | None = None
 
     def start_activity(self, activity: Activity) -> None:
-        """Start a new wait: a button still held from the last one does not answer it."""
+        """Start a new wait. A button that is still held from the last one does not answer it."""
         self._activity, self._since_utc = activity, self._clock.utc()
-        self._buttons_up = False
+        self._buttons_released = False
         self._answer = None
         self._handle_ready = True
         self._published_s = float("-inf")
         self.listen()
-        self._report()
+        self._publish_live_state()
 
-    def sign_of_life(self) -> bool:
-        """The sign of life. False where the wait is over: a fault, a request, a button."""
+    def keep_alive(self) -> bool:
+        """Reset the device's watchdog, take requests and button presses, publish the live state. False where the wait
+        is over: after a fault during a stimulus, a stop or pause request, or an answer by a button; in a pause only
+        after a stop request."""
         self._device.keep_alive()
         self.listen()
-        self._report()
+        self._publish_live_state()
         if self._activity == "pause":
-            return self.stop_asked is None
-        if self.stop_asked is not None or self.pause_asked is not None or self._answer is not None:
+            return self.stop_requester is None
+        if self.stop_requester is not None or self.pause_requester is not None or self._answer is not None:
             return False
         # Between stimuli the fault of the last one is still reported, although it is over.
-        return self._activity not in PLAYING or self._device.fault() is Fault.NONE
+        return self._activity not in PLAYING_ACTIVITIES or self._device.fault() is Fault.NONE
 
     def listen(self) -> None:
-        """Take pending requests. A stop releases the force at once."""
+        """Take pending requests. A stop request releases the force at once."""
         for request in self._requests.take():
             match request:
                 case StopAsked(who=who):
                     self._device.stop()
-                    self.stop_asked = who
+                    self.stop_requester = who
                 case PauseAsked(who=who):
-                    self.pause_asked = who
+                    self.pause_requester = who
                 case NoteAsked():
                     self._notes.append(request)
 
     def resolve(self, reply: Reply) -> Reply:
-        """The reply of a wait: what ended it, where the display only knows that it ended."""
-        if self.stop_asked is not None:
-            return Unanswered(f"the {self.stop_asked} stopped the session", ends_sitting=True)
+        """The reply to a wait: a stop request, the answer, a pause request, in this order; else the reply of the
+        display."""
+        if self.stop_requester is not None:
+            return Unanswered(f"the {self.stop_requester} stopped the session", ends_sitting=True)
         if isinstance(reply, Answered):
             return reply
         if self._answer is not None:
             return self._answer
-        if self.pause_asked is not None:
+        if self.pause_requester is not None:
             return Unanswered(
-                f"the {self.pause_asked} asked for a pause", ends_sitting=False, repeat_requested=True, pause=True
+                f"the {self.pause_requester} asked for a pause", ends_sitting=False, repeat_requested=True, pause=True
             )
         return reply
 
-    def note(self, note: NoteAsked) -> None:
-        """Keep a note until `take_notes`; nothing is written yet."""
+    def add_note(self, note: NoteAsked) -> None:
+        """Store a note until `take_notes`; nothing is written yet."""
         self._notes.append(note)
 
     def take_notes(self) -> tuple[NoteAsked, ...]:
@@ -102,43 +111,47 @@ class SessionSupervisor:
         notes, self._notes = tuple(self._notes), []
         return notes
 
-    def handle_is(self, ready: bool) -> None:
-        """Whether the handle is at its place: shown to viewers, until the next `start_activity`."""
+    def set_handle_ready(self, ready: bool) -> None:
+        """Set whether the handle is at its place, which viewers see; True again after the next `start_activity`."""
         self._handle_ready = ready
 
-    def _report(self) -> None:
+    def _publish_live_state(self) -> None:
+        """Publish the live state every `LIVE_INTERVAL_S`, except in virtual time, and read the buttons."""
         now_s = self._clock.now_s()
-        is_due = not self._clock.virtual and now_s - self._published_s >= LIVE_EVERY_S
+        is_due = not self._clock.virtual and now_s - self._published_s >= LIVE_INTERVAL_S
         if not is_due and not self._buttons:
             return
         look = self._device.look()
-        self._press(look, now_s)
+        self._take_button_answer(look, now_s)
         if is_due:
             self._published_s = now_s
-            self._publish(self._live_state(look))
+            self._publish(self._make_live_state(look))
 
-    def _press(self, look: Look, now_s: float) -> None:
+    def _take_button_answer(self, look: Look, now_s: float) -> None:
+        """Take a newly pressed button as the answer of a trial: exactly one button, after all were released."""
         pressed = [number for number in self._buttons if number in look.buttons]
         if not pressed:
-            self._buttons_up = True
-        elif self._buttons_up and len(pressed) == 1 and self._activity == "trial" and self._answer is None:
+            self._buttons_released = True
+        elif self._buttons_released and len(pressed) == 1 and self._activity == "trial" and self._answer is None:
             self._answer = Answered(1 + self._buttons.index(pressed[0]), now_s)
 
-    def offset_m(self, look: Look) -> tuple[float, float, float] | None:
-        """Offset of the handle from its place; None without a reading."""
+    def compute_offset_m(self, look: Look) -> tuple[float, float, float] | None:
+        """Offset (x, y, z) of the handle from its place (m); None without a position reading."""
         if look.position_m is None:
             return None
         (x, y, z), (x0, y0, z0) = look.position_m, self._place_m
         return (x - x0, y - y0, z - z0)
 
-    def _live_state(self, look: Look) -> Live:
-        fault, offset, acceleration = self._device.fault(), self.offset_m(look), look.acceleration_mps2
+    def _make_live_state(self, look: Look) -> Live:
+        """State of device and session for viewers: distance from the place in mm, magnitude of the acceleration in
+        m/s²."""
+        fault, offset_m, acceleration = self._device.fault(), self.compute_offset_m(look), look.acceleration_mps2
         return Live(
             utc=self._clock.utc(),
             activity=self._activity,
             since_utc=self._since_utc,
             fault="" if fault is Fault.NONE else fault.value,
-            offset_mm=None if offset is None else 1000.0 * math.hypot(*offset),
+            offset_mm=None if offset_m is None else 1000.0 * math.hypot(*offset_m),
             handle_ready=self._handle_ready,
             acceleration_mps2=None if acceleration is None else math.hypot(*acceleration),
             sensor_clipped=look.sensor_clipped,

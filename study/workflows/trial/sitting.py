@@ -102,7 +102,7 @@ def report_clock_steps(steps: tuple[ClockStep, ...], sitting: Sitting) -> None:
 def notify_experimenter(sentence: str, sitting: Sitting) -> None:
     """Notify the experimenter: on the screen now, and in the log with the next notes."""
     sitting.display.trouble(sentence)
-    sitting.supervisor.note(NoteAsked("program", sentence))
+    sitting.supervisor.add_note(NoteAsked("program", sentence))
 
 
 def write_notes(state: SessionState, sitting: Sitting) -> SessionState:
@@ -121,5 +121,5 @@ def release_device(sitting: Sitting) -> PlaybackResult:
         with contextlib.suppress(OSError):
             sitting.display.trouble(play_result.health.fault.value)
     if play_result.health.why:
-        sitting.supervisor.note(NoteAsked("program", f"The device: {play_result.health.why}."))
+        sitting.supervisor.add_note(NoteAsked("program", f"The device: {play_result.health.why}."))
     return play_result

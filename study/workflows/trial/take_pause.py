@@ -27,7 +27,7 @@ def take_pause(state: SessionState, reason: str, sitting: Sitting) -> PauseOutco
     """Show the pause until the participant decides, and log it with its duration (s). Notes that are taken during the
     pause are logged at once. reason: shown to the participant."""
     supervisor = sitting.supervisor
-    requester = supervisor.pause_asked or "participant"
+    requester = supervisor.pause_requester or "participant"
     supervisor.start_activity("pause")
     started_s = sitting.clock.now_s()
 
@@ -35,14 +35,14 @@ def take_pause(state: SessionState, reason: str, sitting: Sitting) -> PauseOutco
         """Sign of life of the pause, which also writes new notes to the disk: a pause may be long."""
         nonlocal state
         state = write_notes(state, sitting)
-        return supervisor.sign_of_life()
+        return supervisor.keep_alive()
 
     decision = sitting.display.pause(PauseNotice(reason, state.answers), sign_of_life)
     state = write_notes(state, sitting)
     # Cleared after the pause, so that a request made during the pause does not start another one.
-    supervisor.pause_asked = None
+    supervisor.pause_requester = None
     paused_s = sitting.clock.now_s() - started_s
     state = log_and_apply(state, PauseTaken(utc=sitting.clock.utc(), who=requester, paused_s=paused_s), sitting)
-    if supervisor.stop_asked is not None:
-        return PauseOutcome(state, f"the {supervisor.stop_asked} stopped the session", withdrawn=False)
+    if supervisor.stop_requester is not None:
+        return PauseOutcome(state, f"the {supervisor.stop_requester} stopped the session", withdrawn=False)
     return PauseOutcome(state, END_REASONS.get(decision, ""), withdrawn=decision is AfterPause.WITHDRAW)

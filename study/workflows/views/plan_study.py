@@ -1,5 +1,5 @@
-"""The plan of each study in a data folder: planned, finished and excluded participants, and the order of frequencies
-that the next participant receives. Only reads files.
+"""The plan of each study in a data folder (`hapteq study-plan`): planned, finished and excluded participants, and the
+order of frequencies that the next participant receives. Only reads files.
 
 A participant may have several sessions; the session with the most progress counts. The design is computed by
 `protocols.procedure.study_plan`.
@@ -22,11 +22,12 @@ from study.store.formats.protocol_files import read_study_protocol
 from study.store.sessions.archive import SessionFolder, list_session_folders
 from study.store.sessions.event_log import read_opening
 from study.workflows.session.participant_number import participant_number, read_begun_participant
-from study.workflows.views.session_line import session_line
+from study.workflows.views.session_line import make_session_line
 
-PROGRESS: dict[str, Progress] = {"finished": "done", "unfinished": "begun", "running": "begun"}
-"""Progress of a participant, by the standing of the best session; with any other standing a participant is left out."""
-BEST_FIRST = ("finished", "running", "unfinished")
+PROGRESS_BY_STANDING: dict[str, Progress] = {"finished": "done", "unfinished": "begun", "running": "begun"}
+"""Progress of a participant, by the standing of the best session; with any other standing the participant is left "
+"out."""
+STANDINGS_BEST_FIRST = ("finished", "running", "unfinished")
 """Standings in the order in which the best session of a participant is chosen."""
 
 
@@ -43,7 +44,7 @@ class PlannedStudy:
 
 @dataclass(frozen=True, slots=True)
 class _StartedSession:
-    """A session that a participant has begun."""
+    """A session that a participant has begun, by its log or its tombstone."""
 
     folder: SessionFolder
     protocol: str
@@ -61,10 +62,13 @@ def list_planned_studies(data: Path, protocol: str | None, simulated: bool) -> t
     where the protocol cannot be read, or there is no session."""
     started_sessions = _find_started_sessions(data, simulated)
     if protocol is not None:
-        chosen = read_study_protocol(protocol, data).protocol
+        study_protocol = read_study_protocol(protocol, data).protocol
         return (
             _plan_from_sessions(
-                data, chosen, [session for session in started_sessions if session.protocol == chosen.name], simulated
+                data,
+                study_protocol,
+                [session for session in started_sessions if session.protocol == study_protocol.name],
+                simulated,
             ),
         )
     studies = []
@@ -73,7 +77,7 @@ def list_planned_studies(data: Path, protocol: str | None, simulated: bool) -> t
     ):
         protocol_sessions = list(sessions)
         studies.append(
-            _plan_from_sessions(data, _latest_protocol(name, protocol_sessions), protocol_sessions, simulated)
+            _plan_from_sessions(data, _load_latest_protocol(name, protocol_sessions), protocol_sessions, simulated)
         )
     if not studies:
         raise WrongUseError(
@@ -92,13 +96,17 @@ def _find_started_sessions(data: Path, simulated: bool) -> list[_StartedSession]
         if participant is not None and participant.protocol and participant.simulated == simulated:
             started_sessions.append(
                 _StartedSession(
-                    folder, participant.protocol, participant.number, session_line(folder), _protocol_text(folder)
+                    folder,
+                    participant.protocol,
+                    participant.number,
+                    make_session_line(folder),
+                    _read_protocol_text(folder),
                 )
             )
     return started_sessions
 
 
-def _protocol_text(folder: SessionFolder) -> str | None:
+def _read_protocol_text(folder: SessionFolder) -> str | None:
     """Text of the protocol from a session's log; None where it cannot be read."""
     try:
         session_opened = read_opening(folder.log)
@@ -111,37 +119,44 @@ def _plan_from_sessions(
     data: Path, protocol: StudyProtocol, started_sessions: Sequence[_StartedSession], simulated: bool
 ) -> PlannedStudy:
     """The plan of one study from its sessions."""
-    people: dict[str, list[_StartedSession]] = {}
-    for session in sorted(started_sessions, key=_by_number):
-        people.setdefault(session.folder.subject, []).append(session)
+    sessions_by_code: dict[str, list[_StartedSession]] = {}
+    for session in sorted(started_sessions, key=_make_sort_key):
+        sessions_by_code.setdefault(session.folder.subject, []).append(session)
     # The number that a new participant would receive: the empty code belongs to no session folder.
     number = participant_number(data, "", protocol.name, simulated)
-    plan = plan_study(protocol, [_participant(code, sessions) for code, sessions in people.items()], number)
-    return PlannedStudy(plan, _free_code(data, tuple(reversed(people))), _remarks(started_sessions))
+    plan = plan_study(
+        protocol, [_make_participant(code, sessions) for code, sessions in sessions_by_code.items()], number
+    )
+    return PlannedStudy(
+        plan, _suggest_unused_code(data, tuple(reversed(sessions_by_code))), _warn_of_different_texts(started_sessions)
+    )
 
 
-def _free_code(data: Path, study_codes: tuple[str, ...]) -> str:
-    """An unused code that continues those of this study. study_codes: codes of this study, the latest first."""
-    used_codes = tuple(folder.subject for folder in list_session_folders(data))
-    return suggest_code((*study_codes, *used_codes)) if study_codes or "P01" in used_codes else suggest_code(())
+def _suggest_unused_code(data: Path, study_codes: tuple[str, ...]) -> str:
+    """An unused participant code that continues those of this study. study_codes: codes of this study, the latest
+    first."""
+    all_codes = tuple(folder.subject for folder in list_session_folders(data))
+    return suggest_code((*study_codes, *all_codes)) if study_codes or "P01" in all_codes else suggest_code(())
 
 
-def _by_number(session: _StartedSession) -> tuple[float, str]:
-    """Sorting key of sessions: by number, then by name of the folder; those without a number last. The time of the
-    start cannot be used, because it is erased from a withdrawn session."""
+def _make_sort_key(session: _StartedSession) -> tuple[float, str]:
+    """Sorting key of sessions: participant number, then name of the folder; those without a number last. The time of
+    the start cannot be used, because it is erased from a withdrawn session."""
     return (float("inf") if session.number is None else session.number, session.folder.name)
 
 
-def _participant(code: str, sessions: Sequence[_StartedSession]) -> Participant:
-    """The participant, with the progress of the best session."""
+def _make_participant(code: str, sessions: Sequence[_StartedSession]) -> Participant:
+    """The participant, with the progress of the best session by `STANDINGS_BEST_FIRST`."""
     standings = [session.line.standing for session in sessions]
     numbers = [session.number for session in sessions if session.number is not None]
-    best = next((standing for standing in BEST_FIRST if standing in standings), standings[-1])
-    progress = PROGRESS.get(best, "left out")
-    return Participant(code, numbers[0] if numbers else None, progress, "" if best in PROGRESS else best)
+    best_standing = next((standing for standing in STANDINGS_BEST_FIRST if standing in standings), standings[-1])
+    progress = PROGRESS_BY_STANDING.get(best_standing, "left out")
+    return Participant(
+        code, numbers[0] if numbers else None, progress, "" if best_standing in PROGRESS_BY_STANDING else best_standing
+    )
 
 
-def _latest_protocol(name: str, sessions: Sequence[_StartedSession]) -> StudyProtocol:
+def _load_latest_protocol(name: str, sessions: Sequence[_StartedSession]) -> StudyProtocol:
     """Protocol of the latest session whose log can be read. Raises WrongUseError where there is none."""
     for session in sorted(sessions, key=lambda session: session.line.begun_utc, reverse=True):
         if session.protocol_text is None:
@@ -159,7 +174,7 @@ def _latest_protocol(name: str, sessions: Sequence[_StartedSession]) -> StudyPro
     )
 
 
-def _remarks(sessions: Sequence[_StartedSession]) -> tuple[str, ...]:
+def _warn_of_different_texts(sessions: Sequence[_StartedSession]) -> tuple[str, ...]:
     """Warning if sessions of this protocol used different texts of it: their orders would be counted together although
     they may differ."""
     texts = {session.protocol_text for session in sessions if session.protocol_text is not None}
@@ -168,8 +183,8 @@ def _remarks(sessions: Sequence[_StartedSession]) -> tuple[str, ...]:
     return (f"{len(texts)} different texts of this protocol were used. Lock it: hapteq protocol lock.",)
 
 
-def document(studies: Sequence[PlannedStudy]) -> dict[str, Any]:
-    """Plans as values that can be written as JSON, for other programs."""
+def summarise_plans(studies: Sequence[PlannedStudy]) -> dict[str, Any]:
+    """Plans as plain values, for a JSON document."""
     return {
         "studies": [
             {
@@ -201,7 +216,7 @@ def document(studies: Sequence[PlannedStudy]) -> dict[str, Any]:
                 "next": {
                     "code": study.next_code,
                     "number": study.plan.next_number,
-                    **_next_order(study.plan.next_cell),
+                    **_summarise_next_order(study.plan.next_cell),
                 },
                 "remarks": list(study.remarks),
             }
@@ -210,22 +225,22 @@ def document(studies: Sequence[PlannedStudy]) -> dict[str, Any]:
     }
 
 
-def _next_order(cell: Cell | None) -> dict[str, Any]:
+def _summarise_next_order(cell: Cell | None) -> dict[str, Any]:
     """Order and labelling of the next participant; empty where nothing is balanced."""
     return {} if cell is None else {"frequencies_hz": list(cell.frequencies_hz), "swapped": cell.swapped}
 
 
-def lines(study: PlannedStudy) -> list[str]:
-    """Lines of text for the terminal: progress, participants to resume or left out, cells that lack participants, next
+def format_plan_lines(study: PlannedStudy) -> list[str]:
+    """Lines of text for the terminal: progress, participants to resume or left out, orders that lack participants, next
     participant, warnings."""
     plan = study.plan
-    done, begun_count, left_out_count = (plan.count(progress) for progress in ("done", "begun", "left out"))
-    size = f" of {plan.planned} planned" if plan.planned else ""
-    lines_of_text = [f"{plan.protocol}: {done} done{size}, {begun_count} begun, {left_out_count} left out"]
-    lines_of_text += _list_with_title(
+    done_count, begun_count, left_out_count = (plan.count(progress) for progress in ("done", "begun", "left out"))
+    planned_text = f" of {plan.planned} planned" if plan.planned else ""
+    text_lines = [f"{plan.protocol}: {done_count} done{planned_text}, {begun_count} begun, {left_out_count} left out"]
+    text_lines += _format_codes(
         "to resume", [participant.code for participant in plan.participants if participant.progress == "begun"]
     )
-    lines_of_text += _list_with_title(
+    text_lines += _format_codes(
         "left out",
         [
             f"{participant.code} ({participant.reason})"
@@ -234,37 +249,41 @@ def lines(study: PlannedStudy) -> list[str]:
         ],
     )
     if plan.planned and plan.planned % plan.cycle_length:
-        lines_of_text.append(
+        text_lines.append(
             f"{plan.planned} participants do not balance the orders: multiples of {plan.cycle_length} would."
         )
     if not plan.planned:
-        lines_of_text.append(
+        text_lines.append(
             "No sample size is declared: analysis.participants in the protocol says how many are planned."
         )
     if not plan.cells:
-        lines_of_text.append("No orders have to be balanced: they are drawn by lot, or the same for all.")
+        text_lines.append("No orders have to be balanced: they are drawn by lot, or the same for all.")
     else:
-        incomplete_cells = [place for place, cell in enumerate(plan.cells) if cell.needed]
-        places = ", ".join(f"{place + 1}" for place in incomplete_cells)
-        lines_of_text.append(f"orders still needed: {places}" if incomplete_cells else "orders still needed: none")
-    lines_of_text.append(f"next: {study.next_code}{_progress_text(plan)}")
-    return [*lines_of_text, *study.remarks]
+        incomplete_cells = [cell_index for cell_index, cell in enumerate(plan.cells) if cell.needed]
+        incomplete_text = ", ".join(f"{cell_index + 1}" for cell_index in incomplete_cells)
+        text_lines.append(
+            f"orders still needed: {incomplete_text}" if incomplete_cells else "orders still needed: none"
+        )
+    text_lines.append(f"next: {study.next_code}{_describe_next_order(plan)}")
+    return [*text_lines, *study.remarks]
 
 
-def _list_with_title(title: str, codes: Sequence[str]) -> list[str]:
+def _format_codes(title: str, codes: Sequence[str]) -> list[str]:
+    """A line with participant codes after a title; empty without codes."""
     return [f"{title}: {', '.join(codes)}"] if codes else []
 
 
-def _progress_text(plan: StudyPlan) -> str:
-    """Order of the next participant in words; empty where nothing is balanced."""
+def _describe_next_order(plan: StudyPlan) -> str:
+    """Order of the next participant as text; empty where nothing is balanced."""
     cell = plan.next_cell
     if cell is None:
         return ""
-    return f", order {plan.next_number % len(plan.cells) + 1}: {order_words(cell)}"
+    return f", order {plan.next_number % len(plan.cells) + 1}: {describe_order(cell)}"
 
 
-def order_words(cell: Cell) -> str:
-    """The order of a cell in words, such as "5, 45, 15, 35, 25 Hz, numbers swapped"."""
-    hertz = ", ".join(f"{frequency:g}" for frequency in cell.frequencies_hz)
-    words = f"{hertz} Hz" if hertz else "by lot"
-    return f"{words}, numbers swapped" if cell.swapped else words
+def describe_order(cell: Cell) -> str:
+    """The order of a cell as text, such as "5, 45, 15, 35, 25 Hz, numbers swapped"; "by lot" where the order is
+    random."""
+    frequencies_text = ", ".join(f"{frequency:g}" for frequency in cell.frequencies_hz)
+    order_text = f"{frequencies_text} Hz" if frequencies_text else "by lot"
+    return f"{order_text}, numbers swapped" if cell.swapped else order_text

@@ -10,19 +10,19 @@ from study.store.sessions.archive import SessionFolder
 from study.store.sessions.log_writer import is_log_locked
 from study.store.sessions.request_inbox import RequestInbox
 
-HEARD_WITHIN_S = 3.0
-"""Longest wait for the session (s). It checks its inbox about twenty times a second, except while a form or notice is
-shown."""
-POLL_EVERY_S = 0.02
-"""Interval (s) at which it is checked whether the request was taken."""
+RECEIVE_TIMEOUT_S = 3.0
+"""Longest time (s) until the session receives the request. It reads its inbox about twenty times a second, except while
+it shows a form or a notice."""
+POLL_INTERVAL_S = 0.02
+"""Interval (s) at which the sender checks whether the request was received."""
 
 
 def send_request(folder: SessionFolder, request: Request, clock: Clock) -> bool:
     """Send a request. Returns True if the session received it, False for a note that stays in the inbox.
 
     Raises StudyError if the session is not running, the request cannot be written, or a stop or pause was not received
-    in time. A stop then stays in the inbox; a pause is taken back. Where it is unknown whether the session is running
-    (no file locks), the request is sent.
+    in time. A stop then stays in the inbox; a pause is withdrawn. Where file locks are not supported, it is unknown
+    whether the session is running, and the request is sent.
     """
     if is_log_locked(folder.log) is False:
         raise StudyError(
@@ -32,35 +32,36 @@ def send_request(folder: SessionFolder, request: Request, clock: Clock) -> bool:
         )
     inbox = RequestInbox(folder.path)
     name = inbox.send(request)
-    until_s = clock.now_s() + HEARD_WITHIN_S
+    deadline_s = clock.now_s() + RECEIVE_TIMEOUT_S
     while inbox.unread(name):
-        if clock.now_s() >= until_s:
-            return _unheard(folder, request, inbox, name)
-        clock.sleep(POLL_EVERY_S)
+        if clock.now_s() >= deadline_s:
+            return _handle_timeout(folder, request, inbox, name)
+        clock.sleep(POLL_INTERVAL_S)
     return True
 
 
-def _unheard(folder: SessionFolder, request: Request, inbox: RequestInbox, name: str) -> bool:
-    """Handle a request that was not received in time; returns and raises as `send_request`."""
+def _handle_timeout(folder: SessionFolder, request: Request, inbox: RequestInbox, name: str) -> bool:
+    """Leave or withdraw a request that was not received in time; returns and raises as `send_request`."""
     if isinstance(request, NoteAsked):
         return False
-    waits = (
-        f"{folder.name} accepted no request within {HEARD_WITHIN_S:g} s: a form or a notice is being read, or it hangs."
+    explanation = (
+        f"{folder.name} accepted no request within {RECEIVE_TIMEOUT_S:g} s: "
+        "a form or a notice is being read, or it hangs."
     )
     if isinstance(request, StopAsked):
         raise StudyError(
             "The session did not respond to the stop",
-            waits,
+            explanation,
             "If the handle moves: hand off, and switch the device off.",
             saved="The stop is kept, and is the first request that the session will receive.",
         )
-    # A pause that begins minutes later would surprise participant and experimenter. If it cannot be taken back, the
-    # session has taken it meanwhile.
+    # A pause is withdrawn, because it would be unexpected minutes later. If that fails, the session has received it in
+    # the meantime.
     if not inbox.take_back(name):
         return True
     raise StudyError(
         "The session did not respond to the pause",
-        waits,
+        explanation,
         "Ask again when trials are running.",
         saved="Nothing is pending.",
     )

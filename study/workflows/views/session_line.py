@@ -1,7 +1,7 @@
-"""One line per session in a list. Read only.
+"""One line per session in a list (`view_home`, `plan_study`). Only reads files.
 
-A list must be fast: the log of a finished session whose checksums and seal hold is trusted and counted without being
-parsed. Every other log is folded.
+A list must be fast: the log of a finished session whose checksums and seal are valid is trusted, and its events are
+counted without parsing them. Every other log is folded.
 """
 
 from dataclasses import replace
@@ -24,34 +24,35 @@ from study.store.sessions.session_summary import SUMMARY_NAME
 from study.store.sessions.withdrawal_files import describe_unfinished, read_intent, read_tombstone
 from study.workflows.results.fold_session import fold_session
 
-MEASURED = b',"event":"trial_measured",'
-"""In the line of a log that closes a trial: counted without parsing."""
+MEASURED_EVENT = b',"event":"trial_measured",'
+"""Bytes in the line of a log that closes a counted trial; they are counted without parsing."""
 
 
-def session_line(folder: SessionFolder) -> SessionLine:
-    """The line; an unreadable session has a remark. Raises nothing."""
+def make_session_line(folder: SessionFolder) -> SessionLine:
+    """The line of a session; an unreadable session has a remark. Raises no StudyError and no OSError."""
     try:
         if folder.withdrawn:
-            return _withdrawn_line(folder)
-        line = _line(folder, _stamp(folder))
+            return _make_withdrawn_line(folder)
+        line = _make_cached_line(folder, _stamp_files(folder))
     except FileNotFoundError:
-        return unreadable(folder, "It has no log: the program died while it was made.")
+        return make_unreadable_line(folder, "It has no log: the program died while it was made.")
     except StudyError as problem:
-        return unreadable(folder, problem.happened)
+        return make_unreadable_line(folder, problem.happened)
     except OSError as problem:
-        return unreadable(folder, f"The system refused: {problem.strerror or problem}.")
-    return with_writer(line, folder)
+        return make_unreadable_line(folder, f"The system refused: {problem.strerror or problem}.")
+    return mark_running(line, folder)
 
 
-def with_writer(line: SessionLine, folder: SessionFolder) -> SessionLine:
-    """The line marked `running` if the session is being written right now; the lock is probed for some microseconds."""
+def mark_running(line: SessionLine, folder: SessionFolder) -> SessionLine:
+    """The line, marked `running` if a process is writing the session now. To find out, its lock is taken for some
+    microseconds."""
     if line.standing == "unfinished" and is_log_locked(folder.log):
         return replace(line, standing="running")
     return line
 
 
-def line_of(state: SessionState, folder: SessionFolder) -> SessionLine:
-    """The session as a line of a list, from its folded log; never `running`, see `with_writer`."""
+def make_line_from_state(state: SessionState, folder: SessionFolder) -> SessionLine:
+    """The line of a session whose log was folded; never `running`, see `mark_running`."""
     session_opened = state.opened
     return SessionLine(
         name=folder.name,
@@ -67,8 +68,8 @@ def line_of(state: SessionState, folder: SessionFolder) -> SessionLine:
     )
 
 
-def unreadable(folder: SessionFolder, remark: str) -> SessionLine:
-    """Line of an unreadable session; its start is unknown, so it is sorted by the last change of its folder."""
+def make_unreadable_line(folder: SessionFolder, remark: str) -> SessionLine:
+    """Line of an unreadable session. Its start is unknown, so that it is sorted by the last change of its folder."""
     try:
         changed_utc = datetime.fromtimestamp(folder.path.stat().st_mtime, UTC).isoformat(timespec="seconds")
     except OSError:
@@ -78,32 +79,35 @@ def unreadable(folder: SessionFolder, remark: str) -> SessionLine:
     )
 
 
-def _withdrawn_line(folder: SessionFolder) -> SessionLine:
+def _make_withdrawn_line(folder: SessionFolder) -> SessionLine:
+    """Line of a withdrawn session, from its tombstone or, before that is written, from the record of the withdrawal."""
     tombstone = read_tombstone(folder)  # its existence is information enough
     intent = read_intent(folder.path.parent, folder.subject)
     withdrawn_utc = str(tombstone.get("withdrawn_utc", intent.withdrawn_utc if intent else ""))
     begun_facts = tombstone.get("begun")
-    if begun_facts is None and intent is not None and (promised := intent.sessions.get(folder.name)):
-        begun_facts = {"protocol": promised.protocol}
+    if begun_facts is None and intent is not None and (intended_session := intent.sessions.get(folder.name)):
+        begun_facts = {"protocol": intended_session.protocol}
     protocol = str(begun_facts.get("protocol", "")) if isinstance(begun_facts, dict) else ""
     remark = "The participant withdrew; the data were erased."
-    if finish := describe_unfinished(folder):
-        remark = f"The participant withdrew, and not everything is erased. {finish}"
+    if unfinished_text := describe_unfinished(folder):
+        remark = f"The participant withdrew, and not everything is erased. {unfinished_text}"
     return SessionLine(
         folder.name, str(folder.path), folder.subject, protocol, withdrawn_utc, None, 0, 0, 0, "withdrawn", remark
     )
 
 
-def _stamp(folder: SessionFolder) -> tuple[tuple[str, int, int, int], ...]:
-    """Times and sizes of all files that determine the line. Raises OSError if there is no log."""
+def _stamp_files(folder: SessionFolder) -> tuple[tuple[str, int, int, int], ...]:
+    """Name, time of modification and of status change (ns) and size (bytes) of all files that determine the line.
+    Raises OSError if there is no log."""
     result_files = (path for path in (*find_seals(folder.path).values(), folder.path / SUMMARY_NAME) if path.exists())
-    stats = ((path.name, path.stat()) for path in (folder.log, *result_files))
-    return tuple((name, stat.st_mtime_ns, stat.st_ctime_ns, stat.st_size) for name, stat in stats)
+    statuses = ((path.name, path.stat()) for path in (folder.log, *result_files))
+    return tuple((name, status.st_mtime_ns, status.st_ctime_ns, status.st_size) for name, status in statuses)
 
 
 @lru_cache(maxsize=4096)
-def _line(folder: SessionFolder, stamp: tuple[tuple[str, int, int, int], ...]) -> SessionLine:
-    """The line; depends only on the files that `stamp` represents (cached). Raises StudyError, OSError."""
+def _make_cached_line(folder: SessionFolder, file_stamp: tuple[tuple[str, int, int, int], ...]) -> SessionLine:
+    """The line of a session that is not withdrawn. file_stamp: key of the cache; the result depends only on the files
+    that it describes. Raises StudyError, OSError."""
     content = read_regular(folder.log)
     session_opened = read_opening(folder.log)
     is_trusted = (
@@ -111,15 +115,15 @@ def _line(folder: SessionFolder, stamp: tuple[tuple[str, int, int, int], ...]) -
         and session_opened.session == folder.name
         and is_sealed(folder.path, content)
     )
-    is_trusted = is_trusted and MEASURED in content  # a person who does not take part left a short log
-    planned = (
-        _protocol_and_runs(session_opened.protocol_text)
+    is_trusted = is_trusted and MEASURED_EVENT in content  # a person who does not take part left a short log
+    name_and_run_count = (
+        _read_name_and_run_count(session_opened.protocol_text)
         if is_trusted and isinstance(session_opened, SessionOpened)
         else None
     )
-    if planned is None or not isinstance(session_opened, SessionOpened):
-        return line_of(fold_session(folder).state, folder)
-    protocol, run_count = planned
+    if name_and_run_count is None or not isinstance(session_opened, SessionOpened):
+        return make_line_from_state(fold_session(folder).state, folder)
+    protocol, run_count = name_and_run_count
     return SessionLine(
         name=folder.name,
         path=str(folder.path),
@@ -127,7 +131,7 @@ def _line(folder: SessionFolder, stamp: tuple[tuple[str, int, int, int], ...]) -
         protocol=protocol,
         begun_utc=session_opened.utc,
         observer=session_opened.observer,
-        answers=content.count(MEASURED),
+        answers=content.count(MEASURED_EVENT),
         runs_done=run_count,
         runs=run_count,
         standing="finished",
@@ -135,8 +139,8 @@ def _line(folder: SessionFolder, stamp: tuple[tuple[str, int, int, int], ...]) -
 
 
 @lru_cache(maxsize=64)
-def _protocol_and_runs(protocol_text: str) -> tuple[str, int] | None:
-    """Name and number of runs; None for text that is not a study protocol."""
+def _read_name_and_run_count(protocol_text: str) -> tuple[str, int] | None:
+    """Name and number of runs of a study protocol; None for text that is not one."""
     try:
         protocol = load_protocol(protocol_text, "the log")
     except ProtocolError:

@@ -1,10 +1,13 @@
-"""A diagnosis as sentences and tables for the terminal, from its document `diagnosis.json`. Only reads files."""
+"""View of a diagnosis as sentences and tables, from its document `diagnosis.json`. Only reads files.
+
+Used by `hapteq show` and the screen.
+"""
 
 from pathlib import Path
 
 from analysis.diagnosis.document import Diagnosis, Errors, Mismatch, NamedEffect
-from analysis.diagnosis.effect_words import noun_of
-from analysis.diagnosis.result.candidate_wording import Device, candidate_sentences
+from analysis.diagnosis.effect_words import get_noun
+from analysis.diagnosis.result.candidate_wording import Device, describe_candidates
 from analysis.diagnosis.result.wording import (
     describe_effect,
     describe_equivalents,
@@ -15,40 +18,40 @@ from analysis.diagnosis.result.wording import (
 from analysis.wording import MISSING, conjoin, format_p
 from study.errors import StudyError
 from study.session.views.archive_views import DiagnosisView
-from study.session.views.printable import printable
+from study.session.views.printable import make_printable
 from study.store.formats.diagnosis_file import MODEL_NAME, read_diagnosis
 from study.store.formats.mechanical_model_file import read_mechanical_model
 
 MISMATCH_HEADER = ("output", "input", "band", "amplitude", "where", "share", "p")
 """Columns of the table of mismatches: response, command, frequency band, amplitude of the command, state of the device,
 share of the mismatch, p-value."""
-FIT_HEADER = ("record", "given model", "re-tuned", "with effects", "repeats allow")
+ERROR_HEADER = ("record", "given model", "re-tuned", "with effects", "repeats allow")
 """Columns of the table of errors on fit and test samples: of the given model, the re-tuned model, the model with the
 named effects, and the noise between repeats."""
 
 
-def diagnosis_view(path: Path) -> DiagnosisView:
-    """The view of a diagnosis. path: its document; the improved model and the HTML report are looked for in the same
+def make_diagnosis_view(path: Path) -> DiagnosisView:
+    """The view of a diagnosis. path: its document; the improved model and the HTML report are searched for in the same
     folder. Raises CannotReadError or UnusableFileError where the document cannot be used."""
-    diagnosis, device = read_diagnosis(path), _device(path.parent / MODEL_NAME)
+    diagnosis, device = read_diagnosis(path), _read_device(path.parent / MODEL_NAME)
     report = path.parent / "report.html"
     view = DiagnosisView(
         path=str(path),
         verdict=describe_verdict(diagnosis, device=device),
-        sentences=tuple(sentence for effect in diagnosis.effects for sentence in _effect(effect)),
+        sentences=tuple(sentence for effect in diagnosis.effects for sentence in _describe_named_effect(effect)),
         rivals=tuple(sentence for effect in diagnosis.effects for sentence in describe_rivals(effect)),
-        mismatch=_mismatches(diagnosis.mismatch),
-        fit=(FIT_HEADER, _errors("fit", diagnosis.fit.fit), _errors("test", diagnosis.fit.test)),
-        remainder=_mismatches(diagnosis.remainder),
-        next_experiment=_next_experiment_text(diagnosis),
+        mismatch=_tabulate_mismatches(diagnosis.mismatch),
+        fit=(ERROR_HEADER, _format_error_row("fit", diagnosis.fit.fit), _format_error_row("test", diagnosis.fit.test)),
+        remainder=_tabulate_mismatches(diagnosis.remainder),
+        next_experiment=_describe_next_experiment(diagnosis),
         report=str(report) if report.is_file() else "",
-        notes=_notes(diagnosis),
-        candidates=candidate_sentences(diagnosis, device),
+        notes=_list_notes(diagnosis),
+        candidates=describe_candidates(diagnosis, device),
     )
-    return printable(view)
+    return make_printable(view)
 
 
-def _device(path: Path) -> Device | None:
+def _read_device(path: Path) -> Device | None:
     """Number of axes and units of the improved model in this file, for the wording of parameters; None if it cannot be
     read."""
     try:
@@ -58,50 +61,50 @@ def _device(path: Path) -> Device | None:
     return Device(model.inputs == 1, model.system)
 
 
-def _effect(effect: NamedEffect) -> tuple[str, ...]:
+def _describe_named_effect(effect: NamedEffect) -> tuple[str, ...]:
     """Sentences on a named effect, and on effects that the recording cannot distinguish from it."""
     text = (
-        f"{describe_effect(effect)} It explains {_percent(effect.share)} of the mismatch that remains after re-tuning "
-        f"(probability {_probability(effect.probability)})."
+        f"{describe_effect(effect)} It explains {_format_percent(effect.share)} of the mismatch that remains after "
+        f"re-tuning (probability {_format_probability(effect.probability)})."
     )
     return tuple(filter(None, (text, describe_equivalents(effect))))
 
 
-def _mismatches(mismatches: tuple[Mismatch, ...]) -> tuple[tuple[str, ...], ...]:
+def _tabulate_mismatches(mismatches: tuple[Mismatch, ...]) -> tuple[tuple[str, ...], ...]:
     """Table of mismatches with its header; empty without any."""
-    return (MISMATCH_HEADER, *map(_mismatch, mismatches)) if mismatches else ()
+    return (MISMATCH_HEADER, *map(_format_mismatch_row, mismatches)) if mismatches else ()
 
 
-def _mismatch(mismatch: Mismatch) -> tuple[str, ...]:
-    """A row of the table of mismatches."""
+def _format_mismatch_row(mismatch: Mismatch) -> tuple[str, ...]:
+    """Row of the table of mismatches, under `MISMATCH_HEADER`."""
     return (
         mismatch.output,
         mismatch.input,
         f"{mismatch.band_hz[0]:g} to {mismatch.band_hz[1]:g} Hz",
         "all" if mismatch.amplitude is None else f"{mismatch.amplitude:g}",
         mismatch.state or "",
-        _percent(mismatch.share),
+        _format_percent(mismatch.share),
         format_p(mismatch.p_value),
     )
 
 
-def _errors(record: str, errors: Errors) -> tuple[str, ...]:
-    """A row of the table of errors. record: the set of samples."""
+def _format_error_row(record: str, errors: Errors) -> tuple[str, ...]:
+    """Row of the table of errors, under `ERROR_HEADER`. record: name of the set of samples."""
     values = (errors.before, errors.retuned, errors.after, errors.noise)
     return (record, *(MISSING if value is None else f"{value:.4f}" for value in values))
 
 
-def _next_experiment_text(diagnosis: Diagnosis) -> str:
+def _describe_next_experiment(diagnosis: Diagnosis) -> str:
     """Command, reason and discriminated effects of the proposed next experiment; empty without a proposal."""
     experiment = diagnosis.next_experiment
     if experiment is None:
         return ""
-    proposed_effect, *rivals = (noun_of(name) for name in experiment.splits) if experiment.splits else ("",)
+    proposed_effect, *rivals = (get_noun(name) for name in experiment.splits) if experiment.splits else ("",)
     splits = f" This distinguishes {proposed_effect} from {conjoin(rivals)}." if rivals else ""
     return f"{experiment.command}\n{experiment.why}{splits}"
 
 
-def _notes(diagnosis: Diagnosis) -> tuple[str, ...]:
+def _list_notes(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Sentences on the error measure, the re-tuned parameters, and the remaining mismatch."""
     retuned = (f"Re-tuned: {conjoin(list(diagnosis.retuned))}.",) if diagnosis.retuned else ()
     remainder = (describe_remainder(diagnosis),) if diagnosis.verdict in ("explained", "partly_explained") else ()
@@ -109,9 +112,11 @@ def _notes(diagnosis: Diagnosis) -> tuple[str, ...]:
     return (measured, *retuned, *remainder)
 
 
-def _percent(share: float) -> str:
+def _format_percent(share: float) -> str:
+    """The share in whole percent."""
     return f"{100 * share:.0f} %"
 
 
-def _probability(probability: float) -> str:
+def _format_probability(probability: float) -> str:
+    """The probability with two decimals; above 0.99 only that it is above."""
     return "> 0.99" if probability > 0.99 else f"{probability:.2f}"

@@ -1,41 +1,42 @@
 """Lists for the start screen: the sessions of a data folder, and the protocols, models and devices to choose from.
 
-Nothing is changed. Damaged files are listed with a remark or left out; they never raise an error.
+Used by the screen (`study.tui.engine.engine_commands`) and `hapteq sessions`. Nothing is changed. Damaged files are
+listed with a remark or left out; they never raise an error.
 """
 
 import tomllib
 from pathlib import Path
 
-from equalizer.plant.model_quality import quality_brief
+from equalizer.plant.model_quality import write_quality_brief
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.opening import DEVICES
 from study.errors import StudyError
 from study.session.views.archive_views import HomeView, ProtocolLine, SessionLine
-from study.session.views.printable import printable, printable_text
+from study.session.views.printable import make_printable, replace_unprintable
 from study.store.disk.text_file import read_toml_text
-from study.store.formats.identified_model_file import is_identified_model, read_identified_model
+from study.store.formats.identified_model_file import confirm_identified_model, read_identified_model
 from study.store.formats.protocol_files import ProtocolRefusedError, list_shipped_protocols, read_protocol
 from study.store.sessions.archive import list_session_folders
-from study.workflows.views.session_line import session_line
+from study.workflows.views.session_line import make_session_line
 
 
-def protocol_lines(data: Path) -> tuple[ProtocolLine, ...]:
+def list_protocol_lines(data: Path) -> tuple[ProtocolLine, ...]:
     """Study protocols to choose from: shipped ones first, then files in the data folder and in its parent folder."""
-    places = dict.fromkeys((data.absolute(), data.absolute().parent))
-    study_files = [str(path) for place in places for path in _toml_files(place) if _says_study(path)]
-    lines = (protocol_line(name, data) for name in (*list_shipped_protocols(), *study_files))
+    folders = dict.fromkeys((data.absolute(), data.absolute().parent))
+    study_files = [str(path) for folder in folders for path in _list_toml_files(folder) if _is_study_protocol(path)]
+    lines = (make_protocol_line(name, data) for name in (*list_shipped_protocols(), *study_files))
     return tuple(line for line in lines if line is not None)
 
 
-def _toml_files(folder: Path) -> list[Path]:
-    """TOML files in a folder, by name; none if it cannot be read."""
+def _list_toml_files(folder: Path) -> list[Path]:
+    """TOML files in a folder, by name; empty if it cannot be read."""
     try:
         return sorted(path for path in folder.glob("*.toml") if path.is_file())
     except OSError:
         return []
 
 
-def _says_study(path: Path) -> bool:
+def _is_study_protocol(path: Path) -> bool:
     """Whether a TOML file has the entry kind = "study"."""
     try:
         return tomllib.loads(read_toml_text(path, "protocol")).get("kind") == "study"
@@ -43,45 +44,45 @@ def _says_study(path: Path) -> bool:
         return False
 
 
-def protocol_line(name: str, data: Path) -> ProtocolLine | None:
+def make_protocol_line(name: str, data: Path) -> ProtocolLine | None:
     """Line of a study protocol; None for a protocol of another kind. An invalid one is listed with its problem."""
     try:
-        file = read_protocol(name, data)
-    except ProtocolRefusedError as refused:
-        return ProtocolLine(name, f"Cannot be used: {refused.problems[0]}", locked=False)
+        protocol_file = read_protocol(name, data)
+    except ProtocolRefusedError as refusal:
+        return ProtocolLine(name, f"Cannot be used: {refusal.problems[0]}", locked=False)
     except StudyError as problem:
         return ProtocolLine(name, f"Cannot be used. {problem.happened}", locked=False)
-    if not isinstance(file.protocol, StudyProtocol):
+    if not isinstance(protocol_file.protocol, StudyProtocol):
         return None
-    equalized = file.protocol.stimulus.quantity == "delivered_acceleration"
-    return ProtocolLine(name, file.protocol.title, file.locked, equalized)
+    is_equalized = protocol_file.protocol.stimulus.quantity == "delivered_acceleration"
+    return ProtocolLine(name, protocol_file.protocol.title, protocol_file.locked, is_equalized)
 
 
-def model_files(data: Path) -> tuple[str, ...]:
+def list_model_files(data: Path) -> tuple[str, ...]:
     """Files of identified models in the data folder and in its parent folder, the latest first."""
-    places = dict.fromkeys((data.absolute(), data.absolute().parent))
-    hdf5_files = [path for place in places for path in _hdf5_files(place)]
-    return tuple(str(path) for path in sorted(hdf5_files, key=_mtime_s, reverse=True) if _is_model(path))
+    folders = dict.fromkeys((data.absolute(), data.absolute().parent))
+    hdf5_files = [path for folder in folders for path in _list_hdf5_files(folder)]
+    return tuple(str(path) for path in sorted(hdf5_files, key=_read_mtime_s, reverse=True) if _is_model(path))
 
 
-def model_words(path: str) -> str:
+def describe_model_quality(path: str) -> str:
     """Quality of the model in a file, in a few words, or why it cannot be used."""
     try:
-        return quality_brief(read_identified_model(Path(path)).quality)
+        return write_quality_brief(read_identified_model(Path(path)).quality)
     except StudyError as problem:
         return f"cannot be used: {problem.title}"
 
 
-def _hdf5_files(folder: Path) -> list[Path]:
-    """HDF5 files in a folder; none if it cannot be read."""
+def _list_hdf5_files(folder: Path) -> list[Path]:
+    """HDF5 files in a folder; empty if it cannot be read."""
     try:
         return [path for path in folder.glob("*.h5") if path.is_file()]
     except OSError:
         return []
 
 
-def _mtime_s(path: Path) -> float:
-    """Time of the last change (s since 1970); 0 for a file that has vanished."""
+def _read_mtime_s(path: Path) -> float:
+    """Time of the last change (s since 1970); 0 for a file that was removed meanwhile."""
     try:
         return path.stat().st_mtime
     except OSError:
@@ -91,25 +92,31 @@ def _mtime_s(path: Path) -> float:
 def _is_model(path: Path) -> bool:
     """Whether an HDF5 file is an identified model."""
     try:
-        return is_identified_model(path)
+        return confirm_identified_model(path)
     except StudyError:  # a recording, or not a hapteq file
         return False
 
 
-def home_view(data: Path) -> HomeView:
-    """Content of the start screen, free of control characters. A missing data folder is shown as empty."""
-    models = model_files(data)
-    qualities = tuple((model, model_words(model)) for model in models)
+def make_home_view(data: Path) -> HomeView:
+    """Content of the start screen. A missing data folder is shown as empty. Control characters are replaced, except in
+    the paths of models, by which the files are opened: the screen replaces them where it shows the names."""
+    models = list_model_files(data)
+    qualities = tuple((model, describe_model_quality(model)) for model in models)
     return HomeView(
-        printable_text(str(data)), session_lines(data), printable(protocol_lines(data)), DEVICES, models, qualities
+        replace_unprintable(str(data)),
+        list_session_lines(data),
+        make_printable(list_protocol_lines(data)),
+        DEVICES,
+        models,
+        qualities,
     )
 
 
-def session_lines(data: Path) -> tuple[SessionLine, ...]:
+def list_session_lines(data: Path) -> tuple[SessionLine, ...]:
     """Lines of all sessions, the latest first. Unreadable sessions are listed with a remark."""
     try:
         folders = list_session_folders(data)
     except OSError:
         return ()
-    lines = printable(tuple(map(session_line, folders)))
+    lines = make_printable(tuple(map(make_session_line, folders)))
     return tuple(sorted(lines, key=lambda line: (line.begun_utc, line.name), reverse=True))

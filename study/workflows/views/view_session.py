@@ -1,6 +1,7 @@
-"""View of one session for screen and command line: facts, thresholds, staircases, and the log in words.
+"""View of one session for screen and command line: facts, thresholds, staircases, and the log as sentences.
 
-Nothing is changed. A damaged session is shown as far as it can be read, with warnings; it never raises an error.
+Used by `hapteq show` and the screen (`study.tui.engine.engine_commands`). Nothing is changed. A damaged session is
+shown as far as it can be read, with warnings; it never raises a StudyError.
 """
 
 from pathlib import Path
@@ -14,15 +15,15 @@ from study.errors import StudyError
 from study.session.facts.event_words import describe_log
 from study.session.state.state import SessionState
 from study.session.views.archive_views import SessionLine, SessionView, Staircase
-from study.session.views.local_time import Zone, in_utc, local_time
-from study.session.views.printable import printable
+from study.session.views.local_time import Zone, format_time_in_zone, to_utc
+from study.session.views.printable import make_printable
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import read_valid_events
 from study.workflows.results.analysis_files import ANALYSIS_NAME
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import list_due_results
-from study.workflows.views.session_facts import session_facts
-from study.workflows.views.session_line import line_of, session_line, with_writer
+from study.workflows.views.session_facts import list_session_facts
+from study.workflows.views.session_line import make_line_from_state, make_session_line, mark_running
 
 if TYPE_CHECKING:
     from analysis.psychophysics.study_analysis import StudyAnalysis
@@ -31,41 +32,47 @@ THRESHOLD_HEADER = ("run", "phase", "at", "threshold", "delivered", "rev.", "tri
 """Columns of the table of thresholds."""
 
 
-def session_view(path: Path, zone: Zone = in_utc) -> SessionView:
+def make_session_view(path: Path, zone: Zone = to_utc) -> SessionView:
     """The view of the session in the folder `path`. zone: time zone of the displayed times, UTC by default; a screen
-    for a person takes `study.local_clock.machine_zone`.
-    """
+    for a person takes `study.local_clock.machine_zone`."""
     folder = SessionFolder(path.absolute())
     try:
         folded_session = None if folder.withdrawn else fold_session(folder)
     except StudyError as problem:
-        return printable(_view_damaged(folder, problem, zone))
-    return printable(
-        _minimal_view(folder, session_line(folder))
+        return make_printable(_make_damaged_view(folder, problem, zone))
+    return make_printable(
+        _make_minimal_view(folder, make_session_line(folder))
         if folded_session is None
-        else _full_view(folder, folded_session, zone)
+        else _make_full_view(folder, folded_session, zone)
     )
 
 
-def _full_view(folder: SessionFolder, folded_session: FoldedSession, zone: Zone) -> SessionView:
+def _make_full_view(folder: SessionFolder, folded_session: FoldedSession, zone: Zone) -> SessionView:
     """View of a session whose log was read without damage."""
     state = folded_session.state
-    analysis, problem = _analysis(state)
-    clock = (f"Before {local_time(step.utc, zone)}: {step.sentence}" for step in state.sitting.clock_steps)
+    analysis, analysis_problem = _analyse_session(state)
+    clock_remarks = (
+        f"Before {format_time_in_zone(step.utc, zone)}: {step.sentence}" for step in state.sitting.clock_steps
+    )
     return SessionView(
-        line=with_writer(line_of(state, folder), folder),
-        facts=session_facts(folded_session, zone),
-        thresholds=_threshold_rows(state, analysis),
-        warnings=(*_log_remarks(folder, folded_session), *clock, *problem, *(analysis.warnings if analysis else ())),
-        staircases=_staircases(state, analysis),
+        line=mark_running(make_line_from_state(state, folder), folder),
+        facts=list_session_facts(folded_session, zone),
+        thresholds=_tabulate_thresholds(state, analysis),
+        warnings=(
+            *_list_log_remarks(folder, folded_session),
+            *clock_remarks,
+            *analysis_problem,
+            *(analysis.warnings if analysis else ()),
+        ),
+        staircases=_list_staircases(state, analysis),
         events=describe_log(folded_session.log_contents.events, zone),
-        report=_report(folder),
-        figures=_figures(folder),
+        report=_find_report(folder),
+        figures=_list_figures(folder),
     )
 
 
-def _log_remarks(folder: SessionFolder, folded_session: FoldedSession) -> tuple[str, ...]:
-    """Sentences on an incomplete last line, results that are missing or out of date, and missing checksums."""
+def _list_log_remarks(folder: SessionFolder, folded_session: FoldedSession) -> tuple[str, ...]:
+    """Sentences on an incomplete last line, on results that are missing or out of date, and on missing checksums."""
     due_files = ", ".join(list_due_results(folder, folded_session))
     remarks = (
         (
@@ -78,9 +85,9 @@ def _log_remarks(folder: SessionFolder, folded_session: FoldedSession) -> tuple[
     return tuple(text for applies, text in remarks if applies)
 
 
-def _view_damaged(folder: SessionFolder, problem: StudyError, zone: Zone) -> SessionView:
+def _make_damaged_view(folder: SessionFolder, problem: StudyError, zone: Zone) -> SessionView:
     """View of a damaged session: its line, the problem, and the events that can be read."""
-    line = session_line(folder)
+    line = make_session_line(folder)
     if line.standing != "unreadable":  # the line reads only parts of the log, and did not find the damage
         line = SessionLine(
             line.name, line.path, line.subject, line.protocol, line.begun_utc, line.observer,
@@ -88,20 +95,20 @@ def _view_damaged(folder: SessionFolder, problem: StudyError, zone: Zone) -> Ses
         )  # fmt: skip
     sentences = tuple(part for part in (problem.happened, problem.saved, problem.do_now) if part)
     events = describe_log(read_valid_events(folder.log), zone)
-    return _minimal_view(folder, line, warnings=(f"{problem.title}.", *sentences), events=events)
+    return _make_minimal_view(folder, line, warnings=(f"{problem.title}.", *sentences), events=events)
 
 
-def _minimal_view(
+def _make_minimal_view(
     folder: SessionFolder, line: SessionLine, warnings: tuple[str, ...] = (), events: tuple[str, ...] = ()
 ) -> SessionView:
     """View of a withdrawn or damaged session, without thresholds and staircases."""
     facts = (("participant", line.subject), ("folder", str(folder.path)))
     notes = warnings or ((line.remark,) if line.remark else ())
-    return SessionView(line, facts, (), notes, (), events, _report(folder), _figures(folder))
+    return SessionView(line, facts, (), notes, (), events, _find_report(folder), _list_figures(folder))
 
 
-def _analysis(state: SessionState) -> "tuple[StudyAnalysis | None, tuple[str, ...]]":
-    """Analysis of the session alone, or None with a sentence on why there is none."""
+def _analyse_session(state: SessionState) -> "tuple[StudyAnalysis | None, tuple[str, ...]]":
+    """Analysis of this session alone, or None with a sentence on why there is none."""
     # Imported here: statistics load slowly, and programs that import this module must start at once.
     from analysis.psychophysics.study_analysis import analyse_study
 
@@ -111,44 +118,53 @@ def _analysis(state: SessionState) -> "tuple[StudyAnalysis | None, tuple[str, ..
         return None, (f"No thresholds: {problem}.",)
 
 
-def _threshold_rows(state: SessionState, analysis: "StudyAnalysis | None") -> tuple[tuple[str, ...], ...]:
+def _tabulate_thresholds(state: SessionState, analysis: "StudyAnalysis | None") -> tuple[tuple[str, ...], ...]:
     """Table of thresholds with its header; empty while no run is complete."""
-    rows = (*analysis.thresholds, *analysis.detection) if analysis else ()
-    if not any(row.complete for row in rows):
+    thresholds = (*analysis.thresholds, *analysis.detection) if analysis else ()
+    if not any(threshold.complete for threshold in thresholds):
         return ()
-    return (THRESHOLD_HEADER, *(_threshold_row(row, state.runs[row.run]) for row in rows))
-
-
-def _threshold_row(row: Threshold, run: Run) -> tuple[str, ...]:
-    """Row of a run under `THRESHOLD_HEADER`: threshold in N and, where it was measured, in m/s²."""
-    remark = "cut by the cap" if row.censored else ""
-    if not row.complete:
-        remark = "trial limit" if row.ended is RunEnd.TRIAL_LIMIT else "not complete"
-    threshold = f"{format_number(row.threshold_n, 3)} N" if row.complete else MISSING
     return (
-        str(row.run + 1),
+        THRESHOLD_HEADER,
+        *(_format_threshold_row(threshold, state.runs[threshold.run]) for threshold in thresholds),
+    )
+
+
+def _format_threshold_row(threshold: Threshold, run: Run) -> tuple[str, ...]:
+    """Row of a run under `THRESHOLD_HEADER`: threshold in N and, where it was measured, in m/s²."""
+    remark = "cut by the cap" if threshold.censored else ""
+    if not threshold.complete:
+        remark = "trial limit" if threshold.ended is RunEnd.TRIAL_LIMIT else "not complete"
+    threshold_text = f"{format_number(threshold.threshold_n, 3)} N" if threshold.complete else MISSING
+    return (
+        str(threshold.run + 1),
         run.phase.value,
-        f"{row.frequency_hz:g} Hz",
-        threshold,
-        MISSING if row.threshold_mps2 is None else f"{row.threshold_mps2:.2f} m/s²",
-        str(row.reversals),
-        str(row.trials),
-        MISSING if row.percent_correct is None else f"{row.percent_correct:.0f} %",
+        f"{threshold.frequency_hz:g} Hz",
+        threshold_text,
+        MISSING if threshold.threshold_mps2 is None else f"{threshold.threshold_mps2:.2f} m/s²",
+        str(threshold.reversals),
+        str(threshold.trials),
+        MISSING if threshold.percent_correct is None else f"{threshold.percent_correct:.0f} %",
         remark,
     )
 
 
-def _staircases(state: SessionState, analysis: "StudyAnalysis | None") -> tuple[Staircase, ...]:
+def _list_staircases(state: SessionState, analysis: "StudyAnalysis | None") -> tuple[Staircase, ...]:
     """Staircases of all runs with counted trials, except practice."""
-    rows = {row.run: row for row in (*analysis.thresholds, *analysis.detection)} if analysis else {}
+    thresholds_by_run = (
+        {threshold.run: threshold for threshold in (*analysis.thresholds, *analysis.detection)} if analysis else {}
+    )
     shown_runs = (run for run in state.runs if not run.practice)
-    staircases = (_staircase(state, run, rows.get(run.index)) for run in shown_runs)
+    staircases = (_make_staircase(state, run, thresholds_by_run.get(run.index)) for run in shown_runs)
     return tuple(staircase for staircase in staircases if staircase.levels_n)
 
 
-def _staircase(state: SessionState, run: Run, row: Threshold | None) -> Staircase:
+def _make_staircase(state: SessionState, run: Run, threshold: Threshold | None) -> Staircase:
     """Levels (N), answers and reversals of the counted trials of a run, without catch trials."""
-    counted_trials = [t for t in state.trials if t.run == run.index and t.counts and t.phase is not Phase.CATCH]
+    counted_trials = [
+        session_trial
+        for session_trial in state.trials
+        if session_trial.run == run.index and session_trial.is_valid and session_trial.phase is not Phase.CATCH
+    ]
     is_complete = run.index < state.run
     return Staircase(
         title=f"Run {run.index + 1}: {run.frequency_hz:g} Hz, {run.phase.value}"
@@ -156,17 +172,17 @@ def _staircase(state: SessionState, run: Run, row: Threshold | None) -> Staircas
         levels_n=tuple(trial.staircase_n for trial in counted_trials),
         correct=tuple(bool(trial.correct) for trial in counted_trials),
         reversals=tuple(trial.reversal for trial in counted_trials),
-        threshold_n=row.threshold_n if row is not None else None,
+        threshold_n=threshold.threshold_n if threshold is not None else None,
         cap_n=state.protocol.staircase.cap_n,
     )
 
 
-def _report(folder: SessionFolder) -> str:
+def _find_report(folder: SessionFolder) -> str:
     """Path of the report of the session's analysis; empty if there is none."""
-    report = folder.path / ANALYSIS_NAME / "report.html"
-    return str(report) if report.is_file() else ""
+    report_path = folder.path / ANALYSIS_NAME / "report.html"
+    return str(report_path) if report_path.is_file() else ""
 
 
-def _figures(folder: SessionFolder) -> tuple[str, ...]:
+def _list_figures(folder: SessionFolder) -> tuple[str, ...]:
     """Paths of the PNG figures of the session's analysis."""
     return tuple(str(path) for path in sorted((folder.path / ANALYSIS_NAME / "figures").glob("*.png")))

@@ -12,15 +12,15 @@ from study.errors import StudyError
 from study.regular_file import TABLE_BYTES, open_regular
 from study.session.facts.events import SessionOpened, parse_event
 from study.session.facts.log_chain import Chain, ChainBrokenError, read_chained
-from study.session.facts.log_time import seconds_between
+from study.session.facts.log_time import compute_wall_clock_s
 from study.session.state.draw_check import LogContradiction
 from study.session.watching.followed_session import FollowedSession, begin_watching
 from study.session.watching.followed_session import apply_followed_event as after
 from study.session.watching.live import Live
 from study.session.watching.make_watch_view import LiveInfo, make_watch_view
 from study.session.watching.requests import Request
-from study.session.watching.watch_alarms import SILENT_AFTER_S
-from study.session.watching.watch_view import DriftLine, WatchView
+from study.session.watching.watch_alarms import LIVE_TIMEOUT_S
+from study.session.watching.watch_view import DriftRecord, WatchView
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.live_file import read_live
 from study.store.sessions.log_seal import find_seals, read_seal
@@ -73,7 +73,7 @@ class Follower:
         self._view = make_watch_view(self._watched, live_info, now_utc, self._view)
         return self._view
 
-    def _look_for_drifts(self, watched: FollowedSession) -> tuple[DriftLine, ...]:
+    def _look_for_drifts(self, watched: FollowedSession) -> tuple[DriftRecord, ...]:
         """Drifts of device and hand by the probes so far; empty without probes."""
         if not watched.probes:
             return ()
@@ -81,7 +81,7 @@ class Follower:
             from study.workflows.results.session_drift import DriftReader
 
             self._drifts = DriftReader(self._folder)
-        return self._drifts.look(watched.probes)
+        return self._drifts.update(watched.probes)
 
     def _read_new_lines(self) -> None:
         """Read the new part of the log and apply its complete lines. A problem stops at its line, which is read again
@@ -160,9 +160,9 @@ class Follower:
         unnecessary."""
         if self._missing:
             return False
-        if live is not None and seconds_between(live.utc, now_utc) <= SILENT_AFTER_S:
+        if live is not None and compute_wall_clock_s(live.utc, now_utc) <= LIVE_TIMEOUT_S:
             self._writer = None
-        elif abs(seconds_between(self._probed_utc, now_utc)) >= PROBE_EVERY_S or not self._probed_utc:
+        elif abs(compute_wall_clock_s(self._probed_utc, now_utc)) >= PROBE_EVERY_S or not self._probed_utc:
             self._probed_utc = now_utc
             self._writer = is_log_locked(self._folder.log)
         return self._writer

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.device_change import probe_lines as spectra
-from analysis.device_change.probe_lines import friction_shapes, probe_lines
+from analysis.device_change.probe_lines import compute_friction_spectra, compute_probe_lines
 from protocols.definition.probes import ProbeSettings
 from study.session.stimulus.probe_stimulus import make_probe_wave
 
@@ -19,15 +19,15 @@ def bare_device(drifting_device, monkeypatch):
     exact = {"ROUNDING_M": 1e-10, "NOISE_MPS2": (0.0, 0.0, 0.0), "DAMPING": 0.0, "SPRING_N_PER_M": 0.0, "MODES": ()}
     for name, value in exact.items():
         monkeypatch.setattr(drifting_device, name, value)
-    monkeypatch.setattr(spectra, "BREAK_AWAYS_M", (drifting_device.BRISTLE_M,))
+    monkeypatch.setattr(spectra, "BREAK_AWAY_LENGTHS_M", (drifting_device.BRISTLE_M,))
     return drifting_device
 
 
 def test_what_mass_and_spring_leave_of_the_command_is_the_friction(bare_device):
     truth = bare_device.make_truth(hand_kg=0.0, hand_n_s_per_m=2.0, hand_n_per_m=110.0)
     (played,) = bare_device.play(WAVE, [truth], (LEVEL_N,), seed=1)
-    lines = probe_lines(played, 1.0)
-    friction = truth.friction_n * friction_shapes((lines,), int(RATE_HZ))[0, 0]
+    lines = compute_probe_lines(played, 1.0)
+    friction = truth.friction_n * compute_friction_spectra((lines,), int(RATE_HZ))[0, 0]
     s = 2j * np.pi * lines.frequency_hz[:, None]
     held = truth.hand_n_per_m + truth.hand_n_s_per_m * s
     # A command acts over a step, and the acceleration is read at its end.

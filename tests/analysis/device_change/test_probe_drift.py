@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.device_change.probe_drift import TimedProbe, find_drifts
-from analysis.device_change.probe_lines import apparent_mass_kg, probe_lines
+from analysis.device_change.probe_lines import compute_probe_lines, estimate_apparent_mass_kg
 from protocols.definition.probes import ProbeSettings
 from study.session.stimulus.probe_stimulus import make_probe_wave
 
@@ -26,7 +26,7 @@ def session(drifting_device):
         device = drifting_device
         truths = [device.Truth()] * 6 + [device.make_truth(**changes)] * 3
         played = device.play(WAVE, truths, LEVELS_N * 3, seed)
-        return [TimedProbe(60.0 * k, LEVELS_N[k % 3], probe_lines(each, 1.0)) for k, each in enumerate(played)]
+        return [TimedProbe(60.0 * k, LEVELS_N[k % 3], compute_probe_lines(each, 1.0)) for k, each in enumerate(played)]
 
     return probes
 
@@ -99,14 +99,14 @@ def test_two_of_each_level_are_the_yardstick_and_name_nothing_by_themselves(sess
 def test_a_hand_adds_to_the_mass_that_the_handle_seems_to_have(drifting_device):
     free = drifting_device.make_truth(hand_kg=0.0, hand_n_s_per_m=0.0, hand_n_per_m=0.0)
     played = drifting_device.play(WAVE, [free, drifting_device.Truth()], (0.8, 0.8), seed=1)
-    masses = [apparent_mass_kg(probe_lines(each, 1.0)) for each in played]
+    masses = [estimate_apparent_mass_kg(compute_probe_lines(each, 1.0)) for each in played]
     assert masses[1] - masses[0] == pytest.approx(0.09, abs=0.02)
 
 
 def test_a_recording_without_a_whole_period_is_refused(drifting_device):
     (played,) = drifting_device.play(WAVE, [drifting_device.Truth()], (0.8,), seed=1)
     with pytest.raises(ValueError, match="less than one whole period"):
-        probe_lines(played, 2.0)
+        compute_probe_lines(played, 2.0)
     torn = np.where(np.arange(len(played))[:, None] == 5, np.nan, played.response.samples)
     with pytest.raises(ValueError, match="missing"):
-        probe_lines(with_response(played, torn), 1.0)
+        compute_probe_lines(with_response(played, torn), 1.0)

@@ -93,15 +93,15 @@ def device() -> Callable[..., InventedDevice]:
 def make_context(diagnosed) -> Callable[..., Any]:
     """What the engine's parts share, over the recording of a small simulated device; see `tests/diagnosed.py`. Imported
     late: it compiles."""
-    from analysis.diagnosis.errors.choose_measure import measure_of
-    from analysis.diagnosis.errors.tuning import tuning_of
+    from analysis.diagnosis.errors.choose_measure import make_measure
+    from analysis.diagnosis.errors.tuning import make_tuning
     from analysis.diagnosis.search.search_context import SearchContext
 
     def context(effects=(), given=None, axes=1, seed=4):
         recording = diagnosed.recorded(axes, effects, seed)
         model = diagnosed.device(axes) if given is None else given
-        measure = measure_of([recording], model).measure
-        return SearchContext(measure.shorten(), measure, tuning_of(model, recording.command.channels), map)
+        measure = make_measure([recording], model).measure
+        return SearchContext(measure.shorten(), measure, make_tuning(model, recording.command.channels), map)
 
     return context
 
@@ -111,7 +111,7 @@ def make_candidate() -> Callable[..., Any]:
     """A candidate with invented errors, in units of the noise; names: effects of the catalogue, the last is the new
     one."""
     from analysis.diagnosis.errors.fit_score import FitScore
-    from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, combine, hypothesis_of_claim
+    from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, combine_hypotheses, make_claim_hypothesis
     from analysis.diagnosis.errors.output_error import Fitted
     from analysis.diagnosis.search.search_context import FittedCandidate
     from equalizer.effects.catalogue import EFFECTS
@@ -121,7 +121,7 @@ def make_candidate() -> Callable[..., Any]:
         for name in names:
             effect = EFFECTS[name]
             values = {p.name: min(max(1.0, p.lower), p.upper) for p in effect.parameters}
-            whole = combine(whole, hypothesis_of_claim(Claim(effect, "one", sites), [values]))
+            whole = combine_hypotheses(whole, make_claim_hypothesis(Claim(effect, "one", sites), [values]))
         errors = np.atleast_1d(np.asarray(seen, dtype=float))
         sealed = errors if test is None else np.atleast_1d(np.asarray(test, dtype=float))
         return FittedCandidate(Fitted(whole, np.zeros(0), (), 0.0), FitScore(errors, errors, sealed))

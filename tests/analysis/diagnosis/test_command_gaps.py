@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.data.observed_parts import parts_of
+from analysis.diagnosis.data.observed_parts import find_parts
 from analysis.diagnosis.prepare_recordings import bridge_gaps
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -40,15 +40,15 @@ def lose_samples(command, *stretches):
 def test_short_gaps_of_a_slow_command_are_bridged_within_the_share_that_is_asked_for():
     (found,), (said,) = bridge_gaps([make_recording(lose_samples(slow_sine(), (1000, 1003), (3000, 3001)))], ["a"])
     assert np.abs(found.command.samples[:, 0] - slow_sine()).max() < 0.02
-    assert parts_of(found) == ((0, SAMPLES),)
+    assert find_parts(found) == ((0, SAMPLES),)
     assert "2 gaps (4 samples) interpolated" in said
 
 
 def test_gaps_of_a_fast_command_are_cut_out_and_what_is_known_stays():
     command = white_noise()
     (found,), (said,) = bridge_gaps([make_recording(lose_samples(command, (1000, 1003), (3000, 3001)))], ["a"])
-    assert parts_of(found) == ((0, 1000), (1003, 3000), (3001, SAMPLES))
-    assert all(np.array_equal(found.command.samples[a:b, 0], command[a:b]) for a, b in parts_of(found))
+    assert find_parts(found) == ((0, 1000), (1003, 3000), (3001, SAMPLES))
+    assert all(np.array_equal(found.command.samples[a:b, 0], command[a:b]) for a, b in find_parts(found))
     assert "2 gaps (4 samples) cut out, so that 3 parts" in said
 
 
@@ -56,7 +56,7 @@ def test_a_long_gap_of_a_slow_command_is_cut_within_the_parts_that_were_known():
     parts = [{"start": 0, "stop": 1500}, {"start": 1500, "stop": SAMPLES}]
     known = replace(make_recording(lose_samples(slow_sine(), (1200, 1600))), meta={"parts": parts})
     (found,), _ = bridge_gaps([known], ["a"])
-    assert parts_of(found) == ((0, 1200), (1600, SAMPLES))
+    assert find_parts(found) == ((0, 1200), (1600, SAMPLES))
 
 
 def test_a_whole_command_is_not_touched_and_nothing_is_reported():

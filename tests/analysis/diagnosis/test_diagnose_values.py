@@ -8,7 +8,7 @@ import pytest
 from analysis.diagnosis import diagnose_values as module
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
-from analysis.diagnosis.errors.prediction_error import prediction_error
+from analysis.diagnosis.errors.prediction_error import compute_prediction_error
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.simulation.simulator import simulate_mechanism
@@ -92,7 +92,7 @@ def test_the_improved_model_is_of_the_commands_as_they_were_recorded():
     assert pull.parameters["force"] == pytest.approx(-0.3, rel=0.05)
     assert friction.parameters["level"] == pytest.approx(0.5, rel=0.05)
     without, with_them = (
-        prediction_error(against, each, "test").without_gain for each in (found.retuned, found.improved)
+        compute_prediction_error(against, each, "test").without_gain for each in (found.retuned, found.improved)
     )
     assert with_them < 0.2 * without < 0.1
 

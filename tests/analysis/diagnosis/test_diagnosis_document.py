@@ -3,7 +3,7 @@ import json
 
 import pytest
 
-from analysis.diagnosis.document import DiagnosisError, diagnosis_from_json, diagnosis_schema, diagnosis_to_json
+from analysis.diagnosis.document import DiagnosisError, build_diagnosis_schema, diagnosis_from_json, diagnosis_to_json
 
 ERRORS = {"before": 0.4, "retuned": 0.3, "after": 0.011, "noise": 0.01}
 DOCUMENT = {
@@ -100,7 +100,7 @@ def test_an_unexplained_mismatch_is_there():
 
 
 def test_the_schema_asks_for_every_key_of_the_contract():
-    assert set(diagnosis_schema()["required"]) == set(DOCUMENT)
+    assert set(build_diagnosis_schema()["required"]) == set(DOCUMENT)
 
 
 LAW = {"expression": "-4.1*abs(vy)**1.5*sign(vy)", "variables": ["vy"], "acts_on": "force", "axis": "y"}

@@ -1,6 +1,6 @@
 import pytest
 
-from analysis.diagnosis.unit_wording import percent_text, scale_of, share_text, value_text
+from analysis.diagnosis.unit_wording import choose_scale, format_percent, format_share, format_value
 
 
 @pytest.mark.parametrize(
@@ -33,29 +33,29 @@ from analysis.diagnosis.unit_wording import percent_text, scale_of, share_text, 
     ],
 )
 def test_values_are_written_as_people_write_them(value, unit, interval, text):
-    assert value_text(value, unit, interval) == text
+    assert format_value(value, unit, interval) == text
 
 
 def test_an_interval_that_is_a_point_takes_three_digits():
-    assert value_text(0.21, "N", (0.21, 0.21)) == "0.210 N [0.210, 0.210]"
+    assert format_value(0.21, "N", (0.21, 0.21)) == "0.210 N [0.210, 0.210]"
 
 
 def test_a_share_is_read_as_per_cent_with_its_interval():
-    assert percent_text(0.3, (0.25, 0.35)) == "30 % [25, 35]"
-    assert percent_text(0.02) == "2.00 %"
+    assert format_percent(0.3, (0.25, 0.35)) == "30 % [25, 35]"
+    assert format_percent(0.02) == "2.00 %"
 
 
 def test_a_share_has_two_digits_and_no_powers_of_ten():
-    assert [share_text(each) for each in (0.0123, 0.4, 0.994, 0.999, 1.0, 25.4)] == [
+    assert [format_share(each) for each in (0.0123, 0.4, 0.994, 0.999, 1.0, 25.4)] == [
         "1.2 %", "40 %", "99 %", "100 %", "100 %", "2540 %",
     ]  # fmt: skip
 
 
 def test_a_scale_takes_a_value_there_and_back():
-    scale = scale_of("m", 54e-6)
+    scale = choose_scale("m", 54e-6)
     assert (54e-6 * scale.factor, scale.unit) == (pytest.approx(54.0), "µm")
 
 
 @pytest.mark.parametrize("unit", ["m", "N", "kg", "s"])
 def test_what_is_not_a_number_has_no_prefix(unit):
-    assert scale_of(unit, float("nan")).factor == 1.0
+    assert choose_scale(unit, float("nan")).factor == 1.0

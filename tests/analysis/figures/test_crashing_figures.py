@@ -12,7 +12,7 @@ def raise_value_error(*arguments):
 
 def test_the_others_are_drawn_and_the_crash_is_reported(friction_findings, friction_pictures, monkeypatch):
     monkeypatch.setattr(module, "held_out_picture", raise_value_error)
-    guard = Guard(on=True)
+    guard = Guard(enabled=True)
     drawn = module.diagnosis_pictures(friction_findings, guard)
     assert len(drawn) == len(friction_pictures) - 1
     (said,) = guard.sentences

@@ -12,10 +12,10 @@ from analysis.diagnosis.result.residual_spectrum import compute_remainder_spectr
 from analysis.figures.diagnosis.held_out import draw_held_out, find_excerpt
 from analysis.figures.diagnosis.mismatch_map import draw_mismatch_map, make_mismatch_map_picture
 from analysis.figures.diagnosis.remainder import draw_remainder
-from analysis.figures.diagnosis.rivals import draw_rivals, list_explanations, rivals_pictures
+from analysis.figures.diagnosis.rivals import draw_rivals, list_explanations, make_rivals_pictures
 from analysis.figures.diagnosis.signature import draw_signature
 from analysis.figures.picture import render_picture_svg
-from analysis.figures.style import new_figure, power_of_ten, ratio_ticks
+from analysis.figures.style import create_figure, format_power_of_ten, set_ratio_ticks
 
 
 def make_cell(output="ax", input_="fx", low_hz=8.0, amplitude=1.0, in_noise=5.0, p=1e-6, quantity="acceleration"):
@@ -218,7 +218,7 @@ def test_the_one_that_was_chosen_stands_on_top_even_where_another_has_less_error
 
 def test_a_round_that_brought_nothing_is_folded_and_reports_it(friction_findings):
     explanation = replace(friction_findings.explanation, steps=())
-    (picture,) = rivals_pictures(explanation, ("x",))
+    (picture,) = make_rivals_pictures(explanation, ("x",))
     assert picture.folded
     assert picture.title == "What was tried for the first effect; none was accepted"
     assert picture.figure.axes[0].get_yticklabels()[0].get_fontweight() != "bold"
@@ -226,15 +226,15 @@ def test_a_round_that_brought_nothing_is_folded_and_reports_it(friction_findings
 
 @pytest.mark.parametrize("high", [1.4, 3.0, 50.0, 800.0, 2e4, 3e6])
 def test_there_is_room_for_every_tick_of_a_ratio(high):
-    axes = new_figure(4.0, 3.0).add_subplot()
+    axes = create_figure(4.0, 3.0).add_subplot()
     axes.set_xscale("log")
-    ratio_ticks(axes.xaxis, 0.7, high)
+    set_ratio_ticks(axes.xaxis, 0.7, high)
     assert 2 <= len(axes.get_xticks()) <= 14
 
 
 @pytest.mark.parametrize(("value", "words"), [(1e-3, "10⁻³"), (1.0, "10⁰"), (1e12, "10¹²"), (0.0, "")])
 def test_powers_of_ten_are_written_out(value, words):
-    assert power_of_ten(value) == words
+    assert format_power_of_ten(value) == words
 
 
 def test_a_map_without_a_known_noise_says_so():

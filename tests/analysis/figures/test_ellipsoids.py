@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.figures.ellipsoids import draw_ellipsoids
-from analysis.psychophysics.ellipsoid import EllipsoidResult, moment_ellipsoid, phasor_ellipse
+from analysis.psychophysics.ellipsoid import EllipsoidResult, compute_moment_ellipsoid, compute_phasor_ellipse
 
 RATE = 1000.0
 
@@ -15,7 +15,7 @@ def result(frequency_hz: float, tilt_deg: float, along: str = "direction_1") -> 
     wave = np.exp(2j * np.pi * frequency_hz * np.arange(2000) / RATE)
     samples = np.real(phasor[None, :] * wave[:, None])
     return EllipsoidResult(
-        frequency_hz, along, 1.0, moment_ellipsoid(samples), phasor_ellipse(samples, RATE, frequency_hz)
+        frequency_hz, along, 1.0, compute_moment_ellipsoid(samples), compute_phasor_ellipse(samples, RATE, frequency_hz)
     )
 
 

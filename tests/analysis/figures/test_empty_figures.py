@@ -4,16 +4,16 @@ from analysis.figures.delivered import draw_delivered
 from analysis.figures.ellipsoids import draw_ellipsoids
 from analysis.figures.staircases import draw_staircases
 from analysis.figures.thresholds import draw_thresholds
-from analysis.psychophysics.anova import one_way_anova
+from analysis.psychophysics.anova import compute_one_way_anova
 from analysis.psychophysics.comparisons import compare_all
-from analysis.psychophysics.threshold_table import threshold_table
+from analysis.psychophysics.threshold_table import tabulate_thresholds
 
 
 @pytest.mark.parametrize(
     ("draw", "sentence"),
     [
         (
-            lambda rule: draw_thresholds(threshold_table((), (5.0,)), compare_all(one_way_anova({})), 3.0),
+            lambda rule: draw_thresholds(tabulate_thresholds((), (5.0,)), compare_all(compute_one_way_anova({})), 3.0),
             "There is no completed run to draw.",
         ),
         (lambda rule: draw_staircases((), rule), "There is no run to draw."),

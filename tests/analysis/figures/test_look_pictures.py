@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from analysis.figures.look_pictures import envelope, look_pictures
-from analysis.look.overview import overview
+from analysis.figures.look_pictures import compute_envelope, make_look_pictures
+from analysis.look.overview import make_overview
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
@@ -13,7 +13,7 @@ RATE_HZ = 100.0
 def test_an_envelope_holds_every_sample_and_leaves_gaps():
     samples = np.random.default_rng(1).standard_normal(5000)
     samples[1000:1200] = np.nan
-    times_s, low, high = envelope(samples, RATE_HZ, 250)
+    times_s, low, high = compute_envelope(samples, RATE_HZ, 250)
     assert len(times_s) == 250
     column = (np.arange(5000) // 20)[np.isfinite(samples)]
     known = samples[np.isfinite(samples)]
@@ -40,7 +40,9 @@ def test_a_derivative_is_drawn_within_one_part():
         position=signal(place, "position", "m", "x"),
         meta={"parts": parts},
     )
-    (picture,) = (picture for picture in look_pictures(overview("r", recording), 1) if "derivatives" in picture.name)
+    (picture,) = (
+        picture for picture in make_look_pictures(make_overview("r", recording), 1) if "derivatives" in picture.name
+    )
     recorded, differences = (line.get_ydata() for line in picture.figure.axes[0].get_lines())
     assert np.nanmax(np.abs(recorded)) > 2.9
     assert np.nanmax(np.abs(differences)) < 3.2

@@ -7,7 +7,7 @@ import pytest
 
 from analysis.figures.medians import draw_medians
 from analysis.figures.style import MARKERS
-from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis, primary_analysis
+from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis, compute_primary_analysis
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from tests.analysis.conftest import PUBLISHED
 
@@ -18,7 +18,7 @@ CAP_N = PUBLISHED.cap_n
 def primary() -> PrimaryAnalysis:
     """Six people, whose median is far above the cap at the highest of three frequencies."""
     study = simulate_study(Crowd((5.0, 25.0, 45.0), (0.4, 1.0, 7.0)), PUBLISHED, 6, (3,))
-    found = primary_analysis(study.answers, CAP_N)
+    found = compute_primary_analysis(study.answers, CAP_N)
     assert found is not None and [median.above_cap for median in found.medians] == [False, False, True]
     return found
 

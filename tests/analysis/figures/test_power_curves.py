@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.figures.power_curves import power_picture
-from analysis.figures.style import PAGE_IN
+from analysis.figures.style import PAGE_WIDTH_IN
 from analysis.psychophysics.power.power_curve import PowerPoint, Share
 
 
@@ -38,7 +38,7 @@ def test_the_caption_says_that_without_an_effect_each_find_is_an_error():
 
 
 def test_it_is_as_wide_as_the_other_figures_for_a_paper():
-    assert power_picture([point(10)], 3.0, (45.0, 5.0)).figure.get_size_inches()[0] == PAGE_IN
+    assert power_picture([point(10)], 3.0, (45.0, 5.0)).figure.get_size_inches()[0] == PAGE_WIDTH_IN
 
 
 def test_the_title_says_which_frequencies_are_compared():

@@ -7,13 +7,13 @@ import pytest
 
 from analysis.figures.psychometric import draw_people_curves, draw_person_curves
 from analysis.figures.study_pictures import study_pictures
-from analysis.figures.style import PAGE_IN
+from analysis.figures.style import PAGE_WIDTH_IN
 from analysis.figures.thresholds_by_unit import draw_thresholds_by_unit
-from analysis.psychophysics.detection import above_detection
+from analysis.psychophysics.detection import compute_thresholds_above_detection
 from analysis.psychophysics.hierarchy.answers import count_answers
 from analysis.psychophysics.hierarchy.observed_shares import compute_group_shares, compute_person_shares
 from analysis.psychophysics.study_analysis import analyse_study
-from analysis.psychophysics.threshold_table import threshold_table
+from analysis.psychophysics.threshold_table import tabulate_thresholds
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ def test_a_study_has_them_page_wide_as_svg_and_png(analysis):
     pictures = {picture.name: picture for picture in study_pictures(analysis)}
     for name in ("thresholds", "units", "psychometric", "psychometric-2-s02", "staircases-2-s02", "delivered"):
         assert pictures[name].bitmap
-        assert pictures[name].figure.get_size_inches()[0] == PAGE_IN
+        assert pictures[name].figure.get_size_inches()[0] == PAGE_WIDTH_IN
 
 
 def test_a_frequency_that_a_person_did_not_play_has_no_panel(analysis, answers):
@@ -72,7 +72,7 @@ def test_a_frequency_that_a_person_did_not_play_has_no_panel(analysis, answers):
 
 def test_units_stand_side_by_side_with_cuts_and_medians(analysis):
     tables = [
-        threshold_table(analysis.thresholds, analysis.table.frequencies_hz, q)
+        tabulate_thresholds(analysis.thresholds, analysis.table.frequencies_hz, q)
         for q in ("threshold_n", "threshold_mps2")
     ]
     force, acceleration = draw_thresholds_by_unit(tables).axes
@@ -90,7 +90,7 @@ def test_units_stand_side_by_side_with_cuts_and_medians(analysis):
 @pytest.mark.slow
 def test_thresholds_of_zero_are_left_out_of_a_ratio_scale(analysis):
     """An accelerometer that says the same all the time delivers nothing, as it says."""
-    table = threshold_table(analysis.thresholds, analysis.table.frequencies_hz, "threshold_mps2")
+    table = tabulate_thresholds(analysis.thresholds, analysis.table.frequencies_hz, "threshold_mps2")
     some = replace(table, values=tuple((0.0, *row[1:]) for row in table.values))
     assert draw_thresholds_by_unit([analysis.table, some]).axes[1].get_ylim()[0] > 0
     still = tuple(replace(row, threshold_mps2=0.0, threshold_mm=0.0) for row in analysis.thresholds)
@@ -100,7 +100,7 @@ def test_thresholds_of_zero_are_left_out_of_a_ratio_scale(analysis):
 @pytest.mark.slow
 def test_above_detection_is_the_ratio_of_both_thresholds_where_both_are(all_trial_kinds, full_protocol):
     analysis = analyse_study(all_trial_kinds, full_protocol)
-    table = above_detection(analysis.table, analysis.detection_table)
+    table = compute_thresholds_above_detection(analysis.table, analysis.detection_table)
     row, felt = table.values[0], analysis.detection_table.values[0][0]
     assert row[:3] == (None, None, None) and row[4] is None
     assert row[3] == pytest.approx(20 * np.log10(analysis.table.values[0][3] / felt))

@@ -1,11 +1,11 @@
 from xml.etree import ElementTree
 
 from analysis.figures.picture import render_inline_svg
-from analysis.figures.style import new_figure
+from analysis.figures.style import create_figure
 
 
 def make_figure():
-    figure = new_figure(3, 2)
+    figure = create_figure(3, 2)
     axes = figure.add_subplot()
     axes.plot([1, 2], [1, 2], "o-")
     axes.set_xlabel("Frequency (Hz)")

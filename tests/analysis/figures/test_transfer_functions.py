@@ -6,7 +6,7 @@ from matplotlib.colors import to_hex
 
 from analysis.figures.picture import render_picture_svg
 from analysis.figures.style import BLUE, ORANGE, VERMILLION
-from analysis.figures.transfer_functions import ResponseCurve, draw_transfer_functions, transfer_functions_picture
+from analysis.figures.transfer_functions import ResponseCurve, draw_transfer_functions, make_transfer_functions_picture
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 
 LINES = np.arange(1, 15000) / 30.0
@@ -69,18 +69,18 @@ def test_a_model_and_a_band_are_laid_over(response):
 
 
 def test_the_caption_says_what_the_estimate_says_of_itself(response):
-    picture = transfer_functions_picture(response)
+    picture = make_transfer_functions_picture(response)
     assert picture.name == "transfer-functions"
     assert picture.caption.endswith("Below 4 Hz nothing is known.")
 
 
 @pytest.mark.slow
 def test_fifteen_thousand_lines_are_no_burden_for_a_page(response):
-    assert len(render_picture_svg(transfer_functions_picture(response))) < 1_000_000
+    assert len(render_picture_svg(make_transfer_functions_picture(response))) < 1_000_000
 
 
 def test_no_line_draws_a_sentence(response):
-    figure = draw_transfer_functions(response.within(600.0, 700.0))
+    figure = draw_transfer_functions(response.select_band(600.0, 700.0))
     assert [text.get_text() for text in figure.texts] == ["There is no line to draw."]
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.look.channels import channels_of
-from analysis.look.cross_spectra import cross_spectra
+from analysis.look.cross_spectra import estimate_cross_spectra
 from analysis.look.gain_and_lag import estimate_gain_and_lag
 
 RATE_HZ = 1000.0
@@ -12,9 +12,9 @@ RATE_HZ = 1000.0
 
 def test_the_nyquist_line_counts_once(make_recording):
     alternating = (-1.0) ** np.arange(4000)
-    spectra = cross_spectra(channels_of(make_recording(alternating, alternating)), [(0, 4000)], RATE_HZ)
+    spectra = estimate_cross_spectra(channels_of(make_recording(alternating, alternating)), [(0, 4000)], RATE_HZ)
     step_hz = spectra.frequency_hz[1] - spectra.frequency_hz[0]
-    assert spectra.power(0).sum() * step_hz == pytest.approx(1.0, rel=1e-3)
+    assert spectra.get_power_density(0).sum() * step_hz == pytest.approx(1.0, rel=1e-3)
 
 
 def test_a_lag_in_stretches_of_odd_length_is_that_in_even_ones(make_recording, make_noise):
@@ -23,7 +23,7 @@ def test_a_lag_in_stretches_of_odd_length_is_that_in_even_ones(make_recording, m
     lags = {}
     for length in (64, 65):
         stretches = [(start, start + length) for start in range(100, 19_000, 65)]
-        spectra = cross_spectra(channels, stretches, RATE_HZ)
+        spectra = estimate_cross_spectra(channels, stretches, RATE_HZ)
         assert spectra.frequency_hz[-1] == RATE_HZ / 2
         lags[length] = estimate_gain_and_lag(spectra, 0, 1).lag_samples
     assert lags[65] == pytest.approx(lags[64], abs=1e-9)

@@ -3,13 +3,13 @@ import pytest
 from scipy import signal as sg
 
 from analysis.look.channels import channels_of
-from analysis.look.cross_spectra import cross_spectra
+from analysis.look.cross_spectra import estimate_cross_spectra
 from analysis.look.driven_band import (
+    check_coherences,
     check_driven_axes,
-    coherence_checks,
+    estimate_coherences,
     find_driven_bands,
-    response_coherences,
-    silent_segments,
+    find_silent_segments,
 )
 from equalizer.signals.recording import Segment
 
@@ -18,17 +18,17 @@ RATE_HZ = 1000.0
 
 def analyse_drive(found):
     channels = channels_of(found)
-    spectra = cross_spectra(channels, [(0, len(found))], RATE_HZ)
+    spectra = estimate_cross_spectra(channels, [(0, len(found))], RATE_HZ)
     bands = find_driven_bands(spectra, channels)
-    return bands, response_coherences(spectra, channels, bands), spectra
+    return bands, estimate_coherences(spectra, channels, bands), spectra
 
 
 def test_spectra_hold_the_power_of_the_signal(make_recording, make_noise):
     command = make_noise()
     _, _, spectra = analyse_drive(make_recording(command, 2 * command))
     step_hz = spectra.frequency_hz[1] - spectra.frequency_hz[0]
-    assert spectra.power(0).sum() * step_hz == pytest.approx(1.0, rel=0.05)
-    assert spectra.power(1).sum() * step_hz == pytest.approx(4.0, rel=0.05)
+    assert spectra.get_power_density(0).sum() * step_hz == pytest.approx(1.0, rel=0.05)
+    assert spectra.get_power_density(1).sum() * step_hz == pytest.approx(4.0, rel=0.05)
 
 
 @pytest.mark.parametrize(("low_hz", "high_hz"), [(5.0, 35.0), (20.0, 200.0)])
@@ -60,7 +60,7 @@ def test_the_share_that_is_linear_is_found(make_recording, make_noise, noise_sha
     response = through + np.sqrt(ratio) * beside * through.std() / beside.std()
     _, (found,), _ = analyse_drive(make_recording(commands, response))
     assert found.share == pytest.approx(1 - noise_share, abs=0.04)
-    (check,) = coherence_checks([found], make_recording(commands, response))
+    (check,) = check_coherences([found], make_recording(commands, response))
     assert noise_share == 0.2 or check.level == ("fine" if noise_share == 0 else "notice")
 
 
@@ -68,13 +68,13 @@ def test_another_channel_is_wrong(make_recording, make_noise):
     for kind, level in (("noise", "wrong"), ("step", "notice")):
         other = make_recording(make_noise(seed=1), make_noise(seed=2), segments=(Segment(0, 20_000, kind, 1.0),))
         _, found, _ = analyse_drive(other)
-        assert [check.level for check in coherence_checks(found, other)] == [level]
+        assert [check.level for check in check_coherences(found, other)] == [level]
 
 
 def test_a_segment_in_which_no_command_moves_is_named(make_recording, make_noise):
     command = make_noise()
     command[5000:8000] = 0.0
     segments = (Segment(0, 5000, "noise", 3.0), Segment(5000, 8000, "sweep", 1.5), Segment(8000, 9000, "rest"))
-    assert silent_segments(make_recording(command, command, segments=segments)) == (
+    assert find_silent_segments(make_recording(command, command, segments=segments)) == (
         "Segment 2 is a sweep of amplitude 1.5, but no command moves in it.",
     )

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.look.imposed_motion import LARGEST_MISFIT, is_imposed, law_misfit
+from analysis.look.imposed_motion import LARGEST_MISFIT, compute_law_misfit, is_imposed
 
 T = np.arange(20_000) / 1000
 NOISE = np.random.default_rng(3).standard_normal(len(T))
@@ -39,7 +39,7 @@ STEPS = np.sign(np.sin(2 * np.pi * 0.3 * T))
 @pytest.mark.parametrize("motion", [TRIANGLE, SINE, SWEEP, T / 10, SINE * (1 + (T > 10))])
 def test_a_motion_by_ramps_or_sines_is_imposed_on_what_answers_with_another_force(motion):
     measured = motion + 0.002 * NOISE
-    assert law_misfit(measured) < LARGEST_MISFIT
+    assert compute_law_misfit(measured) < LARGEST_MISFIT
     assert is_imposed(measured, hysteretic_force(motion))
 
 
@@ -56,4 +56,4 @@ def test_where_both_follow_a_law_or_neither_does_nothing_is_said():
 
 @pytest.mark.parametrize("values", [np.ones(500), np.full(500, np.nan), T[:20]])
 def test_what_does_not_move_or_is_too_short_says_nothing(values):
-    assert law_misfit(values) == 1.0
+    assert compute_law_misfit(values) == 1.0

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from analysis.look.channels import channels_of
-from analysis.look.cross_spectra import cross_spectra
+from analysis.look.cross_spectra import estimate_cross_spectra
 from analysis.look.gain_and_lag import GainAndLag
-from analysis.look.kinematics import KinematicPair, find_kinematic_pairs, kinematic_checks, lag_checks
+from analysis.look.kinematics import KinematicPair, check_kinematics, check_lags, find_kinematic_pairs
 from equalizer.signals.recording import Recording
 
 RATE_HZ = 1000.0
@@ -40,7 +40,7 @@ def test_factor_sign_and_lag_of_an_acceleration_are_found(make_recording, motion
 def test_a_speed_is_compared_with_the_derivative_of_its_position(make_recording, motion, factor, level):
     force, place, speed, _ = motion
     (pair,) = find_pairs(make_recording(force, (factor * speed, "velocity", "m/s"), position=place))
-    (check,) = kinematic_checks([pair], RATE_HZ)
+    (check,) = check_kinematics([pair], RATE_HZ)
     assert (pair.order, check.level) == (1, level)
     assert pair.agreement.gain == pytest.approx(factor, rel=0.01)
 
@@ -50,14 +50,14 @@ def test_a_speed_is_compared_with_the_derivative_of_its_position(make_recording,
 )
 def test_a_factor_of_two_units_is_named(make_recording, motion, factor, words):
     force, place, _, acceleration = motion
-    (check,) = kinematic_checks(find_pairs(make_recording(force, factor * acceleration, position=place)), RATE_HZ)
+    (check,) = check_kinematics(find_pairs(make_recording(force, factor * acceleration, position=place)), RATE_HZ)
     assert words in check.do
 
 
 def test_a_late_speed_is_reported_in_milliseconds(make_recording, motion):
     force, place, speed, _ = motion
     late = (delay(speed, 2.0), "velocity", "m/s")
-    (check,) = kinematic_checks(find_pairs(make_recording(force, late, position=place)), RATE_HZ)
+    (check,) = check_kinematics(find_pairs(make_recording(force, late, position=place)), RATE_HZ)
     assert check.level == "notice"
     assert "2 ms (2 samples) later" in check.seen
 
@@ -86,9 +86,9 @@ def test_of_a_rounded_position_the_factor_is_still_found(make_recording, motion)
 
 def find_lags(found: Recording):
     channels = channels_of(found)
-    spectra = cross_spectra(channels, [(0, len(found))], RATE_HZ)
+    spectra = estimate_cross_spectra(channels, [(0, len(found))], RATE_HZ)
     assert spectra is not None
-    return lag_checks(channels, spectra, RATE_HZ)
+    return check_lags(channels, spectra, RATE_HZ)
 
 
 def test_a_measured_force_that_is_late_is_found(make_recording, motion):
@@ -116,6 +116,6 @@ def test_a_force_behind_a_resonance_is_no_second_view_of_the_command(make_record
 )
 def test_what_is_later_and_smaller_is_no_wrong_unit(factor, lag, level, words):
     pair = KinematicPair("position x", "acceleration ax", 2, GainAndLag(factor, 0.1, lag, 0.9))
-    (check,) = kinematic_checks([pair], 1000.0)
+    (check,) = check_kinematics([pair], 1000.0)
     assert check.level == level
     assert words in check.do

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from analysis.look.channels import channels_of
-from analysis.look.levels import level_checks, segment_levels
+from analysis.look.levels import check_proportionality, compute_segment_levels
 from analysis.look.overview import check_resolution
 from analysis.look.plausibility import check_offsets, check_units
 from equalizer.signals.recording import Segment
@@ -12,7 +12,7 @@ TWO = (Segment(0, 10_000, "noise", 1.0), Segment(10_000, 20_000, "noise", 2.0))
 
 def check_levels(found):
     channels = channels_of(found)
-    return level_checks(segment_levels(found, channels), channels)
+    return check_proportionality(compute_segment_levels(found, channels), channels)
 
 
 @pytest.fixture

@@ -3,12 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.look.overview import overview
+from analysis.look.overview import make_overview
 from equalizer.signals.recording import Recording, Segment
 
 
 def test_an_intact_recording_has_no_findings(clean_recording):
-    found = overview("sound", clean_recording)
+    found = make_overview("sound", clean_recording)
     assert not [check for check in found.checks if check.level == "wrong"]
     assert [check.seen for check in found.checks if check.level == "notice"] == [
         "Nothing repeats, so noise cannot be distinguished from errors of a model."
@@ -21,7 +21,9 @@ def test_an_intact_recording_has_no_findings(clean_recording):
 def test_what_is_wrong_comes_first(clean_recording):
     spoiled = clean_recording.response.samples.copy()
     spoiled[100:5100] = np.nan
-    found = overview("spoiled", replace(clean_recording, response=replace(clean_recording.response, samples=spoiled)))
+    found = make_overview(
+        "spoiled", replace(clean_recording, response=replace(clean_recording.response, samples=spoiled))
+    )
     assert found.checks[0].level == "wrong"
     order = [("wrong", "notice", "fine").index(check.level) for check in found.checks]
     assert order == sorted(order)
@@ -33,7 +35,7 @@ def test_a_recording_of_any_length_can_be_looked_at(make_recording, n, fill):
     made = {"noise": np.random.default_rng(1).standard_normal((n, 2)), "zero": np.zeros((n, 2))}
     samples = made.get(fill, np.full((n, 2), np.nan))
     segments = (Segment(0, n, "noise", 1.0, 10),)
-    found = overview("short", make_recording(samples, samples[::-1], position=samples, segments=segments))
+    found = make_overview("short", make_recording(samples, samples[::-1], position=samples, segments=segments))
     assert isinstance(found.recording, Recording)
     assert len(found.summaries) == 6
     assert all(check.seen.endswith(".") for check in found.checks)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from matplotlib.text import Text
 
-from analysis.figures.look_pictures import look_pictures
+from analysis.figures.look_pictures import make_look_pictures
 from analysis.look.clock import CLOCK
-from analysis.look.overview import overview
+from analysis.look.overview import make_overview
 from analysis.reports.look_report import render_look_report, summarise_overview
 from analysis.wording import replace_time_units
 from equalizer.signals.recording import Recording
@@ -26,8 +26,8 @@ def make_untimed_recording(meta) -> Recording:
 
 
 def report_texts(meta) -> list[str]:
-    found = overview("rig", make_untimed_recording(meta))
-    pictures = look_pictures(found, 1)
+    found = make_overview("rig", make_untimed_recording(meta))
+    pictures = make_look_pictures(found, 1)
     texts = [text.get_text() for each in pictures for text in each.figure.findobj(Text)]
     checks = [f"{check.seen} {check.do}" for check in found.checks if check.name != CLOCK]
     return [summarise_overview(found), *checks, *texts, *(f"{each.caption} {each.alternative}" for each in pictures)]
@@ -42,8 +42,8 @@ def test_a_recording_with_known_time_keeps_its_seconds():
 
 
 def test_its_page_counts_samples():
-    found = overview("rig", make_untimed_recording({"time": "unknown"}))
-    page = render_look_report([found], [look_pictures(found, 1)], {}, "now")
+    found = make_overview("rig", make_untimed_recording({"time": "unknown"}))
+    page = render_look_report([found], [make_look_pictures(found, 1)], {}, "now")
     assert "Start (samples)" in page and "Start (s)" not in page
 
 

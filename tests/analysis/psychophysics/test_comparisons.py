@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import tukey_hsd
 from statsmodels.stats.multicomp import pairwise_tukeyhsd
 
-from analysis.psychophysics.anova import GroupSummary, one_way_anova
+from analysis.psychophysics.anova import GroupSummary, compute_one_way_anova
 from analysis.psychophysics.comparisons import compare_all, comparison_half_widths, tukey_kramer
 
 BEAMS = {
@@ -25,7 +25,7 @@ def test_beam_strength_gives_the_known_pairs():
         ("st", "al2"): (-5.0, -8.3936, -1.6064, 0.00405),
         ("al1", "al2"): (2.0, -1.628, 5.628, 0.356),
     }
-    pairs = compare_all(one_way_anova(BEAMS)).pairs
+    pairs = compare_all(compute_one_way_anova(BEAMS)).pairs
     assert [(pair.first, pair.second) for pair in pairs] == list(known)
     for pair in pairs:
         difference, lower, upper, p = known[pair.first, pair.second]
@@ -35,7 +35,7 @@ def test_beam_strength_gives_the_known_pairs():
 
 
 def test_beam_strength_gives_the_known_comparison_intervals():
-    result = compare_all(one_way_anova(BEAMS))
+    result = compare_all(compute_one_way_anova(BEAMS))
     assert result.critical_range == pytest.approx(3.62796, abs=5e-6)
     assert [half_width(interval) for interval in result.intervals] == pytest.approx(
         [1.57967, 1.81398, 1.81398], abs=5e-6
@@ -55,7 +55,7 @@ def test_five_equal_groups_give_the_published_honest_difference():
 
 def test_disjoint_intervals_are_the_significant_pairs_of_equal_groups():
     generator = np.random.default_rng(2)
-    result = compare_all(one_way_anova({str(i): generator.normal(0.4 * i, 1, 10).tolist() for i in range(5)}))
+    result = compare_all(compute_one_way_anova({str(i): generator.normal(0.4 * i, 1, 10).tolist() for i in range(5)}))
     at = {interval.name: interval for interval in result.intervals}
     for pair in result.pairs:
         first, second = at[pair.first], at[pair.second]
@@ -80,7 +80,7 @@ def test_the_published_standard_errors_of_six_very_unequal_groups_follow_from_th
 def test_pairs_agree_with_scipy_and_intervals_with_statsmodels():
     generator = np.random.default_rng(8)
     groups = {name: generator.normal(shift, 1, n) for name, shift, n in (("a", 0, 10), ("b", 1, 7), ("c", 3, 4))}
-    ours = compare_all(one_way_anova({name: values.tolist() for name, values in groups.items()}))
+    ours = compare_all(compute_one_way_anova({name: values.tolist() for name, values in groups.items()}))
     scipy_result = tukey_hsd(*groups.values())
     assert [pair.p for pair in ours.pairs] == pytest.approx(
         [scipy_result.pvalue[0, 1], scipy_result.pvalue[0, 2], scipy_result.pvalue[1, 2]], abs=1e-9
@@ -103,12 +103,12 @@ def test_two_groups_share_the_width_of_their_difference():
 
 
 def test_a_frequency_without_a_value_has_no_interval():
-    result = compare_all(one_way_anova({**BEAMS, "none": (None,)}))
+    result = compare_all(compute_one_way_anova({**BEAMS, "none": (None,)}))
     assert [interval.name for interval in result.intervals] == ["st", "al1", "al2"]
 
 
 def test_without_spread_it_says_what_is_missing():
-    result = compare_all(one_way_anova({"5 Hz": (0.5,), "15 Hz": (0.7,)}))
+    result = compare_all(compute_one_way_anova({"5 Hz": (0.5,), "15 Hz": (0.7,)}))
     assert (result.pairs, result.intervals, result.critical_range) == ((), (), None)
     assert result.notes == ("Without a spread within groups no pairs can be compared.",)
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import linregress
 
-from analysis.psychophysics.bias import response_bias
-from analysis.psychophysics.criterion_drift import criterion_drifts
+from analysis.psychophysics.bias import estimate_response_bias
+from analysis.psychophysics.criterion_drift import estimate_criterion_drifts
 from tests.analysis.psychophysics.test_bias import simulate_answers
 
 
@@ -18,7 +18,7 @@ def simulate_session(per_100_trials: float, seed: int, start: float = 0.0, runs:
 
 
 def single_drift(runs):
-    (drift,) = criterion_drifts([runs])
+    (drift,) = estimate_criterion_drifts([runs])
     return drift
 
 
@@ -31,7 +31,7 @@ def test_a_drift_is_recovered_with_its_sign(per_100_trials):
 @pytest.mark.parametrize("criterion", [0.0, 0.5])
 def test_no_drift_is_found_as_often_as_the_level_says(criterion):
     p = np.array(
-        [each.p for each in criterion_drifts([simulate_session(0.0, seed, criterion) for seed in range(1000)])]
+        [each.p for each in estimate_criterion_drifts([simulate_session(0.0, seed, criterion) for seed in range(1000)])]
     )
     assert np.mean(p < 0.05) == pytest.approx(0.05, abs=0.025)
     assert np.mean(p < 0.01) < 0.02
@@ -43,7 +43,7 @@ def test_criteria_that_vary_without_an_order_are_no_drift(sd, size):
     """Of 600 sessions with p below 0.05, by binomial variance alone a fifth and a third."""
     sessions = [simulate_session(0.0, seed, sd=sd) for seed in range(600)]
     studies = [sessions[start : start + size] for start in range(0, len(sessions), size)]
-    p = np.array([each.p for study in studies for each in criterion_drifts(study)])
+    p = np.array([each.p for study in studies for each in estimate_criterion_drifts(study)])
     assert np.mean(p < 0.05) < 0.085
     assert np.mean(p < 0.05) > 0.02
 
@@ -55,7 +55,7 @@ def test_a_session_alone_has_the_dispersion_of_its_own_residuals():
     # Rates of right answers alike, criteria not: the errors are shifted between the two directions.
     wrong_of_1 = (2, 14, 4, 12, 7)
     runs = [(shown, [*_correct_answers(wrong, 14 - wrong)]) for wrong in wrong_of_1]
-    line = linregress(35.0 + 70.0 * np.arange(5), [response_bias(*run).criterion for run in runs])
+    line = linregress(35.0 + 70.0 * np.arange(5), [estimate_response_bias(*run).criterion for run in runs])
     assert single_drift(runs).per_100_trials == pytest.approx(100.0 * line.slope)
     assert single_drift(runs).p == pytest.approx(line.pvalue)
 
@@ -69,14 +69,14 @@ def _correct_answers(wrong_of_1, wrong_of_2):
 def test_a_session_takes_part_in_the_dispersion_of_the_others():
     """A line without scatter among nine that scatter is less sure than alone."""
     line, others = simulate_session(0.4, 3), [simulate_session(0.0, seed, sd=0.8) for seed in range(10, 19)]
-    assert criterion_drifts([line, *others])[0].p > single_drift(line).p
+    assert estimate_criterion_drifts([line, *others])[0].p > single_drift(line).p
 
 
 def test_two_runs_or_one_direction_alone_show_no_drift():
     assert single_drift(simulate_session(1.0, 1, runs=2)) is None
     assert single_drift([*simulate_session(1.0, 1, runs=2), ([1, 1, 1], [True, True, False])]) is None
     assert single_drift([]) is None
-    assert criterion_drifts([]) == ()
-    assert criterion_drifts([simulate_session(1.0, 1, runs=2), simulate_session(1.0, 1)])[1] == single_drift(
+    assert estimate_criterion_drifts([]) == ()
+    assert estimate_criterion_drifts([simulate_session(1.0, 1, runs=2), simulate_session(1.0, 1)])[1] == single_drift(
         simulate_session(1.0, 1)
     )

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.psychophysics.group_contrasts import contrasts, pair_contrast
+from analysis.psychophysics.group_contrasts import compute_contrasts, compute_pair_contrast
 from analysis.psychophysics.study_analysis import analyse_study, make_anova_document
 from analysis.reports.study_report import render_study_report
 from protocols.definition.declared_analysis import AnalysisSettings
-from study.workflows.results.analyze_data import text_table
+from study.workflows.results.analyze_data import format_threshold_lines
 
 LOW = (0.2, 0.2, 0.3, 0.5, 0.8)
 """Far below the cap."""
@@ -43,21 +43,21 @@ def page_text(analysis):
 
 def test_a_pair_is_the_first_frequency_minus_the_second():
     values = np.array([[0.0, 1.0, 5.0], [1.0, 2.5, 5.0], [0.5, 1.0, 6.0], [0.0, np.nan, 7.0]])
-    up, down = (pair_contrast((5.0, 35.0, 45.0), values, pair, 0.95) for pair in ((45.0, 35.0), (35.0, 45.0)))
+    up, down = (compute_pair_contrast((5.0, 35.0, 45.0), values, pair, 0.95) for pair in ((45.0, 35.0), (35.0, 45.0)))
     assert (up.frequency_hz, up.against_hz, up.participants) == (45.0, 35.0, 3)
     assert up.difference_db == pytest.approx(np.mean([4.0, 2.5, 5.0]))
     assert (down.difference_db, down.lower_db) == pytest.approx((-up.difference_db, -up.upper_db))
     assert up.p_holm == up.p == down.p
-    (as_family,) = contrasts((35.0, 45.0), values[:, 1:], 0.95)
+    (as_family,) = compute_contrasts((35.0, 45.0), values[:, 1:], 0.95)
     assert as_family == up
     for none in ((), (45.0, 15.0), (45.0, 45.1)):
-        assert pair_contrast((5.0, 35.0, 45.0), values, none, 0.95) is None
+        assert compute_pair_contrast((5.0, 35.0, 45.0), values, none, 0.95) is None
 
 
 def test_equivalence_is_asked_where_both_frequencies_are_low():
     values = np.array([[0.0, 1.0], [1.0, 2.5], [0.5, 1.0]])
-    assert pair_contrast((5.0, 45.0), values, (5.0, 45.0), 0.95).p_equivalence is None
-    assert pair_contrast((5.0, 25.0), values, (5.0, 25.0), 0.95).p_equivalence is not None
+    assert compute_pair_contrast((5.0, 45.0), values, (5.0, 45.0), 0.95).p_equivalence is None
+    assert compute_pair_contrast((5.0, 25.0), values, (5.0, 25.0), 0.95).p_equivalence is not None
 
 
 @pytest.mark.slow
@@ -88,7 +88,9 @@ def test_the_report_begins_with_it(hierarchical_declared):
 
 def test_the_terminal_and_the_document_have_it(hierarchical_declared):
     printed = [
-        line for line in text_table(hierarchical_declared) if line.startswith("Declared contrast, 45 Hz minus 35 Hz")
+        line
+        for line in format_threshold_lines(hierarchical_declared)
+        if line.startswith("Declared contrast, 45 Hz minus 35 Hz")
     ]
     assert len(printed) == 2 and "declared analysis" in printed[0] and "declared analysis" not in printed[1]
     written = json.loads(json.dumps(make_anova_document(hierarchical_declared), allow_nan=False))["declared_result"]
@@ -105,7 +107,7 @@ def test_nothing_declared_takes_a_sentence(analyse_declared):
     assert undeclared.declared.count(". ") == 0
     assert undeclared.declared in page_text(undeclared)
     assert "Participants and exclusions" not in page_text(undeclared)
-    assert not any("Declared" in line for line in text_table(undeclared))
+    assert not any("Declared" in line for line in format_threshold_lines(undeclared))
 
 
 def test_what_the_data_do_not_tell_is_not_known(trials, protocol):

@@ -1,14 +1,14 @@
 import pytest
 from scipy.stats import friedmanchisquare
 
-from analysis.psychophysics.repeated_measures import friedman
+from analysis.psychophysics.repeated_measures import compute_friedman_test
 
 RANKED = ((1.0, 2.0, 3.0), (1.5, 2.5, 3.5), (0.1, 0.2, 0.3), (5.0, 6.0, 7.0))
 
 
 def test_participants_who_agree_give_the_largest_statistic():
     # n people who rank k conditions alike: chi squared is n (k - 1), agreement 1.
-    result = friedman(RANKED)
+    result = compute_friedman_test(RANKED)
     assert result.chi_squared == pytest.approx(8.0)
     assert result.kendall_w == pytest.approx(1.0)
     assert result.df == 2
@@ -17,11 +17,11 @@ def test_participants_who_agree_give_the_largest_statistic():
 
 def test_only_ranks_matter():
     stretched = [tuple(value**3 for value in row) for row in RANKED]
-    assert friedman(stretched) == friedman(RANKED)
+    assert compute_friedman_test(stretched) == compute_friedman_test(RANKED)
 
 
 def test_rows_with_gaps_are_left_out():
-    assert friedman([*RANKED, (1.0, None, 2.0), (1.0, float("nan"), 2.0)]) == friedman(RANKED)
+    assert compute_friedman_test([*RANKED, (1.0, None, 2.0), (1.0, float("nan"), 2.0)]) == compute_friedman_test(RANKED)
 
 
 @pytest.mark.parametrize(
@@ -34,6 +34,6 @@ def test_rows_with_gaps_are_left_out():
     ],
 )
 def test_too_little_data_is_reported_in_a_sentence(values, note):
-    result = friedman(values)
+    result = compute_friedman_test(values)
     assert result.p is None
     assert note in result.notes[0]

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.stats import sem
 
-from analysis.psychophysics.group_contrasts import mean_errors
+from analysis.psychophysics.group_contrasts import compute_mean_errors
 from analysis.psychophysics.hierarchy import primary
 from analysis.psychophysics.hierarchy.answers import count_answers, count_cells
-from analysis.psychophysics.hierarchy.primary import primary_analysis, select_persons
+from analysis.psychophysics.hierarchy.primary import compute_primary_analysis, select_persons
 from analysis.psychophysics.power.simulated_study import Crowd
 from analysis.psychophysics.power.simulated_study import simulate_study as simulate_crowd
 from analysis.psychophysics.study_analysis import analyse_study, make_anova_document
@@ -35,8 +35,8 @@ def drop_frequencies(trials, *frequencies_hz):
 
 def test_the_model_is_that_of_a_protocol_with_the_played_frequencies_alone(trials):
     played = drop_frequencies(trials, 15.0, 35.0)
-    found = primary_analysis(count_answers(played, (5.0, 15.0, 25.0, 35.0, 45.0)), 3.0)
-    alone = primary_analysis(count_answers(played, PLAYED), 3.0)
+    found = compute_primary_analysis(count_answers(played, (5.0, 15.0, 25.0, 35.0, 45.0)), 3.0)
+    alone = compute_primary_analysis(count_answers(played, PLAYED), 3.0)
     assert found.missing_hz == (15.0, 35.0) and alone.missing_hz == ()
     assert found.frequencies_hz == PLAYED
     assert found.contrasts == alone.contrasts
@@ -65,7 +65,7 @@ def test_a_frequency_with_broken_runs_alone_has_no_reversal_means_to_compare(tri
 
 def test_void_trials_are_no_answers(trials):
     void = [replace(t, status=TrialStatus.SPOILED) if t.frequency_hz == 15.0 else t for t in trials]
-    assert primary_analysis(count_answers(void, (5.0, 15.0)), 3.0) is None
+    assert compute_primary_analysis(count_answers(void, (5.0, 15.0)), 3.0) is None
 
 
 def test_a_declared_contrast_with_a_missing_frequency_is_not_known(trials, protocol):
@@ -81,7 +81,7 @@ STUDY = simulate_crowd(Crowd((5.0, 25.0, 45.0), (0.4, 0.7, 1.0)), PUBLISHED, 10,
 @pytest.mark.parametrize("count", [0, 8])
 def test_what_a_single_person_played_has_no_interval(count):
     """The estimate follows the one who played, whose spread is not known: it held the truth in half of the studies."""
-    found = primary_analysis(with_few(STUDY, 1, count), 3.0, declared_hz=(45.0, 5.0))
+    found = compute_primary_analysis(with_few(STUDY, 1, count), 3.0, declared_hz=(45.0, 5.0))
     assert [c.frequency_hz for c in found.contrasts] == [25.0]
     assert found.declared_contrast is None
     assert found.medians[2].lower_db is None and found.medians[2].upper_db is None
@@ -91,14 +91,14 @@ def test_what_a_single_person_played_has_no_interval(count):
 
 @pytest.mark.slow
 def test_few_people_at_a_frequency_count_as_few():
-    few, all_of_them = primary_analysis(with_few(STUDY, 3, 0), 3.0), primary_analysis(STUDY, 3.0)
+    few, all_of_them = compute_primary_analysis(with_few(STUDY, 3, 0), 3.0), compute_primary_analysis(STUDY, 3.0)
     assert [c.participants for c in few.contrasts] == [10, 3]
     assert few.contrasts[1].effect_size is None and few.contrasts[1].p_spread is None
     widths = [found.medians[2].upper_db - found.medians[2].lower_db for found in (few, all_of_them)]
     assert widths[0] > 1.4 * widths[1]
     assert few.overall.participants == 3 and few.overall.left_out == STUDY.subjects[3:]
     assert few.overall == replace(
-        primary_analysis(select_persons(STUDY, np.arange(10) < 3), 3.0).overall,
+        compute_primary_analysis(select_persons(STUDY, np.arange(10) < 3), 3.0).overall,
         left_out=few.overall.left_out,
         notes=few.overall.notes,
     )
@@ -126,26 +126,26 @@ def test_whole_short_runs_are_not_few_beside_the_long_ones_of_others():
 @pytest.mark.slow
 def test_the_fit_of_the_analysis_of_variance_must_converge_too(monkeypatch):
     few = with_few(STUDY, 3, 0)
-    assert primary_analysis(few, 3.0).converged
+    assert compute_primary_analysis(few, 3.0).converged
     own = primary.fit_hierarchy
     monkeypatch.setattr(primary, "fit_hierarchy", lambda a, f: replace(own(a, f), converged=a.persons == 10))
-    assert not primary_analysis(few, 3.0).converged
+    assert not compute_primary_analysis(few, 3.0).converged
 
 
 def test_errors_of_means_are_the_textbooks_where_all_have_answers_and_grow_to_those_of_the_few():
     values = np.random.default_rng(4).normal(0.0, 2.0, (10, 2))
     known = np.ones((10, 2), dtype=bool)
-    whole = mean_errors(values, known)
+    whole = compute_mean_errors(values, known)
     np.testing.assert_allclose(whole.error, sem(values), rtol=1e-12)
     assert whole.df.tolist() == [9.0, 9.0]
     # Seven people without answers of their own, whose values say nothing: the mean of three, weighted by 10 / 3.
     values[3:, 1], known[3:, 1] = 0.0, False
     values[:3, 1] -= values[:3, 1].mean()
-    few = mean_errors(values, known)
+    few = compute_mean_errors(values, known)
     assert few.error[1] == pytest.approx(sem(values[:3, 1] * 3 / 10))
     assert few.df.tolist() == [9.0, pytest.approx(2.0)]
     known[2, 1] = known[1, 1] = False
-    assert mean_errors(values, known).error[1] == np.inf
+    assert compute_mean_errors(values, known).error[1] == np.inf
 
 
 @pytest.mark.slow
@@ -156,6 +156,6 @@ def test_intervals_hold_where_few_of_the_people_played_a_frequency():
     held = 0
     for seed in range(40):
         answers = simulate_crowd(crowd, PUBLISHED, 10, (19, 2, seed)).answers
-        (found,) = primary_analysis(with_few(answers, 2, 8), 3.0).contrasts[1:]
+        (found,) = compute_primary_analysis(with_few(answers, 2, 8), 3.0).contrasts[1:]
         held += found.lower_db <= true_db <= found.upper_db
     assert held >= 36

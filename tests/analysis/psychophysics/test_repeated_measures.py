@@ -6,14 +6,19 @@ import pandas as pd
 import pytest
 from statsmodels.stats.anova import AnovaRM
 
-from analysis.psychophysics.repeated_measures import greenhouse_geisser, huynh_feldt, mauchly, repeated_measures
+from analysis.psychophysics.repeated_measures import (
+    analyse_repeated_measures,
+    compute_greenhouse_geisser_epsilon,
+    compute_huynh_feldt_epsilon,
+    compute_mauchly_test,
+)
 
 DRUGS = ((30, 28, 16, 34), (14, 18, 10, 22), (24, 20, 18, 30), (38, 34, 20, 44), (26, 28, 14, 30))
 REACTIONS = ((1, 3, 4), (2, 2, 3), (2, 5, 6), (3, 4, 4), (3, 5, 6))
 
 
 def analyse(values):
-    return repeated_measures([f"s{i}" for i in range(len(values))], values)
+    return analyse_repeated_measures([f"s{i}" for i in range(len(values))], values)
 
 
 def test_four_drugs_give_the_published_table():
@@ -65,7 +70,7 @@ def test_the_correction_keeps_its_promise_where_the_conditions_vary_unequally():
 
 
 def test_two_conditions_need_no_correction():
-    assert greenhouse_geisser(np.random.default_rng(1).normal(size=(8, 2))) == pytest.approx(1.0)
+    assert compute_greenhouse_geisser_epsilon(np.random.default_rng(1).normal(size=(8, 2))) == pytest.approx(1.0)
 
 
 def test_a_participant_with_a_gap_is_left_out_by_name():
@@ -96,7 +101,9 @@ def test_a_result_is_json():
 
 
 def test_huynh_feldt_and_mauchly_of_the_ncss_manual():
-    assert huynh_feldt(greenhouse_geisser(np.array(DRUGS, float)), 5, 4) == pytest.approx(1.0789, abs=1e-4)
+    assert compute_huynh_feldt_epsilon(
+        compute_greenhouse_geisser_epsilon(np.array(DRUGS, float)), 5, 4
+    ) == pytest.approx(1.0789, abs=1e-4)
     found = analyse(DRUGS)
     assert found.epsilon_huynh_feldt == 1.0
     assert found.p_huynh_feldt == pytest.approx(found.p_uncorrected)
@@ -105,4 +112,4 @@ def test_huynh_feldt_and_mauchly_of_the_ncss_manual():
 
 
 def test_mauchly_needs_more_people_than_contrasts():
-    assert mauchly(np.array(DRUGS[:3], float)) is None
+    assert compute_mauchly_test(np.array(DRUGS[:3], float)) is None

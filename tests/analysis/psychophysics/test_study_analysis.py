@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.psychophysics.anova import one_way_anova
+from analysis.psychophysics.anova import compute_one_way_anova
 from analysis.psychophysics.population import Population
-from analysis.psychophysics.repeated_measures import repeated_measures
+from analysis.psychophysics.repeated_measures import analyse_repeated_measures
 from analysis.psychophysics.study_analysis import analyse_study, make_anova_document
-from analysis.psychophysics.threshold_table import threshold_table
-from analysis.psychophysics.thresholds import thresholds
+from analysis.psychophysics.threshold_table import tabulate_thresholds
+from analysis.psychophysics.thresholds import compute_thresholds
 from protocols.trial import Phase
 
 
@@ -46,9 +46,14 @@ def test_without_an_effect_few_studies_find_one(simulate_study, protocol):
     frequencies = protocol.stimulus.frequencies_hz
     p = []
     for seed in range(24):
-        rows = thresholds(simulate_study(subjects=6, true_n=(0.6,) * 5, seed=seed), protocol.staircase)
-        table = threshold_table(rows, frequencies)
-        p.append((one_way_anova(table.groups()).p, repeated_measures(table.subjects, table.values).p))
+        rows = compute_thresholds(simulate_study(subjects=6, true_n=(0.6,) * 5, seed=seed), protocol.staircase)
+        table = tabulate_thresholds(rows, frequencies)
+        p.append(
+            (
+                compute_one_way_anova(table.group_by_frequency()).p,
+                analyse_repeated_measures(table.subjects, table.values).p,
+            )
+        )
     # At 5 % a right test exceeds four of 24 in one of 200 repetitions of this test; the seeds are fixed.
     assert np.all(np.sum(np.array(p) < 0.05, axis=0) <= 4)
 

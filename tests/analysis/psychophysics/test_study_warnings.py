@@ -3,11 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.psychophysics.anova import one_way_anova
-from analysis.psychophysics.repeated_measures import repeated_measures
+from analysis.psychophysics.anova import compute_one_way_anova
+from analysis.psychophysics.repeated_measures import analyse_repeated_measures
 from analysis.psychophysics.study_analysis import analyse_study, describe_design_difference
 from analysis.psychophysics.study_warnings import STRONG_BIAS
-from analysis.psychophysics.thresholds import thresholds
+from analysis.psychophysics.thresholds import compute_thresholds
 from protocols.procedure.run_rules import make_staircase_rule
 from protocols.trial import Phase, TrialStatus
 from tests.analysis.conftest import simulate_run
@@ -96,7 +96,7 @@ def test_three_answers_of_an_unfinished_run_show_no_bias(able_trials, protocol):
         for trial in simulate_run(0.5, np.random.default_rng(44), subject="s09", session="9", frequency_hz=15.0)[:3]
     ]
     assert [trial.correct for trial in short] == [True, True, False]
-    (row,) = thresholds(short, protocol.staircase)
+    (row,) = compute_thresholds(short, protocol.staircase)
     assert abs(row.criterion) > STRONG_BIAS
     assert not any("A bias towards" in sentence for sentence in warnings_of(short, protocol))
 
@@ -186,7 +186,7 @@ DRUGS = ((30.0, 28.0, 16.0, 34.0), (14.0, 18.0, 10.0, 22.0), (24.0, 20.0, 18.0, 
 
 def both_analyses(values):
     columns = {str(i): column for i, column in enumerate(zip(*values, strict=True))}
-    return one_way_anova(columns), repeated_measures([str(i) for i in range(len(values))], values)
+    return compute_one_way_anova(columns), analyse_repeated_measures([str(i) for i in range(len(values))], values)
 
 
 def test_the_two_analyses_are_distinguished_in_numbers():

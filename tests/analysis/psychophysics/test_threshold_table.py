@@ -2,40 +2,40 @@ from dataclasses import replace
 
 import pytest
 
-from analysis.psychophysics.threshold_table import threshold_table
-from analysis.psychophysics.thresholds import thresholds
+from analysis.psychophysics.threshold_table import tabulate_thresholds
+from analysis.psychophysics.thresholds import compute_thresholds
 
 
 @pytest.fixture
 def rows(simulate_study, rule):
-    return thresholds(simulate_study(subjects=3), rule)
+    return compute_thresholds(simulate_study(subjects=3), rule)
 
 
 FREQUENCIES = (5.0, 15.0, 25.0, 35.0, 45.0)
 
 
 def test_each_participant_has_one_value_per_frequency(rows):
-    table = threshold_table(rows, FREQUENCIES)
+    table = tabulate_thresholds(rows, FREQUENCIES)
     assert table.subjects == ("s01", "s02", "s03")
-    assert list(table.groups()) == ["5 Hz", "15 Hz", "25 Hz", "35 Hz", "45 Hz"]
+    assert list(table.group_by_frequency()) == ["5 Hz", "15 Hz", "25 Hz", "35 Hz", "45 Hz"]
     for row in rows:
         at = table.subjects.index(row.subject), table.frequencies_hz.index(row.frequency_hz)
         assert table.values[at[0]][at[1]] == row.threshold_n
         assert table.censored[at[0]][at[1]] is row.censored
-    assert table.gaps() == ()
+    assert table.list_gaps() == ()
 
 
 def test_an_incomplete_run_leaves_a_gap(rows):
     unfinished = [replace(row, complete=False) if row.subject == "s02" else row for row in rows]
-    table = threshold_table(unfinished, FREQUENCIES)
-    assert table.gaps() == tuple(("s02", frequency) for frequency in FREQUENCIES)
-    assert table.groups()["5 Hz"][1] is None
+    table = tabulate_thresholds(unfinished, FREQUENCIES)
+    assert table.list_gaps() == tuple(("s02", frequency) for frequency in FREQUENCIES)
+    assert table.group_by_frequency()["5 Hz"][1] is None
 
 
 def test_the_first_completed_run_counts_and_the_second_is_named(rows):
     again = replace(rows[0], session="2", run=1, threshold_n=0.1)
-    table = threshold_table([*rows, again], FREQUENCIES)
-    assert table.values == threshold_table(rows, FREQUENCIES).values
+    table = tabulate_thresholds([*rows, again], FREQUENCIES)
+    assert table.values == tabulate_thresholds(rows, FREQUENCIES).values
     assert table.notes == (
         f"s01 completed more than one run at {rows[0].frequency_hz:g} Hz; the first one counts (session 1), "
         "not run 1 of session 2.",
@@ -43,17 +43,17 @@ def test_the_first_completed_run_counts_and_the_second_is_named(rows):
 
 
 def test_a_frequency_of_another_protocol_is_named(rows):
-    table = threshold_table([replace(rows[0], frequency_hz=80.0)], FREQUENCIES)
+    table = tabulate_thresholds([replace(rows[0], frequency_hz=80.0)], FREQUENCIES)
     assert table.notes == ("s01 has a run at 80 Hz, which the protocol does not name.",)
 
 
 def test_the_same_table_in_decibel_or_as_delivered(rows):
     for quantity in ("threshold_db", "threshold_mps2", "threshold_mm"):
-        table = threshold_table(rows, FREQUENCIES, quantity)
+        table = tabulate_thresholds(rows, FREQUENCIES, quantity)
         assert table.values[0][table.frequencies_hz.index(rows[0].frequency_hz)] == getattr(rows[0], quantity)
 
 
 def test_no_run_at_all_is_a_table_without_rows():
-    table = threshold_table((), FREQUENCIES)
+    table = tabulate_thresholds((), FREQUENCIES)
     assert table.subjects == ()
-    assert table.groups() == {f"{f:g} Hz": () for f in FREQUENCIES}
+    assert table.group_by_frequency() == {f"{f:g} Hz": () for f in FREQUENCIES}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import CensoredData, norm
 
-from analysis.psychophysics.tobit import fit_tobit, tobit_contrasts
+from analysis.psychophysics.tobit import compute_tobit_contrasts, fit_tobit
 
 HZ = (5.0, 35.0, 45.0)
 
@@ -41,7 +41,7 @@ def test_differences_that_the_cap_cut_are_recovered_where_cuts_are_clean():
     for seed in range(40):
         values = simulate_people(seed)
         cut = values > 7.0
-        (_, contrast) = tobit_contrasts(HZ, np.minimum(values, 7.0), cut, 0.95)
+        (_, contrast) = compute_tobit_contrasts(HZ, np.minimum(values, 7.0), cut, 0.95)
         found.append(contrast.difference_db)
         covered += contrast.lower_db <= 14.0 <= contrast.upper_db
     assert np.mean(found) == pytest.approx(14.0, abs=0.3)
@@ -54,15 +54,15 @@ def test_differences_that_the_cap_cut_are_recovered_where_cuts_are_clean():
 def test_gaps_are_left_out_and_where_it_says_nothing_it_is_silent():
     values = simulate_people(3)
     cut = values > 7.0
-    whole = tobit_contrasts(HZ, values, cut, 0.95)
+    whole = compute_tobit_contrasts(HZ, values, cut, 0.95)
     values[0, 1] = np.nan
-    gapped = tobit_contrasts(HZ, values, cut & np.isfinite(values), 0.95)
+    gapped = compute_tobit_contrasts(HZ, values, cut & np.isfinite(values), 0.95)
     assert [c.participants for c in gapped] == [9, 10]
     assert gapped[1].difference_db == pytest.approx(whole[1].difference_db, abs=0.6)
-    assert tobit_contrasts(HZ, values, np.zeros_like(cut), 0.95) == ()
-    assert tobit_contrasts(HZ, values[:2], cut[:2], 0.95) == ()
+    assert compute_tobit_contrasts(HZ, values, np.zeros_like(cut), 0.95) == ()
+    assert compute_tobit_contrasts(HZ, values[:2], cut[:2], 0.95) == ()
     none_known = cut.copy()
     none_known[:, 2] = True
-    assert [contrast.frequency_hz for contrast in tobit_contrasts(HZ, values, none_known, 0.95)] == [35.0]
+    assert [contrast.frequency_hz for contrast in compute_tobit_contrasts(HZ, values, none_known, 0.95)] == [35.0]
     none_known[:, 0] = True
-    assert tobit_contrasts(HZ, values, none_known, 0.95) == ()
+    assert compute_tobit_contrasts(HZ, values, none_known, 0.95) == ()

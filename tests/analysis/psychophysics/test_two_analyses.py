@@ -10,10 +10,10 @@ from analysis.psychophysics.coverage.coverage_words import coverage_sentence
 from analysis.psychophysics.coverage.measured_coverage import MEASURED
 from analysis.psychophysics.hierarchy.primary import FAR_ABOVE_NOTE
 from analysis.psychophysics.study_analysis import analyse_study, make_anova_document
-from analysis.psychophysics.two_analyses import SIMULATED_RULE, comparison_text, declaration_text
+from analysis.psychophysics.two_analyses import SIMULATED_RULE, describe_comparison, describe_declaration
 from analysis.reports.study_report import render_study_report
 from protocols.definition.declared_analysis import AnalysisSettings
-from study.workflows.results.analyze_data import text_table
+from study.workflows.results.analyze_data import format_threshold_lines
 
 
 @pytest.fixture(scope="module")
@@ -34,9 +34,9 @@ def test_what_the_cap_hides_is_reported(analysis):
 
 def test_numbers_simulated_with_the_published_rule_are_said_of_no_other(analysis):
     parts = analysis.primary, analysis.mean_contrasts, analysis.comparisons, analysis.table
-    assert comparison_text(*parts, SIMULATED_RULE) == analysis.compared
+    assert describe_comparison(*parts, SIMULATED_RULE) == analysis.compared
     for other in (replace(SIMULATED_RULE, cap_n=2.0), replace(SIMULATED_RULE, down_after_right=2)):
-        said = comparison_text(*parts, other)
+        said = describe_comparison(*parts, other)
         assert "Near the cap the published intervals do not have" in said
         assert "Measured near the cap" not in said
 
@@ -46,14 +46,20 @@ def test_a_missing_lower_bound_is_reported_on_the_page_and_in_the_terminal(analy
     assert high.above_cap
     primary = replace(analysis.primary, medians=(*low, replace(high, lower_db=None)))
     unbounded = replace(analysis, primary=primary)
-    for shown in (lambda a: render_study_report(a, (), {}, "2026-01-02T03:04:05Z"), lambda a: "".join(text_table(a))):
+    for shown in (
+        lambda a: render_study_report(a, (), {}, "2026-01-02T03:04:05Z"),
+        lambda a: "".join(format_threshold_lines(a)),
+    ):
         assert "no lower bound" in shown(unbounded)
         assert "no lower bound" not in shown(analysis)
 
 
 def test_two_people_have_medians_without_an_interval_and_not_above_the_cap(protocol, simulate_study):
     analysis = analyse_study(simulate_study(subjects=2, true_n=(0.2, 0.2, 0.3, 0.5, 0.8)), protocol)
-    page, lines = render_study_report(analysis, (), {}, "2026-01-02T03:04:05Z"), "\n".join(text_table(analysis))
+    page, lines = (
+        render_study_report(analysis, (), {}, "2026-01-02T03:04:05Z"),
+        "\n".join(format_threshold_lines(analysis)),
+    )
     assert f"{analysis.primary.medians[0].newton:.3f} N  no interval: too few people" in lines
     assert "above cap" not in lines
     assert "no interval: too few people" in page and "no lower bound" not in page
@@ -99,22 +105,22 @@ def test_one_participant_leaves_the_published_analysis_alone(simulate_study, pro
     alone = analyse_study(simulate_study(subjects=1), protocol)
     assert alone.primary is None
     assert "only the published analysis is given" in alone.compared
-    assert comparison_text(None, (), alone.comparisons, alone.table, SIMULATED_RULE) == alone.compared
+    assert describe_comparison(None, (), alone.comparisons, alone.table, SIMULATED_RULE) == alone.compared
 
 
 def test_what_was_declared_and_what_was_not_is_reported():
-    assert "declares no primary analysis" in declaration_text(AnalysisSettings())
-    said = declaration_text(AnalysisSettings("hierarchical", (45.0, 5.0), 10))
+    assert "declares no primary analysis" in describe_declaration(AnalysisSettings())
+    said = describe_declaration(AnalysisSettings("hierarchical", (45.0, 5.0), 10))
     assert "hierarchical model" in said and "45 Hz minus 5 Hz" in said and "participants: 10" in said
     assert "Not declared: exclusions." in said
     assert "pseudo-thresholds in dB, paired" in said
-    assert "Tukey's of means of runs in newtons" in declaration_text(AnalysisSettings("published"))
-    assert "Not declared" not in declaration_text(
+    assert "Tukey's of means of runs in newtons" in describe_declaration(AnalysisSettings("published"))
+    assert "Not declared" not in describe_declaration(
         AnalysisSettings("published", (45.0, 5.0), 10, ("No participant is left out.",))
     )
-    by_name = declaration_text(AnalysisSettings("hierarchical", (45.0, 5.0), 10, (), "paired_t"))
+    by_name = describe_declaration(AnalysisSettings("hierarchical", (45.0, 5.0), 10, (), "paired_t"))
     assert "Declared interval (paired_t) of the contrast: 95 %, over people's pseudo-thresholds" in by_name
-    assert "Not declared: interval method, primary contrast and exclusions." in declaration_text(
+    assert "Not declared: interval method, primary contrast and exclusions." in describe_declaration(
         AnalysisSettings(participants=10)
     )
 

@@ -6,16 +6,16 @@ import pytest
 
 from analysis.diagnosis.document import Candidate, Errors, Estimate, Fit, Mismatch, Rival
 from analysis.diagnosis.result.findings import BalanceErrors, BlackBox
-from analysis.diagnosis.result.plausibility import implausible_sentences
+from analysis.diagnosis.result.plausibility import describe_doubts
 from analysis.diagnosis.result.wording import find_final_moves, write_summary_lines
-from analysis.reports.diagnosis_method import method_paragraphs
+from analysis.reports.diagnosis_method import write_method_paragraphs
 from analysis.reports.diagnosis_report import render_diagnosis_report
 from analysis.reports.diagnosis_tables import (
-    channel_table,
-    mismatch_table,
-    parameter_table,
-    rival_table,
+    tabulate_channel_errors,
+    tabulate_mismatches,
+    tabulate_parameters,
     tabulate_retuned,
+    tabulate_rivals,
 )
 from equalizer.effects.effect import PlacedEffect
 
@@ -150,30 +150,30 @@ def test_wrong_parameters_are_said_with_their_numbers(friction_findings):
 
 
 def test_channels_stand_in_their_units_with_the_noise_beside(friction_findings):
-    table = channel_table(friction_findings, "test")
+    table = tabulate_channel_errors(friction_findings, "test")
     assert [row[0] for row in table.rows] == ["ax", "x"]
     assert table.rows[1][3].endswith("×)")
     assert "µm (" in table.rows[1][3]
     ratio = friction_findings.channel_errors["after"]["x"]
     assert f"({ratio:.2f}×)" in table.rows[1][3]
-    assert channel_table(replace(friction_findings, time_series=()), "fit") is None
+    assert tabulate_channel_errors(replace(friction_findings, time_series=()), "fit") is None
 
 
 def test_rivals_that_cannot_be_told_apart_stand_above_those_passed_over(friction_findings):
     (effect,) = friction_findings.diagnosis.effects
     rivals = (Rival("viscous_damping", 0.1, False, "worse"), Rival("stribeck_friction", 0.05, True, ""))
-    table = rival_table(replace(effect, rivals=rivals))
+    table = tabulate_rivals(replace(effect, rivals=rivals))
     assert [row[2] for row in table.rows] == ["named", "cannot be distinguished", "passed over"]
 
 
 def test_a_number_without_an_interval_has_a_dash(friction_findings):
     (effect,) = friction_findings.diagnosis.effects
-    table = parameter_table(replace(effect, parameters={"level": Estimate(0.2, "N")}))
+    table = tabulate_parameters(replace(effect, parameters={"level": Estimate(0.2, "N")}))
     assert table.rows == (("level", "0.200 N", "–"),)
 
 
 def test_a_long_list_of_places_is_cut_and_reports_it():
-    table = mismatch_table("Places", (PLACE,) * 15)
+    table = tabulate_mismatches("Places", (PLACE,) * 15)
     assert len(table.rows) == 12
     assert table.notes[0] == "And 3 smaller places."
 
@@ -193,11 +193,11 @@ def test_every_open_number_is_listed_with_how_far_it_moved(friction_findings):
     ],
 )
 def test_the_method_says_how_errors_were_measured(friction_findings, error, words):
-    assert words in method_paragraphs(change_diagnosis(friction_findings, error=error))[0]
+    assert words in write_method_paragraphs(change_diagnosis(friction_findings, error=error))[0]
 
 
 def test_the_method_says_how_the_time_was_split_and_the_noise_found(friction_findings):
-    said = " ".join(method_paragraphs(friction_findings))
+    said = " ".join(write_method_paragraphs(friction_findings))
     assert "6 s were used for the fit, 3 s were used to choose between explanations and 3 s were held out" in said
     assert "The noise was measured from what differs between repeats" in said
 
@@ -210,21 +210,21 @@ def test_the_summary_begins_with_the_verdict_and_ends_with_the_remarks(friction_
 
 
 def test_a_believable_fit_is_not_doubted(friction_findings):
-    assert implausible_sentences(friction_findings) == ()
+    assert describe_doubts(friction_findings) == ()
 
 
 def test_a_number_at_the_end_of_its_range_is_doubted(friction_findings):
     (placed,) = friction_findings.named
     most = {"level": placed.effect.parameters[0].upper}
     wild = replace(friction_findings, named=(PlacedEffect(placed.effect, placed.sites, most),))
-    (said,) = implausible_sentences(wild)
+    (said,) = describe_doubts(wild)
     assert said.startswith("The level of dry friction reached the limit of its allowed range (")
 
 
 def test_an_interval_that_holds_no_effect_is_doubted(friction_findings):
     (effect,) = friction_findings.diagnosis.effects
     faint = replace(effect, parameters={"level": Estimate(0.01, "N", (-0.01, 0.03))})
-    (said,) = implausible_sentences(change_diagnosis(friction_findings, effects=(faint,)))
+    (said,) = describe_doubts(change_diagnosis(friction_findings, effects=(faint,)))
     assert (
         said == "The interval of dry friction, 0.01 N [−0.01, 0.03], includes the value without the effect: the data "
         "hardly support it."
@@ -233,5 +233,5 @@ def test_an_interval_that_holds_no_effect_is_doubted(friction_findings):
 
 def test_an_improved_model_that_makes_energy_is_doubted(friction_findings):
     model = replace(friction_findings.improved, damping=np.array([[-1.0]]))
-    (said,) = implausible_sentences(replace(friction_findings, improved=model))
+    (said,) = describe_doubts(replace(friction_findings, improved=model))
     assert said == "The improved model's damping is negative in one direction: in it, the device would generate energy."

@@ -12,7 +12,7 @@ from analysis.diagnosis.real_answer.real_answer import OwnParameter
 from analysis.diagnosis.result.wording import write_summary_lines
 from analysis.evaluation.reproduction.document import FigureFindings, PlayedRow, Reproduction
 from analysis.figures.study_pictures import study_pictures
-from analysis.psychophysics.ellipsoid import EllipsoidResult, moment_ellipsoid, phasor_ellipse
+from analysis.psychophysics.ellipsoid import EllipsoidResult, compute_moment_ellipsoid, compute_phasor_ellipse
 from analysis.psychophysics.study_analysis import analyse_study
 from analysis.reports.diagnosis_report import render_diagnosis_report
 from analysis.reports.real_report import parameter_sentence
@@ -70,7 +70,7 @@ def test_on_the_report_of_a_study(simulate_study, protocol):
     trials = simulate_study(subjects=3)
     wave = np.exp(2j * np.pi * 25.0 * np.arange(2000) / 1000.0)
     samples = np.real(np.array([1.0, -0.5, 0.1j])[None, :] * wave[:, None])
-    ellipses = moment_ellipsoid(samples), phasor_ellipse(samples, 1000.0, 25.0)
+    ellipses = compute_moment_ellipsoid(samples), compute_phasor_ellipse(samples, 1000.0, 25.0)
     tilted = (EllipsoidResult(25.0, "direction_1", 1.0, *ellipses),)
     analysis = analyse_study(trials, turned)
     html = render_study_report(analysis, study_pictures(analysis, tilted), {}, "2026-01-02T03:04:05Z", tilted)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from analysis.figures.study_pictures import study_pictures
-from analysis.psychophysics.ellipsoid import EllipsoidResult, moment_ellipsoid, phasor_ellipse
+from analysis.psychophysics.ellipsoid import EllipsoidResult, compute_moment_ellipsoid, compute_phasor_ellipse
 from analysis.psychophysics.study_analysis import analyse_study
 from analysis.psychophysics.thresholds import RunEnd
 from analysis.reports.side_tables import detection_table, practice_table
@@ -62,7 +62,9 @@ def parse_page(html):
 def make_ellipsoid():
     wave = np.exp(2j * np.pi * 25.0 * np.arange(2000) / 1000.0)
     samples = np.real(np.array([1.0, 0.5, 0.1j])[None, :] * wave[:, None])
-    return EllipsoidResult(25.0, "direction_1", 1.0, moment_ellipsoid(samples), phasor_ellipse(samples, 1000.0, 25.0))
+    return EllipsoidResult(
+        25.0, "direction_1", 1.0, compute_moment_ellipsoid(samples), compute_phasor_ellipse(samples, 1000.0, 25.0)
+    )
 
 
 @pytest.fixture

@@ -46,7 +46,9 @@ class Experiment:
         began_s = time.process_time()
         lines = estimate_transfer([recording_of(bare)])
         cpu_s = time.process_time() - began_s
-        lines = lines.of_lines(lines.reliable).within(*IdentificationSettings(self.band_hz, self.order).fitted_hz)
+        lines = lines.select_lines(lines.reliable).select_band(
+            *IdentificationSettings(self.band_hz, self.order).fitted_hz
+        )
         estimate = (lines.frequency_hz, lines.response, np.sqrt(lines.noise_variance), cpu_s)
         return Data(*told, *estimate, self.band_hz, self.order)
 

@@ -11,7 +11,7 @@ from equalizer.effects.command_sign import CROSS_AXIS_TILTS, DIRECTION_PAIRS, SI
 from equalizer.effects.discovered_law import Channels
 from equalizer.effects.placing import place_effects, place_of_effect
 from equalizer.effects.simulation.simulator import simulate_mechanism
-from equalizer.laws.law import law_of
+from equalizer.laws.law import parse_law
 from equalizer.plant.mechanical_model import ModelEffect
 
 RATE_HZ, SAMPLES = 1000.0, 1500
@@ -90,7 +90,7 @@ def test_a_stop_beyond_zero_turns_with_its_side(bench):
 
 
 def test_a_stop_beyond_zero_pushes_as_its_law_written_out(bench):
-    law = law_of("-1e4*maximum(y + 2e-4, 0)", "force", "y")
+    law = parse_law("-1e4*maximum(y + 2e-4, 0)", "force", "y")
     answers = [
         simulate_mechanism(model, COMMANDS, RATE_HZ, place_effects(model, Channels(INPUTS, OUTPUTS))).response
         for effect in (
@@ -117,10 +117,10 @@ def test_an_effect_of_all_axes_is_split_where_some_turn(bench):
 
 @pytest.mark.parametrize("text", ["-1e4*y**2 - 0.3", "-5.0*vy*abs(vy) + 20.0*x", "-0.2*sign(vy) + 0.1*fy", "300.0*z"])
 def test_a_law_without_a_name_turns_with_its_axis_and_its_signals(bench, text):
-    assert apart(bench, ModelEffect("discovered_law", "y", {}, law_of(text, "force", "y"))) < 1e-6
-    assert apart(bench, ModelEffect("discovered_law", "x", {}, law_of(text, "force", "x"))) < 1e-6
+    assert apart(bench, ModelEffect("discovered_law", "y", {}, parse_law(text, "force", "y"))) < 1e-6
+    assert apart(bench, ModelEffect("discovered_law", "x", {}, parse_law(text, "force", "x"))) < 1e-6
 
 
 @pytest.mark.parametrize("text", ["1.3*fy + 0.2", "fy - 0.3*fy**2"])
 def test_a_map_of_the_command_turns(bench, text):
-    assert apart(bench, ModelEffect("discovered_law", "y", {}, law_of(text, "command", "y"))) < 1e-9
+    assert apart(bench, ModelEffect("discovered_law", "y", {}, parse_law(text, "command", "y"))) < 1e-9

@@ -16,7 +16,7 @@ from equalizer.effects.simulation.forces_along_motion import effect_forces_along
 from equalizer.effects.simulation.mechanism_kernel import MAX_LAWS
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.laws.evaluate import evaluate
-from equalizer.laws.law import Law, law_of
+from equalizer.laws.law import Law, parse_law
 from equalizer.laws.parse import LawError
 from equalizer.plant.mechanical_model import MechanicalModel
 
@@ -28,7 +28,7 @@ COMMANDS = sosfilt(
 
 
 def at_y(text: str, acts_on: str = "force") -> PlacedEffect:
-    law = law_of(text, acts_on, "y")
+    law = parse_law(text, acts_on, "y")
     return PlacedEffect(law_effect(law), (1,), law_values(law))
 
 
@@ -124,7 +124,7 @@ def one_body() -> MechanicalModel:
 
 def test_a_relaxing_spring_is_that_of_a_linear_system():
     """Spring and damper in series: F = -k (x - y), y' = (x - y) / tau."""
-    law = law_of("-1500.0*(x - lag(x, 0.02))", "force", "x")
+    law = parse_law("-1500.0*(x - lag(x, 0.02))", "force", "x")
     channels = Channels(("u",), ("a",))
     played = simulate_mechanism(
         one_body(), COMMANDS[:, :1], RATE_HZ, [PlacedEffect(law_effect(law, channels), (0,), law_values(law))]
@@ -136,7 +136,7 @@ def test_a_relaxing_spring_is_that_of_a_linear_system():
 
 
 def test_the_force_is_what_the_formula_gives_along_the_motion(bench):
-    law = law_of("-40.0*abs(vy)**1.5*sign(vy) + 200.0*x*vy + 0.1*fx*tanh(y/0.001)", "force", "y")
+    law = parse_law("-40.0*abs(vy)**1.5*sign(vy) + 200.0*x*vy + 0.1*fx*tanh(y/0.001)", "force", "y")
     effect = PlacedEffect(law_effect(law), (1,), law_values(law))
     played = simulate_mechanism(bench.three_axes(), COMMANDS, RATE_HZ, [effect])
     columns = {
@@ -180,15 +180,15 @@ def test_a_law_of_nothing_changes_nothing(bench):
 def test_signals_are_called_by_axis_or_as_the_recording_calls_them():
     channels = Channels(("motor",), ("encoder",), "position")
     for text in ("-3.0*vx + 2.0*motor", "-3.0*vx + 2.0*fx", "-1.0*encoder"):
-        law_effect(law_of(text, "force", "motor"), channels)
+        law_effect(parse_law(text, "force", "motor"), channels)
     with pytest.raises(LawError, match="needs the signal 'vy'; there are t, x, vx, ax, fx, encoder, motor"):
-        law_effect(law_of("-3.0*vy", "force", "motor"), channels)
+        law_effect(parse_law("-3.0*vy", "force", "motor"), channels)
     with pytest.raises(LawError, match="needs the signal 'vx'; there are fx, motor, t"):
-        law_effect(law_of("fx - 3.0*vx", "command", "motor"), channels)
+        law_effect(parse_law("fx - 3.0*vx", "command", "motor"), channels)
 
 
 def test_a_law_for_other_axes_than_the_model_has_is_refused():
-    law = law_of("-3.0*vx", "force", "x")
+    law = parse_law("-3.0*vx", "force", "x")
     with pytest.raises(ValueError, match="is for 3 axes; the model has 1"):
         simulate_mechanism(
             one_body(), np.zeros((9, 1)), RATE_HZ, [PlacedEffect(law_effect(law), (0,), law_values(law))]

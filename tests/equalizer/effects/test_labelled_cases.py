@@ -9,8 +9,8 @@ import pytest
 from analysis.diagnosis.data.observed import observe
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
-from analysis.diagnosis.errors.output_error import evaluate_fit, fit, gather_evidence, sensitivity
-from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.errors.output_error import build_jacobian, evaluate_fit, fit, gather_evidence
+from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.search.starting_hypotheses import list_candidates
 from equalizer.effects.catalogue import EFFECTS
 from study.store.formats.mechanical_model_file import read_mechanical_model
@@ -38,9 +38,9 @@ def test_with_the_effect_that_it_names_a_case_is_explained_to_the_noise(shared, 
     effect = EFFECTS[truth["effect"]]
     record = observe(recording, model.outputs)
     measure = FreeSimulation((record,), NOISE, NOISE)
-    tuning = tuning_of(model, recording.command.channels)
+    tuning = make_tuning(model, recording.command.channels)
     nominal = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NO_EFFECTS)
-    known = sensitivity(measure, tuning, nominal.deviations, NO_EFFECTS)
+    known = build_jacobian(measure, tuning, nominal.deviations, NO_EFFECTS)
     retuned = fit(measure, tuning, nominal, known, 2)
     spread = "one" if truth["axis"] else "all"
     suggested = list_candidates([effect], gather_evidence(measure, tuning, retuned)[0])
@@ -49,7 +49,7 @@ def test_with_the_effect_that_it_names_a_case_is_explained_to_the_noise(shared, 
     found = evaluate_fit(measure, tuning, nominal.deviations, hypothesis)
     for _ in range(2):
         found = fit(measure, tuning, found, known, 5)
-        known = sensitivity(measure, tuning, found.deviations, found.hypothesis)
+        known = build_jacobian(measure, tuning, found.deviations, found.hypothesis)
     left = np.sqrt(np.mean(found.residuals[0][record.test] ** 2, axis=0))
     assert np.all(left < 1.08)
     (placed,) = found.hypothesis.list_placed_effects()

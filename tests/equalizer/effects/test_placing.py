@@ -8,10 +8,10 @@ from equalizer.effects.discovered_law import Channels, law_effect, law_values
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.placing import PlacingError, axis_letter, model_effects, place_effects
 from equalizer.effects.simulation.simulator import simulate_mechanism
-from equalizer.laws.law import law_of
+from equalizer.laws.law import parse_law
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import ModelEffect
-from equalizer.plant.mechanical_model_toml import mechanical_model_toml, parse_mechanical_model
+from equalizer.plant.mechanical_model_toml import format_mechanical_model, parse_mechanical_model
 
 INPUTS, OUTPUTS = ("fx", "fy", "fz"), ("ax", "ay", "az")
 
@@ -48,7 +48,7 @@ def test_what_was_fitted_is_written_and_read_back_the_same(bench, effect):
     )
     model = replace(bench.three_axes(), effects=model_effects((fitted,), INPUTS, OUTPUTS))
     assert [each.axis for each in model.effects] == (["y"] if one else [None])
-    (again,) = place_effects(parse_mechanical_model(mechanical_model_toml(model)), Channels(INPUTS, OUTPUTS))
+    (again,) = place_effects(parse_mechanical_model(format_mechanical_model(model)), Channels(INPUTS, OUTPUTS))
     assert again.effect is effect
     assert again.sites == fitted.sites
     assert {name: again.values[name] for name in values} == pytest.approx(values)
@@ -94,10 +94,10 @@ def test_a_channel_is_named_by_its_letter_where_that_is_enough(channels, letter)
     ],
 )
 def test_a_discovered_law_is_written_and_read_back_the_same(bench, text, acts_on):
-    law = law_of(text, acts_on, "y")
+    law = parse_law(text, acts_on, "y")
     fitted = PlacedEffect(law_effect(law), (1,), law_values(law))
     model = replace(bench.three_axes(), effects=model_effects((fitted,), INPUTS, OUTPUTS))
-    again = parse_mechanical_model(mechanical_model_toml(model))
+    again = parse_mechanical_model(format_mechanical_model(model))
     assert again.effects == (ModelEffect("discovered_law", "y", {}, law),)
     (placed_again,) = place_effects(again, Channels(INPUTS, OUTPUTS))
     assert (placed_again.sites, placed_again.values) == ((1,), law_values(law))
@@ -107,6 +107,6 @@ def test_a_discovered_law_is_written_and_read_back_the_same(bench, text, acts_on
 
 
 def test_a_law_of_a_signal_that_is_not_there_is_refused(bench):
-    effect = ModelEffect("discovered_law", "y", {}, law_of("-2.0*voltage", "force", "y"))
+    effect = ModelEffect("discovered_law", "y", {}, parse_law("-2.0*voltage", "force", "y"))
     with pytest.raises(PlacingError, match="discovered_law on y: the law needs the signal 'voltage'; there are"):
         placed(bench.three_axes(), effect)

@@ -64,13 +64,13 @@ def under_a_spring(plants, waves, stiffness, seed=0, periods=2, noise=1.0) -> Re
 
 def errors(estimate, truth, low_hz=5.0, high_hz=35.0):
     """Relative error by line, in the norm of matrices."""
-    band = estimate.within(low_hz, high_hz)
+    band = estimate.select_band(low_hz, high_hz)
     true = truth.response(band.frequency_hz)
     return np.linalg.norm(band.response - true, axis=(1, 2)) / np.linalg.norm(true, axis=(1, 2))
 
 
 def rms_error(estimate, truth, low_hz=5.0, high_hz=35.0) -> float:
     """As in the notes: power of all errors over power of all entries."""
-    band = estimate.within(low_hz, high_hz)
+    band = estimate.select_band(low_hz, high_hz)
     true = truth.response(band.frequency_hz)
     return float(np.linalg.norm(band.response - true) / np.linalg.norm(true))

@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from equalizer.laws.evaluate import evaluate
-from equalizer.laws.law import Law, law_of
+from equalizer.laws.law import Law, parse_law
 from equalizer.laws.parse import LawError, parse_formula
 from equalizer.laws.tree import Apply, Free, Node, Number, Variable, format_formula
 
 
 def test_numbers_with_a_point_are_free_and_whole_ones_are_form():
-    law = law_of("-4.1*abs(vy)**1.5*sign(vy) + 2*vy**3", "force", "y")
+    law = parse_law("-4.1*abs(vy)**1.5*sign(vy) + 2*vy**3", "force", "y")
     assert law.expression == "-p0*abs(vy)**p1*sign(vy) + 2*vy**3"
     assert law.numbers == (4.1, 1.5)
     assert law.variables == ("vy",)
@@ -20,9 +20,9 @@ def test_numbers_with_a_point_are_free_and_whole_ones_are_form():
 
 
 def test_the_text_has_five_digits_and_the_exact_text_all():
-    law = law_of("0.123456789*x", "force", "x")
+    law = parse_law("0.123456789*x", "force", "x")
     assert law.text == "0.12346*x"
-    assert law_of(law.exact_text, "force", "x") == law
+    assert parse_law(law.exact_text, "force", "x") == law
 
 
 def test_other_numbers_keep_their_sign_where_they_stand():
@@ -31,7 +31,7 @@ def test_other_numbers_keep_their_sign_where_they_stand():
     columns = {"x": np.array([2.0]), "vx": np.array([0.5])}
     expected = -2.0 + 2.0 * 0.25 + 2.0**-0.5 + 9.0
     assert evaluate(law, columns, 1000.0) == pytest.approx([expected])
-    assert evaluate(law_of(law.text, "force", "x"), columns, 1000.0) == pytest.approx([expected])
+    assert evaluate(parse_law(law.text, "force", "x"), columns, 1000.0) == pytest.approx([expected])
 
 
 LEAVES = st.one_of(
@@ -121,7 +121,7 @@ def test_a_formula_is_read_as_it_was_written(tree: Node, numbers: list[float]):
 )
 def test_what_is_not_in_the_language_is_refused_by_name_and_place(text: str, said: str):
     with pytest.raises(LawError) as error:
-        law_of(text, "force", "y")
+        parse_law(text, "force", "y")
     assert said in str(error.value)
 
 
@@ -129,13 +129,13 @@ def test_a_law_of_other_numbers_than_it_names_is_refused():
     with pytest.raises(LawError, match="names the free numbers p0, p2, but 2 are given"):
         Law("p0*x + p2", (1.0, 2.0), (), "force", "x")
     with pytest.raises(LawError, match="acts on force, command, response; not on 'motion'"):
-        law_of("x", "motion", "x")
+        parse_law("x", "motion", "x")
 
 
 def test_a_signal_that_is_not_there_is_named():
     with pytest.raises(LawError, match="needs the signal 'vz'; there are x"):
-        evaluate(law_of("2.0*vz*x", "force", "x"), {"x": np.zeros(3)}, 1000.0)
+        evaluate(parse_law("2.0*vz*x", "force", "x"), {"x": np.zeros(3)}, 1000.0)
 
 
 def test_the_time_counts_from_the_first_sample():
-    assert evaluate(law_of("2.0*t", "force", "x"), {"x": np.zeros(3)}, 10.0) == pytest.approx([0.0, 0.2, 0.4])
+    assert evaluate(parse_law("2.0*t", "force", "x"), {"x": np.zeros(3)}, 10.0) == pytest.approx([0.0, 0.2, 0.4])

@@ -7,7 +7,7 @@ from scipy.signal import lsim, lti
 
 from equalizer.effects.simulation.command_path import delay_mean, lag_mean
 from equalizer.laws.evaluate import evaluate, evaluate_held
-from equalizer.laws.law import law_of
+from equalizer.laws.law import parse_law
 
 RATE_HZ = 1000.0
 TIME_S = np.arange(3000) / RATE_HZ
@@ -15,7 +15,7 @@ SIGNAL = 0.3 + np.sin(2 * np.pi * 3 * TIME_S) + 0.2 * np.cos(2 * np.pi * 41 * TI
 
 
 def along(text: str) -> np.ndarray:
-    return evaluate(law_of(text, "force", "x"), {"x": SIGNAL, "vx": 2 * SIGNAL}, RATE_HZ)
+    return evaluate(parse_law(text, "force", "x"), {"x": SIGNAL, "vx": 2 * SIGNAL}, RATE_HZ)
 
 
 @pytest.mark.parametrize("tau_s", [1e-5, 0.004, 0.3, 100.0])
@@ -45,8 +45,8 @@ def test_a_delay_is_the_signal_of_before(delay_s: float, off: float):
 
 def test_operators_take_each_other():
     assert along("lag(delay(x, 0.05), 0.01) + 2*play(lag(vx, 0.02), 0.1)") == pytest.approx(
-        evaluate(law_of("lag(y, 0.01)", "force", "x"), {"y": along("delay(x, 0.05)")}, RATE_HZ)
-        + 2 * evaluate(law_of("play(y, 0.1)", "force", "x"), {"y": along("lag(vx, 0.02)")}, RATE_HZ)
+        evaluate(parse_law("lag(y, 0.01)", "force", "x"), {"y": along("delay(x, 0.05)")}, RATE_HZ)
+        + 2 * evaluate(parse_law("play(y, 0.1)", "force", "x"), {"y": along("lag(vx, 0.02)")}, RATE_HZ)
     )
 
 
@@ -57,5 +57,5 @@ def test_held_signals_are_delayed_and_lagged_as_commands_are():
         ("delay(fx, 0.05)", delay_mean(steps, 1 / RATE_HZ, 0.05), 1e-12),
         ("lag(fx, 0.05)", lag_mean(steps, 1 / RATE_HZ, 0.05), 1e-4),
     ):
-        held = evaluate_held(law_of(text, "command", "x"), {"fx": steps}, RATE_HZ)
+        held = evaluate_held(parse_law(text, "command", "x"), {"fx": steps}, RATE_HZ)
         assert held.mean(axis=0) == pytest.approx(expected, abs=off)

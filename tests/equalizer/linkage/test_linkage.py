@@ -5,9 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.linkage.calibration import CalibrationError, inertia_about
-from equalizer.linkage.grid import arm_azimuths, difference_error, difference_positions, symmetric_grid
-from equalizer.linkage.mirror_lines import asymmetry_words, complete_by_symmetry, line_asymmetry, reflection
+from equalizer.linkage.calibration import CalibrationError, estimate_local_inertia
+from equalizer.linkage.grid import (
+    compute_difference_error,
+    estimate_arm_azimuths,
+    list_difference_positions,
+    make_symmetric_grid,
+)
+from equalizer.linkage.mirror_lines import (
+    complete_by_symmetry,
+    compute_reflection,
+    measure_line_asymmetry,
+    write_asymmetry_warnings,
+)
 from tests.equalizer.linkage.truth import ARMS_DEG, calibration, rates, reading, readings
 
 AZIMUTHS = np.radians(ARMS_DEG)
@@ -16,44 +26,44 @@ AZIMUTHS = np.radians(ARMS_DEG)
 @pytest.mark.parametrize("turned_deg", [0.0, 15.0, -40.0])
 def test_the_arms_are_found_from_one_jacobian(turned_deg):
     arms_deg = ARMS_DEG + turned_deg
-    found = arm_azimuths(np.linalg.inv(rates(np.zeros(3), arms_deg)))
+    found = estimate_arm_azimuths(np.linalg.inv(rates(np.zeros(3), arms_deg)))
     np.testing.assert_allclose(np.exp(1j * found), np.exp(1j * np.radians(arms_deg)), atol=1e-12)
 
 
 def test_joints_that_count_backwards_change_no_arm():
     backwards = np.diag([-1.0, 1.0, -1.0]) @ rates(np.zeros(3))
-    np.testing.assert_allclose(np.degrees(arm_azimuths(np.linalg.inv(backwards))) % 360, ARMS_DEG)
+    np.testing.assert_allclose(np.degrees(estimate_arm_azimuths(np.linalg.inv(backwards))) % 360, ARMS_DEG)
 
 
 @pytest.mark.parametrize("arms_deg", [(90.0, 210.0, 300.0), (90.0, 90.0, 210.0), (0.0, 90.0, 180.0)])
 def test_arms_that_are_no_delta_s_are_refused(arms_deg):
     uneven = rates(np.zeros(3), np.array(arms_deg)) + 0.01 * np.arange(9).reshape(3, 3)
     with pytest.raises(CalibrationError, match="120 degrees apart"):
-        arm_azimuths(np.linalg.inv(uneven))
+        estimate_arm_azimuths(np.linalg.inv(uneven))
 
 
 def test_every_line_maps_the_grid_onto_itself():
-    grid = symmetric_grid(AZIMUTHS, 0.05, 0.04)
+    grid = make_symmetric_grid(AZIMUTHS, 0.05, 0.04)
     assert grid.shape == (185, 3) and not grid[0].any()
     for azimuth in AZIMUTHS:
-        images = grid @ reflection(azimuth)
+        images = grid @ compute_reflection(azimuth)
         distances = np.linalg.norm(images[:, None] - grid[None], axis=2).min(axis=1)
         assert distances.max() < 1e-12
 
 
 def test_like_arms_mirror_and_an_odd_one_is_named():
-    shares, _ = line_asymmetry(readings(), AZIMUTHS)
+    shares, _ = measure_line_asymmetry(readings(), AZIMUTHS)
     assert shares.max() < 1e-12
-    odd, where = line_asymmetry(readings(np.array([1e-3, 1.3e-3, 1e-3])), AZIMUTHS)
+    odd, where = measure_line_asymmetry(readings(np.array([1e-3, 1.3e-3, 1e-3])), AZIMUTHS)
     assert odd[1] < 1e-12 and odd[0] > 0.05 and odd[2] > 0.05
-    warnings = asymmetry_words(odd, where, ARMS_DEG)
+    warnings = write_asymmetry_warnings(odd, where, ARMS_DEG)
     assert len(warnings) == 3 and "The line at 210 degrees is a line of symmetry" in warnings[-1]
-    assert asymmetry_words(shares, where, ARMS_DEG) == ()
+    assert write_asymmetry_warnings(shares, where, ARMS_DEG) == ()
 
 
 def test_three_unlike_arms_are_said_and_none_is_blamed():
-    shares, where = line_asymmetry(readings(np.array([1e-3, 1.3e-3, 0.8e-3])), AZIMUTHS)
-    warnings = asymmetry_words(shares, where, ARMS_DEG)
+    shares, where = measure_line_asymmetry(readings(np.array([1e-3, 1.3e-3, 0.8e-3])), AZIMUTHS)
+    warnings = write_asymmetry_warnings(shares, where, ARMS_DEG)
     assert len(warnings) == 3 and not any("holds" in warning for warning in warnings)
 
 
@@ -76,7 +86,7 @@ def test_gravity_is_filled_in_by_the_upright_line_alone():
     sideways = replace(left, gravity_n=np.array([0.0, 0.3, 2.0]))
     (filled,), _ = complete_by_symmetry([sideways], AZIMUTHS, right.position_m[None])
     np.testing.assert_allclose(filled.gravity_n, [0.0, -0.3, 2.0], atol=1e-12)
-    about_another = reflection(AZIMUTHS[1]) @ left.position_m
+    about_another = compute_reflection(AZIMUTHS[1]) @ left.position_m
     (filled,), _ = complete_by_symmetry([sideways], AZIMUTHS, about_another[None])
     assert np.isnan(filled.gravity_n).all()
 
@@ -88,11 +98,11 @@ def test_a_place_without_an_image_stays_unknown():
 
 def test_a_jacobian_is_told_from_another_by_differences():
     true = np.linalg.inv(rates(np.zeros(3)))
-    places = difference_positions(np.zeros(3))
+    places = list_difference_positions(np.zeros(3))
     angles = places @ rates(np.zeros(3)).T
-    assert difference_error(true, places, angles) < 1e-12
-    assert difference_error(1.2 * true, places, angles) == pytest.approx(0.2)
-    assert difference_error(true.T, places, angles) > 0.4
+    assert compute_difference_error(true, places, angles) < 1e-12
+    assert compute_difference_error(1.2 * true, places, angles) == pytest.approx(0.2)
+    assert compute_difference_error(true.T, places, angles) > 0.4
 
 
 SPOILT = {
@@ -140,7 +150,7 @@ def test_gravity_may_be_unknown_where_it_was_filled_in():
 def test_inertia_and_its_slopes_are_those_of_the_formula():
     """The formula's inertia is a polynomial of the second degree: exactly found."""
     place, step = np.array([0.013, -0.02, 0.007]), 1e-5
-    inertia, slopes = inertia_about(calibration(readings()), place)
+    inertia, slopes = estimate_local_inertia(calibration(readings()), place)
     np.testing.assert_allclose(inertia, reading(place).inertia_kg, atol=1e-10)
     for axis in range(3):
         aside = step * np.eye(3)[axis]
@@ -151,4 +161,4 @@ def test_inertia_and_its_slopes_are_those_of_the_formula():
 def test_positions_in_a_plane_tell_no_slopes():
     flat = [each for each in readings() if each.position_m[0] == 0.0]
     with pytest.raises(ValueError, match="do not determine how the inertia changes"):
-        inertia_about(calibration(flat), np.zeros(3))
+        estimate_local_inertia(calibration(flat), np.zeros(3))

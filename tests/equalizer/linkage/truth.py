@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from equalizer.linkage.calibration import LinkageCalibration, LinkageReading
-from equalizer.linkage.grid import arm_azimuths, symmetric_grid
+from equalizer.linkage.grid import estimate_arm_azimuths, make_symmetric_grid
 from equalizer.signals.signal import FloatArray
 
 ARMS_DEG = np.array([90.0, 210.0, 330.0])
@@ -33,7 +33,7 @@ def reading(position_m: FloatArray, weights: FloatArray | None = None) -> Linkag
 
 def readings(weights: FloatArray | None = None) -> list[LinkageReading]:
     centre = reading(np.zeros(3)).jacobian
-    return [reading(position, weights) for position in symmetric_grid(arm_azimuths(centre), 0.05, 0.04)]
+    return [reading(position, weights) for position in make_symmetric_grid(estimate_arm_azimuths(centre), 0.05, 0.04)]
 
 
 def calibration(of: list[LinkageReading], **changed: object) -> LinkageCalibration:

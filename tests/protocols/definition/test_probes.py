@@ -20,7 +20,7 @@ def text_of(small_text: str, addition: str) -> str:
 
 
 def test_a_table_that_is_not_written_changes_no_fingerprint_and_plays_nothing(small_text, small_protocol):
-    assert not small_protocol.probes.played
+    assert not small_protocol.probes.is_enabled
     written_out = load_protocol(f"{small_text}\n[probes]\nlevels_n = []\n", "small.toml")
     assert protocol_hash(written_out) == protocol_hash(small_protocol)
     assert protocol_hash(load_protocol(text_of(small_text, PROBES), "small.toml")) != protocol_hash(small_protocol)

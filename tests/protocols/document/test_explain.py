@@ -5,14 +5,14 @@ from importlib.resources import files
 
 import pytest
 
-from protocols.document.explain import explain
+from protocols.document.explain import explain_protocol
 from protocols.document.loading import load_protocol
 
 NAMES = tuple(sorted(path.name.removesuffix(".toml") for path in files("protocols").iterdir() if ".toml" in path.name))
 
 
 def fields_of(name: str):
-    return explain(load_protocol(files("protocols").joinpath(f"{name}.toml").read_text("utf-8"), name))
+    return explain_protocol(load_protocol(files("protocols").joinpath(f"{name}.toml").read_text("utf-8"), name))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -31,7 +31,7 @@ def test_every_key_is_listed_once(name):
 
 def test_a_field_shows_value_default_and_what_is_allowed(threshold):
     faster = replace(threshold, stimulus=replace(threshold.stimulus, fade_in_s=0.3))
-    field = {field.key: field for field in explain(faster)}["stimulus.fade_in_s"]
+    field = {field.key: field for field in explain_protocol(faster)}["stimulus.fade_in_s"]
     assert (field.value, field.default) == (0.3, 0.5)
     assert field.allowed == "a number above 0 up to 5, in seconds"
     assert "no onset reveals the direction" in field.description

@@ -16,7 +16,7 @@ from protocols.definition.study_protocol import ScheduleSettings
 from protocols.procedure.schedule import (
     Draw,
     are_labels_swapped,
-    detection_direction,
+    draw_detection_direction,
     draw_trial,
     draw_words,
     is_catch_trial,
@@ -68,7 +68,7 @@ def test_one_trial_in_each_block_is_a_catch_trial_at_a_place_that_is_drawn():
 
 def test_the_direction_of_a_detection_trial_tells_nothing_of_its_interval():
     intervals = np.array([draw_trial(RANDOM, "random", 7, 2, trial, 0).direction for trial in range(4000)])
-    along = np.array([detection_direction(7, 2, trial, 0) for trial in range(4000)])
+    along = np.array([draw_detection_direction(7, 2, trial, 0) for trial in range(4000)])
     assert set(along) == {1, 2}
     assert abs(np.corrcoef(intervals, along)[0, 1]) < 0.06
 

@@ -293,7 +293,7 @@ def test_without_a_sensor_no_daily_check_begins(run, monkeypatch, tmp_path):
 @pytest.mark.parametrize(("fine", "code"), [(True, ExitCode.DONE), (False, ExitCode.DEVICE)])
 def test_a_daily_check_that_told_nothing_is_no_success(run, monkeypatch, tmp_path, fine, code):
     told = DeviceFinding("Noise", "", fine=fine, warning=not fine)
-    checked = daily_check.CheckedToday((told,), tmp_path / "a.json")
+    checked = daily_check.DailyCheckResult((told,), tmp_path / "a.json")
     monkeypatch.setattr(daily_check, "check_today", lambda *_: checked)
     setup = Examination((), DeviceReport("omega3", False, ()), None)
     monkeypatch.setattr(examine_setup, "examine_setup", lambda *_, on_progress: setup)

@@ -4,14 +4,14 @@ from pathlib import Path
 
 from typer.testing import CliRunner
 
-from equalizer.laws.law import law_of
+from equalizer.laws.law import parse_law
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from study.cli.main import app
 from study.store.formats.mechanical_model_file import write_mechanical_model
 
 
 def test_a_law_of_a_model_is_kept_as_an_effect(tmp_path: Path):
-    law = law_of("-4.1*abs(vx)**1.5*sign(vx)", "force", "x")
+    law = parse_law("-4.1*abs(vx)**1.5*sign(vx)", "force", "x")
     one = [[1.0]]
     effects = (ModelEffect("discovered_law", "x", {}, law),)
     write_mechanical_model(

@@ -13,7 +13,7 @@ from scipy.io import loadmat
 from protocols.definition.participant_text import Question
 from protocols.trial import Trial
 from study.cli.main import main
-from study.store.disk.csv_rows import column_names
+from study.store.disk.csv_rows import list_columns
 from study.store.disk.file_errors import UnusableFileError
 from study.store.formats.answer_table import AnswerColumn, AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
@@ -42,7 +42,7 @@ def logged(data: Path) -> list[Trial]:
 
 
 def test_every_column_is_described():
-    assert set(TRIAL_COLUMNS) == set(column_names(Trial))
+    assert set(TRIAL_COLUMNS) == set(list_columns(Trial))
 
 
 @pytest.mark.slow
@@ -103,7 +103,7 @@ def test_a_count_that_is_none_is_not_believed(data, tmp_path, count):
     changed = written.replace('"left_out_count": 0', f'"left_out_count": {count}')
     assert changed != written
     facts.write_text(changed, "utf-8")
-    assert collect_exported(tmp_path / "ds").left_out == ()
+    assert collect_exported(tmp_path / "ds").exclusions == ()
 
 
 @pytest.mark.parametrize("form", ["psych-ds", "csv"])
@@ -113,7 +113,7 @@ def test_a_declaration_that_was_changed_after_the_export_is_refused(data, tmp_pa
     (protocol,) = (tmp_path / "ds").rglob("protocol.toml")
     text = protocol.read_text("utf-8")
     protocol.write_text(f"# A comment changes nothing.\n{text}", "utf-8")
-    assert collect_exported(tmp_path / "ds").locked
+    assert collect_exported(tmp_path / "ds").lock_statement
     declared = re.sub(r"\[analysis\]\n(.+\n)*", "", text)
     protocol.write_text(declared + '\n[analysis]\nprimary = "hierarchical"\n', "utf-8")
     capsys.readouterr()
@@ -146,9 +146,9 @@ def test_every_fact_of_an_export_is_described(data, tmp_path):
 
 
 def test_the_quality_of_models_comes_back_from_an_export(data, tmp_path):
-    collected = replace(collect_sessions(data), qualities=(("P01_001 and P02_001", "It predicts 90 %."),))
+    collected = replace(collect_sessions(data), model_qualities=(("P01_001 and P02_001", "It predicts 90 %."),))
     export_study(collected, data, tmp_path / "ds", "psych-ds")
-    assert collect_exported(tmp_path / "ds").qualities == collected.qualities
+    assert collect_exported(tmp_path / "ds").model_qualities == collected.model_qualities
 
 
 def test_one_table_has_every_trial_and_a_dictionary_of_its_columns(data, tmp_path):
@@ -156,7 +156,7 @@ def test_one_table_has_every_trial_and_a_dictionary_of_its_columns(data, tmp_pat
     assert read_trials(tmp_path / "csv" / "trials.csv") == tuple(logged(data))
     with (tmp_path / "csv" / "dictionary.csv").open(newline="", encoding="utf-8") as table:
         described = {row["column"]: row for row in csv.DictReader(table)}
-    assert list(described) == list(column_names(Trial))
+    assert list(described) == list(list_columns(Trial))
     assert described["level_n"]["unit"] == "N"
     assert {name: row["description"] for name, row in described.items()} == {
         name: words for name, (words, _) in TRIAL_COLUMNS.items()
@@ -181,7 +181,7 @@ def test_a_matlab_file_holds_every_trial(data, tmp_path):
     trials = logged(data)
     assert found["trials"]["level_n"].tolist() == [trial.level_n for trial in trials]
     assert list(found["trials"]["session"]) == [trial.session for trial in trials]
-    assert set(found["trials"]) == set(column_names(Trial))
+    assert set(found["trials"]) == set(list_columns(Trial))
     assert found["units"]["level_n"] == "N"
 
 

@@ -83,7 +83,7 @@ def test_a_page_with_figures_is_written(written, tmp_path, capsys):
 def test_missing_samples_and_short_recordings_are_drawn_too(lever, tmp_path):
     few = replace(
         lever,
-        **{name: getattr(lever, name).part(0, 5) for name in ("command", "response", "condition")},
+        **{name: getattr(lever, name).select_samples(0, 5) for name in ("command", "response", "condition")},
         segments=(),
     )
     holes = lever.response.samples.copy()

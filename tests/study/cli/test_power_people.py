@@ -5,14 +5,14 @@ import json
 import pytest
 
 from study.cli.main import main
-from study.workflows.planning.simulate_power import FINISHED_NAME
+from study.workflows.planning.simulate_power import PROGRESS_NAME
 
 ASKED = ("power", "--subjects", "3", "--studies", "10", "--workers", "1", "--effect-db", "0", "--seed", "4")
 
 
 def plan_of(out, *more):
     assert main([*ASKED, "--out", str(out), *more]) == 0
-    return json.loads((out / FINISHED_NAME).read_text().splitlines()[0])["plan"]["crowd"]
+    return json.loads((out / PROGRESS_NAME).read_text().splitlines()[0])["plan"]["crowd"]
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ pytest.importorskip("textual_serve")
 
 from aiohttp import ClientSession, WSServerHandshakeError
 
-from study.tui.web_server import origins
+from study.tui.web_server import list_origins
 
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
@@ -112,7 +112,7 @@ def server(tmp_path_factory):
     script = (
         "import sys; from study.tui import web_server; web_server.RELOAD_S = 2.0; "
         f"web_server.ScreenServer([sys.executable, {str(program)!r}], 'localhost', {port}, "
-        "say=lambda text: print(text, flush=True)).serve()"
+        "print_line=lambda text: print(text, flush=True)).serve()"
     )
     process = subprocess.Popen(
         [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
@@ -257,5 +257,5 @@ def test_a_second_window_is_refused_while_the_first_is_open(server):
 
 
 def test_our_page_has_the_names_that_a_browser_gives_it():
-    assert origins("localhost", 8000) == {f"http://{name}:8000" for name in ("localhost", "127.0.0.1", "[::1]")}
-    assert origins("lab-pc", 80) == {"http://lab-pc"}
+    assert list_origins("localhost", 8000) == {f"http://{name}:8000" for name in ("localhost", "127.0.0.1", "[::1]")}
+    assert list_origins("lab-pc", 80) == {"http://lab-pc"}

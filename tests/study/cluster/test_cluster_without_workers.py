@@ -15,7 +15,7 @@ import pytest
 from analysis.psychophysics.power.simulated_study import Crowd
 from study.errors import StudyError
 from study.workflows import cluster
-from study.workflows.cluster import cluster_workers
+from study.workflows.cluster import open_cluster_workers
 from study.workflows.planning.simulate_power import PowerPlan, simulate_power
 from tests.analysis.conftest import PUBLISHED
 
@@ -87,7 +87,7 @@ def test_without_workers_it_ends_in_words_and_goes_on_with_another(address, here
     with (
         a_worker(address) as worker,
         pytest.raises(StudyError, match="For 2 s the scheduler at .* had none") as ended,
-        cluster_workers(address) as pool,
+        open_cluster_workers(address) as pool,
     ):
         simulate_power(PLAN, out, pool, killing(worker))
     assert f"dask worker {address}" in ended.value.do_now
@@ -95,14 +95,14 @@ def test_without_workers_it_ends_in_words_and_goes_on_with_another(address, here
     assert ended.value.saved == "What was finished is kept."
     kept = (out / "studies.jsonl").read_text("utf-8").splitlines()
     assert 1 < len(kept) < 5  # the plan, and some of four pieces
-    with a_worker(address), cluster_workers(address) as pool:
+    with a_worker(address), open_cluster_workers(address) as pool:
         assert simulate_power(PLAN, out, pool, lambda _: None) == here
     assert (out / "studies.jsonl").read_text("utf-8").splitlines()[: len(kept)] == kept
 
 
 @pytest.mark.slow
 def test_another_worker_within_the_time_goes_on(address, here, tmp_path):
-    with a_worker(address) as worker, cluster_workers(address) as pool:
+    with a_worker(address) as worker, open_cluster_workers(address) as pool:
         late = []
         comes = threading.Timer(3.0, lambda: late.append(a_worker(address)) or late[0].__enter__())
         found = simulate_power(PLAN, tmp_path / "power", pool, killing(worker, comes.start))
@@ -121,7 +121,7 @@ def test_the_wait_for_a_worker_ends_at_once_by_ctrl_c(address, tmp_path):
         began.append(time.monotonic())
         interrupt.start()
 
-    with a_worker(address) as worker, pytest.raises(KeyboardInterrupt), cluster_workers(address) as pool:
+    with a_worker(address) as worker, pytest.raises(KeyboardInterrupt), open_cluster_workers(address) as pool:
         simulate_power(PLAN, tmp_path / "power", pool, killing(worker, begin))
     assert time.monotonic() - began[0] < 15.0
 
@@ -132,7 +132,7 @@ def test_a_scheduler_that_stands_still_ends_the_work_in_words(scheduler, monkeyp
     with (
         a_worker(address),
         pytest.raises(StudyError, match="The scheduler does not answer any more") as ended,
-        cluster_workers(address) as pool,
+        open_cluster_workers(address) as pool,
     ):
         pending = pool.submit(time.sleep, 600.0)
         monkeypatch.setattr(cluster, "SCHEDULER_TIMEOUT_S", 1.0)
@@ -156,7 +156,7 @@ def test_a_scheduler_that_stands_still_after_it_was_reached_ends_before_anything
         monkeypatch.setattr(cluster, "WORKER_TIMEOUT_S", 2.0)
         monkeypatch.setattr(distributed, "Client", reach)
         began = time.monotonic()
-        with pytest.raises(StudyError, match="The cluster does not answer") as ended, cluster_workers(address):
+        with pytest.raises(StudyError, match="The cluster does not answer") as ended, open_cluster_workers(address):
             pass
         monkeypatch.setattr(distributed, "Client", own)
     assert time.monotonic() - began < 30.0
@@ -167,7 +167,7 @@ def test_ctrl_c_ends_the_wait_for_a_scheduler_that_stands_still(scheduler):
     process, address = scheduler
     main = threading.main_thread().ident
     interrupt = threading.Timer(2.0, lambda: signal.pthread_kill(main, signal.SIGINT))
-    with a_worker(address), pytest.raises(KeyboardInterrupt), cluster_workers(address) as pool:
+    with a_worker(address), pytest.raises(KeyboardInterrupt), open_cluster_workers(address) as pool:
         pending = pool.submit(time.sleep, 600.0)
         process.send_signal(signal.SIGSTOP)
         began = time.monotonic()
@@ -185,14 +185,18 @@ def test_the_watch_outlives_a_count_that_fails_in_an_unforeseen_way(address, mon
     with (
         a_worker(address),
         pytest.raises(StudyError, match="AttributeError: unforeseen"),
-        cluster_workers(address) as pool,
+        open_cluster_workers(address) as pool,
     ):
         monkeypatch.setattr(distributed.Client, "nthreads", fail)
         pool.submit(time.sleep, 600.0).result()
 
 
 def test_workers_that_leave_while_they_are_asked_are_no_workers(monkeypatch):
-    monkeypatch.setattr(cluster, "_ask", lambda client: cluster._WorkerSetup({"tcp://w": cluster.hapteq_version()}, ()))
+    monkeypatch.setattr(
+        cluster,
+        "_request_worker_setup",
+        lambda client: cluster._WorkerSetup({"tcp://w": cluster.read_hapteq_version()}, ()),
+    )
     with pytest.raises(StudyError, match=r"The scheduler at tcp://s has no workers\."):
         cluster._require_workers(None, "tcp://s", one_thread=True)
 
@@ -201,7 +205,7 @@ def test_a_question_that_fails_by_a_time_limit_of_its_own_is_no_silence(monkeypa
     def fail(_):
         raise TimeoutError("Timed out during handshake")
 
-    monkeypatch.setattr(cluster, "_ask", fail)
+    monkeypatch.setattr(cluster, "_request_worker_setup", fail)
     with pytest.raises(StudyError, match="asking its workers failed: Timed out during handshake") as ended:
         cluster._require_workers(None, "tcp://s", one_thread=False)
     assert "said nothing more" not in str(ended.value) and ended.value.saved == "Nothing was begun."

@@ -12,7 +12,7 @@ from study.evaluation.bank.prove import prove
 from study.evaluation.bank.seal_cases import BankPlan
 from study.evaluation.bank.sealed_bank import BankOptions
 from study.evaluation.real.real_recordings import RealPlan, diagnose_folder
-from study.workflows.cluster import cluster_workers
+from study.workflows.cluster import open_cluster_workers
 from tests.one_axis_recording import MAP, MODEL, OFFSET, played
 
 pytestmark = pytest.mark.real_time
@@ -44,7 +44,7 @@ def test_a_bank_is_answered_on_a_cluster_as_it_is_here(local, kill_a_worker, tmp
         if what == "diagnosing":
             kill_a_worker(done)
 
-    with cluster_workers(local.scheduler_address, one_thread=True) as pool:
+    with open_cluster_workers(local.scheduler_address, one_thread=True) as pool:
         there = prove(tmp_path / "there", plan, BankOptions(executor=pool), on_progress)
     assert kill_a_worker.killed
     assert ("diagnosing", 1) in steps and steps[-1][1] == len(here.outcomes)
@@ -77,7 +77,7 @@ def test_real_recordings_are_answered_on_a_cluster_as_they_are_here(folder, loca
             kill_a_worker(1)
 
     plan = RealPlan(folder, tmp_path / "there")
-    with cluster_workers(local.scheduler_address, one_thread=True) as pool:
+    with open_cluster_workers(local.scheduler_address, one_thread=True) as pool:
         there = diagnose_folder(plan, on_progress, executor=pool)
         assert kill_a_worker.killed
         kept = {path: path.stat().st_mtime_ns for path in plan.out.rglob(ANSWER)}
@@ -92,6 +92,6 @@ def test_real_recordings_are_answered_on_a_cluster_as_they_are_here(folder, loca
 
 def test_seconds_of_a_processor_are_no_limit_on_other_machines(folder, local, tmp_path):
     refused = pytest.raises(WrongUseError, match="Leave --seconds out")
-    with cluster_workers(local.scheduler_address) as pool, refused:
+    with open_cluster_workers(local.scheduler_address) as pool, refused:
         diagnose_folder(RealPlan(folder, tmp_path / "out", seconds=20.0), lambda *_: None, executor=pool)
     assert not (tmp_path / "out").exists()

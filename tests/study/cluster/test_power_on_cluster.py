@@ -10,7 +10,7 @@ from protocols.definition.staircase_rule import StaircaseRule, StepPhase
 from study.cli.main import main
 from study.errors import StudyError
 from study.workflows import cluster
-from study.workflows.cluster import cluster_workers
+from study.workflows.cluster import open_cluster_workers
 from study.workflows.planning.simulate_power import PowerPlan, simulate_power
 
 pytestmark = pytest.mark.real_time
@@ -35,7 +35,7 @@ def here(plan, tmp_path_factory):
 @pytest.mark.timeout(300)
 def test_a_cluster_gives_the_same_numbers_to_the_bit(plan, local, here, tmp_path):
     finished = []
-    with cluster_workers(local.scheduler_address) as pool:
+    with open_cluster_workers(local.scheduler_address) as pool:
         assert simulate_power(plan, tmp_path / "power", pool, finished.append) == here
     assert finished[-1] == 60
 
@@ -43,7 +43,7 @@ def test_a_cluster_gives_the_same_numbers_to_the_bit(plan, local, here, tmp_path
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_worker_that_dies_loses_no_study(plan, local, here, kill_a_worker, tmp_path):
-    with cluster_workers(local.scheduler_address) as pool:
+    with open_cluster_workers(local.scheduler_address) as pool:
         assert simulate_power(plan, tmp_path / "power", pool, kill_a_worker) == here
     assert kill_a_worker.killed
 
@@ -51,14 +51,14 @@ def test_a_worker_that_dies_loses_no_study(plan, local, here, kill_a_worker, tmp
 @pytest.mark.timeout(300)
 def test_workers_of_another_version_are_refused(plan, local, monkeypatch):
     monkeypatch.setattr(cluster, "version", lambda _: "0.0.0")  # of this process: workers import their own
-    with pytest.raises(StudyError, match="same version"), cluster_workers(local.scheduler_address):
+    with pytest.raises(StudyError, match="same version"), open_cluster_workers(local.scheduler_address):
         pass
 
 
 @pytest.mark.timeout(120)
 def test_a_scheduler_without_workers_is_refused():
     alone = distributed.LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address="127.0.0.1:0")
-    with alone, pytest.raises(StudyError, match="has no workers"), cluster_workers(alone.scheduler_address):
+    with alone, pytest.raises(StudyError, match="has no workers"), open_cluster_workers(alone.scheduler_address):
         pass
 
 
@@ -68,7 +68,7 @@ def test_workers_with_several_threads_are_refused_for_work_that_needs_a_process(
         n_workers=1, threads_per_worker=2, processes=True, host="127.0.0.1", dashboard_address="127.0.0.1:0"
     )
     refused = pytest.raises(StudyError, match="--nthreads 1")
-    with two, refused, cluster_workers(two.scheduler_address, one_thread=True):
+    with two, refused, open_cluster_workers(two.scheduler_address, one_thread=True):
         pass
 
 
@@ -76,7 +76,7 @@ def test_workers_with_several_threads_are_refused_for_work_that_needs_a_process(
 @pytest.mark.timeout(120)
 def test_a_scheduler_that_is_lost_is_reported(plan, tmp_path):
     lost = distributed.LocalCluster(n_workers=1, host="127.0.0.1", dashboard_address="127.0.0.1:0")
-    with lost, pytest.raises(StudyError, match="did not do this"), cluster_workers(lost.scheduler_address) as pool:
+    with lost, pytest.raises(StudyError, match="did not do this"), open_cluster_workers(lost.scheduler_address) as pool:
         simulate_power(plan, tmp_path / "power", pool, lambda finished: finished and lost.close())
     kept = (tmp_path / "power" / "studies.jsonl").read_text("utf-8").splitlines()
     assert 1 < len(kept) < 7  # the plan, and some of six pieces
@@ -86,9 +86,9 @@ def test_a_scheduler_that_is_lost_is_reported(plan, tmp_path):
 @pytest.mark.timeout(120)
 def test_an_error_of_the_executor_is_a_lost_scheduler_only_where_one_is_lost():
     here = distributed.LocalCluster(n_workers=1, host="127.0.0.1", dashboard_address="127.0.0.1:0")
-    with pytest.raises(ValueError, match="of the work itself"), cluster_workers(here.scheduler_address):
+    with pytest.raises(ValueError, match="of the work itself"), open_cluster_workers(here.scheduler_address):
         raise ValueError("of the work itself")
-    with here, pytest.raises(StudyError, match="did not do this"), cluster_workers(here.scheduler_address) as pool:
+    with here, pytest.raises(StudyError, match="did not do this"), open_cluster_workers(here.scheduler_address) as pool:
         here.close()
         wait([pool.submit(len, ())], timeout=60)
         raise ValueError("too many values to unpack")
@@ -104,7 +104,7 @@ def test_work_of_a_client_that_gave_its_scheduler_up_is_reported(given, monkeypa
         distributed, "Client", lambda *args, **settings: clients.append(own(*args, **settings)) or clients[0]
     )
     gone = distributed.LocalCluster(n_workers=1, host="127.0.0.1", dashboard_address="127.0.0.1:0")
-    with gone, pytest.raises(StudyError, match="did not do this"), cluster_workers(gone.scheduler_address) as pool:
+    with gone, pytest.raises(StudyError, match="did not do this"), open_cluster_workers(gone.scheduler_address) as pool:
         gone.close()
         begun = [pool.submit(len, ())] if given == "before" else []
         while clients[0].status != "closed":
@@ -124,7 +124,7 @@ def test_without_the_package_it_is_said_what_to_install(monkeypatch):
     import sys
 
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(StudyError, match=r"hapteq\[cluster\]"), cluster_workers("tcp://127.0.0.1:9"):
+    with pytest.raises(StudyError, match=r"hapteq\[cluster\]"), open_cluster_workers("tcp://127.0.0.1:9"):
         pass
 
 

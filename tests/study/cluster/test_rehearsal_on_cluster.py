@@ -7,7 +7,7 @@ import pytest
 
 from protocols.document.loading import load_protocol
 from study.store.sessions.archive import list_session_folders
-from study.workflows.cluster import cluster_workers
+from study.workflows.cluster import open_cluster_workers
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.rehearse_study import Rehearsal, rehearse_study
 
@@ -50,7 +50,7 @@ def elsewhere(rehearsal, tmp_path):
 @pytest.mark.timeout(300)
 def test_a_cluster_plays_the_same_sessions_and_keeps_those_that_are_there(rehearsal, local, here, tmp_path):
     there, done = elsewhere(rehearsal, tmp_path), []
-    with cluster_workers(local.scheduler_address, one_thread=True) as pool:
+    with open_cluster_workers(local.scheduler_address, one_thread=True) as pool:
         rehearse_study(there, pool, done.append)
         assert done == [1, 2, 3]
         assert tables(there.data) == here
@@ -66,7 +66,7 @@ def test_a_cluster_plays_the_same_sessions_and_keeps_those_that_are_there(rehear
 @pytest.mark.timeout(300)
 def test_a_worker_that_dies_loses_no_session(rehearsal, local, here, kill_a_worker, tmp_path):
     there = elsewhere(rehearsal, tmp_path)
-    with cluster_workers(local.scheduler_address, one_thread=True) as pool:
+    with open_cluster_workers(local.scheduler_address, one_thread=True) as pool:
         rehearse_study(there, pool, kill_a_worker)
     assert kill_a_worker.killed
     assert tables(there.data) == here
@@ -76,7 +76,7 @@ def test_a_worker_that_dies_loses_no_session(rehearsal, local, here, kill_a_work
 @pytest.mark.timeout(300)
 def test_a_session_that_was_begun_here_is_finished(rehearsal, local, here, session_logs, tmp_path):
     there = elsewhere(rehearsal, tmp_path)
-    with cluster_workers(local.scheduler_address, one_thread=True) as pool:
+    with open_cluster_workers(local.scheduler_address, one_thread=True) as pool:
         rehearse_study(there, pool, lambda done: None)
         first, second = list_session_folders(there.data)[:2]
         log = first.log.read_bytes()

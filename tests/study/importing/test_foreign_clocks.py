@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from study.importing.arrays.arrays import read_arrays
-from study.importing.header_map import header_map
+from study.importing.header_map import make_header_map
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError, MapNeededError
-from study.importing.map_skeleton import map_skeleton
+from study.importing.map_skeleton import make_map_skeleton
 from study.store.disk.file_errors import UnusableFileError
 from study.workflows.recording.import_recording import read_foreign
 from tests.recording_maps import N, U, Y, built, map_text, refusal
@@ -143,7 +143,7 @@ def test_equal_clocks_and_empty_columns_are_left_out_and_that_is_said(tmp_path):
         "Left out: 'time_ms [ms]' is the same time as 'time [s]'.",
         "Left out: 'Time rel [s]' is the same time as 'time [s]'.",
     ]
-    text = map_skeleton(read_arrays(tmp_path / "a.csv", CsvMap()))
+    text = make_map_skeleton(read_arrays(tmp_path / "a.csv", CsvMap()))
     assert (text.count("[[clock]]"), text.count("[[channel]]")) == (1, 2)
     assert "# spare [V] holds no numbers at all" in text
 
@@ -153,13 +153,13 @@ def test_clocks_that_differ_are_not_left_out(tmp_path):
     rows = [f"{k / 50:.3f},{k / 50.5:.3f},{k % 7},{k % 5}" for k in range(60)]
     (tmp_path / "a.csv").write_text("\n".join((header, *rows)) + "\n")
     arrays = read_arrays(tmp_path / "a.csv", CsvMap())
-    assert header_map(arrays) is None
-    assert map_skeleton(arrays).count("[[clock]]") == 2
+    assert make_header_map(arrays) is None
+    assert make_map_skeleton(arrays).count("[[clock]]") == 2
 
 
 def test_a_coarse_time_is_proposed_as_the_time_and_its_import_names_the_rate(files):
     path = files(t=np.floor(np.arange(N) / 2) / 100, u=U, y=Y)
-    assert 'time = "t"' in map_skeleton(read_arrays(path, CsvMap()))
+    assert 'time = "t"' in make_map_skeleton(read_arrays(path, CsvMap()))
     assert "as in rate_hz = 200.5" in refusal(map_text(CLOCK), path)
 
 

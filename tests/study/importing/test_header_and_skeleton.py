@@ -5,12 +5,12 @@ import pytest
 
 from study.importing.arrays.arrays import Arrays, read_arrays
 from study.importing.build_recording import build_recording
-from study.importing.header_map import header_map, header_notes, header_problems
+from study.importing.header_map import describe_header_choices, find_header_problems, make_header_map
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import MapNeededError
 from study.importing.map_format.map_toml import parse_map
 from study.importing.map_format.signal_words import parse_signal_name, propose_roles, split_bracketed_unit
-from study.importing.map_skeleton import map_skeleton
+from study.importing.map_skeleton import make_map_skeleton
 from study.store.disk.file_errors import UnusableFileError
 from study.workflows.recording.import_recording import read_foreign
 
@@ -54,7 +54,7 @@ def test_a_header_is_a_name_and_a_unit(header, expected):
     ],
 )
 def test_a_header_with_units_needs_no_map(tmp_path, header, roles):
-    found = header_map(arrays(tmp_path, header))
+    found = make_header_map(arrays(tmp_path, header))
     assert found is not None
     assert [channel.role for channel in found.channel] == roles
 
@@ -62,7 +62,7 @@ def test_a_header_with_units_needs_no_map(tmp_path, header, roles):
 def test_arrays_of_one_length_whose_names_say_units_need_no_map(tmp_path):
     time = np.arange(20) / 100
     np.savez(tmp_path / "a.npz", t_s=time, force_N=time, position_mm=time)
-    found = header_map(read_arrays(tmp_path / "a.npz", CsvMap()))
+    found = make_header_map(read_arrays(tmp_path / "a.npz", CsvMap()))
     assert found is not None
     assert [(each.value, each.role, each.unit) for each in found.channel] == [
         ("force_N", "command", "N"),
@@ -80,14 +80,14 @@ def test_arrays_of_one_length_whose_names_say_units_need_no_map(tmp_path):
     ],
 )
 def test_a_channel_does_not_keep_a_unit_in_its_name_that_it_is_no_longer_in(tmp_path, header, names):
-    found = header_map(arrays(tmp_path, header))
+    found = make_header_map(arrays(tmp_path, header))
     assert found is not None
     assert [channel.name for channel in found.channel] == names
 
 
 def test_arrays_of_several_lengths_are_not_guessed_at(tmp_path):
     np.savez(tmp_path / "a.npz", t_s=np.arange(20.0), force_N=np.ones(20), position_mm=np.ones(10))
-    assert header_map(read_arrays(tmp_path / "a.npz", CsvMap())) is None
+    assert make_header_map(read_arrays(tmp_path / "a.npz", CsvMap())) is None
 
 
 def test_a_reference_is_no_response(tmp_path):
@@ -103,7 +103,7 @@ def test_a_reference_is_no_response(tmp_path):
      "time [furlong],fx [N],ax [g]"],
 )  # fmt: skip
 def test_a_header_that_leaves_something_open_is_not_guessed_at(tmp_path, header):
-    assert header_map(arrays(tmp_path, header)) is None
+    assert make_header_map(arrays(tmp_path, header)) is None
 
 
 @pytest.mark.parametrize(
@@ -121,11 +121,11 @@ def test_a_header_that_leaves_something_open_is_not_guessed_at(tmp_path, header)
     ],
 )  # fmt: skip
 def test_what_is_unclear_is_said_of_the_column_alone(tmp_path, header, said):
-    assert list(header_problems(arrays(tmp_path, header))) == said
+    assert list(find_header_problems(arrays(tmp_path, header))) == said
 
 
 def test_an_unknown_unit_stays_in_the_map_as_a_comment_and_other_columns_keep_what_they_say(tmp_path):
-    text = map_skeleton(arrays(tmp_path, "time [s],position [furlong],torque [Nm],battery [V],phase_A"))
+    text = make_map_skeleton(arrays(tmp_path, "time [s],position [furlong],torque [Nm],battery [V],phase_A"))
     assert "unit = \"\"                   # 'furlong' is not a unit known here" in text
     roles = [line.split('"')[1] for line in text.splitlines() if line.startswith("role")]
     units = [line.split('"')[1] for line in text.splitlines() if line.startswith("unit")]
@@ -138,7 +138,7 @@ def test_a_skeleton_names_every_array_and_is_refused_until_it_is_complete(tmp_pa
         {"drive_t_ms": np.arange(99.0), "speed": np.ones(99), "daq_time": np.arange(120.0), "y": np.ones((3, 120)),
          "force [N]": np.ones(120), "gain": np.array(3.0), "note": np.array("x"), "cube": np.ones((3, 3, 3))},
     )  # fmt: skip
-    text = map_skeleton(held)
+    text = make_map_skeleton(held)
     for words in (
         'time = "drive_t_ms"',
         'time_unit = "ms"',
@@ -158,7 +158,7 @@ def test_a_skeleton_names_every_array_and_is_refused_until_it_is_complete(tmp_pa
 
 def test_a_completed_skeleton_is_a_map(tmp_path):
     held = Arrays(tmp_path / "a.npz", {"fs": np.array(100.0), "u": np.ones(50), "y": np.ones(50)})
-    first, _, second = map_skeleton(held).partition('name = "y"')
+    first, _, second = make_map_skeleton(held).partition('name = "y"')
     complete = (
         first.replace('device = ""', 'device = "rig"').replace('role = "" ', 'role = "command" ', 1)
         .replace('role = "" ', 'role = "response" ', 1) + 'name = "y"' + second
@@ -202,7 +202,7 @@ def runs(*names):
     ],
 )  # fmt: skip
 def test_several_runs_in_a_file_are_proposed_as_parts(tmp_path, names, prefixes):
-    text = map_skeleton(Arrays(tmp_path / "a.npz", runs(*names) | {"fs": np.array(100.0)}))
+    text = make_map_skeleton(Arrays(tmp_path / "a.npz", runs(*names) | {"fs": np.array(100.0)}))
     assert [line for line in text.splitlines() if line.startswith("prefix")] == [f'prefix = "{p}"' for p in prefixes]
     assert text.count("[[channel]]") == (len(names) // len(prefixes) if prefixes else len(names))
 
@@ -210,7 +210,7 @@ def test_several_runs_in_a_file_are_proposed_as_parts(tmp_path, names, prefixes)
 def test_a_proposal_for_several_runs_needs_a_device_and_no_more(tmp_path):
     arrays = runs("A01__u_mm", "A01__y_N", "A02__u_mm", "A02__y_N")
     np.savez(tmp_path / "a.npz", fs_Hz=100.0, **arrays)
-    text = map_skeleton(read_arrays(tmp_path / "a.npz", CsvMap())).replace('device = ""', 'device = "rig"')
+    text = make_map_skeleton(read_arrays(tmp_path / "a.npz", CsvMap())).replace('device = ""', 'device = "rig"')
     found = build_recording(parse_map(text, tmp_path / "m.toml"), [tmp_path / "a.npz"]).recording
     assert (found.command.unit, found.response.unit, found.sample_rate_hz, len(found)) == ("m", "N", 100.0, 80)
     np.testing.assert_allclose(found.command.samples[40:, 0], arrays["A02__u_mm"] / 1000)
@@ -231,7 +231,7 @@ def test_a_proposal_for_several_runs_needs_a_device_and_no_more(tmp_path):
     ],
 )
 def test_roles_are_proposed_where_names_say_them(tmp_path, names, roles):
-    text = map_skeleton(Arrays(tmp_path / "a.npz", runs(*names)))
+    text = make_map_skeleton(Arrays(tmp_path / "a.npz", runs(*names)))
     found = [line.split('"')[1] for line in text.splitlines() if line.startswith("role = ")]
     assert found == roles
 
@@ -243,7 +243,7 @@ def test_a_number_in_hertz_is_the_rate_of_an_archive_and_its_runs_are_parts(tmp_
     }
     np.savez(tmp_path / "a.npz", fs_Hz=250.0, **runs)
     read = read_arrays(tmp_path / "a.npz", CsvMap())
-    built = build_recording(header_map(read), [tmp_path / "a.npz"], lambda share: None)
+    built = build_recording(make_header_map(read), [tmp_path / "a.npz"], lambda share: None)
     recording = built.recording
     assert recording.sample_rate_hz == 250.0
     assert len(recording) == 2 * count
@@ -263,7 +263,7 @@ def test_a_number_in_hertz_is_the_rate_of_an_archive_and_its_runs_are_parts(tmp_
 )
 def test_a_rate_without_a_unit_is_not_guessed_and_of_two_none_is_chosen(tmp_path, beside, problem):
     np.savez(tmp_path / "a.npz", force_N=np.ones(400), displacement_mm=np.ones(400), **beside)
-    assert any(problem in said for said in header_problems(read_arrays(tmp_path / "a.npz", CsvMap())))
+    assert any(problem in said for said in find_header_problems(read_arrays(tmp_path / "a.npz", CsvMap())))
 
 
 @pytest.mark.parametrize("none", ["N/A", "n/a", "-"])
@@ -283,16 +283,16 @@ def test_rms_and_peak_values_are_kept_with_a_note(tmp_path, unit, said):
         text = held.path.read_text().partition("\n")[2]
         held.path.write_text(f"{header}\n{text}")
         held = read_arrays(held.path, CsvMap())
-        wanted = header_map(held)
+        wanted = make_header_map(held)
         assert wanted is not None
         assert wanted.channel[0].unit == "A"
-        assert any("Rms or peak values" in note for note in header_notes(held, wanted)) == said
+        assert any("Rms or peak values" in note for note in describe_header_choices(held, wanted)) == said
 
 
 def test_names_of_many_columns_take_no_time_by_the_square(tmp_path):
     held = arrays(tmp_path, "time [s]," + ",".join(f"sensor_front_left_upper_raw_value_{k}" for k in range(300)))
     begin = time.process_time()
-    assert len(header_problems(held)) == 300
+    assert len(find_header_problems(held)) == 300
     assert time.process_time() - begin < 2
     with pytest.raises(MapNeededError) as refused:
         read_foreign((held.path,), None)

@@ -3,7 +3,7 @@ import pytest
 
 from study.importing.arrays.arrays import read_arrays
 from study.importing.map_format.import_map import CsvMap
-from study.importing.map_skeleton import map_skeleton
+from study.importing.map_skeleton import make_map_skeleton
 from study.workflows.recording.import_recording import read_foreign
 from tests.analysis.look.test_imposed_motion import TRIANGLE, driven_motion, hysteretic_force, smooth
 
@@ -47,7 +47,7 @@ def test_where_names_say_the_command_the_data_are_not_asked(tmp_path, names):
 
 def test_the_map_that_is_proposed_has_the_same_roles_and_says_so(tmp_path):
     path = table(tmp_path, "clock,displacement [mm],load [kN]", PULL, hysteretic_force(TRIANGLE)[:COUNT])
-    text = map_skeleton(read_arrays(path, CsvMap()))
+    text = make_map_skeleton(read_arrays(path, CsvMap()))
     roles = [line.split('"')[1] for line in text.splitlines() if line.startswith("role = ")]
     assert roles[-2:] == ["command", "response"]
     assert "# The motion is taken for the command" in text

@@ -8,9 +8,9 @@ import pytest
 from scipy.io import savemat
 
 from study.importing.arrays.arrays import read_arrays
-from study.importing.header_map import header_problems
+from study.importing.header_map import find_header_problems
 from study.importing.map_format.import_map import CsvMap
-from study.importing.map_skeleton import map_skeleton
+from study.importing.map_skeleton import make_map_skeleton
 from study.workflows.recording.import_recording import read_foreign
 from tests.recording_maps import built, map_text, refusal
 
@@ -54,7 +54,7 @@ def test_runs_whose_names_say_all_are_parts(tmp_path):
 
 def test_a_proposed_map_takes_the_longer_cells_and_says_how_to_add_the_others(tmp_path):
     path = written(tmp_path, u=cell(RUNS[:3]), y=cell(RUNS[:3]), u_test=cell(RUNS[3:]), y_test=cell(RUNS[3:]))
-    text = map_skeleton(read_arrays(path, CsvMap()))
+    text = make_map_skeleton(read_arrays(path, CsvMap()))
     assert [text.count(mark) for mark in ("[[channel]]", "\n[[part]]", "\n[[clock]]")] == [2, 3, 1]
     assert 'prefix = "2-of-2/" and let = { u = "u_test", y = "y_test" }' in text
     parts = '\n[[part]]\nprefix = "3-of-3/"\n[[part]]\nprefix = "2-of-2/"\nlet = { u = "u_test", y = "y_test" }\n'
@@ -64,14 +64,14 @@ def test_a_proposed_map_takes_the_longer_cells_and_says_how_to_add_the_others(tm
 
 def test_cells_of_other_lengths_are_not_taken_for_each_other(tmp_path):
     path = written(tmp_path, u=cell(RUNS[:2]), y=cell(RUNS[:3]), y_ref=cell(RUNS[:2]))
-    text = map_skeleton(read_arrays(path, CsvMap()))
+    text = make_map_skeleton(read_arrays(path, CsvMap()))
     assert "in cells of another length: " in text
     assert "let =" not in text
 
 
 def test_a_cell_of_single_numbers_holds_constants(tmp_path):
     path = written(tmp_path, gains=cell([1.0, 2.0]), u=RUNS[0], y=RUNS[0])
-    text = map_skeleton(read_arrays(path, CsvMap()))
+    text = make_map_skeleton(read_arrays(path, CsvMap()))
     assert "# 1-of-2/gains: one number, a constant for expressions" in text
     assert [text.count(mark) for mark in ("[[channel]]", "[[part]]")] == [2, 0]
 
@@ -82,7 +82,7 @@ def test_a_cell_of_anything_else_is_named_with_what_to_do(tmp_path, held):
     said = refusal(map_text(), path)
     assert "the array 'u' in a.mat holds text or objects, not real numbers: it is a cell" in said
     assert "in Matlab: u_1 = u{1}" in said
-    assert "# in Matlab: u_1 = u{1}" in map_skeleton(read_arrays(path, CsvMap()))
+    assert "# in Matlab: u_1 = u{1}" in make_map_skeleton(read_arrays(path, CsvMap()))
 
 
 def test_a_cell_that_says_more_than_it_holds_is_refused(tmp_path):
@@ -101,7 +101,7 @@ def test_what_objects_hold_is_not_offered_as_a_signal(tmp_path):
     path.write_bytes(path.read_bytes() + element(14, held + element(2, bytes(99))))
     arrays = read_arrays(path, CsvMap())
     assert list(arrays.by_name) == ["dt"]
-    assert header_problems(arrays) == ("it holds no arrays of numbers",)
+    assert find_header_problems(arrays) == ("it holds no arrays of numbers",)
 
 
 def test_cells_and_objects_of_the_later_format_are_named(tmp_path):
@@ -109,6 +109,6 @@ def test_cells_and_objects_of_the_later_format_are_named(tmp_path):
         file["u"], file["y"], file["held"] = np.zeros(4, "u8"), np.zeros((1, 6), "u4"), RUNS[0]
         file["u"].attrs["MATLAB_class"] = np.bytes_("cell")
         file["y"].attrs.update(MATLAB_class=np.bytes_("timeseries"), MATLAB_object_decode=3)
-    text = map_skeleton(read_arrays(tmp_path / "a.mat", CsvMap()))
+    text = make_map_skeleton(read_arrays(tmp_path / "a.mat", CsvMap()))
     assert "# u holds no numbers: it is a cell, which is read where the file was saved with -v7" in text
     assert "# y holds no numbers: it is an object of the class timeseries\n# in Matlab: y = struct('time'" in text

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from study.importing.arrays.arrays import Arrays
-from study.importing.header_map import header_map, header_problems
+from study.importing.header_map import find_header_problems, make_header_map
 from study.importing.map_format.signal_words import parse_signal_name
-from study.importing.map_skeleton import map_skeleton
+from study.importing.map_skeleton import make_map_skeleton
 
 
 def arrays(tmp_path, *names):
@@ -24,7 +24,7 @@ def arrays(tmp_path, *names):
      ("time_s", "input", "Speed_rpm"), ("time_s", "torque_Nm", "WSA_rad", "Yaw_Rate")],
 )  # fmt: skip
 def test_a_header_says_all(tmp_path, names):
-    wanted = header_map(arrays(tmp_path, *names))
+    wanted = make_header_map(arrays(tmp_path, *names))
     assert wanted is not None
     assert [channel.value for channel in wanted.channel if channel.role == "command"] == [names[1]]
     assert [channel.value for channel in wanted.channel if channel.role == "response"] == [names[-1]]
@@ -47,11 +47,11 @@ def test_an_end_that_may_be_a_word_stays_unsure(name):
 
 def test_the_output_of_a_loop_is_proposed_and_what_it_measures_stays_open(tmp_path):
     held = arrays(tmp_path, "Tiempo [s]", "Entrada", "Salida", "referencia")
-    roles = [line.split('"')[1] for line in map_skeleton(held).splitlines() if line.startswith("role")]
+    roles = [line.split('"')[1] for line in make_map_skeleton(held).splitlines() if line.startswith("role")]
     assert roles == ["command", "response", "helper"]
-    assert "nothing says what 'Salida' is" in header_problems(held)
+    assert "nothing says what 'Salida' is" in find_header_problems(held)
 
 
 def test_an_input_among_other_words_is_no_command(tmp_path):
-    wanted = header_map(arrays(tmp_path, "time [s]", "torque [Nm]", "input angle [rad]", "output speed [rpm]"))
+    wanted = make_header_map(arrays(tmp_path, "time [s]", "torque [Nm]", "input angle [rad]", "output speed [rpm]"))
     assert [channel.role for channel in wanted.channel] == ["command", "position", "response"]

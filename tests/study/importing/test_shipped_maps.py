@@ -115,11 +115,11 @@ def test_the_paddles_torque_is_what_its_firmware_commands(imported, shared):
     found = imported("haptic_paddle", "haptic_paddle_torque").recording
     logged = np.load(shared / "recordings" / "haptic_paddle" / "torque_sine.npz")
     begun_s = found.meta["parts"][0]["clock_start_s"]
-    torque = np.interp(logged["t_s"], begun_s + found.command.times_s(), found.command.samples[:, 0])
+    torque = np.interp(logged["t_s"], begun_s + found.command.compute_times_s(), found.command.samples[:, 0])
     delayed = 15 * 0.0011 * np.sin(2 * 3.14 * (logged["t_s"] - 0.000175))
     np.testing.assert_allclose(torque[:-2], delayed[:-2], atol=1e-6)
     np.testing.assert_allclose(delayed, 15 * logged["u_motor_Nm"], atol=2e-5)
-    angle = np.interp(begun_s + found.response.times_s(), logged["t_s"], logged["y_deg"])
+    angle = np.interp(begun_s + found.response.compute_times_s(), logged["t_s"], logged["y_deg"])
     np.testing.assert_allclose(np.degrees(found.response.samples[:, 0]), angle, atol=0.3)
 
 

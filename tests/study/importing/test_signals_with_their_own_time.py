@@ -8,17 +8,17 @@ from scipy.io import savemat
 
 from study.importing.arrays.arrays import read_arrays
 from study.importing.build_recording import build_recording
-from study.importing.header_map import header_problems
+from study.importing.header_map import find_header_problems
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_toml import parse_map
-from study.importing.map_skeleton import map_skeleton
+from study.importing.map_skeleton import make_map_skeleton
 
 SLOW, FAST = np.arange(200) / 100, np.arange(400) / 200
 FORCE, PLACE = np.sin(7 * SLOW), np.cos(7 * FAST)
 
 
 def proposed(path):
-    return map_skeleton(read_arrays(path, CsvMap()))
+    return make_map_skeleton(read_arrays(path, CsvMap()))
 
 
 def imported(path, text):
@@ -94,5 +94,5 @@ def test_an_object_of_matlab_is_named_with_what_to_save_instead(tmp_path):
     arrays = read_arrays(tmp_path / "a.mat", CsvMap())
     mend = "in Matlab: pos = struct('time', pos.Time, 'values', pos.Data)"
     said = f"it holds no arrays of numbers ('pos' is an object of the class timeseries); {mend}"
-    assert header_problems(arrays) == (said,)
-    assert "struct('time', pos.Time, 'values', pos.Data)" in map_skeleton(arrays)
+    assert find_header_problems(arrays) == (said,)
+    assert "struct('time', pos.Time, 'values', pos.Data)" in make_map_skeleton(arrays)

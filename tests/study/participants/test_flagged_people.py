@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from analysis.psychophysics.repeated_trials import repeat_warning
-from analysis.psychophysics.study_warnings import study_warnings
-from analysis.psychophysics.threshold_table import threshold_table
-from analysis.psychophysics.thresholds import thresholds
+from analysis.psychophysics.study_warnings import list_study_warnings
+from analysis.psychophysics.threshold_table import tabulate_thresholds
+from analysis.psychophysics.thresholds import compute_thresholds
 from protocols.procedure.staircase import begin_staircase, is_finished, level_n
 from protocols.trial import Phase, TrialStatus, VoidCause
 from study.participants.observer import PerceivedStimulus
@@ -53,8 +53,8 @@ def warnings_of(observer, seed, protocol, company):
     """What a study says of this person beside the others of it, one sentence after the other."""
     mine = session(observer, "P01", seed)
     trials = [*mine, *company]
-    rows = thresholds(trials, PUBLISHED)
-    said = study_warnings(trials, rows, threshold_table(rows, HZ), protocol)
+    rows = compute_thresholds(trials, PUBLISHED)
+    said = list_study_warnings(trials, rows, tabulate_thresholds(rows, HZ), protocol)
     return " ".join(sentence for sentence in (*said, repeat_warning(mine)) if "P01" in sentence)
 
 

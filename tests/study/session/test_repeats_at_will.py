@@ -12,7 +12,7 @@ import pytest
 
 from analysis.psychophysics.repeated_trials import repeat_warning
 from analysis.psychophysics.runs import recompute_runs
-from analysis.psychophysics.thresholds import threshold_of
+from analysis.psychophysics.thresholds import compute_run_threshold
 from protocols.trial import Phase, TrialStatus, VoidCause
 from study.participants.psychometric_curve import WeibullCurve
 from study.session.facts.events import AnswerGiven, TrialMeasured, TrialSpoiled
@@ -49,7 +49,7 @@ def run_of(facts, protocol, seed: int, rules: int, cause: VoidCause, unsure: flo
         action = next_action(state)
         state = apply_event(state, facts.presented(action))
         side = 1.0 if action.label == 1 else -1.0
-        fresh = side * CURVE.distance(action.level_n) / 2 + luck.normal()
+        fresh = side * CURVE.compute_d_prime(action.level_n) / 2 + luck.normal()
         evidence, looks = (evidence + fresh, looks + 1) if rules == 2 else (fresh, 1)
         allowed = cause is not VoidCause.ASKED or count_repeats_left(state) != 0
         if allowed and abs(evidence) / np.sqrt(looks) < unsure:
@@ -64,7 +64,11 @@ def run_of(facts, protocol, seed: int, rules: int, cause: VoidCause, unsure: flo
 
 def thresholds(facts, protocol, rules: int, cause: VoidCause, unsure: float, runs: int):
     each = [run_of(facts, protocol, seed, rules, cause, unsure) for seed in range(runs)]
-    return [threshold_of(run, protocol.staircase) for rows in each for run in recompute_runs(rows, protocol.staircase)]
+    return [
+        compute_run_threshold(run, protocol.staircase)
+        for rows in each
+        for run in recompute_runs(rows, protocol.staircase)
+    ]
 
 
 def check_the_attack(facts, protocol, runs: int):
@@ -157,6 +161,6 @@ def test_sessions_of_the_first_rules_have_no_limit(facts, protocol):
 
 
 def test_the_band_of_the_attack_is_as_wide_as_stated():
-    near = CURVE.distance(0.85) / 2
+    near = CURVE.compute_d_prime(0.85) / 2
     unsure = NormalDist(near).cdf(UNSURE) - NormalDist(near).cdf(-UNSURE)
     assert unsure == pytest.approx(0.54, abs=0.03)

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from study.devices.simulated.compiled import pose
 from study.devices.simulated.layout import PLATFORM_DEPTH
 from study.devices.simulated.linkage import forward_kinematics
-from study.devices.simulated.packing import isotropic_depth_m, pack_parameters
+from study.devices.simulated.packing import compute_isotropic_depth_m, pack_parameters
 from study.devices.simulated.parameters import Linkage, Omega3Parameters
 
 PARAMETERS = pack_parameters(Omega3Parameters(), hand=False, place_m=(0, 0, 0))
@@ -40,7 +40,7 @@ def test_every_forearm_spans_from_its_elbow_to_the_platform(place):
     for angle, azimuth in zip(angles, np.radians(linkage.azimuths_deg), strict=True):
         radial = linkage.radius_m + linkage.upper_arm_m * np.cos(angle)
         elbow = [linkage.upper_arm_m * np.sin(angle), radial * np.cos(azimuth), radial * np.sin(azimuth)]
-        platform = place + np.array([isotropic_depth_m(linkage), 0, 0])
+        platform = place + np.array([compute_isotropic_depth_m(linkage), 0, 0])
         assert np.linalg.norm(platform - elbow) == pytest.approx(linkage.forearm_m, abs=1e-12)
 
 
@@ -78,9 +78,9 @@ def test_a_place_out_of_reach_still_gives_finite_angles():
 
 
 def test_the_depth_of_the_centre_is_what_the_kinematics_use():
-    assert PARAMETERS[PLATFORM_DEPTH] == isotropic_depth_m(Linkage())
+    assert PARAMETERS[PLATFORM_DEPTH] == compute_isotropic_depth_m(Linkage())
 
 
 def test_arms_too_short_for_an_isotropic_point_are_refused():
     with pytest.raises(ValueError, match=r"no isotropic point on the axis: .* between -1 and 1"):
-        isotropic_depth_m(Linkage(upper_arm_m=0.05))
+        compute_isotropic_depth_m(Linkage(upper_arm_m=0.05))

@@ -16,12 +16,12 @@ from study.devices.simulated.packing import pack_parameters
 from study.devices.simulated.parameters import Hand, Omega3Parameters
 from study.session.stimulus.delivered import HEAVIEST_KG, has_hardly_moved, measure_delivered
 from study.session.stimulus.held_stimulus import HeldStimulus
-from study.session.stimulus.stimulus import direction_vector
+from study.session.stimulus.stimulus import compute_direction_vector
 from study.store.formats.protocol_files import read_study_protocol
 from study.workflows.device_settings import device_settings
 
 PROTOCOL = read_study_protocol("direction_threshold").protocol
-VECTOR = direction_vector(TestDirections(), 1)
+VECTOR = compute_direction_vector(TestDirections(), 1)
 LEVEL_N = 1.0
 FRICTION_N = PROTOCOL.safety.plausibility.friction_n
 DEVICE_KG = build_omega3(1, hand=True).info.effective_mass_kg

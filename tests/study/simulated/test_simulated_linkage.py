@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.linkage.calibration import inertia_about
-from equalizer.linkage.grid import difference_error, difference_positions, symmetric_grid
+from equalizer.linkage.calibration import estimate_local_inertia
+from equalizer.linkage.grid import compute_difference_error, list_difference_positions, make_symmetric_grid
 from study.devices.rig import POSITION
 from study.devices.simulated.parameters import Linkage, Masses, Omega3Parameters
 from study.devices.simulated.simulated_linkage import SimulatedLinkage, fit_linkage, make_simulated_linkage
@@ -28,9 +28,9 @@ def told(parameters=OTHER, spoil=lambda reading: reading):
 def test_its_jacobian_is_the_derivative_of_its_own_positions():
     linkage = make_simulated_linkage()
     for place in ([0.0, 0, 0], [0.03, -0.02, 0.04]):
-        places = difference_positions(np.array(place))
+        places = list_difference_positions(np.array(place))
         angles = np.array([linkage.angles_at(each) for each in places])
-        assert difference_error(linkage.at(np.array(place)).jacobian, places, angles) < 1e-3
+        assert compute_difference_error(linkage.at(np.array(place)).jacobian, places, angles) < 1e-3
 
 
 def test_its_inertia_at_the_centre_is_what_it_says_as_a_device():
@@ -44,8 +44,8 @@ def test_its_inertia_at_the_centre_is_what_it_says_as_a_device():
 def test_slopes_of_its_inertia_are_found_from_the_grid(place_m):
     """Oracle: differences of the linkage's own equations. The grid knows nothing between its positions."""
     linkage, place, step = make_simulated_linkage(), np.array(place_m), 1e-4
-    grid = symmetric_grid(np.radians([90.0, 210.0, 330.0]), 0.05, 0.04)
-    slopes = inertia_about(calibration([linkage.at(each) for each in grid]), place)[1]
+    grid = make_symmetric_grid(np.radians([90.0, 210.0, 330.0]), 0.05, 0.04)
+    slopes = estimate_local_inertia(calibration([linkage.at(each) for each in grid]), place)[1]
     asides = step * np.eye(3)
     true = [(linkage.at(place + a).inertia_kg - linkage.at(place - a).inertia_kg) / (2 * step) for a in asides]
     np.testing.assert_allclose(slopes, true, atol=0.02 * np.abs(true).max())
@@ -83,13 +83,13 @@ def test_a_push_moves_it_as_the_calibrated_inertia_says(bench, place_m, axis):
     ticks, force_n = 60, 0.5
     moved = bench.play(rig, np.tile(force_n * np.eye(3)[axis], (ticks + 1, 1)))[:, POSITION]
     travelled = moved[ticks] - moved[0]
-    mobility = np.linalg.inv(inertia_about(told(), np.array(place_m))[0])[:, axis]
+    mobility = np.linalg.inv(estimate_local_inertia(told(), np.array(place_m))[0])[:, axis]
     np.testing.assert_allclose(travelled, 0.5 * force_n * mobility * (ticks / 1000) ** 2, rtol=0.04, atol=1e-4)
 
 
 def test_a_heavier_place_is_told_from_a_lighter_one(bench):
     """What the test above would not see if all places weighed the same."""
-    masses = [inertia_about(told(), np.array(place))[0][2, 2] for place in ([0, 0, 0.04], [0.0, 0, -0.04])]
+    masses = [estimate_local_inertia(told(), np.array(place))[0][2, 2] for place in ([0, 0, 0.04], [0.0, 0, -0.04])]
     assert masses[0] > 1.1 * masses[1]
 
 

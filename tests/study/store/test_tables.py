@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from analysis.psychophysics.thresholds import Threshold
 from protocols.trial import Phase, Trial, TrialStatus
-from study.store.disk.csv_rows import CsvError, describe_type, drop_absent_columns, rows_from_csv, rows_to_csv
+from study.store.disk.csv_rows import CsvError, describe_type, drop_absent_columns, format_csv_table, parse_csv_table
 from study.store.disk.file_errors import UnusableFileError
 from study.store.formats.thresholds_file import THRESHOLDS_HEADER, read_thresholds, write_thresholds
 from study.store.formats.trials_file import TRIALS_HEADER, read_trials, write_trials
@@ -43,7 +43,7 @@ trials = st.builds(
 @given(st.lists(trials, max_size=5))
 @settings(max_examples=60, deadline=None)
 def test_rows_are_read_back_to_the_last_digit(rows):
-    assert rows_from_csv(rows_to_csv(rows, Trial), Trial) == tuple(rows)
+    assert parse_csv_table(format_csv_table(rows, Trial), Trial) == tuple(rows)
 
 
 def test_the_columns_of_trials_begin_as_in_the_contract():
@@ -58,7 +58,7 @@ def test_the_columns_of_thresholds_begin_as_in_the_contract():
 
 def test_a_row_is_plain_text():
     unanswered = replace(TRIAL, answer=None, correct=None, felt=None)
-    first, second, third = rows_to_csv([TRIAL, unanswered], Trial).splitlines()
+    first, second, third = format_csv_table([TRIAL, unanswered], Trial).splitlines()
     assert first == ",".join(TRIALS_HEADER)
     assert (
         second
@@ -86,39 +86,39 @@ def test_thresholds_go_to_disk_and_back(tmp_path):
 
 
 def test_a_table_of_before_a_column_was_is_still_read():
-    lines = rows_to_csv([TRIAL], Trial).splitlines()
+    lines = format_csv_table([TRIAL], Trial).splitlines()
     older = "\n".join(line.removesuffix(LATER).removesuffix(",,,,,,,,,,,") for line in lines)
-    assert rows_from_csv(older, Trial) == (TRIAL,)
+    assert parse_csv_table(older, Trial) == (TRIAL,)
     foreign = older.replace("angle_deg", "remark").replace("135.0", "late")
-    assert rows_from_csv(foreign, Trial) == (replace(TRIAL, angle_deg=None),)
+    assert parse_csv_table(foreign, Trial) == (replace(TRIAL, angle_deg=None),)
 
 
 @pytest.mark.parametrize("absent", [LATER[LATER.index(name) - 1 :] for name in TIMES])
 def test_a_table_of_before_late_ticks_were_written_down_says_nothing_of_them(absent):
     late = replace(TRIAL, late_ticks=3, latest_s=0.0042, onset_s=12.5)
-    assert rows_from_csv(rows_to_csv([late], Trial), Trial) == (late,)
-    header, row = rows_to_csv([late], Trial).splitlines()
+    assert parse_csv_table(format_csv_table([late], Trial), Trial) == (late,)
+    header, row = format_csv_table([late], Trial).splitlines()
     columns_absent = absent.count(",")
     older = f"{header.removesuffix(absent)}\n{row.rsplit(',', columns_absent)[0]}\n"
-    (read,) = rows_from_csv(older, Trial)
+    (read,) = parse_csv_table(older, Trial)
     known = TIMES[: TIMES.index(absent.split(",")[1])]
     assert read == replace(TRIAL, **{name: getattr(late, name) for name in known})
 
 
 def test_columns_after_the_known_ones_do_no_harm():
-    lines = rows_to_csv([TRIAL], Trial).splitlines()
-    assert rows_from_csv(f"{lines[0]},more\r\n{lines[1]},1\r\n", Trial) == (TRIAL,)
+    lines = format_csv_table([TRIAL], Trial).splitlines()
+    assert parse_csv_table(f"{lines[0]},more\r\n{lines[1]},1\r\n", Trial) == (TRIAL,)
 
 
 @pytest.mark.parametrize("odd", ["\r", "a\rb", "a\nb", "\r\n", 'a"b', "a,b", " ", "", "\x00"])
 def test_a_name_may_hold_what_tables_are_made_of(odd):
     row = replace(TRIAL, session=odd)
-    assert rows_from_csv(rows_to_csv([row], Trial), Trial) == (row,)
+    assert parse_csv_table(format_csv_table([row], Trial), Trial) == (row,)
 
 
 def test_a_text_that_is_no_table_is_refused():
     with pytest.raises(CsvError, match="this is not CSV: new-line character seen in unquoted field"):
-        rows_from_csv("subject\rsession,x\n", Trial)
+        parse_csv_table("subject\rsession,x\n", Trial)
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_a_text_that_is_no_table_is_refused():
     ],
 )
 def test_every_fault_of_a_table_is_named_with_its_line(tmp_path, old, new, problem):
-    (tmp_path / "trials.csv").write_text(rows_to_csv([TRIAL], Trial).replace(old, new, 1))
+    (tmp_path / "trials.csv").write_text(format_csv_table([TRIAL], Trial).replace(old, new, 1))
     with pytest.raises(UnusableFileError) as refused:
         read_trials(tmp_path / "trials.csv")
     assert any(found.startswith(problem) for found in refused.value.problems), refused.value.problems
@@ -159,12 +159,12 @@ def test_a_faulty_table_of_thresholds_is_an_error_of_the_study(tmp_path):
 
 def test_an_empty_text_has_no_header():
     with pytest.raises(CsvError, match="column 1 of the header is missing; it must be 'subject'"):
-        rows_from_csv("", Trial)
+        parse_csv_table("", Trial)
 
 
 def test_of_many_faults_the_first_are_named_and_the_rest_counted():
     with pytest.raises(CsvError) as refused:
-        rows_from_csv(",".join(TRIALS_HEADER) + "\n" + "x\n" * 20, Trial)
+        parse_csv_table(",".join(TRIALS_HEADER) + "\n" + "x\n" * 20, Trial)
     assert len(refused.value.problems) == 9
     assert refused.value.problems[-1] == "and 12 more problems of this kind"
 
@@ -175,8 +175,8 @@ def test_columns_are_described_for_people():
 
 
 def test_a_table_of_before_a_column_was_added_agrees_with_rows_of_today():
-    before = "\n".join(line.rpartition(",")[0] for line in rows_to_csv((TRIAL,), Trial).splitlines()) + "\n"
-    (read,) = rows_from_csv(before, Trial)
+    before = "\n".join(line.rpartition(",")[0] for line in format_csv_table((TRIAL,), Trial).splitlines()) + "\n"
+    (read,) = parse_csv_table(before, Trial)
     assert drop_absent_columns(before, (TRIAL,), Trial) == (read,)
     last = fields(Trial)[-1]
     changed = replace(TRIAL, **{last.name: "something else", "level_n": 9.0})
@@ -186,7 +186,7 @@ def test_a_table_of_before_a_column_was_added_agrees_with_rows_of_today():
 @pytest.mark.parametrize("name", ["level_n", " answer", "mine"])
 def test_a_column_that_is_there_twice_is_refused(name, tmp_path):
     """Neither of both is taken; further columns of other names stay allowed, and so do empty ones at the end."""
-    header, row = rows_to_csv([TRIAL], Trial).splitlines()
+    header, row = format_csv_table([TRIAL], Trial).splitlines()
     path = tmp_path / "trials.csv"
     path.write_text(f"{header},mine,{name},,\n{row},1,2,,\n")
     with pytest.raises(UnusableFileError, match=f"names the column '{name.strip()}' twice"):

@@ -28,34 +28,34 @@ def dots(lines):
 
 def test_a_stroke_is_as_thick_as_it_says():
     canvas = Canvas(10, 5)
-    canvas.stroke((2, 10), (17, 10), 4.0)
-    assert dots(canvas.lines()) == {(x, y) for x in range(2, 18) for y in range(8, 13)}
+    canvas.draw_bar((2, 10), (17, 10), 4.0)
+    assert dots(canvas.render_lines()) == {(x, y) for x in range(2, 18) for y in range(8, 13)}
 
 
 def test_a_stroke_of_no_length_draws_nothing():
     canvas = Canvas(4, 2)
-    canvas.stroke((3, 3), (3, 3), 4.0)
-    assert not dots(canvas.lines())
+    canvas.draw_bar((3, 3), (3, 3), 4.0)
+    assert not dots(canvas.render_lines())
 
 
 def test_what_is_filled_outside_the_canvas_is_dropped():
     canvas = Canvas(4, 2)
-    canvas.fill(((-50, -50), (50, -50), (50, 50), (-50, 50)))
-    assert len(dots(canvas.lines())) == 8 * 8
+    canvas.fill_polygon(((-50, -50), (50, -50), (50, 50), (-50, 50)))
+    assert len(dots(canvas.render_lines())) == 8 * 8
 
 
 def test_a_disc_is_round():
     canvas = Canvas(20, 10)
-    canvas.disc(canvas.middle, 12.0)
-    drawn = dots(canvas.lines())
-    assert all(math.dist(dot, canvas.middle) <= 12.01 for dot in drawn)
+    canvas.draw_disc(canvas.centre, 12.0)
+    drawn = dots(canvas.render_lines())
+    assert all(math.dist(dot, canvas.centre) <= 12.01 for dot in drawn)
     assert len(drawn) == pytest.approx(math.pi * 144, rel=0.05)
 
 
 def test_a_circle_is_only_its_line():
     canvas = Canvas(20, 10)
-    canvas.circle(canvas.middle, 12.0)
-    assert all(11.0 <= math.dist(dot, canvas.middle) <= 13.0 for dot in dots(canvas.lines()))
+    canvas.draw_circle(canvas.centre, 12.0)
+    assert all(11.0 <= math.dist(dot, canvas.centre) <= 13.0 for dot in dots(canvas.render_lines()))
 
 
 @pytest.mark.parametrize("angle", [0.0, 20.0, 45.0, 70.0, 90.0, 135.0, 170.0])

@@ -31,7 +31,7 @@ def served():
 
     def run(visit):
         async def go():
-            server = ScreenServer(["none"], "localhost", 8000, say=lambda text: None)
+            server = ScreenServer(["none"], "localhost", 8000, print_line=lambda text: None)
             program = Program(server)
             await server.download_manager.create_download(
                 app_service=program, delivery_key="k", file_name="report.html", open_method="browser",

@@ -74,6 +74,20 @@ def test_a_log_that_cannot_be_followed_is_told_as_a_sentence(session):
         feed.close()
 
 
+def test_a_problem_is_over_once_the_log_can_be_read_again(session):
+    log = session / "events.jsonl"
+    intact = log.read_bytes()
+    log.write_bytes(b"{}\n")
+    feed = WatchFeed(str(session))
+    try:
+        assert until(lambda: feed.problem)
+        log.write_bytes(intact)
+        assert until(feed.latest).session == "P01_001"
+        assert until(lambda: not feed.problem)
+    finally:
+        feed.close()
+
+
 def test_a_reader_that_dies_is_reported(session):
     feed = WatchFeed(str(session))
     try:

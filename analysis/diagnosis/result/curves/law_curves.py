@@ -1,7 +1,8 @@
 """Signature curve of a discovered law: the missing force against the variable that explains most of the law's force.
 
 The variable is that of the largest correlation ratio (variance of bin means over variance). Where none reaches
-`_MAIN_SHARE`, the missing force is drawn against the law's own value, so that a correct law is a straight line.
+`_MAIN_CORRELATION_RATIO`, the missing force is drawn against the law's own value, so that a correct law is a straight
+line.
 """
 
 from collections.abc import Mapping
@@ -21,7 +22,7 @@ from equalizer.signals.unit_system import UnitSystem
 
 _EXTRAPOLATED_SHARE = 0.25
 """Share of the visited range by which a formula is drawn beyond it, on either side."""
-_MAIN_SHARE = 0.5
+_MAIN_CORRELATION_RATIO = 0.5
 """Correlation ratio of a law's force with one variable from which the curve is drawn against it alone. By hand."""
 _LINE_POINTS = 400
 """Number of points of a drawn law."""
@@ -37,33 +38,36 @@ class _Variable:
     """(n,)"""
 
 
-def law_signature(
+def compute_law_signature(
     evidence: Evidence, placed_effect: PlacedEffect, axes: tuple[str, ...], system: UnitSystem
 ) -> Signature | None:
-    """The curve of a discovered law along the measured motion; for a law of the command, of its change of the command.
-    None where it acts on a response, or depends on a signal other than time, motions and commands. axes: names."""
+    """Compute the curve of a discovered law along the measured motion; for a law of the command, of its change of the
+    command. None where it acts on a response, or depends on a signal other than time, motions and commands. axes:
+    names."""
     if placed_effect.effect.law is None or placed_effect.effect.law.acts_on == "response":
         return None
     law = law_with_values(placed_effect.effect.law, placed_effect.values)
     if law.acts_on == "command":
         command = COMMAND + axis_names(axes)[placed_effect.sites[0]]
         law = replace(law, expression=f"({law.expression}) - {command}", acts_on="force", units=())
-    variables = _variables(evidence, axes, system)
+    variables = _list_variables(evidence, axes, system)
     if not law.variables or not set(law.variables) <= variables.keys():
         return None
     rate_hz, axis = evidence.sample_rate_hz, placed_effect.sites[0]
     force = evaluate(law, {name: variables[name].values for name in law.variables}, rate_hz)
     used = (evidence.used > 0) & np.isfinite(force)
-    shares = {name: compute_correlation_ratio(variables[name].values[used], force[used]) for name in law.variables}
-    variable = variables[max(shares, key=lambda name: shares[name])]
-    abscissa, visited = variable.name, None
-    if max(shares.values()) < _MAIN_SHARE:  # only the variables together explain most of it
+    correlation_ratios = {
+        name: compute_correlation_ratio(variables[name].values[used], force[used]) for name in law.variables
+    }
+    variable = variables[max(correlation_ratios, key=lambda name: correlation_ratios[name])]
+    abscissa, visited_range = variable.name, None
+    if max(correlation_ratios.values()) < _MAIN_CORRELATION_RATIO:  # only the variables together explain most of it
         variable = _Variable(f"force of the law ({system.force})", force)
-        abscissa, law_at, values = variable.name, *_identity(force[used])
+        abscissa, law_abscissa, law_force = variable.name, *_make_identity_line(force[used])
     elif len(law.variables) == 1 and not has_memory(law):
-        law_at, values, visited = _evaluate_extrapolated(law, variable.values[used], rate_hz)
+        law_abscissa, law_force, visited_range = _evaluate_extrapolated(law, variable.values[used], rate_hz)
     else:
-        law_at, values = bin_law_means(variable.values[used], force[used])
+        law_abscissa, law_force = bin_law_means(variable.values[used], force[used])
     bin_centres, mean, spread = bin_means(variable.values, evidence.axis_force[:, axis], used, rate_hz)
     return Signature(
         placed_effect.effect.name,
@@ -73,14 +77,15 @@ def law_signature(
         bin_centres,
         mean,
         spread,
-        law_at,
-        values,
-        visited,
+        law_abscissa,
+        law_force,
+        visited_range,
     )
 
 
-def _variables(evidence: Evidence, axes: tuple[str, ...], system: UnitSystem) -> Mapping[str, _Variable]:
-    """Signals by their names in a formula: time, then position, velocity, acceleration and command of each axis."""
+def _list_variables(evidence: Evidence, axes: tuple[str, ...], system: UnitSystem) -> Mapping[str, _Variable]:
+    """List signals by their names in a formula: time, then position, velocity, acceleration and command of each
+    axis."""
     rate_hz, length = evidence.sample_rate_hz, system.length
     variables = {"t": _Variable("time (s)", np.arange(len(evidence.command)) / rate_hz)}
     for index, (axis, letter) in enumerate(zip(axes, axis_names(axes), strict=True)):
@@ -94,19 +99,19 @@ def _variables(evidence: Evidence, axes: tuple[str, ...], system: UnitSystem) ->
 
 
 def _evaluate_extrapolated(
-    law: Law, visited: FloatArray, rate_hz: float
+    law: Law, visited_values: FloatArray, rate_hz: float
 ) -> tuple[FloatArray, FloatArray, tuple[float, float]]:
-    """Abscissa and value of a formula of one variable over the visited range and `_EXTRAPOLATED_SHARE` of it on either
-    side; and that range. visited: (n,)."""
-    low, high = float(visited.min()), float(visited.max())
+    """Evaluate a formula of one variable over the visited range and `_EXTRAPOLATED_SHARE` of it on either
+    side. Returns abscissa, value, and visited range. visited_values: (n,)."""
+    low, high = float(visited_values.min()), float(visited_values.max())
     margin = _EXTRAPOLATED_SHARE * (high - low)
     abscissa = np.linspace(low - margin, high + margin, _LINE_POINTS)
-    values = evaluate(law, {law.variables[0]: abscissa}, rate_hz)
-    is_known = np.isfinite(values)
-    return abscissa[is_known], values[is_known], (low, high)
+    law_force = evaluate(law, {law.variables[0]: abscissa}, rate_hz)
+    is_known = np.isfinite(law_force)
+    return abscissa[is_known], law_force[is_known], (low, high)
 
 
-def _identity(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Both ends of the straight line of a law drawn against its own force: abscissa and ordinate."""
+def _make_identity_line(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return abscissa and ordinate of the straight line y = x over the range of the law's force (n,)."""
     ends = np.array([values.min(), values.max()])
     return ends, ends

@@ -2,7 +2,7 @@
 
 For forces of the mechanism and the actuator the residual is the missing force, for sensors the error of a channel. The
 fitted law is drawn with it: simulated, and averaged over bins of the same kind. Effects without such a variable are
-shown as the spectrum of the residual.
+shown as the spectrum of the residual. Called by `post_search`.
 """
 
 from collections.abc import Mapping
@@ -12,8 +12,8 @@ from typing import Literal
 import numpy as np
 
 from analysis.diagnosis.errors.evidence_from_residuals import EXPECTED_FORCE_SHARE
-from analysis.diagnosis.forces.missing_force import missing_force
-from analysis.diagnosis.result.curves.law_curves import law_signature
+from analysis.diagnosis.forces.missing_force import estimate_missing_force
+from analysis.diagnosis.result.curves.law_curves import compute_law_signature
 from analysis.diagnosis.result.curves.signature_bins import bin_law_means, bin_means, compute_running_rms
 from analysis.diagnosis.result.findings import Signature
 from equalizer.effects.effect import OnCommand, OnResponse, PlacedEffect, Structure
@@ -21,7 +21,7 @@ from equalizer.effects.simulation.simulator import SimulationResult, simulate_me
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
-from equalizer.signals.spectral_density import spectral_density
+from equalizer.signals.spectral_density import estimate_spectral_density
 from equalizer.signals.unit_system import LINEAR, UnitSystem
 
 Abscissa = Literal["velocity", "position", "acceleration", "command", "reading", "time", "growth", "frequency"]
@@ -71,141 +71,162 @@ class Names:
     system: UnitSystem = LINEAR
 
 
-def signature_of(evidence: Evidence, complete: FloatArray, placed: PlacedEffect, names: Names, hold: Hold) -> Signature:
-    """The curve of one effect. evidence: of the final model with all its effects except this one. complete: (n, p),
-    prediction of the final model with all its effects."""
-    law = law_signature(evidence, placed, names.axes, names.system)
+def compute_signature(
+    evidence: Evidence, complete: FloatArray, placed_effect: PlacedEffect, names: Names, hold: Hold
+) -> Signature:
+    """Compute the curve of one effect. evidence: of the final model with all its effects except this one. complete: (n,
+    p), prediction of the final model with all its effects."""
+    law = compute_law_signature(evidence, placed_effect, names.axes, names.system)
     if law is not None:
         return law
-    action, abscissa = placed.effect.action, ABSCISSA.get(placed.effect.name, "frequency")
+    action, abscissa = placed_effect.effect.action, ABSCISSA.get(placed_effect.effect.name, "frequency")
     if abscissa in ("velocity", "position", "acceleration") and not isinstance(action, (OnCommand, OnResponse)):
-        return _motion_signature(evidence, placed, abscissa, names, hold)
+        return _compute_motion_signature(evidence, placed_effect, abscissa, names, hold)
     if abscissa == "command" and isinstance(action, OnCommand):
-        return _command_signature(evidence, placed, names)
+        return _compute_command_signature(evidence, placed_effect, names)
     if abscissa in ("reading", "time", "growth") and isinstance(action, OnResponse):
-        changed_signal = action.change(evidence.predicted, evidence.sample_rate_hz, placed.sites, placed.values)
+        changed_signal = action.change(
+            evidence.predicted, evidence.sample_rate_hz, placed_effect.sites, placed_effect.values
+        )
         if abscissa == "reading":
-            return _make_reading_signature(evidence, placed, changed_signal - evidence.predicted, names)
-        return _time_signature(evidence, placed, changed_signal - evidence.predicted, names, abscissa)
-    return _frequency_signature(evidence, complete - evidence.predicted, placed, names)
+            return _compute_reading_signature(evidence, placed_effect, changed_signal - evidence.predicted, names)
+        return _compute_time_signature(evidence, placed_effect, changed_signal - evidence.predicted, names, abscissa)
+    return _compute_frequency_signature(evidence, complete - evidence.predicted, placed_effect, names)
 
 
-def _motion_signature(
-    evidence: Evidence, placed: PlacedEffect, abscissa: Abscissa, names: Names, hold: Hold
+def _compute_motion_signature(
+    evidence: Evidence, placed_effect: PlacedEffect, abscissa: Abscissa, names: Names, hold: Hold
 ) -> Signature:
-    """Missing force of the axis with the strongest one, over its motion."""
-    axis = _strongest(placed.sites, evidence.axis_force)
-    simulated = simulate_mechanism(evidence.model, evidence.command, evidence.sample_rate_hz, (placed,), hold)
+    """Compute the curve of the missing force over the motion, on the effect's axis with the largest missing force."""
+    axis = _find_strongest_site(placed_effect.sites, evidence.axis_force)
+    simulated = simulate_mechanism(evidence.model, evidence.command, evidence.sample_rate_hz, (placed_effect,), hold)
     force = simulated.axis_force
-    if isinstance(placed.effect.action, Structure):
-        force = _equivalent_force(evidence, simulated, hold)
+    if isinstance(placed_effect.effect.action, Structure):
+        force = _compute_equivalent_force(evidence, simulated, hold)
     used, unit = evidence.used > 0, names.system.length
     unit += {"position": "", "velocity": "/s", "acceleration": "/s^2"}[abscissa]
-    visited, law_abscissa = (
-        _abscissa(position[:, axis], velocity[:, axis], abscissa, evidence.sample_rate_hz)
+    visited, simulated_abscissa = (
+        _compute_abscissa(position[:, axis], velocity[:, axis], abscissa, evidence.sample_rate_hz)
         for position, velocity in (
             (evidence.axis_position, evidence.axis_velocity),
             (simulated.axis_position, simulated.axis_velocity),
         )
     )
     bin_centres, mean, spread = bin_means(visited, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
-    law_at, law = bin_law_means(law_abscissa[used], force[used, axis])
+    law_abscissa, law = bin_law_means(simulated_abscissa[used], force[used, axis])
     return Signature(
-        placed.effect.name, names.axes[axis], f"{abscissa} of {names.axes[axis]} ({unit})",
-        f"missing force ({names.system.force})", bin_centres, mean, spread, law_at, law,
+        placed_effect.effect.name, names.axes[axis], f"{abscissa} of {names.axes[axis]} ({unit})",
+        f"missing force ({names.system.force})", bin_centres, mean, spread, law_abscissa, law,
     )  # fmt: skip
 
 
-def _abscissa(position: FloatArray, velocity: FloatArray, abscissa: Abscissa, rate_hz: float) -> FloatArray:
+def _compute_abscissa(position: FloatArray, velocity: FloatArray, abscissa: Abscissa, rate_hz: float) -> FloatArray:
     """(n,): position, velocity or acceleration of an axis."""
     if abscissa == "acceleration":
         return np.asarray(np.gradient(velocity) * rate_hz)
     return velocity if abscissa == "velocity" else position
 
 
-def _equivalent_force(evidence: Evidence, with_effect: SimulationResult, hold: Hold) -> FloatArray:
+def _compute_equivalent_force(evidence: Evidence, with_effect: SimulationResult, hold: Hold) -> FloatArray:
     """(n, m), N: the force on the model without the effect that would cause the same responses, by deconvolution."""
     without_effect = simulate_mechanism(evidence.model, evidence.command, evidence.sample_rate_hz, (), hold)
-    change, unit = [with_effect.response - without_effect.response], [evidence.noise]
+    response_changes, noise_levels = [with_effect.response - without_effect.response], [evidence.noise]
     if evidence.position_noise is not None:
-        change.append(with_effect.position - without_effect.position)
-        unit.append(evidence.position_noise)
+        response_changes.append(with_effect.position - without_effect.position)
+        noise_levels.append(evidence.position_noise)
     expected = EXPECTED_FORCE_SHARE * np.maximum(np.sqrt(np.mean(evidence.command**2, axis=0)), 1e-12)
-    noise = np.concatenate(unit)
-    return missing_force(evidence.model, np.hstack(change) / noise, noise, evidence.sample_rate_hz, expected).force
+    noise = np.concatenate(noise_levels)
+    return estimate_missing_force(
+        evidence.model, np.hstack(response_changes) / noise, noise, evidence.sample_rate_hz, expected
+    ).force
 
 
-def _command_signature(evidence: Evidence, placed: PlacedEffect, names: Names) -> Signature:
-    """Missing force over the command of its axis; the law is the change of the command."""
-    assert isinstance(placed.effect.action, OnCommand)
-    axis = _strongest(placed.sites, evidence.axis_force)
+def _compute_command_signature(evidence: Evidence, placed_effect: PlacedEffect, names: Names) -> Signature:
+    """Compute the curve of the missing force over the command of its axis; the law is the change of the command."""
+    assert isinstance(placed_effect.effect.action, OnCommand)
+    axis = _find_strongest_site(placed_effect.sites, evidence.axis_force)
     command, used = evidence.command[:, axis], evidence.used > 0
-    changed_command = placed.effect.action.change(command, 1 / evidence.sample_rate_hz, placed.values)
+    changed_command = placed_effect.effect.action.change(command, 1 / evidence.sample_rate_hz, placed_effect.values)
     bin_centres, mean, spread = bin_means(command, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
-    law_at, law = bin_law_means(command[used], (changed_command - command)[used])
+    law_abscissa, law = bin_law_means(command[used], (changed_command - command)[used])
     unit = names.system.force
     return Signature(
-        placed.effect.name, names.axes[axis], f"command of {names.axes[axis]} ({unit})", f"missing force ({unit})",
-        bin_centres, mean, spread, law_at, law,
+        placed_effect.effect.name, names.axes[axis], f"command of {names.axes[axis]} ({unit})",
+        f"missing force ({unit})", bin_centres, mean, spread, law_abscissa, law,
     )  # fmt: skip
 
 
-def _make_reading_signature(evidence: Evidence, placed: PlacedEffect, change: FloatArray, names: Names) -> Signature:
-    """Error of a channel over the predicted reading that explains most of it. change: (n, p), by the effect."""
+def _compute_reading_signature(
+    evidence: Evidence, placed_effect: PlacedEffect, change: FloatArray, names: Names
+) -> Signature:
+    """Compute the curve of a channel's error over the predicted reading that explains most of it. change: (n, p), by
+    the effect."""
     used = evidence.used > 0
-    drives = evidence.predicted[used]
+    predictions = evidence.predicted[used]
     # The pair of channels with the strongest effect: regression of the change in one channel on the signal of the
     # other.
-    projections = np.abs(change[used].T @ drives) / np.maximum(np.sqrt(np.sum(drives**2, axis=0)), 1e-300)
+    projections = np.abs(change[used].T @ predictions) / np.maximum(np.sqrt(np.sum(predictions**2, axis=0)), 1e-300)
     channel, predictor = np.unravel_index(int(np.argmax(projections)), projections.shape)
     errors = (evidence.response - evidence.predicted)[:, channel]
     bin_centres, mean, spread = bin_means(evidence.predicted[:, predictor], errors, used, evidence.sample_rate_hz)
-    law_at, law = bin_law_means(drives[:, predictor], change[used, channel])
+    law_abscissa, law = bin_law_means(predictions[:, predictor], change[used, channel])
     return Signature(
-        placed.effect.name, names.channels[channel], f"predicted {names.channels[predictor]} ({names.unit})",
-        f"error of {names.channels[channel]} ({names.unit})", bin_centres, mean, spread, law_at, law,
+        placed_effect.effect.name, names.channels[channel], f"predicted {names.channels[predictor]} ({names.unit})",
+        f"error of {names.channels[channel]} ({names.unit})", bin_centres, mean, spread, law_abscissa, law,
     )  # fmt: skip
 
 
-def _time_signature(
-    evidence: Evidence, placed: PlacedEffect, change: FloatArray, names: Names, abscissa: Abscissa
+def _compute_time_signature(
+    evidence: Evidence, placed_effect: PlacedEffect, change: FloatArray, names: Names, abscissa: Abscissa
 ) -> Signature:
-    """Error of the channel with the largest change over time; its running rms where it grows with time ("growth")."""
+    """Compute the curve over time of the error of the channel with the largest change; its running rms where it grows
+    with time ("growth")."""
     used, rate_hz = evidence.used > 0, evidence.sample_rate_hz
     channel = int(np.argmax(np.sqrt(np.mean(change[used] ** 2, axis=0)) / evidence.noise))
     errors, seconds = (evidence.response - evidence.predicted)[:, channel], np.arange(len(change)) / rate_hz
     ordinate = f"error of {names.channels[channel]} ({names.unit})"
     if abscissa == "growth":
         bin_centres, mean, spread = compute_running_rms(seconds, errors, used)
-        law_at, law, _ = compute_running_rms(seconds, np.hypot(change[:, channel], evidence.noise[channel]), used)
+        law_abscissa, law, _ = compute_running_rms(seconds, np.hypot(change[:, channel], evidence.noise[channel]), used)
         ordinate = f"rms {ordinate}"
     else:
         bin_centres, mean, spread = bin_means(seconds, errors, used, rate_hz)
-        law_at, law = bin_law_means(seconds[used], change[used, channel])
+        law_abscissa, law = bin_law_means(seconds[used], change[used, channel])
     return Signature(
-        placed.effect.name, names.channels[channel], "time (s)", ordinate, bin_centres, mean, spread, law_at, law
+        placed_effect.effect.name,
+        names.channels[channel],
+        "time (s)",
+        ordinate,
+        bin_centres,
+        mean,
+        spread,
+        law_abscissa,
+        law,
     )
 
 
-def _frequency_signature(evidence: Evidence, change: FloatArray, placed: PlacedEffect, names: Names) -> Signature:
-    """Spectrum of the error of the channel with the largest change, and that of the change by the effect."""
+def _compute_frequency_signature(
+    evidence: Evidence, change: FloatArray, placed_effect: PlacedEffect, names: Names
+) -> Signature:
+    """Compute the spectrum of the error of the channel with the largest change, and that of the change by the effect.
+    change: (n, p)."""
     rate_hz, used = evidence.sample_rate_hz, evidence.used > 0
     errors = evidence.response - evidence.predicted
     channel = int(np.argmax(np.sqrt(np.mean(change[used] ** 2, axis=0)) / evidence.noise))
-    frequency_hz, measured, spread = _spectrum(errors[used, channel], rate_hz)
-    _, law, _ = _spectrum(change[used, channel], rate_hz)
+    frequency_hz, measured, spread = _compute_spectrum(errors[used, channel], rate_hz)
+    _, law, _ = _compute_spectrum(change[used, channel], rate_hz)
     return Signature(
-        placed.effect.name, names.channels[channel], "frequency (Hz)",
+        placed_effect.effect.name, names.channels[channel], "frequency (Hz)",
         f"error of {names.channels[channel]}, amplitude density ({names.unit}/√Hz)",
         frequency_hz, measured, spread, frequency_hz, law,
     )  # fmt: skip
 
 
-def _spectrum(signal: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Frequency (Hz), amplitude density (unit/√Hz) in twelfths of an octave, and its standard error. Half-overlapping
-    Hann windows count as 1.5 independent ones per window length."""
+def _compute_spectrum(signal: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Compute frequency (Hz), amplitude density (unit/√Hz) in twelfths of an octave, and its standard error.
+    Half-overlapping Hann windows count as 1.5 independent ones per window length."""
     length = min(2 * _FREQUENCY_LINES, len(signal))
-    lines_hz, power = spectral_density(signal, rate_hz, length)
+    lines_hz, power = estimate_spectral_density(signal, rate_hz, length)
     window_count = max(1.0, 1.5 * len(signal) / length)
     edges = np.geomspace(lines_hz[1], lines_hz[-1], int(12 * np.log2(lines_hz[-1] / lines_hz[1])) + 1)
     bin_of_line = np.digitize(lines_hz[1:], edges)
@@ -217,6 +238,6 @@ def _spectrum(signal: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArra
     return centres_hz, mean, mean / 2 / np.sqrt(window_count * np.array([len(group) for group in groups]))
 
 
-def _strongest(sites: tuple[int, ...], force: FloatArray) -> int:
-    """The site with the largest mean square of force (n, m)."""
+def _find_strongest_site(sites: tuple[int, ...], force: FloatArray) -> int:
+    """Find the site with the largest mean square of force (n, m)."""
     return max(sites, key=lambda site: float(np.mean(force[:, site] ** 2)))

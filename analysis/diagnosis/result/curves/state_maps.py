@@ -137,7 +137,7 @@ def _extract_balance_series(balance: "Balance", diagnosis: Diagnosis, letter: st
     names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
     named_laws = [law.place for law in balance.laws if law.simulated_as in names]
     laws = named_laws or [law.place for law in balance.laws]
-    linear, completed = (regression.remainder(regression.columns_of(law_set)) for law_set in ((), laws))
+    linear, completed = (regression.compute_residuals(regression.select_columns(law_set)) for law_set in ((), laws))
     axis = min(regression.axis, len(regression.motions[0].channels) - 1)
     motions = regression.motions
     series = _AxisSeries(
@@ -148,7 +148,7 @@ def _extract_balance_series(balance: "Balance", diagnosis: Diagnosis, letter: st
         np.concatenate(regression.force),
         np.concatenate(_subtract_remainder(regression, linear)),
         np.concatenate(_subtract_remainder(regression, completed)) if laws else None,
-        np.concatenate([motion.valid_samples(motion.fit | motion.test) for motion in motions]),
+        np.concatenate([motion.mask_valid_samples(motion.fit | motion.test) for motion in motions]),
         _make_slices([len(force) for force in regression.force]),
     )
     return (series if series.used.any() else None), (WITH_NAMED if named_laws else WITH_CANDIDATES if laws else "")

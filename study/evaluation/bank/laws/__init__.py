@@ -1,2 +1,2 @@
 """A bank of concealed laws (terms outside the effect catalogue): `seal_laws`, `prove_laws` (answer and reveal),
-`write_laws`."""
+`write_law_proof`."""

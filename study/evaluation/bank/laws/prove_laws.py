@@ -2,7 +2,7 @@
 
 Each case is a simulated device with a law of motion or signals outside the catalogue of effects. The labels (the
 truths) are hashed before any diagnosis and checked when they are revealed. A found law is compared with the true one on
-a fresh test motion that the diagnosis never had (`law_error`).
+a fresh test motion that the diagnosis never had (`compute_law_error`).
 """
 
 from collections.abc import Mapping
@@ -11,9 +11,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from analysis.evaluation.laws.law_error import law_error
+from analysis.evaluation.laws.law_error import compute_law_error
 from analysis.evaluation.laws.law_outcome import LawOutcome, TrueLaw
-from analysis.evaluation.laws.law_score import LawScore, law_score
+from analysis.evaluation.laws.law_score import LawScore, compute_law_score
 from study.errors import resumable
 from study.evaluation.bank.ask_engine import ask_and_count, is_answered
 from study.evaluation.bank.laws.seal_laws import fresh_motions_path, read_fresh_motions, seal_laws
@@ -60,7 +60,7 @@ def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Pr
             diagnosable=diagnosable,
         )
     outcomes = reveal_laws(folder, plan.cases)
-    return LawBlindTest(folder, plan, seal, outcomes, law_score(outcomes), engines(folder, names))
+    return LawBlindTest(folder, plan, seal, outcomes, compute_law_score(outcomes), engines(folder, names))
 
 
 def reveal_laws(folder: ProofFolder, cases: int) -> tuple[LawOutcome, ...]:
@@ -84,7 +84,7 @@ def _make_outcome(label: Mapping[str, Any], answer: Mapping[str, Any], fresh_pat
     if truth is None or not outcome.laws:
         return outcome
     motions = read_fresh_motions(fresh_path, label["axes"], truth.axes, truth.acts_on == ("response",))
-    return replace(outcome, errors=tuple(law_error(outcome.laws, motion) for motion in motions))
+    return replace(outcome, errors=tuple(compute_law_error(outcome.laws, motion) for motion in motions))
 
 
 def _read_true_law(label: Mapping[str, Any]) -> TrueLaw:

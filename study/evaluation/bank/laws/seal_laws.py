@@ -18,7 +18,7 @@ import numpy as np
 from analysis.evaluation.laws.law_error import FreshMotion
 from study.evaluation.bank.begun_cases import begin_case, show_case
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
-from study.evaluation.bank.seal_cases import PROCESSOR_S, SALT_BYTES, BankPlan, seal_missing
+from study.evaluation.bank.seal_cases import SALT_BYTES, SEARCH_CPU_S, BankPlan, seal_missing_cases
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ
 from study.evaluation.challenge.laws.draw_law import FreshTestMotion, LawCase, LawDraw, draw_law, generate_law_case
 from study.store.disk.provenance import sha256_of
@@ -32,7 +32,7 @@ def seal_laws(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Call
     number of cases sealed so far. Returns the SHA-256 of labels.sha256. Raises StudyError."""
     law_draws = [draw_law(plan.seed, number, plan.brief) for number in range(plan.cases)]
     write_case = {law_draw.number: partial(_seal_law, folder, law_draw) for law_draw in law_draws}
-    return seal_missing(folder, write_case, workers, on_sealed)
+    return seal_missing_cases(folder, write_case, workers, on_sealed)
 
 
 def fresh_motions_path(folder: ProofFolder, number: int) -> Path:
@@ -80,7 +80,7 @@ def _seal_law(folder: ProofFolder, law_draw: LawDraw) -> None:
     law_case = generate_law_case(law_draw, case_folder.name)
     write_recording(case_folder / RECORDING, law_case.case.recording, precision="float32")
     write_mechanical_model(case_folder / MODEL, law_case.case.model)
-    diagnosis_settings = {"without": [], "discovery": True, "processor_s": PROCESSOR_S}
+    diagnosis_settings = {"without": [], "discovery": True, "processor_s": SEARCH_CPU_S}
     write_text(case_folder / SETTINGS, json.dumps(diagnosis_settings) + "\n")
     np.savez(fresh_motions_path(folder, law_draw.number), allow_pickle=False, **_collect_arrays(law_case.fresh_motions))
     label = _make_label(folder, law_draw, law_case, case_folder)

@@ -20,7 +20,7 @@ from study.evaluation.challenge.drive_plan import LEVELS_N
 
 def _draw_saturation(context: EffectContext) -> dict[str, float]:
     """Limit (N) that cuts 2 % to 70 % off the strongest command."""
-    return {"limit": LEVELS_N[-1] * (1.0 - context.log_between(0.02, 0.7))}
+    return {"limit": LEVELS_N[-1] * (1.0 - context.interpolate_log(0.02, 0.7))}
 
 
 def _build_saturation(device: Device, axis: int, values: Values) -> Device:
@@ -29,7 +29,7 @@ def _build_saturation(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_deadband(context: EffectContext) -> dict[str, float]:
     """Half width (N) of the dead band, 0.003 to 0.2."""
-    return {"width": context.log_between(0.003, 0.2)}
+    return {"width": context.interpolate_log(0.003, 0.2)}
 
 
 def _build_deadband(device: Device, axis: int, values: Values) -> Device:
@@ -38,7 +38,7 @@ def _build_deadband(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_slew(context: EffectContext) -> dict[str, float]:
     """Slew rate (N/s), 4000 (weakest) down to 150."""
-    return {"rate": context.log_between(4000.0, 150.0)}
+    return {"rate": context.interpolate_log(4000.0, 150.0)}
 
 
 def _build_slew(device: Device, axis: int, values: Values) -> Device:
@@ -47,7 +47,7 @@ def _build_slew(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_lag(context: EffectContext) -> dict[str, float]:
     """Time constant (s), 0.06 ms to 3 ms."""
-    return {"time_constant": context.log_between(6e-5, 3e-3)}
+    return {"time_constant": context.interpolate_log(6e-5, 3e-3)}
 
 
 def _build_lag(device: Device, axis: int, values: Values) -> Device:
@@ -56,7 +56,7 @@ def _build_lag(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_delay(context: EffectContext) -> dict[str, float]:
     """Delay (s), 0.02 ms to 4 ms."""
-    return {"delay": context.log_between(2e-5, 4e-3)}
+    return {"delay": context.interpolate_log(2e-5, 4e-3)}
 
 
 def _build_delay(device: Device, axis: int, values: Values) -> Device:
@@ -65,7 +65,7 @@ def _build_delay(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_gain(context: EffectContext) -> dict[str, float]:
     """Gain of 0.7 to 0.995, or of 1.005 to 1.3."""
-    return {"gain": 1.0 + context.draw_sign() * context.log_between(0.005, 0.3)}
+    return {"gain": 1.0 + context.draw_sign() * context.interpolate_log(0.005, 0.3)}
 
 
 def _build_gain(device: Device, axis: int, values: Values) -> Device:

@@ -34,7 +34,7 @@ CREEP_TIMES_S = (0.02, 0.2, 2.0)
 
 def _draw_creep(context: EffectContext) -> dict[str, float]:
     """stiffness: N/m, of each of the relaxing springs; relative to the ground stiffness of the axis."""
-    return {"stiffness": context.log_between(0.05, 1.0) * context.bench.stiffness[context.axis, context.axis]}
+    return {"stiffness": context.interpolate_log(0.05, 1.0) * context.bench.stiffness[context.axis, context.axis]}
 
 
 def _build_creep(device: Device, axis: int, values: Values) -> Device:
@@ -45,7 +45,7 @@ def _build_creep(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_damping(context: EffectContext) -> dict[str, float]:
     """damping_per_m2: N s/m per m²; at the largest distance of the motion, 0.5 to 12 N s/m."""
-    return {"damping_per_m2": context.log_between(0.5, 12.0) / context.travel_m[context.axis] ** 2}
+    return {"damping_per_m2": context.interpolate_log(0.5, 12.0) / context.travel_m[context.axis] ** 2}
 
 
 def _build_damping(device: Device, axis: int, values: Values) -> Device:
@@ -54,7 +54,7 @@ def _build_damping(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_switching(context: EffectContext) -> dict[str, float]:
     """rate_hz: of the switching; depth: change of the stiffness, relative to that of the axis."""
-    return {"rate_hz": context.draw_log_uniform(0.7, 9.0), "depth": context.log_between(0.05, 0.7)}
+    return {"rate_hz": context.draw_log_uniform(0.7, 9.0), "depth": context.interpolate_log(0.05, 0.7)}
 
 
 def _build_switching(device: Device, axis: int, values: Values) -> Device:
@@ -66,7 +66,10 @@ def _build_switching(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_bending(context: EffectContext) -> dict[str, float]:
     """bend: s²/m, reciprocal of the largest reading of the saturation; play: m/s², half its width."""
-    return {"bend": context.log_between(0.3, 1.5) / context.peak_mps2.max(), "play": context.log_between(0.03, 0.8)}
+    return {
+        "bend": context.interpolate_log(0.3, 1.5) / context.peak_mps2.max(),
+        "play": context.interpolate_log(0.03, 0.8),
+    }
 
 
 def _build_bending(device: Device, axis: int, values: Values) -> Device:
@@ -77,7 +80,7 @@ def _draw_coupling(context: EffectContext) -> dict[str, float]:
     """coupling: N/m²; relative to the ground stiffness of the x axis over the largest travel."""
     return {
         "coupling": context.draw_sign()
-        * context.log_between(0.02, 0.3)
+        * context.interpolate_log(0.02, 0.3)
         * context.bench.stiffness[0, 0]
         / context.travel_m.max()
     }
@@ -89,7 +92,7 @@ def _build_coupling(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_skipped(context: EffectContext) -> dict[str, float]:
     """every: n; the command numbered n, 2n, … is not written. Stronger is a smaller n."""
-    return {"every": float(round(context.log_between(2000.0, 8.0)))}
+    return {"every": float(round(context.interpolate_log(2000.0, 8.0)))}
 
 
 def _build_skipped(device: Device, axis: int, values: Values) -> Device:
@@ -98,7 +101,7 @@ def _build_skipped(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_heating(context: EffectContext) -> dict[str, float]:
     """loss_per_n2: share of the force lost per N² of mean square force; seconds: averaging time of that mean."""
-    return {"loss_per_n2": context.log_between(0.02, 0.3), "seconds": context.draw_log_uniform(2.0, 8.0)}
+    return {"loss_per_n2": context.interpolate_log(0.02, 0.3), "seconds": context.draw_log_uniform(2.0, 8.0)}
 
 
 def _build_heating(device: Device, axis: int, values: Values) -> Device:
@@ -107,7 +110,7 @@ def _build_heating(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_hysteresis(context: EffectContext) -> dict[str, float]:
     """half_width: N, half the play between command and force."""
-    return {"half_width": context.log_between(0.01, 0.3)}
+    return {"half_width": context.interpolate_log(0.01, 0.3)}
 
 
 def _build_hysteresis(device: Device, axis: int, values: Values) -> Device:

@@ -26,7 +26,7 @@ def _with_bristle(device: Device, axis: int, cells: dict[int, float]) -> Device:
 
 
 def _draw_coulomb(context: EffectContext) -> dict[str, float]:
-    return {"level": context.log_between(0.003, 0.25)}
+    return {"level": context.interpolate_log(0.003, 0.25)}
 
 
 def _build_coulomb(device: Device, axis: int, values: Values) -> Device:
@@ -34,7 +34,7 @@ def _build_coulomb(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_asymmetric(context: EffectContext) -> dict[str, float]:
-    mean, asymmetry = context.log_between(0.01, 0.25), context.draw_sign() * context.random.uniform(0.2, 0.6)
+    mean, asymmetry = context.interpolate_log(0.01, 0.25), context.draw_sign() * context.random.uniform(0.2, 0.6)
     return {"level_positive": mean * (1 + asymmetry), "level_negative": mean * (1 - asymmetry)}
 
 
@@ -43,7 +43,7 @@ def _build_asymmetric(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_stribeck(context: EffectContext) -> dict[str, float]:
-    coulomb = context.log_between(0.01, 0.2)
+    coulomb = context.interpolate_log(0.01, 0.2)
     return {
         "coulomb": coulomb,
         "static": coulomb * context.random.uniform(1.3, 2.2),
@@ -58,7 +58,7 @@ def _build_stribeck(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_presliding(context: EffectContext) -> dict[str, float]:
-    level = context.log_between(0.01, 0.25)
+    level = context.interpolate_log(0.01, 0.25)
     return {"level": level, "stiffness": level / context.draw_log_uniform(5e-5, 5e-4)}
 
 
@@ -70,7 +70,7 @@ def _build_presliding(device: Device, axis: int, values: Values) -> Device:
 def _draw_position_dependent(context: EffectContext) -> dict[str, float]:
     slope = context.draw_sign() * context.random.uniform(0.3, 0.7) / context.travel_m[context.axis]
     bend = context.random.uniform(-0.25, 0.6) / context.travel_m[context.axis] ** 2
-    return {"level": context.log_between(0.01, 0.25), "slope_per_m": float(slope), "bend_per_m2": float(bend)}
+    return {"level": context.interpolate_log(0.01, 0.25), "slope_per_m": float(slope), "bend_per_m2": float(bend)}
 
 
 def _build_position_dependent(device: Device, axis: int, values: Values) -> Device:

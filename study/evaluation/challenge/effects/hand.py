@@ -18,7 +18,7 @@ from study.evaluation.challenge.mechanism_kernel import DAMPING_DEPTH, PHASE, RA
 
 def _draw_hand(context: EffectContext) -> dict[str, float]:
     """Along x at strength 1: 0.04 to 0.09 kg, 2.5 to 6 N s/m, 100 to 300 N/m, log-uniform."""
-    grip_strength = context.log_between(0.01, 1.0)
+    grip_strength = context.interpolate_log(0.01, 1.0)
     x_values = {
         "mass": grip_strength * context.draw_log_uniform(0.04, 0.09),
         "damping": grip_strength * context.draw_log_uniform(2.5, 6.0),
@@ -46,7 +46,7 @@ def _draw_grip(context: EffectContext) -> dict[str, float]:
     """Rate (Hz), depth 0.02 to 0.8, phase (rad); stiffness_share: 0 or 1, whether the stiffness varies too."""
     return {
         "rate_hz": context.draw_log_uniform(0.03, 0.5),
-        "depth": context.log_between(0.02, 0.8),
+        "depth": context.interpolate_log(0.02, 0.8),
         "phase": context.random.uniform(0, 2 * np.pi),
         "stiffness_share": float(context.random.integers(2)),
     }

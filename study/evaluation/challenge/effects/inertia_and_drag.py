@@ -31,7 +31,7 @@ def _add_to_handle(device: Device, axis: int, mass_kg: float, damping: float) ->
 
 
 def _draw_viscous(context: EffectContext) -> dict[str, float]:
-    return {"damping": context.log_between(0.2, 6.0)}
+    return {"damping": context.interpolate_log(0.2, 6.0)}
 
 
 def _build_viscous(device: Device, axis: int, values: Values) -> Device:
@@ -39,7 +39,7 @@ def _build_viscous(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_added(context: EffectContext) -> dict[str, float]:
-    return {"mass": context.log_between(0.003, 0.08)}
+    return {"mass": context.interpolate_log(0.003, 0.08)}
 
 
 def _build_added(device: Device, axis: int, values: Values) -> Device:
@@ -47,7 +47,7 @@ def _build_added(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_quadratic(context: EffectContext) -> dict[str, float]:
-    return {"coefficient": context.log_between(1.0, 60.0)}
+    return {"coefficient": context.interpolate_log(1.0, 60.0)}
 
 
 def _build_quadratic(device: Device, axis: int, values: Values) -> Device:
@@ -58,7 +58,7 @@ def _draw_pose(context: EffectContext) -> dict[str, float]:
     """per_m (1/m): the mass changes by 1 to 50 % over the largest distance from the centre."""
     whole_handle = float(context.random.integers(2))
     return {
-        "per_m": context.draw_sign() * context.log_between(0.01, 0.5) / context.travel_m[context.axis],
+        "per_m": context.draw_sign() * context.interpolate_log(0.01, 0.5) / context.travel_m[context.axis],
         "whole_handle": whole_handle,
     }
 
@@ -77,7 +77,7 @@ def _draw_mode(context: EffectContext) -> dict[str, float]:
     tilts = context.random.uniform(-0.25, 0.25, 2)
     return {
         "frequency": context.draw_log_uniform(18.0, 190.0),
-        "mass": context.log_between(0.0005, 0.025),
+        "mass": context.interpolate_log(0.0005, 0.025),
         "damping_ratio": context.draw_log_uniform(0.02, 0.06),
         "tilt_next": float(tilts[0]),
         "tilt_after_next": float(tilts[1]),
@@ -101,7 +101,7 @@ def _draw_backlash(context: EffectContext) -> dict[str, float]:
     mass = context.bench.mass[context.axis, context.axis] * context.random.uniform(0.2, 0.4)
     spring = mass * (2 * np.pi * context.draw_log_uniform(220.0, 400.0)) ** 2
     return {
-        "gap": context.log_between(3e-6, 1.5e-4),
+        "gap": context.interpolate_log(3e-6, 1.5e-4),
         "motor_mass": float(mass),
         "contact_stiffness": float(spring),
         "contact_damping": float(2 * context.draw_log_uniform(0.015, 0.06) * np.sqrt(spring * mass)),

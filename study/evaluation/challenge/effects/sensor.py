@@ -32,7 +32,7 @@ def _set_channel(table: FloatArray, axis: int, value: float) -> FloatArray:
 
 
 def _draw_lag(context: EffectContext) -> dict[str, float]:
-    return {"bandwidth": context.log_between(420.0, 30.0)}
+    return {"bandwidth": context.interpolate_log(420.0, 30.0)}
 
 
 def _build_lag(device: Device, axis: int, values: Values) -> Device:
@@ -41,7 +41,7 @@ def _build_lag(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_clipping(context: EffectContext) -> dict[str, float]:
     """Limit (m/s^2) that cuts 2 % to 70 % off the largest reading."""
-    return {"limit": context.peak_mps2[context.axis] * (1.0 - context.log_between(0.02, 0.7))}
+    return {"limit": context.peak_mps2[context.axis] * (1.0 - context.interpolate_log(0.02, 0.7))}
 
 
 def _build_clipping(device: Device, axis: int, values: Values) -> Device:
@@ -50,7 +50,7 @@ def _build_clipping(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_misalignment(context: EffectContext) -> dict[str, float]:
     """Angle of 0.1 to 15 degrees, and the rotation vector (degrees)."""
-    degrees = context.log_between(0.1, 15.0)
+    degrees = context.interpolate_log(0.1, 15.0)
     rotation_deg = degrees * context.draw_direction()
     return {"degrees": degrees} | dict(zip(("about_x", "about_y", "about_z"), map(float, rotation_deg), strict=True))
 
@@ -63,7 +63,7 @@ def _build_misalignment(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_gain(context: EffectContext) -> dict[str, float]:
-    return {"gain": 1.0 + context.draw_sign() * context.log_between(0.005, 0.3)}
+    return {"gain": 1.0 + context.draw_sign() * context.interpolate_log(0.005, 0.3)}
 
 
 def _build_gain(device: Device, axis: int, values: Values) -> Device:
@@ -72,7 +72,7 @@ def _build_gain(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_nonlinearity(context: EffectContext) -> dict[str, float]:
     """cubic, 1/(m/s^2)^2: at the largest reading, the cubic term is 0.5 % to 25 % of the reading."""
-    return {"cubic": context.draw_sign() * context.log_between(0.005, 0.25) / context.peak_mps2[context.axis] ** 2}
+    return {"cubic": context.draw_sign() * context.interpolate_log(0.005, 0.25) / context.peak_mps2[context.axis] ** 2}
 
 
 def _build_nonlinearity(device: Device, axis: int, values: Values) -> Device:
@@ -92,7 +92,7 @@ def _channel_shares(values: Values) -> FloatArray:
 
 
 def _draw_drift(context: EffectContext) -> dict[str, float]:
-    return {"total": context.draw_sign() * context.log_between(0.01, 2.0)} | _draw_shares(context)
+    return {"total": context.draw_sign() * context.interpolate_log(0.01, 2.0)} | _draw_shares(context)
 
 
 def _build_drift(device: Device, axis: int, values: Values) -> Device:
@@ -100,7 +100,7 @@ def _build_drift(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_steps(context: EffectContext) -> dict[str, float]:
-    return {"step": context.log_between(0.02, 1.5)}
+    return {"step": context.interpolate_log(0.02, 1.5)}
 
 
 def _build_steps(device: Device, axis: int, values: Values) -> Device:
@@ -110,7 +110,9 @@ def _build_steps(device: Device, axis: int, values: Values) -> Device:
 def _draw_hum(context: EffectContext) -> dict[str, float]:
     mains_hz = float(context.random.choice((50.0, 60.0))) + context.random.uniform(-0.05, 0.05)
     phase = context.random.uniform(0.0, 2 * np.pi)
-    return {"amplitude": context.log_between(0.01, 1.0), "frequency": mains_hz, "phase": phase} | _draw_shares(context)
+    return {"amplitude": context.interpolate_log(0.01, 1.0), "frequency": mains_hz, "phase": phase} | _draw_shares(
+        context
+    )
 
 
 def _build_hum(device: Device, axis: int, values: Values) -> Device:
@@ -126,7 +128,7 @@ def _build_hum(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_clock(context: EffectContext) -> dict[str, float]:
-    return {"ppm": context.draw_sign() * context.log_between(0.5, 100.0)}
+    return {"ppm": context.draw_sign() * context.interpolate_log(0.5, 100.0)}
 
 
 def _build_clock(device: Device, axis: int, values: Values) -> Device:
@@ -134,7 +136,7 @@ def _build_clock(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_lost(context: EffectContext) -> dict[str, float]:
-    return {"fraction": context.log_between(1e-4, 0.04)}
+    return {"fraction": context.interpolate_log(1e-4, 0.04)}
 
 
 def _build_lost(device: Device, axis: int, values: Values) -> Device:
@@ -144,7 +146,7 @@ def _build_lost(device: Device, axis: int, values: Values) -> Device:
 def _draw_crossed(context: EffectContext) -> dict[str, float]:
     """Shares of the two other channels, in cyclic order; together 0.3 % to 15 % (root of the sum of squares)."""
     angle = context.random.uniform(0.0, 2 * np.pi)
-    size = context.log_between(0.003, 0.15)
+    size = context.interpolate_log(0.003, 0.15)
     return {"from_next": float(size * np.cos(angle)), "from_after_next": float(size * np.sin(angle))}
 
 
@@ -157,7 +159,7 @@ def _build_crossed(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_offset(context: EffectContext) -> dict[str, float]:
-    return {"offset": context.draw_sign() * context.log_between(5e-4, 0.5)}
+    return {"offset": context.draw_sign() * context.interpolate_log(5e-4, 0.5)}
 
 
 def _build_offset(device: Device, axis: int, values: Values) -> Device:
@@ -167,7 +169,7 @@ def _build_offset(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_logger(context: EffectContext) -> dict[str, float]:
-    return {"offset": context.draw_sign() * context.log_between(1e-5, 5e-3)}
+    return {"offset": context.draw_sign() * context.interpolate_log(1e-5, 5e-3)}
 
 
 def _build_logger(device: Device, axis: int, values: Values) -> Device:

@@ -28,7 +28,7 @@ from study.evaluation.challenge.handle_force_kernel import (
 
 def _draw_hardening(context: EffectContext) -> dict[str, float]:
     """k3 such that the force at the end of the travel is 0.005 to 0.4 N."""
-    return {"k3": context.log_between(0.005, 0.4) / context.travel_m[context.axis] ** 3}
+    return {"k3": context.interpolate_log(0.005, 0.4) / context.travel_m[context.axis] ** 3}
 
 
 def _build_hardening(device: Device, axis: int, values: Values) -> Device:
@@ -39,7 +39,9 @@ def _draw_asymmetric(context: EffectContext) -> dict[str, float]:
     # k2 x at the end of the travel over the ground's stiffness; above 0.5 the tangent stiffness would be negative.
     stiffness = context.bench.stiffness[context.axis, context.axis]
     return {
-        "k2": float(context.draw_sign() * context.log_between(0.005, 0.3) * stiffness / context.travel_m[context.axis])
+        "k2": float(
+            context.draw_sign() * context.interpolate_log(0.005, 0.3) * stiffness / context.travel_m[context.axis]
+        )
     }
 
 
@@ -48,7 +50,7 @@ def _build_asymmetric(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_constant(context: EffectContext) -> dict[str, float]:
-    return {"force": context.draw_sign() * context.log_between(0.001, 0.3)}
+    return {"force": context.draw_sign() * context.interpolate_log(0.001, 0.3)}
 
 
 def _build_constant(device: Device, axis: int, values: Values) -> Device:
@@ -57,7 +59,7 @@ def _build_constant(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_cogging(context: EffectContext) -> dict[str, float]:
     return {
-        "amplitude": context.log_between(0.004, 0.15),
+        "amplitude": context.interpolate_log(0.004, 0.15),
         "pitch": context.draw_log_uniform(4e-4, 4e-3),
         "phase": context.random.uniform(0, 2 * np.pi),
     }
@@ -70,7 +72,7 @@ def _build_cogging(device: Device, axis: int, values: Values) -> Device:
 
 def _draw_stop(context: EffectContext) -> dict[str, float]:
     """Position at 99.8 % (weakest) to 40 % of the travel without the stop; opposite: 1 for a stop on both sides."""
-    travel_share = 1.0 - 0.6 * context.log_between(0.003, 1.0)
+    travel_share = 1.0 - 0.6 * context.interpolate_log(0.003, 1.0)
     return {
         "position": context.draw_sign() * travel_share * context.travel_m[context.axis],
         "stiffness": context.draw_log_uniform(300.0, 2e4),

@@ -19,7 +19,7 @@ from study.evaluation.challenge.injection.drive_injections import (
     DRIVE_INJECTIONS,
     ForceInjection,
     Values,
-    level_of,
+    compute_force_level,
     rms,
 )
 
@@ -28,10 +28,11 @@ SIGN_WIDTH = 0.05
 
 
 def _scale_shape(name: str, shape: Callable[[AxisMotion], FloatArray]) -> ForceInjection:
-    """Injection of the force size * shape(motion). `size` is drawn so that the rms of the force is `level_of`."""
+    """Injection of the force size * shape(motion). `size` is drawn so that the rms of the force is
+    `compute_force_level`."""
 
     def draw(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
-        return {"size": level_of(motion, strength) / max(rms(shape(motion)), 1e-300)}
+        return {"size": compute_force_level(motion, strength) / max(rms(shape(motion)), 1e-300)}
 
     return ForceInjection(name, draw, lambda motion, values: motion.command + values["size"] * shape(motion))
 
@@ -49,7 +50,7 @@ def _centre_position(motion: AxisMotion) -> FloatArray:
 def _draw_cogging(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
     """Amplitude, pitch (3 to 30 % of the travel) and phase (turns) of cogging. 1.4: amplitude over rms of a sine."""
     pitch = float(np.ptp(motion.q)) * float(random.uniform(0.03, 0.3))
-    return {"amplitude": 1.4 * level_of(motion, strength), "pitch": pitch, "turn": float(random.random())}
+    return {"amplitude": 1.4 * compute_force_level(motion, strength), "pitch": pitch, "turn": float(random.random())}
 
 
 def _add_cogging(motion: AxisMotion, values: Values) -> FloatArray:
@@ -66,13 +67,13 @@ def _travel_beyond(motion: AxisMotion, position: float) -> FloatArray:
 def _draw_stop(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
     """Position of the stops, 40 to 90 % of the largest excursion, and their stiffness."""
     position = float(random.uniform(0.4, 0.9)) * float(np.abs(_centre_position(motion)).max())
-    stiffness = level_of(motion, strength) / max(rms(_travel_beyond(motion, position)), 1e-300)
+    stiffness = compute_force_level(motion, strength) / max(rms(_travel_beyond(motion, position)), 1e-300)
     return {"position": position, "stiffness": stiffness}
 
 
 def _draw_asymmetric(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
     """Friction levels of the two directions, which differ from their mean by 20 to 60 %."""
-    level, share = 1.2 * level_of(motion, strength), float(random.uniform(0.2, 0.6))
+    level, share = 1.2 * compute_force_level(motion, strength), float(random.uniform(0.2, 0.6))
     return {"level_positive": level * (1 + share), "level_negative": level * (1 - share)}
 
 
@@ -85,7 +86,7 @@ def _add_asymmetric_friction(motion: AxisMotion, values: Values) -> FloatArray:
 def _draw_bristles(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
     """Friction level, and stiffness of the bristle, which slips after 1 to 15 % of the travel."""
     slip_distance = float(np.ptp(motion.q)) * float(random.uniform(0.01, 0.15))
-    level = 1.2 * level_of(motion, strength)
+    level = 1.2 * compute_force_level(motion, strength)
     return {"level": level, "stiffness": level / slip_distance}
 
 

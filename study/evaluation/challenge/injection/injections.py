@@ -14,26 +14,26 @@ import numpy as np
 from equalizer.plant.effect_vocabulary import Place
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
-from study.evaluation.challenge.injection.axis_motion import axis_motion, takes_of
+from study.evaluation.challenge.injection.axis_motion import compute_axis_motion, find_takes
 from study.evaluation.challenge.injection.drive_injections import ForceInjection
 from study.evaluation.challenge.injection.force_injections import FORCE_INJECTIONS
 from study.evaluation.challenge.injection.reading_faults import (
-    clip,
-    cubic,
-    delay,
-    drift,
-    hum,
-    lag,
+    add_cubic_term,
+    add_drift,
+    add_hum,
+    add_noise,
+    add_offset,
+    add_square_term,
+    apply_lag,
+    apply_play,
+    clip_readings,
+    delay_readings,
     lose_samples,
     mix_channels,
-    noise,
-    offset,
-    play,
-    quantize,
-    rotate,
-    scale,
+    quantize_readings,
+    rotate_readings,
+    scale_readings,
     shift_clock,
-    square,
 )
 
 MAINS_HZ = (50.0, 60.0)
@@ -111,11 +111,13 @@ INJECTIONS: tuple[Injection, ...] = (
     Injection(
         "sensor_lag",
         lambda statistics, s, r: {"bandwidth": statistics.median_hz * _log_between(20.0, 0.5, s)},
-        lag,
+        apply_lag,
         memory=True,
     ),
     Injection(
-        "sensor_clipping", lambda statistics, s, r: {"limit": statistics.peak * _log_between(0.95, 0.25, s)}, clip
+        "sensor_clipping",
+        lambda statistics, s, r: {"limit": statistics.peak * _log_between(0.95, 0.25, s)},
+        clip_readings,
     ),
     Injection(
         "mains_hum",
@@ -124,19 +126,23 @@ INJECTIONS: tuple[Injection, ...] = (
             "frequency": float(r.choice(MAINS_HZ)) + float(r.normal(0.0, 0.02)),
             "turn": float(r.random()),
         },
-        hum,
+        add_hum,
     ),
     Injection(
         "sensor_drift",
         lambda statistics, s, r: {"total": _random_sign(r) * statistics.rms * _log_between(0.05, 3.0, s)},
-        drift,
+        add_drift,
     ),
     Injection(
         "sensor_offset",
         lambda statistics, s, r: {"offset": _random_sign(r) * statistics.rms * _log_between(0.02, 1.5, s)},
-        offset,
+        add_offset,
     ),
-    Injection("quantization", lambda statistics, s, r: {"step": statistics.rms * _log_between(0.05, 1.5, s)}, quantize),
+    Injection(
+        "quantization",
+        lambda statistics, s, r: {"step": statistics.rms * _log_between(0.05, 1.5, s)},
+        quantize_readings,
+    ),
     Injection("lost_samples", lambda statistics, s, r: {"fraction": _log_between(0.003, 0.3, s)}, lose_samples),
     Injection(
         "clock_drift",
@@ -149,27 +155,32 @@ INJECTIONS: tuple[Injection, ...] = (
     Injection(
         "sensor_gain",
         lambda statistics, s, r: {"gain": 1 + float(r.choice((-0.5, 1.0))) * _log_between(0.02, 0.8, s)},
-        scale,
+        scale_readings,
     ),
     Injection(
         "logger_offset",
         lambda statistics, s, r: {"offset": _log_between(0.005, 0.1, s) / statistics.median_hz},
-        delay,
+        delay_readings,
         memory=True,
     ),
     Injection(
         "sensor_nonlinearity",
         lambda statistics, s, r: {"cubic": _random_sign(r) * _log_between(0.02, 0.3, s) / statistics.peak**2},
-        cubic,
+        add_cubic_term,
     ),
     Injection(
         "sensor_asymmetry",
         lambda statistics, s, r: {"square": _random_sign(r) * _log_between(0.02, 0.4, s) / statistics.peak},
-        square,
+        add_square_term,
     ),
-    Injection("sensor_noise", lambda statistics, s, r: {"rms": statistics.rms * _log_between(0.003, 0.5, s)}, noise),
     Injection(
-        "sensor_play", lambda statistics, s, r: {"gap": statistics.rms * _log_between(0.01, 0.6, s)}, play, memory=True
+        "sensor_noise", lambda statistics, s, r: {"rms": statistics.rms * _log_between(0.003, 0.5, s)}, add_noise
+    ),
+    Injection(
+        "sensor_play",
+        lambda statistics, s, r: {"gap": statistics.rms * _log_between(0.01, 0.6, s)},
+        apply_play,
+        memory=True,
     ),
     Injection(
         "cross_axis_sensitivity",
@@ -177,7 +188,7 @@ INJECTIONS: tuple[Injection, ...] = (
         mix_channels,
         axes=2,
     ),
-    Injection("sensor_misalignment", _draw_turn, rotate, axes=3),
+    Injection("sensor_misalignment", _draw_turn, rotate_readings, axes=3),
 )
 """Faults of sensor, clock and line: name in the vocabulary, draw of the parameters, and change of the response."""
 
@@ -202,7 +213,7 @@ def inject(recording: Recording, effect: str, strength: float, random: np.random
     if samples.shape[1] < injection.axes:
         raise ValueError(f"{effect} needs {injection.axes} response channels, and there are {samples.shape[1]}")
     values = injection.draw(measure_response(recording), strength, random)
-    takes = takes_of(recording) if injection.memory else ((0, len(recording)),)
+    takes = find_takes(recording) if injection.memory else ((0, len(recording)),)
     rate_hz = recording.sample_rate_hz
     faulty = np.vstack([injection.apply(samples[start:stop], rate_hz, values, random) for start, stop in takes])
     change = np.sqrt(np.nanmean((faulty - samples) ** 2, axis=0))
@@ -217,12 +228,12 @@ def _inject_force(
     Raises ValueError where the recording has no motion along the command."""
     samples = recording.command.samples.copy()
     axis = int(random.integers(samples.shape[1]))
-    motion = axis_motion(recording, axis)
+    motion = compute_axis_motion(recording, axis)
     if motion is None:
         raise ValueError(f"{injection.effect} needs a motion along command {axis + 1}")
     values = injection.draw(motion, strength, random)
-    takes = takes_of(recording) if injection.memory else ((0, len(recording)),)
-    samples[:, axis] = np.concatenate([injection.command(motion.part(*bounds), values) for bounds in takes])
+    takes = find_takes(recording) if injection.memory else ((0, len(recording)),)
+    samples[:, axis] = np.concatenate([injection.command(motion.select_samples(*bounds), values) for bounds in takes])
     change = np.sqrt(np.mean((samples - recording.command.samples) ** 2, axis=0))
     command = replace(recording.command, samples=samples)
     return Injected(replace(recording, command=command), injection.effect, values, strength, np.asarray(change))
@@ -246,7 +257,7 @@ def applicable_injections(recording: Recording) -> tuple[str, ...]:
     force_injections = [
         injection for injection in FORCE_INJECTIONS if not (injection.actuator and "imposed" in recording.meta)
     ]
-    is_measured = all(axis_motion(recording, axis) is not None for axis in axes)
+    is_measured = all(compute_axis_motion(recording, axis) is not None for axis in axes)
     return (*sensor_effects, *(injection.effect for injection in force_injections if is_measured))
 
 

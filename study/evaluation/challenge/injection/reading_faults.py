@@ -13,35 +13,45 @@ from scipy.spatial.transform import Rotation
 from equalizer.signals.signal import FloatArray
 
 
-def lag(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def apply_lag(
+    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+) -> FloatArray:
     """First-order low-pass with the corner frequency `bandwidth` (Hz), at rest at the first reading."""
-    share = 1.0 - np.exp(-2 * np.pi * values["bandwidth"] / rate_hz)
-    filtered, _ = lfilter([share], [1.0, share - 1.0], samples, axis=0, zi=(1.0 - share) * samples[:1])
+    smoothing = 1.0 - np.exp(-2 * np.pi * values["bandwidth"] / rate_hz)
+    filtered, _ = lfilter([smoothing], [1.0, smoothing - 1.0], samples, axis=0, zi=(1.0 - smoothing) * samples[:1])
     return np.asarray(filtered)
 
 
-def clip(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def clip_readings(
+    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+) -> FloatArray:
     """Clipping at +-limit."""
     return np.asarray(np.clip(samples, -values["limit"], values["limit"]))
 
 
-def hum(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def add_hum(
+    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+) -> FloatArray:
     """Mains hum, the same in all channels: `amplitude`, `frequency` (Hz), phase `turn` (turns)."""
     turns = values["frequency"] * np.arange(len(samples)) / rate_hz + values["turn"]
     return np.asarray(samples + values["amplitude"] * np.sin(2 * np.pi * turns)[:, None])
 
 
-def drift(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def add_drift(
+    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+) -> FloatArray:
     """Drift, the same in all channels: linear from 0 at the start to `total` at the end."""
     return samples + values["total"] * np.linspace(0.0, 1.0, len(samples))[:, None]
 
 
-def offset(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def add_offset(
+    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+) -> FloatArray:
     """Constant `offset`, the same in all channels."""
     return samples + values["offset"]
 
 
-def quantize(
+def quantize_readings(
     samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
     """Quantization to multiples of `step`."""
@@ -52,9 +62,9 @@ def lose_samples(
     samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
 ) -> FloatArray:
     """Each sample is lost with probability `fraction` and then repeats the previous sample."""
-    lost = random.random(len(samples)) < values["fraction"]
-    lost[0] = False
-    source_index = np.maximum.accumulate(np.where(lost, 0, np.arange(len(samples))))
+    is_lost = random.random(len(samples)) < values["fraction"]
+    is_lost[0] = False
+    source_index = np.maximum.accumulate(np.where(is_lost, 0, np.arange(len(samples))))
     return np.asarray(samples[source_index])
 
 
@@ -67,49 +77,63 @@ def shift_clock(
     return np.column_stack([np.interp(read_index, index, channel) for channel in samples.T])
 
 
-def rotate(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def rotate_readings(
+    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+) -> FloatArray:
     """Misalignment: rotation of the three channels by `degrees` about the unit vector (about_x, about_y, about_z)."""
     axis = np.array([values["about_x"], values["about_y"], values["about_z"]])
     return np.asarray(Rotation.from_rotvec(np.radians(values["degrees"]) * axis).apply(np.array(samples)))
 
 
-def scale(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def scale_readings(
+    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+) -> FloatArray:
     """Factor `gain` in all channels."""
     return values["gain"] * samples
 
 
-def delay(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def delay_readings(
+    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+) -> FloatArray:
     """Readings delayed by `offset` (s), interpolated linearly."""
     index = np.arange(len(samples), dtype=np.float64)
     return np.column_stack([np.interp(index - values["offset"] * rate_hz, index, channel) for channel in samples.T])
 
 
-def cubic(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def add_cubic_term(
+    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+) -> FloatArray:
     """Cubic nonlinearity a + cubic a^3."""
     return np.asarray(samples + values["cubic"] * samples**3)
 
 
-def square(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def add_square_term(
+    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+) -> FloatArray:
     """Quadratic nonlinearity a + square a^2."""
     return np.asarray(samples + values["square"] * samples**2)
 
 
-def noise(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def add_noise(
+    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+) -> FloatArray:
     """Added white normal noise with the given `rms`."""
     return np.asarray(samples + values["rms"] * random.normal(size=samples.shape))
 
 
-def play(samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator) -> FloatArray:
+def apply_play(
+    samples: FloatArray, rate_hz: float, values: Mapping[str, float], random: np.random.Generator
+) -> FloatArray:
     """Hysteresis (play operator) with the total width `gap`. A missing reading (NaN) stays missing."""
-    output, previous, half = np.empty_like(samples), samples[0], 0.5 * values["gap"]
-    for k, reading in enumerate(samples):
+    output, previous, half_gap = np.empty_like(samples), samples[0], 0.5 * values["gap"]
+    for index, reading in enumerate(samples):
         is_finite = np.isfinite(reading)
         previous = np.where(
             is_finite,
-            np.where(np.isfinite(previous), np.clip(previous, reading - half, reading + half), reading),
+            np.where(np.isfinite(previous), np.clip(previous, reading - half_gap, reading + half_gap), reading),
             previous,
         )
-        output[k] = np.where(is_finite, previous, np.nan)
+        output[index] = np.where(is_finite, previous, np.nan)
     return output
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ
-from study.evaluation.challenge.law_kernel import law_force, law_memory
-from study.evaluation.challenge.laws.concealed_laws import LawKind, Random, Sizes
+from study.evaluation.challenge.law_kernel import advance_law_memory, compute_law_force
+from study.evaluation.challenge.laws.concealed_laws import LawKind, PeakValues, Random
 from study.evaluation.challenge.mechanism_kernel import Motion
 
 WEAKEST, STRONGEST = 0.015, 0.25
@@ -49,10 +49,10 @@ def build_law(
     axis of the law, and another axis. strength: 0 to 1."""
     motion, command = baseline
     axis, other_axis = places
-    sizes = Sizes(
+    peaks = PeakValues(
         *(float(np.abs(part[:, axis]).max()) for part in (motion.position, motion.velocity, motion.acceleration))
     )
-    first, second = kind.draw(random, sizes)
+    first, second = kind.draw(random, peaks)
     side = float(random.choice((-1.0, 1.0)))
     share = WEAKEST * (STRONGEST / WEAKEST) ** strength
     if kind.change is not None:
@@ -125,8 +125,8 @@ def _evaluate_force(row: FloatArray, motion: Motion, command: FloatArray) -> Flo
     memory, force = 0.0, np.zeros(len(command))
     for k in range(len(command)):
         q, v, drive = motion.position[k], motion.velocity[k], command[k]
-        force[k] = law_force(row, q, v, drive, memory, k / RATE_HZ)
-        memory = law_memory(row, q, drive, memory, 1 / RATE_HZ)
+        force[k] = compute_law_force(row, q, v, drive, memory, k / RATE_HZ)
+        memory = advance_law_memory(row, q, drive, memory, 1 / RATE_HZ)
     return force
 
 

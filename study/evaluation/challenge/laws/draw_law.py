@@ -23,10 +23,10 @@ from study.evaluation.challenge.draw_case import (
     make_recording,
     measure_detectability,
 )
-from study.evaluation.challenge.drive_plan import RATE_HZ, DrivePlan, draw_plan, multisine
+from study.evaluation.challenge.drive_plan import RATE_HZ, DrivePlan, draw_multisine, draw_plan
 from study.evaluation.challenge.extras import with_extras
 from study.evaluation.challenge.laws.build_law import LawTruth, build_law
-from study.evaluation.challenge.laws.concealed_laws import LAW_KINDS, LAW_OF_NAME
+from study.evaluation.challenge.laws.concealed_laws import LAW_KINDS, LAWS_BY_NAME
 from study.evaluation.challenge.mechanism_kernel import Motion
 from study.evaluation.challenge.nominal import as_model, draw_calibration, retune
 from study.evaluation.challenge.sensor import read_sensor
@@ -109,7 +109,7 @@ def draw_law(seed: int, number: int, brief: bool = False) -> LawDraw:
         ]
     )
     concealed = {"law": names[name_index], "decoy": names[name_index], "mode": MODE, "nothing": ""}[kind]
-    has_two_axes = (kind == "law" and LAW_OF_NAME[concealed].axes == 2) or random.random() > ONE_AXIS
+    has_two_axes = (kind == "law" and LAWS_BY_NAME[concealed].axes == 2) or random.random() > ONE_AXIS
     axes = tuple(sorted(int(axis) for axis in random.choice(3, 2 if has_two_axes else 1, replace=False)))
     model = cast(ModelOrigin, str(random.choice(["calibrated", "retuned"])))
     settings = CaseSettings(axes, 1000 if brief else 2000, 3, 1.0, STEPS_PER_SAMPLE, LOUD_N)
@@ -160,7 +160,7 @@ def _build_law_scaled(
     for strength in (law_draw.strength, law_draw.strength / 2, law_draw.strength / 4):
         random.bit_generator.state = state
         device, truth = build_law(
-            baseline, LAW_OF_NAME[law_draw.concealed], (motion, plan.command), places, strength, random
+            baseline, LAWS_BY_NAME[law_draw.concealed], (motion, plan.command), places, strength, random
         )
         try:
             law_motion = simulate_full_motion(device, plan.command)
@@ -182,7 +182,9 @@ def _make_fresh_motion(
     """Motion of the device under a new multisine on all driven axes."""
     command = np.zeros((FRESH_PERIOD * FRESH_PERIODS, 3))
     for axis in settings.axes:
-        command[:, axis] = np.tile(multisine(random, level_n / len(settings.axes) ** 0.5, FRESH_PERIOD), FRESH_PERIODS)
+        command[:, axis] = np.tile(
+            draw_multisine(random, level_n / len(settings.axes) ** 0.5, FRESH_PERIOD), FRESH_PERIODS
+        )
     motion, axes = simulate_full_motion(device, command), list(settings.axes)
     changed_command = command if device.drive_law is None else device.drive_law(command)
     reading = motion.acceleration if device.sensor.law is None else device.sensor.law(motion.acceleration)

@@ -1,9 +1,9 @@
 """The bench of the blind test as a MuJoCo model: a handle on three slides, attached oscillators, concealed effects.
 
-A second physics engine, so that cases do not depend on hapteq's own simulation alone. Dry friction is the engine's own
-friction loss (a constraint, no bristle); an end stop is a tendon whose spring has a dead band; backlash is a motor body
-behind a tendon with limits; a hand and added masses are armature, damping and stiffness of the slides; saturation, gain
-and lag are those of its actuators. Integrator: Runge-Kutta of fourth order.
+`mujoco_case` draws its cases: a second physics engine, so that cases do not depend on hapteq's own simulation alone.
+Dry friction is the engine's own friction loss (a constraint, no bristle); an end stop is a tendon whose spring has a
+dead band; backlash is a motor body behind a tendon with limits; a hand and added masses are armature, damping and
+stiffness of the slides; saturation, gain and lag are those of its actuators. Integrator: Runge-Kutta of fourth order.
 """
 
 from collections.abc import Mapping
@@ -17,13 +17,13 @@ from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.bench import Bench, Oscillators
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ
 
-STEPS = 10
+STEPS_PER_SAMPLE = 10
 """Integration steps per sample."""
-STEP_S = 1.0 / (RATE_HZ * STEPS)
+STEP_S = 1.0 / (RATE_HZ * STEPS_PER_SAMPLE)
 """Step of integration (s)."""
 HANDLE_SHARE = 0.4
 """Mass of the handle's body over that of the lightest axis. The rest of an axis's mass moves with that axis alone."""
-CONTACT = 0.01
+CONTACT_IMPEDANCE = 0.01
 """MuJoCo's constraint impedance (0 to 1) of a contact: small, so that the contact force is that of a spring and a
 damper with their nominal values."""
 
@@ -60,43 +60,44 @@ class MujocoBench:
     """Axis, and the parameters of `backlash`: motor mass, gap, contact stiffness and damping (SI units)."""
 
 
-def baseline_bench(bench: Bench) -> MujocoBench:
+def make_baseline_bench(bench: Bench) -> MujocoBench:
     """The closest MuJoCo equivalent of a bench, without concealed effects: the off-diagonal terms of mass, damping and
     stiffness are dropped."""
-    mass, damping, stiffness = (np.diag(part).copy() for part in (bench.mass, bench.damping, bench.stiffness))
+    mass, damping, stiffness = (np.diag(matrix).copy() for matrix in (bench.mass, bench.damping, bench.stiffness))
     zeros = np.zeros(3)
     return MujocoBench(mass, damping, stiffness, bench.oscillators, zeros, zeros, np.ones(3), zeros)
 
 
-def linear_bench(bench: MujocoBench) -> Bench:
+def linearise_bench(bench: MujocoBench) -> Bench:
     """The linear part as a bench. Perpendicular to its slide, an oscillator moves with the handle, so that its mass
     adds to the handle's in these directions."""
     mass = np.diag(bench.mass_kg)
-    for kg, direction in zip(bench.oscillators.mass_kg, bench.oscillators.direction, strict=True):
-        mass += kg * (np.eye(3) - np.outer(direction, direction))
+    for oscillator_kg, direction in zip(bench.oscillators.mass_kg, bench.oscillators.direction, strict=True):
+        mass += oscillator_kg * (np.eye(3) - np.outer(direction, direction))
     return Bench(mass, np.diag(bench.damping), np.diag(bench.stiffness), bench.oscillators)
 
 
 def simulate_motion(bench: MujocoBench, command: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Acceleration (m/s²) and position (m) of the handle, (samples, 3) each, just before each command is written.
 
-    command: (samples, 3), N. Raises ValueError where the motion is not finite or reaches 1 m.
+    The delay is whole samples and a rest of integration steps. command: (samples, 3), N. Raises ValueError where the
+    motion is not finite or reaches 1 m.
     """
-    model = mujoco.MjModel.from_xml_string(_model_xml(bench))
+    model = mujoco.MjModel.from_xml_string(_format_mjcf(bench))
     data = mujoco.MjData(model)
-    handle = [model.joint(axis).dofadr[0] for axis in AXES]
-    data.qfrc_applied[handle] = bench.force_n
+    handle_dofs = [model.joint(axis).dofadr[0] for axis in AXES]
+    data.qfrc_applied[handle_dofs] = bench.force_n
     delay_steps = round(bench.delay_s / STEP_S)
-    delay_samples, extra_steps = divmod(delay_steps, STEPS)
+    delay_samples, extra_steps = divmod(delay_steps, STEPS_PER_SAMPLE)
     acceleration, position = np.zeros((len(command), 3)), np.zeros((len(command), 3))
-    for k in range(len(command)):
+    for sample in range(len(command)):
         mujoco.mj_forward(model, data)
-        acceleration[k], position[k] = data.qacc[handle], data.qpos[handle]
+        acceleration[sample], position[sample] = data.qacc[handle_dofs], data.qpos[handle_dofs]
         if extra_steps:
-            data.ctrl[:] = _command_at(command, k - delay_samples - 1)
+            data.ctrl[:] = _select_command(command, sample - delay_samples - 1)
             mujoco.mj_step(model, data, extra_steps)
-        data.ctrl[:] = _command_at(command, k - delay_samples)
-        mujoco.mj_step(model, data, STEPS - extra_steps)
+        data.ctrl[:] = _select_command(command, sample - delay_samples)
+        mujoco.mj_step(model, data, STEPS_PER_SAMPLE - extra_steps)
     if not (np.isfinite(acceleration).all() and np.abs(position).max() < 1.0):
         raise ValueError("the device of the second engine ran away")
     return acceleration, position
@@ -107,17 +108,17 @@ def with_delay(bench: MujocoBench, delay_s: float) -> MujocoBench:
     return replace(bench, delay_s=max(round(delay_s / STEP_S), 1) * STEP_S)
 
 
-def _command_at(command: FloatArray, sample: int) -> FloatArray:
-    """Command of a sample; zero before the first."""
+def _select_command(command: FloatArray, sample: int) -> FloatArray:
+    """Command (3,), N, of a sample; zero before the first."""
     return command[sample] if sample >= 0 else np.zeros(3)
 
 
-def _model_xml(bench: MujocoBench) -> str:
+def _format_mjcf(bench: MujocoBench) -> str:
     """MuJoCo's description of the bench (MJCF). Armature adds inertia along a single joint, so that axes differ."""
     root = Xml.Element("mujoco")
     _add_element(root, "compiler", {"autolimits": "true"})
-    exact = {"integrator": "RK4", "tolerance": "1e-12", "iterations": "50"}
-    _add_element(root, "option", {"timestep": f"{STEP_S:.12g}", "gravity": "0 0 0"} | exact)
+    solver_options = {"integrator": "RK4", "tolerance": "1e-12", "iterations": "50"}
+    _add_element(root, "option", {"timestep": f"{STEP_S:.12g}", "gravity": "0 0 0"} | solver_options)
     world = _add_element(root, "worldbody")
     handle = _add_element(world, "body", {"name": "handle"})
     handle_kg = HANDLE_SHARE * float(bench.mass_kg.min())
@@ -128,19 +129,21 @@ def _model_xml(bench: MujocoBench) -> str:
         motor = _add_element(world, "body", {"name": "motor"})
         _add_slide(motor, "motor", np.eye(3)[axis], {})
         _add_mass(motor, float(values["motor_mass"]))
-    for j, name in enumerate(AXES):
+    for index, name in enumerate(AXES):
         joint_values = {
-            "armature": bench.mass_kg[j] - handle_kg - motor_kg[j], "damping": bench.damping[j],
-            "stiffness": bench.stiffness[j], "frictionloss": bench.friction_n[j],
+            "armature": bench.mass_kg[index] - handle_kg - motor_kg[index], "damping": bench.damping[index],
+            "stiffness": bench.stiffness[index], "frictionloss": bench.friction_n[index],
         }  # fmt: skip
-        _add_slide(handle, name, np.eye(3)[j], joint_values)
+        _add_slide(handle, name, np.eye(3)[index], joint_values)
     _add_mass(handle, handle_kg)
     _add_oscillators(handle, bench.oscillators)
     tendons = _add_element(root, "tendon")
     if bench.stop is not None:
-        axis, low, high, stiffness = bench.stop
-        ends = f"{low:.12g} {high:.12g}"
-        stop_tendon = _add_element(tendons, "fixed", {"name": "stop", "stiffness": stiffness, "springlength": ends})
+        axis, lower_m, upper_m, stiffness = bench.stop
+        spring_range = f"{lower_m:.12g} {upper_m:.12g}"
+        stop_tendon = _add_element(
+            tendons, "fixed", {"name": "stop", "stiffness": stiffness, "springlength": spring_range}
+        )
         _add_element(stop_tendon, "joint", {"joint": AXES[axis], "coef": 1.0})
     if bench.play is not None:
         _add_play(tendons, bench, *bench.play)
@@ -150,41 +153,49 @@ def _model_xml(bench: MujocoBench) -> str:
 
 def _add_oscillators(handle: Xml.Element, oscillators: Oscillators) -> None:
     """Add each oscillator as a body on a slide with spring and damper, along its direction."""
-    for k, (hz, kg, ratio, direction) in enumerate(
+    for index, (frequency_hz, mass_kg, damping_ratio, direction) in enumerate(
         zip(
             oscillators.frequency_hz, oscillators.mass_kg, oscillators.damping_ratio, oscillators.direction, strict=True
         )
     ):
-        stiffness = kg * (2 * np.pi * hz) ** 2
-        body = _add_element(handle, "body", {"name": f"rider {k}"})
+        stiffness = mass_kg * (2 * np.pi * frequency_hz) ** 2
+        body = _add_element(handle, "body", {"name": f"rider {index}"})
         _add_slide(
-            body, f"rider {k}", direction, {"stiffness": stiffness, "damping": 2 * ratio * np.sqrt(stiffness * kg)}
+            body,
+            f"rider {index}",
+            direction,
+            {"stiffness": stiffness, "damping": 2 * damping_ratio * np.sqrt(stiffness * mass_kg)},
         )
-        _add_mass(body, float(kg))
+        _add_mass(body, float(mass_kg))
 
 
 def _add_play(tendons: Xml.Element, bench: MujocoBench, axis: int, values: Values) -> None:
     """Backlash: a tendon between motor and handle limits their distance, a one-sided contact at each end of the gap."""
     motor_kg = values["motor_mass"]
-    mass, _, _ = linear_bench(bench).matrices()
+    mass, _, _ = linearise_bench(bench).assemble_matrices()
     mass[axis, axis] -= motor_kg
     # MuJoCo takes stiffness and damping of a contact per unit of effective mass, here of motor and handle in series.
-    reduced = 1.0 / (1.0 / motor_kg + np.linalg.inv(mass)[axis, axis])
-    spring, damper = values["contact_stiffness"] / reduced, values["contact_damping"] / reduced
-    half = 0.5 * values["gap"]
-    contact = {"solreflimit": f"{-spring:.12g} {-damper:.12g}", "solimplimit": f"{CONTACT} {CONTACT} 1"}
-    play_tendon = _add_element(tendons, "fixed", {"name": "play", "range": f"{-half:.12g} {half:.12g}"} | contact)
+    reduced_mass_kg = 1.0 / (1.0 / motor_kg + np.linalg.inv(mass)[axis, axis])
+    spring, damper = values["contact_stiffness"] / reduced_mass_kg, values["contact_damping"] / reduced_mass_kg
+    half_gap_m = 0.5 * values["gap"]
+    contact = {
+        "solreflimit": f"{-spring:.12g} {-damper:.12g}",
+        "solimplimit": f"{CONTACT_IMPEDANCE} {CONTACT_IMPEDANCE} 1",
+    }
+    play_tendon = _add_element(
+        tendons, "fixed", {"name": "play", "range": f"{-half_gap_m:.12g} {half_gap_m:.12g}"} | contact
+    )
     _add_element(play_tendon, "joint", {"joint": "motor", "coef": 1.0})
     _add_element(play_tendon, "joint", {"joint": AXES[axis], "coef": -1.0})
 
 
 def _add_actuators(parent: Xml.Element, bench: MujocoBench) -> None:
     """Add the force of each axis, with gain, saturation and lag; with backlash it acts on the motor."""
-    for j, name in enumerate(AXES):
-        joint = "motor" if bench.play is not None and bench.play[0] == j else name
-        actuator = _add_element(parent, "general", {"joint": joint, "gainprm": float(bench.gain[j])})
-        if bench.limit_n[j] > 0.0:
-            actuator.set("forcerange", f"{-bench.limit_n[j]:.12g} {bench.limit_n[j]:.12g}")
+    for index, name in enumerate(AXES):
+        joint = "motor" if bench.play is not None and bench.play[0] == index else name
+        actuator = _add_element(parent, "general", {"joint": joint, "gainprm": float(bench.gain[index])})
+        if bench.limit_n[index] > 0.0:
+            actuator.set("forcerange", f"{-bench.limit_n[index]:.12g} {bench.limit_n[index]:.12g}")
         if bench.lag_s > 0.0:
             actuator.set("dyntype", "filter")
             actuator.set("dynprm", f"{bench.lag_s:.12g}")

@@ -26,8 +26,8 @@ from study.evaluation.challenge.drive_plan import RATE_HZ, draw_plan
 from study.evaluation.challenge.nominal import as_model, draw_calibration, retune
 from study.evaluation.challenge.second_engine.mujoco_bench import (
     MujocoBench,
-    baseline_bench,
-    linear_bench,
+    linearise_bench,
+    make_baseline_bench,
     simulate_motion,
     with_delay,
 )
@@ -46,8 +46,8 @@ def draw_mujoco_case(
         raise ValueError(f"the second engine cannot conceal {', '.join(sorted(unknown))}")
     random = np.random.default_rng([seed, len(effects), 2])
     drawn_bench, plan = draw_bench(random), draw_plan(random, settings)
-    baseline = baseline_bench(drawn_bench)
-    bench = linear_bench(baseline)
+    baseline = make_baseline_bench(drawn_bench)
+    bench = linearise_bench(baseline)
     base_motion = simulate_motion(baseline, plan.command)
     device, measured, truth = baseline, Device(bench), []
     peak = np.minimum(np.abs(base_motion[0]).max(axis=0), RANGE_MPS2)

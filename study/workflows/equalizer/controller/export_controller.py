@@ -1,7 +1,7 @@
 """`hapteq export-controller`: C sources of the real-time controller of an identified model.
 
-The controller (`equalizer.tracking.realtime`) plays a stored transient in any direction, and tracks a stream of wanted
-accelerations with a preview. Header, example loop and check program are written into a new folder.
+The controller (`equalizer.tracking.realtime`) plays a stored transient in any direction, and tracks a stream of
+reference accelerations with a preview. Header, example loop and check program are written into a new folder.
 """
 
 from dataclasses import dataclass, field
@@ -14,25 +14,36 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY, TableError, require_rate
 from equalizer.tracking.lqr.tracking_problem import TrackingError
 from equalizer.tracking.realtime.controller_cases import controller_cases
-from equalizer.tracking.realtime.realtime_controller import RealtimeController, RealtimeSettings, realtime_controller
+from equalizer.tracking.realtime.realtime_controller import (
+    RealtimeController,
+    RealtimeSettings,
+    make_realtime_controller,
+)
 from study.devices.opening import HAND_STIMULUS_CAP_N, STRONGEST_N
 from study.errors import StudyError
 from study.store.disk.provenance import sha256_of
 from study.store.disk.text_file import write_text
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.trajectory_file import read_trajectory
-from study.workflows.equalizer.controller.c_text import CHECK, EXAMPLE, HEADER, check_text, example_text, header_text
+from study.workflows.equalizer.controller.c_text import (
+    CHECK_NAME,
+    EXAMPLE_NAME,
+    HEADER_NAME,
+    format_check_program,
+    format_header,
+    read_example,
+)
 from study.workflows.free_name import require_free
 
 TITLE = "The controller was not exported"
 """Title of each error message of this command."""
-LONGEST_ROWS = 5000
-"""Longest transient (rows): every row becomes 130 numbers for a model of order 26, all of which a compiler must
-read."""
+MOST_TRANSIENT_ROWS = 5000
+"""Largest number of rows of a transient. For a model of order 26 each row becomes 130 numbers of C source, all of
+which a compiler must read."""
 LONGEST_PREVIEW_S = 2.0
 """Longest preview that is accepted (s)."""
-TRY = "Such as --preview 200 --cap 3."
-"""Advice for messages: settings that fit in most cases."""
+EXAMPLE_SETTINGS = "Such as --preview 200 --cap 3."
+"""Advice in error messages: settings that fit in most cases."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +53,7 @@ class ControllerPlan:
     model: Path
     out: Path
     transient: Path | None = None
-    """Table of wanted accelerations (m/s²); None: a tap, a short built-in transient."""
+    """Table of reference accelerations (m/s²); None: the built-in `realtime_controller.tap`."""
     settings: RealtimeSettings = field(default_factory=RealtimeSettings)
 
 
@@ -57,45 +68,52 @@ class ExportedController:
     @property
     def files(self) -> tuple[Path, ...]:
         """Paths of the header, the example and the check."""
-        return tuple(self.plan.out / name for name in (HEADER, EXAMPLE, CHECK))
+        return tuple(self.plan.out / name for name in (HEADER_NAME, EXAMPLE_NAME, CHECK_NAME))
 
 
 def export_controller(plan: ControllerPlan) -> ExportedController:
-    """Compute the controller and write its sources. Raises StudyError for a cap above the strongest device, and for a
-    model or transient from which no controller can be made; nothing is written then."""
+    """Compute the controller and write its sources. Raises StudyError for a cap above the force of the strongest
+    supported device, and for a model or transient from which no controller can be made; nothing is written then."""
     require_free(plan.out, title=TITLE, kind="controllers")
     if plan.settings.cap_n > STRONGEST_N:
-        raise _refusal(f"The cap is {plan.settings.cap_n:g} N; the strongest device gives {STRONGEST_N:g} N.", TRY)
+        raise _make_refusal(
+            f"The cap is {plan.settings.cap_n:g} N; the strongest device gives {STRONGEST_N:g} N.", EXAMPLE_SETTINGS
+        )
     model = read_identified_model(plan.model)
     try:
         _require_force_model(model)
         transient = None if plan.transient is None else _read_transient(plan.transient, model)
-        controller = realtime_controller(model, transient, plan.settings)
+        controller = make_realtime_controller(model, transient, plan.settings)
         cases = controller_cases(controller)
     except (TrackingError, TableError) as problem:
-        raise _refusal(f"{capitalise(str(problem))}.", "Correct what it says, or choose another model.") from problem
+        raise _make_refusal(
+            f"{capitalise(str(problem))}.", "Correct what it says, or choose another model."
+        ) from problem
     exported = ExportedController(plan, model, controller)
-    sources = (header_text(controller, _origin(plan, model)), example_text(), check_text(cases))
+    sources = (format_header(controller, _describe_origin(plan, model)), read_example(), format_check_program(cases))
     plan.out.mkdir()
     for path, text in zip(exported.files, sources, strict=True):
         write_text(path, text)
     return exported
 
 
-def controller_settings(weight: float, preview_s: float, cap_n: float) -> RealtimeSettings:
-    """Settings of the real-time controller. weight: of the forces in the cost; preview_s: time (s) for which the stream
-    is known in advance; cap_n: largest force (N). Raises StudyError for values outside their limits."""
+def make_controller_settings(weight: float, preview_s: float, cap_n: float) -> RealtimeSettings:
+    """Make and check the settings of the real-time controller. weight: of |force|² against |error|² in the cost,
+    (m/s² per N)²; preview_s: time (s) for which the stream is known in advance; cap_n: largest force (N). Raises
+    StudyError for values outside their limits."""
     if not preview_s <= LONGEST_PREVIEW_S:
-        raise _refusal(f"A preview of {preview_s:g} s was requested; {LONGEST_PREVIEW_S:g} s is the longest.", TRY)
+        raise _make_refusal(
+            f"A preview of {preview_s:g} s was requested; {LONGEST_PREVIEW_S:g} s is the longest.", EXAMPLE_SETTINGS
+        )
     try:
         return RealtimeSettings(weight, preview_s, cap_n)
     except TrackingError as problem:
-        raise _refusal(f"{capitalise(str(problem))}.", TRY) from problem
+        raise _make_refusal(f"{capitalise(str(problem))}.", EXAMPLE_SETTINGS) from problem
 
 
 def summarise_export(exported: ExportedController) -> dict[str, Any]:
-    """The export as plain values, for a JSON document. Errors are relative (1 = 100 %), as predicted by the model
-    itself."""
+    """The export as plain values, for a JSON document. Errors are tracking errors relative to the reference (1 =
+    100 %), as predicted by the model itself."""
     controller, rate_hz = exported.controller, exported.model.sample_rate_hz
     return {
         "files": [str(path) for path in exported.files],
@@ -112,8 +130,8 @@ def summarise_export(exported: ExportedController) -> dict[str, Any]:
 
 
 def warn_of_export(exported: ExportedController) -> tuple[str, ...]:
-    """A warning if the controller's cap is above the largest force that hapteq plays with a hand on the handle;
-    otherwise empty."""
+    """Return a warning if the controller's cap is above the largest force that hapteq plays with a hand on the handle;
+    empty otherwise."""
     cap_n = exported.controller.cap_n
     if cap_n <= HAND_STIMULUS_CAP_N:
         return ()
@@ -124,8 +142,8 @@ def warn_of_export(exported: ExportedController) -> tuple[str, ...]:
 
 
 def describe_export(exported: ExportedController) -> tuple[str, ...]:
-    """Lines for the terminal: files, length of the transient, delay and predicted error of the stream, command of the
-    check."""
+    """Lines for the terminal: files, length of the transient, delay and predicted error of the stream, and the command
+    that compiles and runs the check."""
     values, (low_hz, high_hz) = summarise_export(exported), exported.model.band_hz
     return (
         *values["files"],
@@ -133,19 +151,19 @@ def describe_export(exported: ExportedController) -> tuple[str, ...]:
         f"Stream: {1000 * values['stream_late_s']:.0f} ms late; as the model itself predicts, error "
         f"{100 * values['stream_error']:.2g} % from {low_hz:g} to {high_hz:g} Hz "
         f"({100 * values['stream_error_without_limit']:.2g} % with all of it known), and what the bands' overlap adds.",
-        f"Check it where it shall run: cc -std=c11 -O2 {CHECK} -o check -lm && ./check",
+        f"Check it where it shall run: cc -std=c11 -O2 {CHECK_NAME} -o check -lm && ./check",
     )
 
 
 def _read_transient(path: Path, model: IdentifiedModel) -> FloatArray:
-    """(N, 3), m/s²: the transient of a table. Raises TableError for another kind of table, another sample rate than the
-    model's, or too many rows."""
+    """Read the transient (N, 3), m/s², of a table. Raises TableError for another kind of table, another sample rate
+    than the model's, or too many rows."""
     table = read_trajectory(path)
     if table.kind is not TRAJECTORY:
         raise TableError((f"{path.name} holds forces; a transient is a table of accelerations",))
     require_rate(table, model.sample_rate_hz)
-    if len(table.signal) > LONGEST_ROWS:
-        raise TableError((f"{path.name} has {len(table.signal)} rows; a controller takes {LONGEST_ROWS}",))
+    if len(table.signal) > MOST_TRANSIENT_ROWS:
+        raise TableError((f"{path.name} has {len(table.signal)} rows; a controller takes {MOST_TRANSIENT_ROWS}",))
     return table.signal.samples
 
 
@@ -156,19 +174,20 @@ def _require_force_model(model: IdentifiedModel) -> None:
         raise TrackingError("the model is not of three forces (N) and three accelerations (m/s^2)")
 
 
-def _origin(plan: ControllerPlan, model: IdentifiedModel) -> tuple[str, ...]:
-    """Lines for the header: model file, band, place, channels, transient and weight."""
+def _describe_origin(plan: ControllerPlan, model: IdentifiedModel) -> tuple[str, ...]:
+    """Lines for the header: model file, band, position in the workspace, channels, transient and weight."""
     low_hz, high_hz = model.band_hz
-    table = "a tap along the last axis, 1 m/s^2" if plan.transient is None else plan.transient.name
-    place = (
+    transient_text = "a tap along the last axis, 1 m/s^2" if plan.transient is None else plan.transient.name
+    place_text = (
         "" if model.place_m is None else f", at {', '.join(f'{coordinate_m:g}' for coordinate_m in model.place_m)} m"
     )
     return (
-        f"Of {plan.model.name} (SHA-256 {sha256_of(plan.model)[:16]}), {low_hz:g} to {high_hz:g} Hz{place}.",
+        f"Of {plan.model.name} (SHA-256 {sha256_of(plan.model)[:16]}), {low_hz:g} to {high_hz:g} Hz{place_text}.",
         f"Forces {', '.join(model.input_channels)} in N; accelerations {', '.join(model.output_channels)} in m/s^2.",
-        f"The transient: {table}. Weight {plan.settings.weight:g}.",
+        f"The transient: {transient_text}. Weight {plan.settings.weight:g}.",
     )
 
 
-def _refusal(explanation: str, advice: str) -> StudyError:
+def _make_refusal(explanation: str, advice: str) -> StudyError:
+    """Error of this command, which wrote nothing."""
     return StudyError(TITLE, explanation, advice, saved="Nothing was written.")

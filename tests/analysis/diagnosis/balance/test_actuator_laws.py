@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance import actuator_equivalents
-from analysis.diagnosis.balance.command_laws import AS_COMMANDED, neighbours_of
+from analysis.diagnosis.balance.command_laws import AS_COMMANDED, vary_parameters
 
 
 @pytest.fixture(scope="module")
@@ -225,7 +225,7 @@ def test_what_pulls_alike_everywhere_is_no_coil(find_balance, law):
 
 def test_a_law_of_the_command_is_tried_in_order_and_never_twice():
     law = replace(AS_COMMANDED, values={"power": 2.0, "width": 0.0, "limit": 3.0})
-    tried = [tuple(each.values.values()) for each in neighbours_of(law)]
+    tried = [tuple(each.values.values()) for each in vary_parameters(law)]
     assert tried == [(2.0, 0.0, 3.0 * f) for f in (0.95, 0.98, 1.02, 1.05)] + [
         (2.0 * f, 0.0, 3.0) for f in (0.95, 0.98, 1.02, 1.05)
     ]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.judged_law import family_of
+from analysis.diagnosis.balance.judged_law import find_family
 from tests.analysis.diagnosis.balance.invented_axis import make_recording
 
 RATE_HZ, STEPS = 250.0, 20
@@ -42,7 +42,7 @@ def simulate_motor(friction_n, dead_band_n, seed):
 def test_friction_that_holds_a_motor_between_its_moves_is_no_dead_band(find_balance, seed):
     (balance,) = find_balance(simulate_motor(LEVEL_N, 0.0, seed))
     (named,) = balance.named
-    assert named.law.effect in family_of("coulomb_friction")
+    assert named.law.effect in find_family("coulomb_friction")
 
 
 @pytest.mark.slow

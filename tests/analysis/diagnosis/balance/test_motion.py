@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.laws import laws_of
+from analysis.diagnosis.balance.laws import make_laws
 from analysis.diagnosis.balance.motion import NoMotionError, compute_motions, find_motion_signal
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.settings import BAND_WIDEST
@@ -87,7 +87,7 @@ def test_within_its_band_a_noisy_motion_keeps_its_acceleration(record_samples):
 
 def test_samples_near_the_ends_are_not_fitted_to(record_samples):
     found = observe_motion(record_samples(exact_derivative(2), exact_derivative(0), RATE_HZ))
-    kept = found.valid_samples(np.ones(COUNT, dtype=bool))
+    kept = found.mask_valid_samples(np.ones(COUNT, dtype=bool))
     assert kept.any() and not kept[0] and not kept[-1]
     assert len(kept) == len(found.decimate(found.force))
 
@@ -112,7 +112,7 @@ def test_without_a_clock_no_law_asks_how_fast_it_moves(record_samples):
     def effects(meta):
         return {
             law.effect
-            for law in laws_of(
+            for law in make_laws(
                 [observe_motion(record_samples(exact_derivative(2), exact_derivative(0), 1.0, meta=meta))], False
             )
         }

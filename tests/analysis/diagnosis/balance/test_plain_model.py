@@ -24,9 +24,9 @@ def rubbing(play_axis, axis_module):
 
 
 def test_beside_friction_it_is_that_of_the_balance(rubbing):
-    from analysis.diagnosis.first_model.model_from_balance import plain_model
+    from analysis.diagnosis.first_model.model_from_balance import build_plain_model
 
-    model = plain_model(*rubbing, "first")
+    model = build_plain_model(*rubbing, "first")
     assert model is not None
     assert model.mass[0, 0] == pytest.approx(0.3, rel=0.05)
     assert model.stiffness[0, 0] == pytest.approx(100.0, rel=0.1)
@@ -34,22 +34,22 @@ def test_beside_friction_it_is_that_of_the_balance(rubbing):
 
 @pytest.mark.slow
 def test_without_a_named_law_another_fit_is_asked_for(play_axis, axis_module):
-    from analysis.diagnosis.first_model.model_from_balance import plain_model
+    from analysis.diagnosis.first_model.model_from_balance import build_plain_model
 
-    assert plain_model(*play_axis(axis_module.Physics()), "first") is None
+    assert build_plain_model(*play_axis(axis_module.Physics()), "first") is None
 
 
 @pytest.mark.slow
 def test_a_second_body_asks_for_another_fit(play_axis, axis_module):
-    from analysis.diagnosis.first_model.model_from_balance import plain_model
+    from analysis.diagnosis.first_model.model_from_balance import build_plain_model
 
-    assert plain_model(*play_axis(replace(axis_module.Physics(), coulomb=0.8, second_mass=0.1)), "first") is None
+    assert build_plain_model(*play_axis(replace(axis_module.Physics(), coulomb=0.8, second_mass=0.1)), "first") is None
 
 
 def test_a_band_holds_the_friction_of_a_slow_motion_but_no_ripple_above_it(rubbing):
-    from analysis.diagnosis.first_model.model_from_balance import law_power_share_in_band
+    from analysis.diagnosis.first_model.model_from_balance import compute_law_power_share
 
     balances, _ = rubbing
-    shares = [law_power_share_in_band(balances, band_hz) for band_hz in (1e-3, 1.0, 1e3)]
+    shares = [compute_law_power_share(balances, band_hz) for band_hz in (1e-3, 1.0, 1e3)]
     assert shares[0] < 0.05 and shares[0] < shares[1] < shares[2]
     assert shares[2] == pytest.approx(1.0)

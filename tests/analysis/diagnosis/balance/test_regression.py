@@ -7,7 +7,7 @@ import pytest
 
 from analysis.diagnosis.balance.law import Law, name_weights
 from analysis.diagnosis.balance.motion import compute_motions
-from analysis.diagnosis.balance.regression import fit_all_laws, keep_laws, regression_of, replace_law
+from analysis.diagnosis.balance.regression import build_regression, fit_all_laws, keep_laws, replace_law
 from analysis.diagnosis.balance.structures import Structure, improves_significantly
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.settings import BALANCE_FOLDS
@@ -32,7 +32,7 @@ def regression(record_samples):
         force += 5 * np.tanh(np.gradient(q) * RATE_HZ) + random.standard_normal(COUNT)
         records.append(record_samples(force[:, None], q[:, None], RATE_HZ))
     motions = compute_motions(observe_parts(records, 1))
-    return regression_of(motions, 0, (SCALE, CUBE, PAIR), turns=False)
+    return build_regression(motions, 0, (SCALE, CUBE, PAIR), turns=False)
 
 
 def stack_blocks(regression, columns, blocks):
@@ -52,14 +52,14 @@ def residual_energy(regression, columns, weights, block):
 
 
 def test_weights_are_those_of_least_squares(regression):
-    columns = regression.columns_of((0, 1))
-    assert regression.weights(columns) == pytest.approx(solve_blocks(regression, columns, regression.fit), rel=1e-4)
-    assert regression.weights(columns)[-1] == pytest.approx(30, rel=0.2)
+    columns = regression.select_columns((0, 1))
+    assert regression.fit_weights(columns) == pytest.approx(solve_blocks(regression, columns, regression.fit), rel=1e-4)
+    assert regression.fit_weights(columns)[-1] == pytest.approx(30, rel=0.2)
 
 
 def test_a_folds_error_is_that_of_numbers_fitted_to_all_others(regression):
-    columns = regression.columns_of((1,))
-    found = regression.cross_validated_errors(columns)
+    columns = regression.select_columns((1,))
+    found = regression.cross_validate(columns)
     for number, block in enumerate(regression.fit):
         others = [other for other in regression.fit if other is not block]
         assert found[number] == pytest.approx(
@@ -73,12 +73,12 @@ def test_a_folds_error_is_that_of_numbers_fitted_to_all_others(regression):
 
 
 def test_held_out_errors_are_of_samples_that_nothing_was_fitted_to(regression):
-    columns = regression.columns_of((0, 2))
+    columns = regression.select_columns((0, 2))
     truth = [
         residual_energy(regression, columns, solve_blocks(regression, columns, regression.fit), b)
         for b in regression.test
     ]
-    assert regression.held_out_errors(columns) == pytest.approx(truth, rel=1e-4)
+    assert regression.compute_test_errors(columns) == pytest.approx(truth, rel=1e-4)
     rows = {(b.motion, k) for b in regression.fit for k in b.rows.tolist()}
     assert not rows & {(b.motion, k) for b in regression.test for k in b.rows.tolist()}
     assert len(regression.fit) >= BALANCE_FOLDS
@@ -87,14 +87,14 @@ def test_held_out_errors_are_of_samples_that_nothing_was_fitted_to(regression):
 def test_a_law_in_anothers_place_gives_what_a_new_regression_would(regression):
     wider = replace(SCALE, numbers=(0.2,))
     changed = replace_law(regression, 0, wider)
-    anew = regression_of(regression.motions, 0, (wider, CUBE, PAIR), turns=False)
+    anew = build_regression(regression.motions, 0, (wider, CUBE, PAIR), turns=False)
     for laws in ((0,), (0, 1, 2)):
-        columns = anew.columns_of(laws)
-        assert changed.cross_validated_errors(columns) == pytest.approx(anew.cross_validated_errors(columns))
-        assert changed.held_out_errors(columns) == pytest.approx(anew.held_out_errors(columns))
-        assert changed.weights(columns) == pytest.approx(anew.weights(columns))
-    assert changed.cross_validated_errors(changed.columns_of((0,))).sum() != pytest.approx(
-        regression.cross_validated_errors(anew.columns_of((0,))).sum()
+        columns = anew.select_columns(laws)
+        assert changed.cross_validate(columns) == pytest.approx(anew.cross_validate(columns))
+        assert changed.compute_test_errors(columns) == pytest.approx(anew.compute_test_errors(columns))
+        assert changed.fit_weights(columns) == pytest.approx(anew.fit_weights(columns))
+    assert changed.cross_validate(changed.select_columns((0,))).sum() != pytest.approx(
+        regression.cross_validate(anew.select_columns((0,))).sum()
     )
     assert replace_law(regression, 0, PAIR) is None
     assert replace_law(regression, 0, replace(SCALE, columns=lambda m, n: 0 * m.velocity[:, :1])) is None
@@ -103,20 +103,20 @@ def test_a_law_in_anothers_place_gives_what_a_new_regression_would(regression):
 def test_some_laws_alone_leave_what_they_leave_among_the_others(regression):
     alone = keep_laws(regression, (2, 0))
     assert [law.effect for law in alone.laws] == ["pair", "scale"]
-    assert alone.cross_validated_errors(alone.columns_of((0, 1))) == pytest.approx(
-        regression.cross_validated_errors(regression.columns_of((2, 0)))
+    assert alone.cross_validate(alone.select_columns((0, 1))) == pytest.approx(
+        regression.cross_validate(regression.select_columns((2, 0)))
     )
-    assert alone.held_out_errors(alone.columns_of((1,))) == pytest.approx(
-        regression.held_out_errors(regression.columns_of((0,)))
+    assert alone.compute_test_errors(alone.select_columns((1,))) == pytest.approx(
+        regression.compute_test_errors(regression.select_columns((0,)))
     )
 
 
 def test_all_laws_together_leave_no_more_than_the_truth_and_noise_alone_stays(regression):
     everything = range(regression.columns[0].shape[1])
     crossed, tested = fit_all_laws(regression, everything)
-    truth = regression.cross_validated_errors(regression.columns_of((0, 1))).sum()
+    truth = regression.cross_validate(regression.select_columns((0, 1))).sum()
     assert crossed == pytest.approx(truth, rel=0.05)
-    assert crossed < 0.7 * regression.cross_validated_errors(regression.columns_of(())).sum()
+    assert crossed < 0.7 * regression.cross_validate(regression.select_columns(())).sum()
     assert tested.shape == (len(regression.test),)
 
 
@@ -125,9 +125,9 @@ def test_an_axis_has_no_mass_and_no_damping_below_zero(regression):
         regression, force=tuple(-f for f in regression.force),
         fit=tuple(replace(b, cross=-b.cross) for b in regression.fit),
     )  # fmt: skip
-    columns = turned.columns_of(())
+    columns = turned.select_columns(())
     assert solve_blocks(turned, columns, turned.fit)[1] < 0
-    assert (turned.weights(columns)[:2] >= 0).all()
+    assert (turned.fit_weights(columns)[:2] >= 0).all()
 
 
 def test_columns_that_are_nothing_in_all_blocks_but_one_give_finite_errors(regression):
@@ -135,10 +135,10 @@ def test_columns_that_are_nothing_in_all_blocks_but_one_give_finite_errors(regre
     last = Law(
         "late", 0, (), lambda m, _: (np.arange(len(m.force))[:, None] > 4300) * 1e6 * m.position, name_weights("k")
     )
-    late = regression_of(regression.motions[:1], 0, (last,), turns=False)
-    found = late.cross_validated_errors(late.columns_of((0,)))
+    late = build_regression(regression.motions[:1], 0, (last,), turns=False)
+    found = late.cross_validate(late.select_columns((0,)))
     assert np.isfinite(found).all()
-    assert found.sum() < 3 * late.cross_validated_errors(late.columns_of(())).sum()
+    assert found.sum() < 3 * late.cross_validate(late.select_columns(())).sum()
 
 
 def test_laws_are_worth_it_where_the_folds_agree():

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.command_laws import slew_laws
+from analysis.diagnosis.balance.command_laws import make_slew_laws
 from analysis.diagnosis.settings import SLEW_REACHED
 
 RATE_HZ, SPEED = 50.0, 1.5
@@ -46,11 +46,11 @@ def test_the_limit_is_named_with_its_speed(offset_m, record_follower, find_balan
 @pytest.mark.slow
 def test_a_late_command_is_in_the_first_model_beside_the_limit(record_follower, find_balance):
     """Else the limit would be taken for a slower one, which is late, too."""
-    from analysis.diagnosis.first_model.model_from_balance import plain_model
+    from analysis.diagnosis.first_model.model_from_balance import build_plain_model
 
     late = 4
     given = record_follower(SPEED, late, 3000)
-    model = plain_model(find_balance(given), given, "first")
+    model = build_plain_model(find_balance(given), given, "first")
 
     assert model is not None
     assert model.actuator.delay_s == pytest.approx(late / RATE_HZ, abs=1.2 / RATE_HZ)
@@ -73,9 +73,9 @@ def test_of_a_force_no_limit_is_asked(record_follower, find_balance):
 
 def test_rates_that_never_catch_up_are_not_tried():
     command = np.sin(2 * np.pi * 5 * np.arange(5000) / 500)
-    rates = [law.values["rate"] for law in slew_laws([command], 500.0)]
+    rates = [law.values["rate"] for law in make_slew_laws([command], 500.0)]
 
     assert rates
-    for law in slew_laws([command], 500.0):
-        reached = np.abs(law.of(command, command)[:, 0] - command) < law.values["rate"] / 500.0
+    for law in make_slew_laws([command], 500.0):
+        reached = np.abs(law.compute_columns(command, command)[:, 0] - command) < law.values["rate"] / 500.0
         assert reached.mean() > SLEW_REACHED

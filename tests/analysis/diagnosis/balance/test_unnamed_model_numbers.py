@@ -54,7 +54,7 @@ def test_a_spring_that_hardens_or_softens_is_named_and_not_explained_without_rep
 @pytest.mark.slow
 @pytest.mark.parametrize(("seconds", "names"), [(10.0, ["coulomb_friction"]), (1.4, [])], ids=["long", "too short"])
 def test_a_recording_that_is_too_short_to_name_physics_gets_candidates(axis_module, seconds, names):
-    from analysis.diagnosis.diagnose import TOO_SHORT, diagnose
+    from analysis.diagnosis.diagnose import TOO_SHORT_TO_NAME, diagnose
     from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 
     recording = axis_module.record_axis(
@@ -65,7 +65,7 @@ def test_a_recording_that_is_too_short_to_name_physics_gets_candidates(axis_modu
     assert [effect.effect for effect in found.effects] == names
     if not names:
         assert found.verdict == "unexplained"
-        assert (found.candidates[0].effect, found.candidates[0].why_not) == ("coulomb_friction", TOO_SHORT)
+        assert (found.candidates[0].effect, found.candidates[0].why_not) == ("coulomb_friction", TOO_SHORT_TO_NAME)
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance.judged_law import JudgedLaw
-from analysis.diagnosis.balance.laws import _stop_values
+from analysis.diagnosis.balance.laws import _make_stop_reader
 from analysis.diagnosis.confirm import confirm_laws as by_balance
 from analysis.diagnosis.confirm import require_gain
 from analysis.diagnosis.confirm.confirm_laws import (
@@ -17,9 +17,9 @@ from analysis.diagnosis.confirm.confirm_laws import (
     find_open_refinements,
 )
 from analysis.diagnosis.confirm.held_out_gain import HeldOutGain
-from analysis.diagnosis.confirm.laws_for_simulation import can_be_simulated, find_special_case, hypothesis_of_judged
+from analysis.diagnosis.confirm.laws_for_simulation import can_be_simulated, find_special_case, make_hypothesis
 from analysis.diagnosis.confirm.require_gain import ONLY_BESIDE_CALIBRATION, unname_doubtful_effects
-from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import Claim, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.search.verdict import Judgement, SearchResult
@@ -37,9 +37,9 @@ RIPPLE = ("cogging", {"amplitude": 0.5, "pitch": 0.01, "phase": 0.0})
 
 
 def make_explanation(*laws):
-    whole = hypothesis_of_claim(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 1.0}])
+    whole = make_claim_hypothesis(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 1.0}])
     for name, values in laws:
-        whole = combine(whole, hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values]))
+        whole = combine_hypotheses(whole, make_claim_hypothesis(Claim(EFFECTS[name], "one", (0,)), [values]))
     return SimpleNamespace(steps=(SimpleNamespace(fitted=SimpleNamespace(hypothesis=whole)),))
 
 
@@ -126,7 +126,7 @@ def test_laws_are_fitted_from_the_model_s_own_numbers_where_the_balance_s_end_be
         return [candidate_with_test_error(from_balance if np.any(deviations) else from_model)]
 
     monkeypatch.setattr(by_balance, "_fit_steps", steps)
-    monkeypatch.setattr(by_balance, "parameters_beside_laws", lambda tuning, balances, laws: np.array([1.0, -2.0]))
+    monkeypatch.setattr(by_balance, "compute_starting_deviations", lambda tuning, balances, laws: np.array([1.0, -2.0]))
     context = SimpleNamespace(tuning=None, with_test_score=lambda candidate: candidate)
     _, after = _fit_from_starts(context, (), (candidate_with_test_error(8.0), candidate_with_test_error(8.0)), ())
     assert after.score.test[0] == end
@@ -152,7 +152,8 @@ def test_a_law_that_foretells_no_better_than_the_given_model_is_not_named(monkey
     regression = SimpleNamespace(base_terms=SimpleNamespace(driven_channel=0))
     balance = SimpleNamespace(named=(law,), search=SimpleNamespace(regression=regression))
     patched = {
-        "can_be_simulated": lambda own, weighed: True, "constants_of": lambda balances: SimpleNamespace(claims=()),
+        "can_be_simulated": lambda own, weighed: True,
+        "estimate_constant_forces": lambda balances: SimpleNamespace(claims=()),
         "refit_laws": lambda balances, named: named, "evaluate_fit": lambda *of: given, "refine": lambda *of: 4.0,
         "compute_final_errors": lambda *of: np.zeros(1), "_find_undetermined_law": lambda *of: None,
         "_fit_from_starts": lambda *of: ([candidate_with_test_error(1.1)], candidate_with_test_error(1.1)),
@@ -163,9 +164,9 @@ def test_a_law_that_foretells_no_better_than_the_given_model_is_not_named(monkey
         monkeypatch.setattr(by_balance, name, stand_in)
     context = SimpleNamespace(
         measure=None,
-        whole=None,
+        full_measure=None,
         tuning=SimpleNamespace(names=()),
-        candidate=candidate_with_test_error,
+        score_fit=candidate_with_test_error,
         with_test_score=lambda each: each,
     )
     context.fit_to_all = lambda: context
@@ -188,13 +189,13 @@ def make_search_result(*names):
     retuned = make_candidate()
     steps = tuple(make_candidate(*names[: place + 1]) for place in range(len(names)))
     found = Explanation(retuned, retuned, steps[-1], (), steps)
-    context = SimpleNamespace(whole=None, with_test_score=lambda each: each)
+    context = SimpleNamespace(full_measure=None, with_test_score=lambda each: each)
     return SearchResult(context, found, Judgement("partly_explained", True))
 
 
 @pytest.fixture
 def half_held_out_gain(monkeypatch):
-    monkeypatch.setattr(require_gain, "held_out_gain", lambda *_: HeldOutGain(0.5, 0.4, 0.6))
+    monkeypatch.setattr(require_gain, "estimate_held_out_gain", lambda *_: HeldOutGain(0.5, 0.4, 0.6))
 
 
 @pytest.mark.usefixtures("half_held_out_gain")
@@ -240,7 +241,7 @@ def test_what_the_signal_itself_shows_keeps_its_name_unless_the_model_runs_away(
 
 
 def test_what_gains_nothing_on_held_out_data_is_no_candidate(monkeypatch):
-    monkeypatch.setattr(require_gain, "held_out_gain", lambda *_: HeldOutGain(-0.1, -0.2, 0.1))
+    monkeypatch.setattr(require_gain, "estimate_held_out_gain", lambda *_: HeldOutGain(-0.1, -0.2, 0.1))
     assert unname_doubtful_effects(make_search_result("slew_limit")).unconfirmed == ()
 
 
@@ -249,11 +250,11 @@ def test_what_gains_nothing_on_held_out_data_is_no_candidate(monkeypatch):
     [(0.04, 1.0, 0.05), (-0.02, 1.0, 0.0), (-0.04, -1.0, -0.05), (0.02, -1.0, 0.0)],
 )
 def test_a_stop_is_played_on_whichever_side_of_zero_it_stands(position_m, side, pushing_at_m):
-    values = _stop_values(side)(np.array([800.0]), (position_m,), 1.0)
+    values = _make_stop_reader(side)(np.array([800.0]), (position_m,), 1.0)
     judged = SimpleNamespace(formula=None, law=SimpleNamespace(effect="end_stop", channel=0), values=values)
     assert can_be_simulated(0, judged)
 
-    (placed,) = hypothesis_of_judged(0, judged, None).list_placed_effects()
+    (placed,) = make_hypothesis(0, judged, None).list_placed_effects()
     at, numbers = np.zeros(LENGTH), placed.effect.action.pack(None, 0, placed.values)
     at[X] = at[X_FREE] = pushing_at_m
     assert placed.effect.action.law(numbers, np.zeros(1), at) == pytest.approx(-800.0 * (pushing_at_m - position_m))

@@ -9,8 +9,8 @@ import pytest
 from analysis.diagnosis.confirm import decide_with_model as beside_given
 from analysis.diagnosis.confirm.balance_with_model import find_balances_with_model
 from analysis.diagnosis.confirm.decide_with_model import find_objection
-from analysis.diagnosis.confirm.held_out_gain import explains_half, held_out_gain, predicts_motion
-from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.confirm.held_out_gain import estimate_held_out_gain, explains_half, predicts_motion
+from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.search.time_budget import unlimited_time
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.recording import Recording
@@ -62,12 +62,12 @@ def test_a_device_within_its_calibration_lacks_nothing(mass):
 def test_a_calibrated_number_does_not_take_friction_on_itself(friction_balance):
     """Fitted freely, damping would hold part of it; its prior keeps it within a few standard deviations."""
     regression = friction_balance.search.regression
-    deviations = regression.weights(regression.columns_of(()))[1 : regression.base - 1]
+    deviations = regression.fit_weights(regression.select_columns(()))[1 : regression.base - 1]
     assert np.abs(deviations).max() < 10
     loose = replace(regression, prior=None)
     assert (
-        loose.cross_validated_errors(loose.columns_of(())).sum()
-        <= regression.cross_validated_errors(regression.columns_of(())).sum()
+        loose.cross_validate(loose.select_columns(())).sum()
+        <= regression.cross_validate(regression.select_columns(())).sum()
     )
 
 
@@ -83,13 +83,13 @@ NOISE = np.random.default_rng(5).normal(size=(1600, 2))
 
 
 def test_a_gain_is_the_share_of_the_error_power_that_goes():
-    found = held_out_gain(MEASURE, make_candidate(NOISE), make_candidate(0.5 * NOISE))
+    found = estimate_held_out_gain(MEASURE, make_candidate(NOISE), make_candidate(0.5 * NOISE))
     assert (found.gain, found.low, found.high) == pytest.approx((0.75, 0.75, 0.75))
 
 
 def test_a_random_difference_has_a_gain_interval_around_zero():
     other = np.random.default_rng(6).normal(size=(1600, 2))
-    found = held_out_gain(MEASURE, make_candidate(NOISE), make_candidate(other))
+    found = estimate_held_out_gain(MEASURE, make_candidate(NOISE), make_candidate(other))
     assert found.low < 0 < found.high
 
 
@@ -124,8 +124,8 @@ def test_a_name_needs_a_model_that_explains_half_of_what_is_no_noise(name, left,
 
 
 def make_search_result(after, rival=None):
-    tuning = tuning_of(device(1), ("fx",))
-    context = SimpleNamespace(whole=MEASURE, tuning=tuning, with_test_score=lambda each: each)
+    tuning = make_tuning(device(1), ("fx",))
+    context = SimpleNamespace(full_measure=MEASURE, tuning=tuning, with_test_score=lambda each: each)
     rounds = ((after, *(() if rival is None else (rival,))),)
     found = SimpleNamespace(steps=(after,), plain=make_candidate(NOISE), after=after, rounds=rounds)
     return SimpleNamespace(context=context, found=found)

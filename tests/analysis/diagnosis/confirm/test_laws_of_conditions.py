@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.balance.condition_laws import _formula
+from analysis.diagnosis.balance.condition_laws import _make_formula
 from analysis.diagnosis.balance.motion import Condition
-from analysis.diagnosis.data.recorded_conditions import effects_under_conditions
+from analysis.diagnosis.data.recorded_conditions import apply_conditions
 from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.prepare_recordings import prepare_recordings
 from analysis.diagnosis.result.wording import format_effect_title
@@ -16,7 +16,7 @@ from equalizer.effects.discovered_law import Channels, condition_names
 from equalizer.effects.placing import PlacingError, place_effects, place_recorded_effects
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.laws.evaluate import evaluate
-from equalizer.laws.law import Law, law_of
+from equalizer.laws.law import Law, parse_law
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -94,7 +94,7 @@ def test_a_condition_that_does_nothing_is_not_named(seed):
 
 
 def test_a_model_with_such_a_law_is_played_with_the_recording_s_condition_and_not_without():
-    law = law_of("-2.0*(T - 300)*vx", "force", "x")
+    law = parse_law("-2.0*(T - 300)*vx", "force", "x")
     plain = MechanicalModel("m", "position", np.eye(1), np.eye(1), 9 * np.eye(1), input=np.eye(1), output=np.eye(1))
     model = MechanicalModel(
         "m", "position", np.eye(1), np.eye(1), 9 * np.eye(1), input=np.eye(1), output=np.eye(1),
@@ -103,7 +103,7 @@ def test_a_model_with_such_a_law_is_played_with_the_recording_s_condition_and_no
     recording = record_rubbing_mass(np.zeros(SAMPLES), np.where(TIME_S < 4, 300.0, 301.0), 1)
     placed = place_recorded_effects(model, recording)
     command = recording.command.samples
-    bound = simulate_mechanism(model, command, RATE_HZ, effects_under_conditions(placed, recording))
+    bound = simulate_mechanism(model, command, RATE_HZ, apply_conditions(placed, recording))
     without = simulate_mechanism(plain, command, RATE_HZ)
     same = int(4 * RATE_HZ)
     np.testing.assert_allclose(bound.response[:same], without.response[:same], atol=1e-9)
@@ -129,9 +129,9 @@ def test_a_condition_is_called_by_its_channel_where_no_signal_is_called_so():
 
 @pytest.mark.parametrize(("mean", "spread"), [(312.68, 7.64003), (1_013_250.4, 0.3), (-2.5e-4, 1e-5), (3.0, 4e4)])
 def test_a_formula_with_a_condition_keeps_its_free_numbers_when_it_is_read_back(mean, spread):
-    formula = _formula(Condition("T", mean, spread), "v")({"change": 2.5})
+    formula = _make_formula(Condition("T", mean, spread), "v")({"change": 2.5})
     law = Law(formula.text, formula.numbers, (), "force", "x")
-    again = law_of(law.exact_text, "force", "x")
+    again = parse_law(law.exact_text, "force", "x")
     assert again.numbers == (2.5,)
     at = {"T": np.array([mean + 2 * spread]), "v": np.ones(1)}
     assert evaluate(again, at, 1.0) == pytest.approx(-5.0, rel=2e-3)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.diagnose_values import diagnose_values
-from equalizer.laws.law import law_of
+from equalizer.laws.law import parse_law
 from tests.analysis.diagnosis.balance.invented_axis import make_recording
 
 RATE_HZ = 100.0
@@ -43,7 +43,7 @@ def test_the_curve_of_a_valve_is_named_with_its_formula(seed):
     ]
     law = named["discovered_law"].law
     assert (law.acts_on, law.variables) == ("command", ("fx",))
-    width, power = law_of(law.expression, "command", "x").numbers[1:]
+    width, power = parse_law(law.expression, "command", "x").numbers[1:]
     assert width == pytest.approx(0.1, abs=0.03)
     assert power == pytest.approx(0.4, abs=0.1)
 

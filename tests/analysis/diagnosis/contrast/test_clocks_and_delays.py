@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from analysis.diagnosis.contrast.actuator_faults import SIZE_RANGE, delays_to_try
+from analysis.diagnosis.contrast.actuator_faults import SIZE_RANGE, choose_trial_delays_s
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase
 from analysis.diagnosis.contrast.bases import bases_of, compute_unexplained_share
 from analysis.diagnosis.contrast.compared_base import (
@@ -23,7 +23,7 @@ from analysis.diagnosis.contrast.interpolation import noise_gain, resample, shif
 from analysis.diagnosis.contrast.likely_delays import suggest_clock_rates, suggest_delays_s
 from analysis.diagnosis.contrast.part import split_into_parts
 from analysis.diagnosis.contrast.rank_faults import rank_faults
-from analysis.diagnosis.contrast.sensor_faults import sensor_faults
+from analysis.diagnosis.contrast.sensor_faults import make_sensor_faults
 from analysis.diagnosis.settings import LEAST_FAULT_GAIN
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -45,7 +45,7 @@ def test_a_clock_that_ran_on_before_the_first_reading_is_named_with_its_rate(rig
 
 def test_each_delay_lies_within_reach_of_those_that_are_tried():
     slow = np.sin(2 * np.pi * 0.2 * np.arange(20_000) / 1000.0)
-    tried = np.array(delays_to_try(slow, 1000.0))
+    tried = np.array(choose_trial_delays_s(slow, 1000.0))
     assert tried[-1] / tried[0] > 1000
     assert np.all(tried[1:] * SIZE_RANGE[0] <= 1.0001 * tried[:-1] * SIZE_RANGE[1])
 
@@ -253,7 +253,9 @@ def test_sensor_faults_of_a_response_with_hardly_any_noise_can_be_undone():
     """Errors of 1e-8 of its size are beyond products of values in double precision, and not of second differences."""
     parts = split_into_parts([record_oscillator(2)[0]])
     compared = compare_base(AutoregressiveBase(0, 24, 1, 1), split_into_parts([record_oscillator(1)[0]]), parts)
-    gains = [fault for fault in sensor_faults(0, "x", parts, Rows(1, (), 0.0, ())) if fault.effect == "sensor_gain"]
+    gains = [
+        fault for fault in make_sensor_faults(0, "x", parts, Rows(1, (), 0.0, ())) if fault.effect == "sensor_gain"
+    ]
     for variant in gains[0].variants:
         undone = undo_fault_in_rows(compared, compared.faulty, gains[0], variant)
         assert compared.compute_grams(compared.faulty, undone).is_well_conditioned(variant)

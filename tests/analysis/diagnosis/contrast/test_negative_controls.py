@@ -71,7 +71,7 @@ def test_a_balance_that_cannot_be_solved_leaves_the_other_base_to_compare_by(rig
     def unsolvable(*of: object) -> None:
         raise np.linalg.LinAlgError("singular matrix")
 
-    monkeypatch.setattr("analysis.diagnosis.contrast.bases.force_base", unsolvable)
+    monkeypatch.setattr("analysis.diagnosis.contrast.bases.build_force_base", unsolvable)
     monkeypatch.setattr("analysis.diagnosis.contrast.bases.choose_decimation_step", lambda parts: 1)
     found = rank_faults([rig.record_rig(2)], [rig.record_rig(1)], frozenset(), lambda: False)
     assert found is not None and not found.by_force

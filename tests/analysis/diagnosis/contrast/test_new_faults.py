@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.contrast.actuator_faults import actuator_faults
+from analysis.diagnosis.contrast.actuator_faults import make_actuator_faults
 from analysis.diagnosis.contrast.decide import choose_fault
 from analysis.diagnosis.contrast.fault import Rows
 from analysis.diagnosis.contrast.part import split_into_parts
@@ -98,7 +98,7 @@ def test_a_drive_that_follows_slowly_is_named(rig):
         given[k] = reached
     part = split_into_parts([replace(plain, command=replace(plain.command, samples=asked[:, None]))])
     (fault,) = [
-        each for each in actuator_faults(0, "fx", part, True, Rows(1, (), 0.0, ())) if each.effect == "slew_limit"
+        each for each in make_actuator_faults(0, "fx", part, True, Rows(1, (), 0.0, ())) if each.effect == "slew_limit"
     ]
     left = [np.std(variant.undo[0](part[0]).command[:, 0] - given) for variant in fault.variants]
     best = fault.variants[int(np.argmin(left))]

@@ -4,7 +4,7 @@ import pytest
 
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
-from analysis.diagnosis.forces.rigid_model import rigid_model
+from analysis.diagnosis.forces.rigid_model import fit_rigid_model
 from analysis.diagnosis.localisation.clean_floor import NothingLearned
 from analysis.diagnosis.reference import learn_model_error
 from analysis.diagnosis.reference.compare_with_reference import Contrast, find_contrast
@@ -58,7 +58,7 @@ def test_clean_recordings_that_teach_a_model_nothing_leave_the_comparison_as_it_
     clean = rig.record_rig(1)
     settings = DiagnosisSettings(without=rig.UNDONE, clean=(clean,))
     faulty = rig.record_rig(2, "coulomb_friction", 0.6)
-    found = diagnose([faulty], rigid_model([clean], "given"), settings, map, lambda said, share: None)
+    found = diagnose([faulty], fit_rigid_model([clean], "given"), settings, map, lambda said, share: None)
     assert len(asked) == 2
     assert found.diagnosis.verdict == "unexplained"
     assert found.diagnosis.candidates

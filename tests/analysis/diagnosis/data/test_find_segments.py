@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.find_segments import exact_period, find_segments
+from analysis.diagnosis.data.find_segments import find_exact_period, find_segments
 from analysis.diagnosis.noise.noise_floor import estimate_noise_floor
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
@@ -60,7 +60,7 @@ def test_numbers_that_were_rounded_repeat_as_well(digits):
     time = np.arange(3000) / 1000
     phases = np.random.default_rng(2).uniform(0, 6, len(lines))
     command = np.cos(2 * np.pi * np.outer(time, 2 * lines) + phases).sum(axis=1)
-    assert exact_period(np.round(command, digits)[:, None]) == 500
+    assert find_exact_period(np.round(command, digits)[:, None]) == 500
 
 
 def test_of_a_short_period_an_odd_multiple_is_stated():

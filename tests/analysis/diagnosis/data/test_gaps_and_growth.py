@@ -10,10 +10,10 @@ from analysis.diagnosis.data.recorded_conditions import is_unstable_within
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
-from analysis.diagnosis.errors.output_error import evaluate_fit, fit, sensitivity
-from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.errors.output_error import build_jacobian, evaluate_fit, fit
+from analysis.diagnosis.errors.tuning import make_tuning
 from equalizer.effects.catalogue import CATALOGUE
-from equalizer.plant.linear_simulation import growth_rate
+from equalizer.plant.linear_simulation import compute_growth_rate
 from equalizer.plant.mechanical_model import Tolerance
 
 TRIED = ("coulomb_friction", "sensor_clipping", "hardening_stiffness")
@@ -36,10 +36,10 @@ def gapped_recording(device_module):
 
 
 def test_every_estimator_sees_whole_courses_of_a_recording_with_a_gap(device_module, gapped_recording, make_context):
-    from analysis.diagnosis.errors.choose_measure import measure_of
+    from analysis.diagnosis.errors.choose_measure import make_measure
 
     model = device_module.device(1)
-    measure = measure_of([gapped_recording], model).measure
+    measure = make_measure([gapped_recording], model).measure
     evidence = measure.evidence(model, (), measure.residuals(model, ()))[0]
     for each in (evidence.response, evidence.predicted, evidence.position, evidence.predicted_position):
         assert each is not None and np.isfinite(each).all()
@@ -60,14 +60,14 @@ def test_friction_is_named_in_spite_of_a_gap(device_module, gapped_recording):
 
 def test_growth_is_distinguished_from_motion_that_dies_out(device_module):
     model = device_module.device(1)
-    assert growth_rate(model) == pytest.approx(-8.0)
+    assert compute_growth_rate(model) == pytest.approx(-8.0)
     assert not is_unstable_within(model, 1000.0)
     pushed = replace(model, damping=-model.damping)
     assert is_unstable_within(pushed, 1.0) and not is_unstable_within(pushed, 0.1)
 
 
 def test_a_fit_with_wide_tolerances_stays_with_models_that_hold_themselves(device_module):
-    from analysis.diagnosis.errors.choose_measure import measure_of
+    from analysis.diagnosis.errors.choose_measure import make_measure
 
     recording = device_module.recorded(1, effects=())
     given = replace(
@@ -76,14 +76,14 @@ def test_a_fit_with_wide_tolerances_stays_with_models_that_hold_themselves(devic
         stiffness=np.array([[60.0]]),
         tolerance=Tolerance(0.1, 4.0, 400.0),
     )
-    measure = measure_of([recording], given).measure
-    tuning = tuning_of(given, ("fx",))
+    measure = make_measure([recording], given).measure
+    tuning = make_tuning(given, ("fx",))
     start = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NO_EFFECTS)
     found = start
     for _ in range(4):
-        found = fit(measure, tuning, found, sensitivity(measure, tuning, found.deviations, NO_EFFECTS), 4)
+        found = fit(measure, tuning, found, build_jacobian(measure, tuning, found.deviations, NO_EFFECTS), 4)
     assert found.cost < start.cost / 10
     assert not is_unstable_within(tuning.tune(found.deviations), 12.0)
     # Where a number is moved to see what it does, it may run away: that way is not looked.
     at = np.array([0.0, -0.02 - given.damping[0, 0] / 4.0, 0.0])
-    assert np.isfinite(sensitivity(measure, tuning, at, NO_EFFECTS).columns).all()
+    assert np.isfinite(build_jacobian(measure, tuning, at, NO_EFFECTS).columns).all()

@@ -7,7 +7,7 @@ import pytest
 
 from analysis.diagnosis.data.observed import (
     Span,
-    error_units,
+    compute_error_units,
     find_moving_spans,
     observe,
     split_samples,
@@ -180,8 +180,8 @@ def test_decisions_do_not_reach_the_sealed_samples():
 
 def test_errors_are_counted_in_noise_and_in_a_share_of_the_signal():
     loud = np.full((100, 1), 10.0)
-    assert error_units(loud, np.array([1.0])) == pytest.approx(np.hypot(1.0, 10 * MODEL_FLOOR))
-    assert error_units(loud, np.array([0.0])) == pytest.approx(10 * MODEL_FLOOR)
+    assert compute_error_units(loud, np.array([1.0])) == pytest.approx(np.hypot(1.0, 10 * MODEL_FLOOR))
+    assert compute_error_units(loud, np.array([0.0])) == pytest.approx(10 * MODEL_FLOOR)
 
 
 def test_what_was_chosen_by_other_means_is_fitted_to_all_but_the_held_out_samples():

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.data.observed_parts import observe_parts, samples_to_fit
+from analysis.diagnosis.data.observed_parts import count_fit_samples, observe_parts
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 
@@ -41,4 +41,4 @@ def test_where_the_middle_level_was_lost_some_of_what_is_left_is_chosen_by():
     (one,) = observe_parts([recording], 1)
     assert one.choose.any() and one.fit.any() and one.test.any()
     assert np.isfinite(lost[one.fit | one.choose | one.test]).all()
-    assert samples_to_fit([recording]) == one.fit.sum()
+    assert count_fit_samples([recording]) == one.fit.sum()

@@ -7,7 +7,7 @@ import pytest
 
 from analysis.diagnosis.data.input_checks import NothingToDiagnose, require_model_of
 from analysis.diagnosis.data.recorded_conditions import add_carried_weight, add_mass, has_carried_weight
-from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.errors.choose_measure import make_measure
 from equalizer.effects.simulation.simulator import simulate_mechanism
 
 ADDED_KG = 0.03
@@ -26,7 +26,7 @@ def recordings(diagnosed):
 
 def largest_error(recording, model):
     """In units of the noise."""
-    measure = measure_of([recording], model).measure
+    measure = make_measure([recording], model).measure
     (left,) = measure.residuals(model, ())
     return float(np.sqrt(np.mean(left**2, axis=0)).max())
 
@@ -41,7 +41,7 @@ def test_a_recording_with_a_weight_agrees_with_a_model_that_is_told_of_it(record
 def test_the_weight_of_one_recording_is_not_that_of_another(recordings, diagnosed):
     bare, heavy = recordings
     model, told = diagnosed.device(1), replace(heavy, meta={"added_mass_kg": ADDED_KG})
-    measure = measure_of([bare, told], model).measure
+    measure = make_measure([bare, told], model).measure
     assert all(np.sqrt(np.mean(left**2)) < 1.2 for left in measure.residuals(model, ()))
     assert (has_carried_weight([bare]), has_carried_weight([bare, told])) == (False, True)
 

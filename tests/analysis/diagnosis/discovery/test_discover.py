@@ -8,21 +8,21 @@ import pytest
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.discovery.add_laws import LawSearch
-from analysis.diagnosis.discovery.beam import best_sums
+from analysis.diagnosis.discovery.beam import search_best_sums
+from analysis.diagnosis.discovery.convert_sum import convert_sum_to_law, list_fitted_laws
 from analysis.diagnosis.discovery.discover import discover
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import Term
-from analysis.diagnosis.discovery.law_of_sum import convert_sum_to_law, list_fitted_laws
 from analysis.diagnosis.discovery.matched_filter import build_views
-from analysis.diagnosis.discovery.screen_terms import products_of
+from analysis.diagnosis.discovery.screen_terms import build_normal_equations
 from analysis.diagnosis.discovery.snap_exponents import simplify_powers
-from analysis.diagnosis.discovery.validation import SAME_KIND
+from analysis.diagnosis.discovery.validation import NO_OTHER_EXCITATION
 from analysis.diagnosis.discovery.view_terms import view_terms
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.result.wording import write_summary_lines
 from analysis.diagnosis.search.verdict import SearchResult, judge
-from analysis.diagnosis.search_by_simulation import names_discovered_law
+from analysis.diagnosis.search_by_simulation import has_discovered_law
 from analysis.diagnosis.settings import LAW_PLACEBO
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.laws.evaluate import evaluate
@@ -103,7 +103,7 @@ def test_a_proved_law_explains(seed=7):
     seen = search_any_law(recorded((DRAG,), seed))
     assert seen.judgement.verdict == "explained"
     assert [claim.effect.name for claim in seen.found.after.fitted.hypothesis.claims] == ["discovered_law"]
-    assert names_discovered_law(seen)
+    assert has_discovered_law(seen)
     assert "stronger commands and another kind of command" in seen.remarks[0]
     assert "Beyond vx = ±" in seen.remarks[0]
 
@@ -115,7 +115,7 @@ def test_without_a_test_of_another_kind_a_law_is_a_candidate(seed=8):
     law = list_fitted_laws(seen.unconfirmed[0].hypothesis)[0]
     assert law is not None
     assert "abs(vx)**1.5" in law.expression
-    assert SAME_KIND in seen.unconfirmed[0].why_not
+    assert NO_OTHER_EXCITATION in seen.unconfirmed[0].why_not
     assert seen.unconfirmed[0].gain > 0.9
 
 
@@ -125,7 +125,7 @@ def test_a_shuffled_force_holds_no_law(seed=9):
     view = build_views(
         context.measure, context.tuning, evaluate_fit(context.measure, context.tuning, fitted.deviations, NO_EFFECTS)
     )[0]
-    found = best_sums(products_of(view), view_terms(view), always)
+    found = search_best_sums(build_normal_equations(view), view_terms(view), always)
     best = found.sums[0]
     assert best.cross_validated / best.base_error < LAW_PLACEBO * (1 - found.placebo)
     assert any("vx" not in each.variables for each in found.sums)  # the grammar without it was asked

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.discovery.add_laws import LawSearch, check_laws, may_approximate_law
+from analysis.diagnosis.discovery.convert_sum import list_fitted_laws
 from analysis.diagnosis.discovery.discover import discover
-from analysis.diagnosis.discovery.law_of_sum import list_fitted_laws
 from analysis.diagnosis.discovery.validation import is_shorter_and_as_good
-from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import Claim, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.time_budget import CountedBudget
@@ -29,7 +29,7 @@ def always():
 
 
 def make_hypothesis(name, **values):
-    return hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values])
+    return make_claim_hypothesis(Claim(EFFECTS[name], "one", (0,)), [values])
 
 
 @pytest.fixture(scope="module")
@@ -42,14 +42,14 @@ def make_named_search(of, *claims, fitted=True):
     context, known = of
     whole = None
     for each in claims:
-        whole = each if whole is None else combine(whole, each)
+        whole = each if whole is None else combine_hypotheses(whole, each)
     start = evaluate_fit(context.measure, context.tuning, known.retuned.fitted.deviations, whole)
-    step = context.candidate(refine(context, start) if fitted else start)
+    step = context.score_fit(refine(context, start) if fitted else start)
     return replace(known, after=context.with_test_score(step), steps=(step,), rounds=((step,),))
 
 
 def largest_travel(of):
-    return max(float(np.ptp(record.recording.position.samples)) for record in of[0].whole.records)
+    return max(float(np.ptp(record.recording.position.samples)) for record in of[0].full_measure.records)
 
 
 @pytest.fixture(scope="module")

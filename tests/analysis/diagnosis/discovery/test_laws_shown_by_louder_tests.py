@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.discovery.add_laws import LawSearch, check_laws
+from analysis.diagnosis.discovery.convert_sum import list_fitted_laws
 from analysis.diagnosis.discovery.discover import Discovery, Round, discover
 from analysis.diagnosis.discovery.fit_sum import Sum
-from analysis.diagnosis.discovery.law_of_sum import list_fitted_laws
-from analysis.diagnosis.discovery.validation import choose_on_held_out, holds_on_held_out
-from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
+from analysis.diagnosis.discovery.validation import choose_on_held_out, is_confirmed_on_held_out
+from analysis.diagnosis.errors.hypothesis import Claim, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.verdict import SearchResult, judge
@@ -49,14 +49,16 @@ def test_a_law_that_takes_nearly_all_of_a_louder_error_is_named_though_some_nois
 @pytest.mark.slow
 def test_a_law_holds_elsewhere_only_where_little_of_the_held_out_error_is_left(search_result):
     _, _, found = search_result
-    assert holds_on_held_out(found.explanation)
+    assert is_confirmed_on_held_out(found.explanation)
     half = replace(
         found.explanation.retuned,
         score=replace(found.explanation.retuned.score, test=found.explanation.retuned.score.test / 2),
     )
-    assert not holds_on_held_out(replace(found.explanation, after=half))
+    assert not is_confirmed_on_held_out(replace(found.explanation, after=half))
     unknown = replace(found.explanation.retuned.score, test=np.full(2, np.nan))
-    assert not holds_on_held_out(replace(found.explanation, retuned=replace(found.explanation.retuned, score=unknown)))
+    assert not is_confirmed_on_held_out(
+        replace(found.explanation, retuned=replace(found.explanation.retuned, score=unknown))
+    )
 
 
 def test_of_laws_that_fit_alike_the_one_that_the_louder_test_bears_out_is_chosen(search_result):
@@ -79,11 +81,11 @@ def test_a_law_too_weak_to_be_known_takes_no_other_laws_name_away(search_result)
     context, known, found = search_result
     weak = replace(law("p0*x*vx*abs(vx)", 1e-3), units=())
     effect = law_effect(weak, law_channels(context.measure.records[0].recording))
-    alone = hypothesis_of_claim(Claim(effect, "one", (0,)), [law_values(weak)])
+    alone = make_claim_hypothesis(Claim(effect, "one", (0,)), [law_values(weak)])
     after = found.explanation.after.fitted
     first, both = (
-        context.candidate(refine(context, evaluate_fit(context.measure, context.tuning, after.deviations, hypothesis)))
-        for hypothesis in (alone, combine(alone, after.hypothesis))
+        context.score_fit(refine(context, evaluate_fit(context.measure, context.tuning, after.deviations, hypothesis)))
+        for hypothesis in (alone, combine_hypotheses(alone, after.hypothesis))
     )
     rounds = (
         Round((first,), (replace(found.rounds[0].sums[0], spread=1.0),), 0.5),
@@ -106,12 +108,14 @@ def test_a_law_whose_round_is_not_known_is_named_by_no_check(search_result):
     context, known, found = search_result
     weak = replace(law("p0*x*vx*abs(vx)", 1e-3), units=())
     effect = law_effect(weak, law_channels(context.measure.records[0].recording))
-    alone = hypothesis_of_claim(Claim(effect, "one", (0,)), [law_values(weak)])
+    alone = make_claim_hypothesis(Claim(effect, "one", (0,)), [law_values(weak)])
     first, rounded = found.rounds[0].fitted_candidates[0], found.explanation.after.fitted
     expressions = [list_fitted_laws(each.hypothesis)[0].expression for each in (first.fitted, rounded)]
     assert expressions[0] != expressions[1]
-    start = evaluate_fit(context.measure, context.tuning, rounded.deviations, combine(rounded.hypothesis, alone))
-    both = context.with_test_score(context.candidate(refine(context, start)))
+    start = evaluate_fit(
+        context.measure, context.tuning, rounded.deviations, combine_hypotheses(rounded.hypothesis, alone)
+    )
+    both = context.with_test_score(context.score_fit(refine(context, start)))
     rounds = (found.rounds[0], Round((both,), (replace(found.rounds[0].sums[0], spread=1.0),), 0.5))
     whole = replace(
         found.explanation, after=both, steps=(first, both), rounds=tuple(each.fitted_candidates for each in rounds)

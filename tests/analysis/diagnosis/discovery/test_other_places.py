@@ -12,16 +12,16 @@ from analysis.diagnosis.discovery.antisymmetric_pairs import (
     find_antisymmetric_pairs,
     make_antisymmetric,
 )
+from analysis.diagnosis.discovery.convert_sum import convert_sum_to_hypothesis, convert_sum_to_law, list_fitted_laws
 from analysis.diagnosis.discovery.discover import discover
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import Term
-from analysis.diagnosis.discovery.law_of_sum import convert_sum_to_hypothesis, convert_sum_to_law, list_fitted_laws
 from analysis.diagnosis.discovery.matched_filter import build_views
 from analysis.diagnosis.discovery.view_terms import terms_of_readings
 from analysis.diagnosis.document import Candidate, diagnosis_from_json, make_found_law
-from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
-from analysis.diagnosis.result.candidates import add_balances_to_search
+from analysis.diagnosis.result.candidates import add_balances_with_given_model
 from equalizer.effects.discovered_law import Channels, law_effect, law_parameters, law_values
 from equalizer.effects.effect import PlacedEffect
 from equalizer.laws.law import Law
@@ -38,7 +38,7 @@ def ignore_progress(said, share):
 def test_a_force_that_grows_with_time_is_no_coupling_of_axes():
     drift = Law("p0*t", (0.1,), (), "force", "x")
     claim = Claim(law_effect(drift), "one", (0,))
-    fitted = SimpleNamespace(hypothesis=hypothesis_of_claim(claim, [law_values(drift)]))
+    fitted = SimpleNamespace(hypothesis=make_claim_hypothesis(claim, [law_values(drift)]))
     assert not can_coupling_imitate(None, fitted, ("fx", "fy"))
 
 
@@ -183,4 +183,4 @@ def test_candidates_keep_both_laws_of_a_pair():
     pair = [make_found_law(each) for each in (law("p0*vy", 0.6), replace(law("p0*vx", -0.6), axis="y"))]
     said = [Candidate("discovered_law", "mechanism", each.axis, {}, 0.5, 0.5, "no", law=each) for each in pair]
     again = (*said, said[0])
-    assert add_balances_to_search(nothing_named, (), again, ("fx", "fy")).candidates == tuple(said)
+    assert add_balances_with_given_model(nothing_named, (), again, ("fx", "fy")).candidates == tuple(said)

@@ -9,7 +9,11 @@ from scipy.optimize import lsq_linear
 from analysis.diagnosis.discovery.fit_sum import fit_sum
 from analysis.diagnosis.discovery.grammar import Term
 from analysis.diagnosis.discovery.matched_filter import View, build_views
-from analysis.diagnosis.discovery.screen_terms import products_of, solve, solve_bounded
+from analysis.diagnosis.discovery.screen_terms import (
+    build_normal_equations,
+    solve_all_blocks,
+    solve_bounded_least_squares,
+)
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.settings import RETUNING_BOUND
 from tests.lawful import arena_of, law, recorded
@@ -21,11 +25,11 @@ def test_a_batch_is_solved_within_its_bounds_as_a_peer_solves_each(seed):
     columns, wanted = rng.standard_normal((7, 60, 4)), rng.standard_normal((7, 60))
     low, high = np.array([-0.05, -np.inf, -np.inf, -np.inf]), np.array([0.05, np.inf, np.inf, np.inf])
     squares, right = np.einsum("tsk,tsl->tkl", columns, columns), np.einsum("tsk,ts->tk", columns, wanted)
-    found = solve_bounded(squares, right, low, high)
+    found = solve_bounded_least_squares(squares, right, low, high)
     for a, b, own in zip(columns, wanted, found, strict=True):
         assert own == pytest.approx(lsq_linear(a, b, (low, high), method="bvls", tol=1e-14).x, abs=1e-9)
     assert np.isclose(np.abs(found[:, 0]), 0.05).any()
-    free = solve_bounded(squares, right, np.full(4, -np.inf), np.full(4, np.inf))
+    free = solve_bounded_least_squares(squares, right, np.full(4, -np.inf), np.full(4, np.inf))
     assert free == pytest.approx(np.linalg.solve(squares, right[:, :, None])[:, :, 0])
 
 
@@ -34,7 +38,7 @@ def test_a_barred_weight_is_zero_and_the_others_as_without_it():
     a, b = rng.standard_normal((40, 3)), rng.standard_normal(40)
     squares = (a.T @ a)[None]
     squares[0, 1, 1] = np.inf
-    found = solve_bounded(squares, (a.T @ b)[None], np.full(3, -np.inf), np.full(3, np.inf))[0]
+    found = solve_bounded_least_squares(squares, (a.T @ b)[None], np.full(3, -np.inf), np.full(3, np.inf))[0]
     assert found[1] == pytest.approx(0, abs=1e-12)
     assert found[[0, 2]] == pytest.approx(np.linalg.lstsq(a[:, [0, 2]], b, rcond=None)[0])
 
@@ -51,13 +55,13 @@ def test_the_models_numbers_stay_within_the_bounds_of_re_tuning(pumped_view):
     """A residual that half of the mass gone would explain, and more."""
     mass = pumped_view.parameter_columns[0]
     gone = replace(pumped_view, residual=-50 * mass)
-    moved = solve(products_of(gone)).weights[0] - gone.to_calibration[0]
+    moved = solve_all_blocks(build_normal_equations(gone)).weights[0] - gone.to_calibration[0]
     assert moved == pytest.approx(-RETUNING_BOUND)
 
 
 @pytest.mark.parametrize("off_hz", [0.02, -0.02])
 def test_a_frequency_is_found_from_a_start_that_is_out_of_phase_at_the_end(pumped_view, off_hz):
     term = Term("x*sin(2*pi*p0*t + p1)", (3.371 + off_hz, 0.0), ((2.0, 5.0), (-20.0, 20.0)), (), (1,))
-    found = fit_sum(products_of(pumped_view), (term,))
+    found = fit_sum(build_normal_equations(pumped_view), (term,))
     assert found is not None
     assert found.terms[0].numbers[0] == pytest.approx(3.371, abs=2e-4)

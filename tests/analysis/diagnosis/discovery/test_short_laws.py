@@ -6,10 +6,10 @@ import pytest
 
 import analysis.diagnosis.discovery.discover as discover_module
 from analysis.diagnosis.discovery.add_laws import LawSearch, is_short_description
+from analysis.diagnosis.discovery.convert_sum import list_fitted_laws
 from analysis.diagnosis.discovery.discover import Discovery, Round
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import Term
-from analysis.diagnosis.discovery.law_of_sum import list_fitted_laws
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.search import FurtherSearches, search_effects
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
@@ -169,7 +169,7 @@ def test_a_law_search_that_crashes_keeps_what_the_catalogue_names(seed=12):
         raise ValueError("operands could not be broadcast together")
 
     context, _ = arena_of(recorded((CUBE, DRAG_2), seed))
-    guarded = replace(context, guard=Guard(on=True))
+    guarded = replace(context, guard=Guard(enabled=True))
     searches = FurtherSearches(crashes, at_end=crashes)
     result = search_effects(guarded, CATALOGUE, lambda what, share: None, always, searches)
     assert effect_names(result) == {"hardening_stiffness", "quadratic_damping"}

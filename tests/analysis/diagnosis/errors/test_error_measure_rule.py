@@ -39,8 +39,8 @@ def test_the_rule_takes_windows_where_a_recording_begins_in_motion(drifting_reco
     assert choice.measure == "free simulation"
     late = replace(
         drifting_recording,
-        command=drifting_recording.command.part(900, 4900),
-        response=drifting_recording.response.part(900, 4900),
+        command=drifting_recording.command.select_samples(900, 4900),
+        response=drifting_recording.response.select_samples(900, 4900),
         segments=(),
     )
     choice = choose_measure(observe_parts([late], 1), make_model(stiffness=400.0))

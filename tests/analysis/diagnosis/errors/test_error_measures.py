@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.errors.choose_measure import make_measure
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 from equalizer.plant.mechanical_model import ModelEffect
@@ -23,7 +23,7 @@ from tests.analysis.diagnosis.errors.drifting_plant import (
 
 
 def test_a_controlled_plant_that_does_not_hold_itself_is_compared_by_forces(controlled_recording: Recording) -> None:
-    chosen = measure_of([controlled_recording], make_model())
+    chosen = make_measure([controlled_recording], make_model())
     assert chosen.measure.name == "predicted force"
     assert "command depends on the response" in chosen.remarks[0]
     assert "compared up to" in chosen.remarks[1]
@@ -48,7 +48,7 @@ def test_no_friction_is_found_under_a_controller_where_there_is_none() -> None:
 
 
 def test_a_plant_that_drifts_freely_is_simulated_in_windows(drifting_recording: Recording) -> None:
-    chosen = measure_of([drifting_recording], make_model())
+    chosen = make_measure([drifting_recording], make_model())
     assert chosen.measure.name == "windows of 1 s"
     assert "integrates freely" in chosen.remarks[0]
 
@@ -60,7 +60,7 @@ def test_a_window_holds_many_readings_per_number_of_its_state_at_any_rate(drifti
         command=replace(drifting_recording.command, sample_rate_hz=1.0),
         response=replace(drifting_recording.response, sample_rate_hz=1.0),
     )
-    measure = measure_of([slow], make_model()).measure
+    measure = make_measure([slow], make_model()).measure
     assert measure.name == "windows of 20 s"
     heavy = replace(make_model(), mass=np.array([[1e9]]), damping=np.array([[1e9]]))
     assert np.std(measure.residuals(heavy, ())[0]) > 0
@@ -78,7 +78,7 @@ def test_friction_of_a_drifting_plant_is_recovered_in_windows(drifting_recording
 
 def test_windows_of_the_true_plant_leave_noise_alone() -> None:
     clean = record_plant(9.0 * random_course(6.0, 7), controlled=False, level=0.0)
-    measure = measure_of([clean], make_model()).measure
+    measure = make_measure([clean], make_model()).measure
     true = replace(make_model(), mass=np.array([[MASS]]), damping=np.array([[DRAG]]))
     left, wrong = measure.residuals(true, ())[0], measure.residuals(make_model(), ())[0]
     # The integrator above is exact to a thousandth.
@@ -87,7 +87,7 @@ def test_windows_of_the_true_plant_leave_noise_alone() -> None:
 
 
 def test_a_state_is_fitted_even_where_the_windows_begin_wrong(drifting_recording: Recording) -> None:
-    measure = measure_of([drifting_recording], make_model()).measure
+    measure = make_measure([drifting_recording], make_model()).measure
     off = replace(measure, states=tuple(states + 0.01 for states in measure.states))
     one, other = measure.residuals(make_model(), ()), off.residuals(make_model(), ())
     assert np.allclose(one[0], other[0], atol=1e-3 * np.abs(one[0]).max())
@@ -100,7 +100,7 @@ def test_what_decisions_see_does_not_hang_on_sealed_samples(
         spoiled = np.array(item.response.samples)
         spoiled[item.segments[1].start :] += 0.5
         other = replace(item, response=replace(item.response, samples=spoiled))
-        first, second = (measure_of([each], make_model()).measure for each in (item, other))
+        first, second = (make_measure([each], make_model()).measure for each in (item, other))
         second = replace(second, unit=first.unit, noise=first.noise)
         if first.name == "predicted force":
             second = replace(second, band_hz=first.band_hz)
@@ -112,14 +112,14 @@ def test_what_decisions_see_does_not_hang_on_sealed_samples(
 
 
 def test_sensors_are_not_told_by_forces(controlled_recording: Recording) -> None:
-    measure = measure_of([controlled_recording], make_model()).measure
+    measure = make_measure([controlled_recording], make_model()).measure
     assert not measure.can_observe(EFFECTS["sensor_gain"])
     assert measure.can_observe(EFFECTS["coulomb_friction"])
     assert measure.can_observe(EFFECTS["force_saturation"])
 
 
 def test_a_weaker_actuator_does_not_make_errors_smaller(controlled_recording: Recording) -> None:
-    measure = measure_of([controlled_recording], make_model()).measure
+    measure = make_measure([controlled_recording], make_model()).measure
     weak = (PlacedEffect(EFFECTS["force_gain"], (0,), {"gain": 0.5}),)
     one, other = (np.std(measure.residuals(make_model(), effects)[0]) for effects in ((), weak))
     assert other > one
@@ -130,12 +130,12 @@ def test_what_a_beginning_in_motion_left_behind_is_left_out_where_it_dies_out_so
 ) -> None:
     late = replace(
         drifting_recording,
-        command=drifting_recording.command.part(900, 5900),
-        response=drifting_recording.response.part(900, 5900),
+        command=drifting_recording.command.select_samples(900, 5900),
+        response=drifting_recording.response.select_samples(900, 5900),
         segments=(),
     )
     stiff = replace(make_model(stiffness=400.0), damping=np.array([[60.0]]))
-    chosen = measure_of([late], stiff)
+    chosen = make_measure([late], stiff)
     assert chosen.measure.name == "free simulation"
     first = np.flatnonzero(chosen.measure.records[0].fit)[0]
     assert 0.3 * RATE_HZ < first < 2.0 * RATE_HZ
@@ -145,9 +145,9 @@ def test_what_a_beginning_in_motion_left_behind_is_left_out_where_it_dies_out_so
 def test_what_the_models_own_file_names_is_part_of_every_prediction(which: str, request: pytest.FixtureRequest) -> None:
     one = request.getfixturevalue(which)
     rubbing = replace(make_model(), effects=(ModelEffect("coulomb_friction", None, {"level": LEVEL}),))
-    chosen = measure_of([one], rubbing)
+    chosen = make_measure([one], rubbing)
     placed = (PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": LEVEL}),)
-    (beside,) = measure_of([one], make_model()).measure.residuals(make_model(), placed)
+    (beside,) = make_measure([one], make_model()).measure.residuals(make_model(), placed)
     assert np.array_equal(chosen.measure.residuals(rubbing, ())[0], beside)
     assert (
         "are part of every simulation: dry friction." in chosen.remarks[-2 if which == "controlled_recording" else -1]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.data.recorded_conditions import is_unstable_within
-from analysis.diagnosis.errors.fit_score import FitScore, fit_score, rms_over, signal_rms
-from equalizer.plant.linear_simulation import growth_rate
+from analysis.diagnosis.errors.fit_score import FitScore, compute_fit_score, compute_residual_rms, compute_signal_rms
+from equalizer.plant.linear_simulation import compute_growth_rate
 from equalizer.plant.mechanical_model import MechanicalModel
 
 
@@ -17,40 +17,40 @@ def make_model(damping, stiffness):
 
 
 def test_noise_alone_stands_at_one(make_context):
-    measure = make_context().whole
-    score = fit_score(measure, measure.residuals(make_context().tuning.model, ()))
+    measure = make_context().full_measure
+    score = compute_fit_score(measure, measure.residuals(make_context().tuning.model, ()))
     for part in (score.fit, score.choose, score.test):
         assert part == pytest.approx(np.ones(2), abs=0.06)
 
 
 def test_only_its_own_samples_count_for_each_part(make_context):
-    measure = make_context().whole
+    measure = make_context().full_measure
     (left,) = measure.residuals(make_context().tuning.model, ())
     (record,) = measure.records
     louder = left.copy()
     louder[record.test] *= 10
-    one, other = fit_score(measure, (left,)), fit_score(measure, (louder,))
+    one, other = compute_fit_score(measure, (left,)), compute_fit_score(measure, (louder,))
     assert np.array_equal(one.fit, other.fit) and np.array_equal(one.choose, other.choose)
     assert other.test == pytest.approx(10 * one.test)
 
 
 def test_where_nothing_was_sealed_nothing_is_reported(make_context):
     measure = make_context().measure
-    assert np.isnan(fit_score(measure, measure.residuals(make_context().tuning.model, ())).test).all()
+    assert np.isnan(compute_fit_score(measure, measure.residuals(make_context().tuning.model, ())).test).all()
 
 
 def test_recordings_count_by_their_samples(make_context):
-    (record,) = make_context().whole.records
+    (record,) = make_context().full_measure.records
     long, short = np.ones((len(record.command), 1)), np.full((10, 1), 3.0)
     cut = replace(record, fit=record.fit[:10], choose=record.choose[:10], test=record.test[:10])
     masks = [np.ones(len(long), dtype=bool), np.ones(10, dtype=bool)]
     n = len(long)
-    assert rms_over((record, cut), (long, short), masks) == pytest.approx(np.sqrt((n + 90) / (n + 10)))
+    assert compute_residual_rms((record, cut), (long, short), masks) == pytest.approx(np.sqrt((n + 90) / (n + 10)))
 
 
 @pytest.mark.parametrize(("quantity", "expected"), [("velocity", np.hypot(5.0, 1.0)), ("position", 1.0)])
 def test_takes_at_their_own_speeds_differ_by_their_means_and_encoders_begin_anywhere(make_context, quantity, expected):
-    (record,) = make_context().whole.records
+    (record,) = make_context().full_measure.records
     n, channels = record.measured.shape
     response = replace(record.recording.response, quantity=quantity)
     ripple = np.tile(np.where(np.arange(n) % 2, 1.0, -1.0)[:, None], (1, channels))
@@ -59,7 +59,7 @@ def test_takes_at_their_own_speeds_differ_by_their_means_and_encoders_begin_anyw
         for level in (5.0, -5.0)
     )
     masks = [np.arange(n) < 200 for _ in takes]
-    assert signal_rms(takes, masks) == pytest.approx(np.full(channels, expected))
+    assert compute_signal_rms(takes, masks) == pytest.approx(np.full(channels, expected))
 
 
 def test_the_worst_channel_and_the_mean_of_all():
@@ -76,5 +76,5 @@ def test_a_model_that_gains_energy_runs_away(damping, stiffness, grows):
 
 
 def test_the_rate_is_that_of_the_slowest_motion():
-    assert growth_rate(make_model(2.0, 100.0)) == pytest.approx(-1.0)
-    assert growth_rate(make_model(0.0, -4.0)) == pytest.approx(2.0)
+    assert compute_growth_rate(make_model(2.0, 100.0)) == pytest.approx(-1.0)
+    assert compute_growth_rate(make_model(0.0, -4.0)) == pytest.approx(2.0)

@@ -6,9 +6,9 @@ import pytest
 from analysis.diagnosis.errors.hypothesis import (
     NO_EFFECTS,
     Claim,
-    combine,
+    combine_hypotheses,
     generate_near_equivalents,
-    hypothesis_of_claim,
+    make_claim_hypothesis,
     remove_claim,
 )
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
@@ -26,14 +26,14 @@ def values_within_bounds(effect):
 @pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
 def test_what_is_claimed_is_what_is_placed(effect):
     values = values_within_bounds(effect)
-    (placed,) = hypothesis_of_claim(Claim(effect, "one", (1,)), [values]).list_placed_effects()
+    (placed,) = make_claim_hypothesis(Claim(effect, "one", (1,)), [values]).list_placed_effects()
     assert (placed.effect, placed.sites) == (effect, (1,))
     assert dict(placed.values) == pytest.approx(values)
 
 
 @pytest.mark.parametrize("effect", CATALOGUE, ids=lambda effect: effect.name)
 def test_a_step_never_leaves_what_is_allowed(effect):
-    whole = hypothesis_of_claim(Claim(effect, "one", (0,)), [values_within_bounds(effect)])
+    whole = make_claim_hypothesis(Claim(effect, "one", (0,)), [values_within_bounds(effect)])
     for far in (-1e9, 1e9):
         (placed,) = whole.list_placed_effects(np.full(len(whole.point), far))
         for p in effect.parameters:
@@ -42,28 +42,32 @@ def test_a_step_never_leaves_what_is_allowed(effect):
 
 def test_every_axis_has_numbers_of_its_own_where_each_is_claimed():
     drag = EFFECTS["viscous_damping"]
-    each = hypothesis_of_claim(Claim(drag, "each", (0, 1)), [{p.name: v for p in drag.parameters} for v in (0.5, 0.25)])
+    each = make_claim_hypothesis(
+        Claim(drag, "each", (0, 1)), [{p.name: v for p in drag.parameters} for v in (0.5, 0.25)]
+    )
     assert [item.sites for item in each.list_placed_effects()] == [(0,), (1,)]
     assert len(each.parameters) == 2 * sum(not p.fixed for p in drag.parameters)
 
 
 def test_claims_are_put_together_and_taken_away_again():
     parts = [
-        hypothesis_of_claim(Claim(EFFECTS[name], "one", (k,)), [values_within_bounds(EFFECTS[name])])
+        make_claim_hypothesis(Claim(EFFECTS[name], "one", (k,)), [values_within_bounds(EFFECTS[name])])
         for k, name in enumerate(("coulomb_friction", "extra_mode", "sensor_lag"))
     ]
-    whole = combine(combine(parts[0], parts[1]), parts[2])
+    whole = combine_hypotheses(combine_hypotheses(parts[0], parts[1]), parts[2])
     assert [key[0] for key in whole.key] == ["coulomb_friction", "extra_mode", "sensor_lag"]
     less = remove_claim(whole, 1)
-    expected = combine(parts[0], parts[2])
+    expected = combine_hypotheses(parts[0], parts[2])
     assert less.key == expected.key and np.array_equal(less.point, expected.point)
     assert less.list_placed_effects() == expected.list_placed_effects()
     assert [each.effect.name for each in whole.list_effects_of(1)] == ["extra_mode"]
 
 
 def test_nothing_is_the_beginning_of_all_claims():
-    part = hypothesis_of_claim(Claim(EFFECTS["sensor_lag"], "one", (0,)), [values_within_bounds(EFFECTS["sensor_lag"])])
-    assert combine(NO_EFFECTS, part).list_placed_effects() == part.list_placed_effects()
+    part = make_claim_hypothesis(
+        Claim(EFFECTS["sensor_lag"], "one", (0,)), [values_within_bounds(EFFECTS["sensor_lag"])]
+    )
+    assert combine_hypotheses(NO_EFFECTS, part).list_placed_effects() == part.list_placed_effects()
     assert NO_EFFECTS.list_placed_effects() == ()
 
 
@@ -98,16 +102,16 @@ def test_every_effect_is_suggested_at_every_axis_or_not_at_all(make_context):
 
 def test_numbers_that_do_almost_the_same_are_tried_in_place_of_an_effects_own():
     parts = [
-        hypothesis_of_claim(Claim(EFFECTS["sensor_lag"], "one", (0,)), [{"bandwidth": 60.0}]),
-        hypothesis_of_claim(Claim(EFFECTS["force_deadband"], "one", (1,)), [{"width": 0.02, "jump": 0.25}]),
-        hypothesis_of_claim(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 0.1}]),
+        make_claim_hypothesis(Claim(EFFECTS["sensor_lag"], "one", (0,)), [{"bandwidth": 60.0}]),
+        make_claim_hypothesis(Claim(EFFECTS["force_deadband"], "one", (1,)), [{"width": 0.02, "jump": 0.25}]),
+        make_claim_hypothesis(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 0.1}]),
     ]
-    (other,) = generate_near_equivalents(combine(combine(parts[0], parts[1]), parts[2]))
+    (other,) = generate_near_equivalents(combine_hypotheses(combine_hypotheses(parts[0], parts[1]), parts[2]))
     lag, band, force = other.list_placed_effects()
     assert band.values == pytest.approx({"width": 0.015, "jump": 0.0})
     assert (lag.values["bandwidth"], force.values["force"]) == pytest.approx((60.0, 0.1))
 
 
 def test_plain_numbers_have_nothing_else_to_try():
-    plain = hypothesis_of_claim(Claim(EFFECTS["force_deadband"], "one", (0,)), [{"width": 0.02, "jump": 0.0}])
+    plain = make_claim_hypothesis(Claim(EFFECTS["force_deadband"], "one", (0,)), [{"width": 0.02, "jump": 0.0}])
     assert not list(generate_near_equivalents(plain))

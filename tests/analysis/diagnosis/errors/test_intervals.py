@@ -10,14 +10,14 @@ import pytest
 from scipy.signal import lfilter
 
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.errors.hypothesis import Claim, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import Claim, make_claim_hypothesis
 from analysis.diagnosis.errors.intervals import (
+    compute_full_sensitivity,
+    compute_segment_errors,
+    compute_standard_errors,
     finish_fit,
-    segment_errors,
-    sensitivity_to_all,
-    standard_errors,
 )
-from analysis.diagnosis.errors.output_error import evaluate_fit, fit, sensitivity
+from analysis.diagnosis.errors.output_error import build_jacobian, evaluate_fit, fit
 from analysis.diagnosis.errors.tuning import Tuning
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -50,7 +50,7 @@ MODEL = MechanicalModel("line", "position", ONE, ONE, [[100.0]], ONE, ONE)
 TUNING = Tuning(
     MODEL, ("stiffness x",), np.ones(1), ("N/m",), lambda at: replace(MODEL, stiffness=np.array([[100.0 + at[0]]]))
 )
-PUSHED = hypothesis_of_claim(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 0.1}])
+PUSHED = make_claim_hypothesis(Claim(EFFECTS["constant_force"], "one", (0,)), [{"force": 0.1}])
 
 
 def response_rows(seed):
@@ -75,15 +75,15 @@ def make_measure(seed, colour, strength):
 
 
 def all_sensitivities(measure, found):
-    return sensitivity_to_all(measure, TUNING, found.deviations, found.hypothesis)
+    return compute_full_sensitivity(measure, TUNING, found.deviations, found.hypothesis)
 
 
 def fitted_and_errors(seed, colour, strength):
     measure, own = make_measure(seed, colour, strength)
     start = evaluate_fit(measure, TUNING, np.zeros(1), PUSHED)
-    known = sensitivity(measure, TUNING, np.zeros(1), PUSHED)
+    known = build_jacobian(measure, TUNING, np.zeros(1), PUSHED)
     found = fit(measure, TUNING, start, known, 4)
-    return found, standard_errors(measure, found, all_sensitivities(measure, found)), own
+    return found, compute_standard_errors(measure, found, all_sensitivities(measure, found)), own
 
 
 @pytest.mark.parametrize(("colour", "strength"), [(0.0, 1.0), (0.9, 1.0), (0.9, 6.0)])
@@ -92,7 +92,7 @@ def test_ninety_five_of_a_hundred_intervals_hold_the_truth(colour, strength):
     for seed in range(DRAWS):
         found, errors, _ = fitted_and_errors(seed, colour, strength)
         of, at = found.hypothesis.parameters[0], found.hypothesis.point[0]
-        held += of.value(at - 1.96 * errors[1]) <= FORCE_N <= of.value(at + 1.96 * errors[1])
+        held += of.to_value(at - 1.96 * errors[1]) <= FORCE_N <= of.to_value(at + 1.96 * errors[1])
     assert 0.88 <= held / DRAWS <= 0.99
 
 
@@ -125,14 +125,15 @@ def measure_of_segments(seed, varies, count=SEGMENTS):
     segments = tuple(Segment(k * length, (k + 1) * length, "multisine", 1.0, 0) for k in range(count))
     record = replace(record, measured=samples, recording=replace(record.recording, segments=segments))
     varied = replace(measure, records=(record,))
-    known = sensitivity(varied, TUNING, np.zeros(1), PUSHED)
+    known = build_jacobian(varied, TUNING, np.zeros(1), PUSHED)
     found = fit(varied, TUNING, evaluate_fit(varied, TUNING, np.zeros(1), PUSHED), known, 4)
     noise, between = (
-        errors(varied, found, all_sensitivities(varied, found)) for errors in (standard_errors, segment_errors)
+        errors(varied, found, all_sensitivities(varied, found))
+        for errors in (compute_standard_errors, compute_segment_errors)
     )
     of, at = found.hypothesis.parameters[0], found.hypothesis.point[0]
     return [
-        of.value(at - 1.96 * error) <= FORCE_N <= of.value(at + 1.96 * error)
+        of.to_value(at - 1.96 * error) <= FORCE_N <= of.to_value(at + 1.96 * error)
         for error in (noise[1], np.hypot(noise[1], between[1]))
     ]
 
@@ -153,25 +154,27 @@ def test_the_jackknife_is_that_of_fits_without_each_segment():
     segments = tuple(Segment(k * length, (k + 1) * length, "multisine", 1.0, 0) for k in range(SEGMENTS))
     record = replace(record, recording=replace(record.recording, segments=segments))
     measure = replace(measure, records=(record,))
-    known = sensitivity(measure, TUNING, np.zeros(1), PUSHED)
+    known = build_jacobian(measure, TUNING, np.zeros(1), PUSHED)
     whole = fit(measure, TUNING, evaluate_fit(measure, TUNING, np.zeros(1), PUSHED), known, 8)
     forces = []
     for segment in segments:
         kept = record.fit.copy()
         kept[segment.start : segment.stop] = False
         fewer = replace(measure, records=(replace(record, fit=kept),))
-        there = sensitivity(fewer, TUNING, np.zeros(1), PUSHED)
+        there = build_jacobian(fewer, TUNING, np.zeros(1), PUSHED)
         start = evaluate_fit(fewer, TUNING, whole.deviations, whole.hypothesis)
         forces.append(fit(fewer, TUNING, start, there, 8).hypothesis.point[0])
     expected = np.sqrt((SEGMENTS - 1) / SEGMENTS * np.sum((np.array(forces) - np.mean(forces)) ** 2))
-    assert segment_errors(measure, whole, all_sensitivities(measure, whole))[1] == pytest.approx(expected, rel=0.02)
+    assert compute_segment_errors(measure, whole, all_sensitivities(measure, whole))[1] == pytest.approx(
+        expected, rel=0.02
+    )
 
 
 def test_one_segment_has_no_jackknife():
     measure, _ = make_measure(3, 0.0, 1.0)
-    known = sensitivity(measure, TUNING, np.zeros(1), PUSHED)
+    known = build_jacobian(measure, TUNING, np.zeros(1), PUSHED)
     found = fit(measure, TUNING, evaluate_fit(measure, TUNING, np.zeros(1), PUSHED), known, 4)
-    assert segment_errors(measure, found, all_sensitivities(measure, found)) is None
+    assert compute_segment_errors(measure, found, all_sensitivities(measure, found)) is None
 
 
 PERIOD = 500
@@ -196,11 +199,11 @@ def measure_of_periods(seed, period=PERIOD, lacking=1.0):
     repeated = replace(
         measure, records=(replace(record, measured=samples, recording=recording),), response_rows=rows_of
     )
-    known = sensitivity(repeated, TUNING, np.zeros(1), PUSHED)
+    known = build_jacobian(repeated, TUNING, np.zeros(1), PUSHED)
     found = fit(repeated, TUNING, evaluate_fit(repeated, TUNING, np.zeros(1), PUSHED), known, 4)
-    error = standard_errors(repeated, found, all_sensitivities(repeated, found))[1]
+    error = compute_standard_errors(repeated, found, all_sensitivities(repeated, found))[1]
     of, at = found.hypothesis.parameters[0], found.hypothesis.point[0]
-    return of.value(at - 1.96 * error) <= FORCE_N <= of.value(at + 1.96 * error)
+    return of.to_value(at - 1.96 * error) <= FORCE_N <= of.to_value(at + 1.96 * error)
 
 
 def test_what_repeats_with_the_drive_is_not_counted_as_often_as_it_repeats():
@@ -227,11 +230,14 @@ def test_a_number_at_its_bound_has_no_error_there_and_leaves_it_where_the_data_a
     (record,) = measure.records
     samples = (measure.response_rows[0] * FORCE_N)[:, None] + np.random.default_rng(8).standard_normal((SAMPLES, 1))
     jumping = Jumping((replace(record, measured=samples),), *measure_parts(measure))
-    plain = hypothesis_of_claim(Claim(EFFECTS["force_deadband"], "one", (0,)), [{"width": 0.1, "jump": 0.0}])
+    plain = make_claim_hypothesis(Claim(EFFECTS["force_deadband"], "one", (0,)), [{"width": 0.1, "jump": 0.0}])
     begun = evaluate_fit(jumping, TUNING, np.zeros(1), plain)
-    assert standard_errors(jumping, begun, all_sensitivities(jumping, begun))[-1] == 0.0
+    assert compute_standard_errors(jumping, begun, all_sensitivities(jumping, begun))[-1] == 0.0
     found, known = finish_fit(jumping, TUNING, begun, lambda at: all_sensitivities(jumping, at), lambda: True)
-    jump, error = found.hypothesis.list_placed_effects()[0].values["jump"], standard_errors(jumping, found, known)[-1]
+    jump, error = (
+        found.hypothesis.list_placed_effects()[0].values["jump"],
+        compute_standard_errors(jumping, found, known)[-1],
+    )
     assert error > 0.0
     assert jump == pytest.approx(FORCE_N, abs=0.03)
 
@@ -257,20 +263,20 @@ def test_two_numbers_that_act_alike_are_parted_by_the_calibration_alone(quality)
     measure, _ = make_measure(3, 0.0, 1.0)
     (record,) = measure.records
     silent = TwoMasses((replace(record, measured=np.zeros((SAMPLES, 1))),), *measure_parts(measure), quality=quality)
-    added = hypothesis_of_claim(Claim(EFFECTS["added_mass"], "one", (0,)), [{"mass": 0.4}])
+    added = make_claim_hypothesis(Claim(EFFECTS["added_mass"], "one", (0,)), [{"mass": 0.4}])
     (played,) = silent.residuals(MODEL, added.list_placed_effects())
     samples = np.random.default_rng(7).standard_normal((SAMPLES, 1)) - played
     alike = replace(silent, records=(replace(record, measured=samples),))
-    far = replace(added, point=np.array([added.parameters[0].coordinate(0.1)]))
+    far = replace(added, point=np.array([added.parameters[0].to_coordinate(0.1)]))
     begun = evaluate_fit(alike, TUNING, np.array([3.0]), far)
 
     def at(fitted):
-        return sensitivity_to_all(alike, TUNING, fitted.deviations, fitted.hypothesis)
+        return compute_full_sensitivity(alike, TUNING, fitted.deviations, fitted.hypothesis)
 
     found, known = finish_fit(alike, TUNING, begun, at, lambda: True)
     assert (begun.cost - found.cost) * SAMPLES > 8
     assert found.deviations[0] == pytest.approx(0.0, abs=0.15)
-    own, error = standard_errors(alike, found, known)
+    own, error = compute_standard_errors(alike, found, known)
     mass = found.hypothesis.list_placed_effects()[0].values["mass"]
     assert mass == pytest.approx(0.4, rel=0.06)
     assert (own, mass * error) == (pytest.approx(1.0, rel=0.1), pytest.approx(0.1, rel=0.1))

@@ -3,8 +3,14 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, combine, hypothesis_of_claim
-from analysis.diagnosis.errors.output_error import evaluate_fit, fit, residuals_to_fit, sensitivity, solve_bounded_step
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, combine_hypotheses, make_claim_hypothesis
+from analysis.diagnosis.errors.output_error import (
+    build_jacobian,
+    evaluate_fit,
+    fit,
+    solve_bounded_step,
+    stack_fit_residuals,
+)
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.settings import RETUNING_BOUND
 from equalizer.effects.catalogue import EFFECTS
@@ -14,13 +20,13 @@ FRICTION_N, LAG_S = 0.2, 1.5e-3
 
 
 def make_hypothesis(name, values):
-    return hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values])
+    return make_claim_hypothesis(Claim(EFFECTS[name], "one", (0,)), [values])
 
 
 def fit_hypothesis(context, hypothesis):
     zero = np.zeros(len(context.tuning.names))
     start = evaluate_fit(context.measure, context.tuning, zero, hypothesis)
-    known = sensitivity(context.measure, context.tuning, zero, NO_EFFECTS)
+    known = build_jacobian(context.measure, context.tuning, zero, NO_EFFECTS)
     return refine(context, fit(context.measure, context.tuning, start, known, 4))
 
 
@@ -42,7 +48,7 @@ def test_the_model_s_own_numbers_are_found(make_context):
     context = make_context(given=truth.tuning.tune(wrong))
     found = fit_hypothesis(context, NO_EFFECTS)
     assert found.deviations == pytest.approx(-wrong, abs=0.15)
-    assert context.candidate(found).score.worst_channel < 1.03
+    assert context.score_fit(found).score.worst_channel < 1.03
 
 
 def test_a_number_that_fits_as_it_is_stays(make_context):
@@ -54,7 +60,7 @@ def test_a_number_that_fits_as_it_is_stays(make_context):
 def test_friction_is_found_from_far_away(friction_context, start):
     found = fit_hypothesis(friction_context, make_hypothesis("coulomb_friction", {"level": start}))
     assert found.hypothesis.list_placed_effects()[0].values["level"] == pytest.approx(FRICTION_N, rel=2e-3)
-    assert friction_context.candidate(found).score.worst_channel < 1.03
+    assert friction_context.score_fit(found).score.worst_channel < 1.03
 
 
 def test_two_effects_are_found_at_once(make_context):
@@ -62,7 +68,7 @@ def test_two_effects_are_found_at_once(make_context):
         PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": FRICTION_N}),
         PlacedEffect(EFFECTS["amplifier_lag"], (0,), {"time_constant": LAG_S}),
     )
-    both = combine(
+    both = combine_hypotheses(
         make_hypothesis("coulomb_friction", {"level": 0.1}), make_hypothesis("amplifier_lag", {"time_constant": 1e-3})
     )
     rubs, lags = fit_hypothesis(make_context(truth), both).hypothesis.list_placed_effects()
@@ -72,12 +78,12 @@ def test_two_effects_are_found_at_once(make_context):
 
 def test_a_wrong_law_does_not_come_down_to_the_noise(friction_context):
     found = fit_hypothesis(friction_context, make_hypothesis("hardening_stiffness", {"k3": 1e4}))
-    assert friction_context.candidate(found).score.worst_channel > 3
+    assert friction_context.score_fit(found).score.worst_channel > 3
 
 
 def test_a_fit_is_never_worse_than_its_start(friction_context):
     zero = np.zeros(len(friction_context.tuning.names))
-    known = sensitivity(friction_context.measure, friction_context.tuning, zero, NO_EFFECTS)
+    known = build_jacobian(friction_context.measure, friction_context.tuning, zero, NO_EFFECTS)
     for level in (1e-3, 0.2, 3.0):
         start = evaluate_fit(
             friction_context.measure,
@@ -106,17 +112,18 @@ def test_numbers_stay_within_what_calibration_and_physics_allow(make_context):
 def test_sealed_samples_are_not_fitted_to(friction_context):
     left = evaluate_fit(friction_context.measure, friction_context.tuning, np.zeros(3), NO_EFFECTS).residuals
     (record,) = friction_context.measure.records
-    assert len(residuals_to_fit(friction_context.measure, left)) == record.fit.sum() * record.measured.shape[1]
+    assert len(stack_fit_residuals(friction_context.measure, left)) == record.fit.sum() * record.measured.shape[1]
     assert not record.test.any()
 
 
 def test_a_sensitivity_predicts_the_effect_of_a_small_change(make_context):
     context = make_context()
     zero = np.zeros(len(context.tuning.names))
-    known = sensitivity(context.measure, context.tuning, zero, NO_EFFECTS)
+    known = build_jacobian(context.measure, context.tuning, zero, NO_EFFECTS)
     step = make_deviations(context.tuning, damping_fx=0.05)
     base, there = (
-        residuals_to_fit(context.measure, context.measure.residuals(context.tuning.tune(at), ())) for at in (zero, step)
+        stack_fit_residuals(context.measure, context.measure.residuals(context.tuning.tune(at), ()))
+        for at in (zero, step)
     )
     assert base - there == pytest.approx(step @ known.columns, abs=0.02 * np.abs(base - there).max())
     assert known.gram == pytest.approx(known.columns @ known.columns.T)
@@ -154,9 +161,9 @@ class DivergingMeasure:
 @pytest.mark.parametrize("size", [1e200, np.inf])
 def test_a_simulation_that_ran_away_is_the_worst_of_fits(friction_context, size):
     zero = np.zeros(len(friction_context.tuning.names))
-    known = sensitivity(friction_context.measure, friction_context.tuning, zero, NO_EFFECTS)
+    known = build_jacobian(friction_context.measure, friction_context.tuning, zero, NO_EFFECTS)
     measure = DivergingMeasure(friction_context.measure, size)
     start = evaluate_fit(measure, friction_context.tuning, zero, make_hypothesis("coulomb_friction", {"level": 0.1}))
     assert start.cost == np.inf
     assert fit(measure, friction_context.tuning, start, known, 2) is start
-    assert not sensitivity(measure, friction_context.tuning, zero, NO_EFFECTS).columns.any()
+    assert not build_jacobian(measure, friction_context.tuning, zero, NO_EFFECTS).columns.any()

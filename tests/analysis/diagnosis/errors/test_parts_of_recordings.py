@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.data.measured_motion import as_force_driven
-from analysis.diagnosis.data.observed_parts import names_of_parts, observe_parts
-from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.data.observed_parts import name_parts, observe_parts
+from analysis.diagnosis.errors.choose_measure import make_measure
 from equalizer.signals.joining import join
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
@@ -18,10 +18,10 @@ def test_parts_made_one_after_another_are_compared_apart(controlled_recording: R
     both = join(
         [controlled_recording, controlled_recording], {"parts": [{"start": 0, "stop": n}, {"start": n, "stop": 2 * n}]}
     )
-    one, two = measure_of([both], make_model()).measure, measure_of([controlled_recording], make_model()).measure
+    one, two = make_measure([both], make_model()).measure, make_measure([controlled_recording], make_model()).measure
     assert len(one.records) == 2
     assert np.allclose(one.residuals(make_model(), ())[1], two.residuals(make_model(), ())[0], atol=1e-6)
-    assert names_of_parts([both, controlled_recording], ("a", "b")) == ("a, part 1", "a, part 2", "b")
+    assert name_parts([both, controlled_recording], ("a", "b")) == ("a, part 1", "a, part 2", "b")
 
 
 def test_a_recording_for_the_test_spares_the_others(controlled_recording: Recording) -> None:
@@ -40,7 +40,7 @@ def test_an_imposed_motion_is_turned_round(controlled_recording: Recording) -> N
     turned = as_force_driven(Recording("rack", speed, force, x, segments=controlled_recording.segments))
     assert turned.command is force and turned.response is speed
     assert as_force_driven(controlled_recording) is controlled_recording
-    chosen = measure_of([turned], make_model(quantity="velocity"))
+    chosen = make_measure([turned], make_model(quantity="velocity"))
     assert chosen.measure.name == "predicted force"
     assert "imposed" in chosen.remarks[0]
 

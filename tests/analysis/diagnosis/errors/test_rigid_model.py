@@ -6,7 +6,7 @@ import pytest
 
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
-from analysis.diagnosis.forces.rigid_model import can_be_rigid, rigid_model, should_use_rigid_model
+from analysis.diagnosis.forces.rigid_model import can_be_rigid, fit_rigid_model, should_use_rigid_model
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.recording import Recording
@@ -16,7 +16,7 @@ from tests.analysis.diagnosis.errors.drifting_plant import DRAG, LEVEL, MASS, ra
 def test_a_rigid_model_is_fitted_to_the_forces_under_a_controller() -> None:
     clean = record_plant(0.08 * random_course(12.0, 3), controlled=True, level=0.0)
     assert should_use_rigid_model([clean])
-    fitted = rigid_model([clean], "fitted")
+    fitted = fit_rigid_model([clean], "fitted")
     assert fitted.mass[0, 0] == pytest.approx(MASS, rel=0.01)
     assert fitted.damping[0, 0] == pytest.approx(DRAG, rel=0.03)
     assert fitted.stiffness[0, 0] == 0.0
@@ -25,7 +25,7 @@ def test_a_rigid_model_is_fitted_to_the_forces_under_a_controller() -> None:
 @pytest.mark.slow
 def test_friction_is_named_beside_a_model_that_was_fitted_first(controlled_recording: Recording) -> None:
     others = tuple(each.name for each in CATALOGUE if each.name not in ("coulomb_friction", "transport_delay"))
-    fitted = rigid_model([controlled_recording], "fitted")
+    fitted = fit_rigid_model([controlled_recording], "fitted")
     assert fitted.damping[0, 0] > 1.5 * DRAG
     findings = diagnose(
         [controlled_recording], fitted, DiagnosisSettings(without=others), map, lambda said, share: None
@@ -40,4 +40,4 @@ def test_no_rigid_model_is_asked_of_accelerations_alone(controlled_recording: Re
     )
     assert not can_be_rigid([felt])
     with pytest.raises(MechanicalModelError, match="neither positions nor velocities"):
-        rigid_model([felt], "fitted")
+        fit_rigid_model([felt], "fitted")

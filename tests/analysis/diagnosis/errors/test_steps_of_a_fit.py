@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
-from analysis.diagnosis.errors.output_error import evaluate_fit, fit, sensitivity
-from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.errors.output_error import build_jacobian, evaluate_fit, fit
+from analysis.diagnosis.errors.tuning import make_tuning
 from equalizer.plant.mechanical_model import Tolerance
 
 
@@ -36,9 +36,9 @@ def fit_parameters(context, start, best):
     mass, damping, stiffness = (np.array([[each]]) for each in start)
     plant = replace(context.tuning.model, mass=mass, damping=damping, stiffness=stiffness)
     plant = replace(plant, tolerance=Tolerance(*(10 * abs(each) for each in best)))
-    tuning, measure = tuning_of(plant, ("fx",)), LinearMeasure(context.measure, np.array(best))
+    tuning, measure = make_tuning(plant, ("fx",)), LinearMeasure(context.measure, np.array(best))
     zero = np.zeros(3)
-    known = sensitivity(measure, tuning, zero, NO_EFFECTS)
+    known = build_jacobian(measure, tuning, zero, NO_EFFECTS)
     found = tuning.tune(fit(measure, tuning, evaluate_fit(measure, tuning, zero, NO_EFFECTS), known, 6).deviations)
     return [float(each[0, 0]) for each in (found.mass, found.damping, found.stiffness)]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from analysis.diagnosis.errors.tuning import DAMPING_PER_MODES, tuning_of
+from analysis.diagnosis.errors.tuning import DAMPING_UNCERTAINTY_RATIO, make_tuning
 from analysis.diagnosis.settings import UNSTATED_SHARE
 from equalizer.plant.linear_simulation import discretise_model
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError, Tolerance
@@ -32,7 +32,7 @@ def make_hanging_model(axes=2, tolerance=KNOWN):
 
 
 def open_tuning(model):
-    return tuning_of(model, ("fx", "fy", "fz")[: model.inputs])
+    return make_tuning(model, ("fx", "fy", "fz")[: model.inputs])
 
 
 def tune_model(model, **deviations):
@@ -116,14 +116,14 @@ def test_a_mode_s_mass_is_added_to_the_axis_it_is_attached_to():
 def test_a_mode_s_damping_is_known_less_well_than_its_frequency():
     model = make_hanging_model()
     other = tune_model(model, **{f"damping of the mode at {HANGING_HZ:.3g} Hz": 1.0})
-    assert other.damping[2, 2] == pytest.approx(model.damping[2, 2] * (1 + 0.01 * DAMPING_PER_MODES))
+    assert other.damping[2, 2] == pytest.approx(model.damping[2, 2] * (1 + 0.01 * DAMPING_UNCERTAINTY_RATIO))
 
 
 def test_every_number_is_named_sized_and_of_a_unit():
     tuning = open_tuning(make_hanging_model())
     assert len(tuning.names) == len(set(tuning.names)) == len(tuning.deviation) == len(tuning.units) == 3 * 3 + 3
     assert dict(zip(tuning.names, tuning.units, strict=True))["damping fx fy"] == "N s/m"
-    ones = dict(zip(tuning.names, tuning.values(np.ones(len(tuning.names))), strict=True))
+    ones = dict(zip(tuning.names, tuning.to_changes(np.ones(len(tuning.names))), strict=True))
     assert (ones["mass fx"], ones["damping fy"], ones["stiffness fx fy"]) == (0.004, 0.3, 6.0)
 
 
@@ -156,18 +156,18 @@ def test_a_rigid_model_has_no_modes_to_tune():
 
 def test_small_deviations_move_the_response_in_a_straight_line():
     model, tuning = make_hanging_model(), open_tuning(make_hanging_model())
-    bare = discretise_model(model, 1e-3).advance
+    bare = discretise_model(model, 1e-3).transition
     for number in range(len(tuning.names)):
         at = np.zeros(len(tuning.names))
         at[number] = 1e-3
-        up, down = (discretise_model(tuning.tune(sign * at), 1e-3).advance - bare for sign in (1.0, -1.0))
+        up, down = (discretise_model(tuning.tune(sign * at), 1e-3).transition - bare for sign in (1.0, -1.0))
         assert np.abs(up).max() > 0
         assert up == pytest.approx(-down, abs=1e-2 * np.abs(up).max())
 
 
 @pytest.mark.parametrize(("name", "lowest"), [("mass fx", 62.5), ("damping fx", 13.4), ("stiffness fx", 21.7)])
 def test_a_model_is_possible_until_a_matrix_becomes_indefinite(name, lowest):
-    tuning = tuning_of(make_hanging_model(1), ("fx",))
+    tuning = make_tuning(make_hanging_model(1), ("fx",))
     deviations = np.zeros(len(tuning.names))
     deviations[tuning.names.index(name)] = -0.9 * lowest
     assert tuning.is_possible(deviations)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.data.closed_loop import is_in_closed_loop
-from analysis.diagnosis.first_model.one_motion_per_force import one_motion_per_force
+from analysis.diagnosis.first_model.one_motion_per_force import convert_to_driven_motions
 from equalizer.signals.recording import Hold
 from tests.analysis.diagnosis.first_model.short_recordings import RATE_HZ, make_recording, simulate_speed, smooth_noise
 
@@ -34,7 +34,7 @@ def test_a_response_of_which_nothing_says_what_it_is_is_taken_for_what_its_cours
     own = "voltage" if unit == "V" else "1"
     recording = make_recording([("u", own, unit, push)], [("y", own, unit, course(push))])
 
-    (found,), said = one_motion_per_force((recording,))
+    (found,), said = convert_to_driven_motions((recording,))
 
     if (quantity, unit) == ("position", "V"):  # a voltage counts as a position already
         assert (found, said) == (recording, ())
@@ -47,7 +47,7 @@ def test_what_an_imposed_motion_meets_is_a_force_where_nothing_says_so():
     place = smooth_noise(2000, 5)
     recording = make_recording([("x", "position", "m", place)], [("y", "1", "1", 3 * place)])
 
-    (found,), _ = one_motion_per_force((recording,))
+    (found,), _ = convert_to_driven_motions((recording,))
 
     assert found.response.quantities == ("force",)
 
@@ -63,8 +63,8 @@ def test_a_command_that_is_counted_against_its_motion_is_turned_round(seed, fric
     speed = simulate_speed(np.sign(push) * np.maximum(np.abs(push) - friction, 0.0))
     recording = make_recording([("u", "force", "N", push)], [("v", "velocity", "m/s", speed)])
 
-    assert one_motion_per_force((recording,)) == ((recording,), ())
-    (found,), (said,) = one_motion_per_force((reverse_command(recording),))
+    assert convert_to_driven_motions((recording,)) == ((recording,), ())
+    (found,), (said,) = convert_to_driven_motions((reverse_command(recording),))
     np.testing.assert_array_equal(found.command.samples, recording.command.samples)
     assert said.startswith("u is counted against the motion")
 
@@ -77,7 +77,7 @@ def test_what_was_decided_beforehand_is_turned_with_the_command(hold):
     beside = replace(recording.command, samples=decided[:, None])
     recording = replace(reverse_command(recording), hold=hold, excitation=replace(beside, samples=-beside.samples))
 
-    (found,), _ = one_motion_per_force((recording,))
+    (found,), _ = convert_to_driven_motions((recording,))
 
     np.testing.assert_array_equal(found.excitation.samples, beside.samples)
     assert is_in_closed_loop(found)
@@ -91,7 +91,7 @@ def test_what_was_decided_beforehand_is_summed_with_the_commands():
         [("v", "velocity", "m/s", simulate_speed(first + 0.5 * second))],
     )
 
-    (found,), _ = one_motion_per_force((replace(recording, excitation=recording.command),))
+    (found,), _ = convert_to_driven_motions((replace(recording, excitation=recording.command),))
 
     np.testing.assert_allclose(found.excitation.samples, found.command.samples)
 
@@ -104,8 +104,8 @@ def test_a_loop_without_time_tells_which_way_a_force_is_counted(seed):
     recording = make_recording([("u", "force", "N", pulled)], [("x", "position", "m", way)])
     recording = replace(recording, meta={"time": "unknown"})
 
-    assert one_motion_per_force((recording,))[1] == ()
-    (found,), _ = one_motion_per_force((reverse_command(recording),))
+    assert convert_to_driven_motions((recording,))[1] == ()
+    (found,), _ = convert_to_driven_motions((reverse_command(recording),))
     np.testing.assert_array_equal(found.command.samples, recording.command.samples)
 
 
@@ -114,12 +114,12 @@ def test_a_command_that_moves_nothing_and_a_spring_alone_are_left_as_they_are(se
     push = smooth_noise(2000, seed)
     for moved in (smooth_noise(2000, seed + 100), -push):
         recording = make_recording([("u", "force", "N", push)], [("x", "position", "m", moved)])
-        assert one_motion_per_force((recording,)) == ((recording,), ())
+        assert convert_to_driven_motions((recording,)) == ((recording,), ())
 
 
 def test_of_an_imposed_motion_the_measured_force_is_turned_round():
     push = smooth_noise(2000, 1)
     recording = make_recording([("v", "velocity", "m/s", simulate_speed(push))], [("f", "force", "N", -push)])
 
-    (found,), _ = one_motion_per_force((recording,))
+    (found,), _ = convert_to_driven_motions((recording,))
     np.testing.assert_array_equal(found.response.samples[:, 0], push)

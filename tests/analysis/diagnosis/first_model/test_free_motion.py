@@ -10,7 +10,7 @@ from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.first_model.choose_structure import choose_structure
 from analysis.diagnosis.first_model.free_motion import is_free_motion, read_free_motion
 from analysis.diagnosis.first_model.model_structures import StructureRefused
-from analysis.diagnosis.first_model.one_motion_per_force import one_motion_per_force
+from analysis.diagnosis.first_model.one_motion_per_force import convert_to_driven_motions
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
@@ -93,7 +93,7 @@ def test_a_decay_in_an_unknown_unit_is_read_as_a_position_and_named():
     response = replace(counted.response, quantity="1", unit="1", channels=("diode",))
     unknown = replace(counted, response=response)
     assert "coulomb_friction" in effect_names(diagnose_values(unknown))
-    assert "diode measures; it was taken for a position that moves freely" in one_motion_per_force([unknown])[1][0]
+    assert "diode measures; it was taken for a position that moves freely" in convert_to_driven_motions([unknown])[1][0]
 
 
 @pytest.mark.parametrize(("quantity", "unit"), [("temperature", "K"), ("current", "A")])

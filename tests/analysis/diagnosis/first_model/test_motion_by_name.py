@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.first_model.infer_quantity import name_motion
+from analysis.diagnosis.first_model.infer_quantity import infer_quantities
 from tests.analysis.diagnosis.first_model.short_recordings import make_recording, simulate_speed, smooth_noise
 
 PUSH = smooth_noise(4000, 1)
@@ -13,7 +13,7 @@ PLAIN = ("1", "1")
 
 def named_quantities(*channels):
     """Quantities of the responses, and what is said. channels: name, quantity, unit, samples."""
-    (found,), said = name_motion((make_recording([("u", "voltage", "V", PUSH)], list(channels)),))
+    (found,), said = infer_quantities((make_recording([("u", "voltage", "V", PUSH)], list(channels)),))
     return found.response.quantities, said
 
 

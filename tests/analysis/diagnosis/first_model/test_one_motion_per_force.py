@@ -7,8 +7,8 @@ import pytest
 
 from analysis.diagnosis.balance.motion import find_motion_signal
 from analysis.diagnosis.data.driven_response import compute_response_significance
-from analysis.diagnosis.data.measured_motion import all_as_force_driven
-from analysis.diagnosis.first_model.one_motion_per_force import one_motion_per_force
+from analysis.diagnosis.data.measured_motion import convert_all_to_force_driven
+from analysis.diagnosis.first_model.one_motion_per_force import convert_to_driven_motions
 from analysis.diagnosis.settings import ANSWER_DEVIATIONS
 from tests.analysis.diagnosis.first_model.short_recordings import RATE_HZ, make_recording, simulate_speed, smooth_noise
 
@@ -17,7 +17,7 @@ def test_a_plain_recording_stays_as_it_is():
     push = smooth_noise(2000, 1)
     recording = make_recording([("u", "force", "N", push)], [("v", "velocity", "m/s", simulate_speed(push))])
 
-    assert one_motion_per_force((recording,)) == ((recording,), ())
+    assert convert_to_driven_motions((recording,)) == ((recording,), ())
 
 
 def test_a_temperature_among_the_commands_is_a_condition():
@@ -27,7 +27,7 @@ def test_a_temperature_among_the_commands_is_a_condition():
         [("w", "angular velocity", "rad/s", simulate_speed(push))],
     )
 
-    (found,), (said,) = one_motion_per_force((recording,))
+    (found,), (said,) = convert_to_driven_motions((recording,))
 
     assert found.command.channels == ("u",)
     assert found.condition is not None
@@ -42,7 +42,7 @@ def test_two_commands_of_one_motion_become_one():
         [("w", "angular velocity", "rad/s", simulate_speed(first + 0.4 * second))],
     )
 
-    (found,), (said,) = one_motion_per_force((recording,))
+    (found,), (said,) = convert_to_driven_motions((recording,))
 
     assert found.command.channels == ("u1",)
     assert found.command.samples[:, 0] == pytest.approx(first + 0.4 * second, abs=0.02 * first.std())
@@ -60,7 +60,7 @@ def test_a_command_that_never_changes_is_left_out_and_the_others_are_summed(leve
     command = recording.command.samples.copy()
     command[2000:2010] = np.nan
 
-    (found,), (left_out, summed) = one_motion_per_force(
+    (found,), (left_out, summed) = convert_to_driven_motions(
         (replace(recording, command=replace(recording.command, samples=command)),)
     )
 
@@ -82,7 +82,7 @@ def test_of_two_commands_with_a_constant_sum_the_difference_drives(share):
         [("v", "velocity", "m/s", simulate_speed(push + 40 * push.std()))],
     )
 
-    (found,), _ = one_motion_per_force((recording,))
+    (found,), _ = convert_to_driven_motions((recording,))
 
     drive = found.command.samples[:, 0] - found.command.samples[:, 0].mean()
     assert np.abs(drive) == pytest.approx(np.abs(2 * (push - push.mean())), abs=0.02 * push.std())
@@ -96,12 +96,12 @@ def test_a_command_that_never_changes_is_left_out_with_the_motion_of_its_axis():
         [("x", "velocity", "m/s", simulate_speed(push)), ("y", "velocity", "m/s", 1e-3 * smooth_noise(2000, 3))],
     )
 
-    (found,), said = one_motion_per_force((recording,))
+    (found,), said = convert_to_driven_motions((recording,))
 
     assert (found.command.channels, found.response.channels) == (("fx",), ("x",))
     assert said == ("fy among the commands never changes, and was left out with y, which no command moves.",)
     in_turn = replace(recording, command=replace(recording.command, samples=recording.command.samples[:, ::-1]))
-    assert one_motion_per_force((recording, in_turn)) == ((recording, in_turn), ())
+    assert convert_to_driven_motions((recording, in_turn)) == ((recording, in_turn), ())
 
 
 def test_of_motions_of_several_kinds_the_lowest_is_kept():
@@ -113,7 +113,7 @@ def test_of_motions_of_several_kinds_the_lowest_is_kept():
         [("q", "angle", "rad", angle), ("w", "angular velocity", "rad/s", speed), ("i", "current", "A", push)],
     )
 
-    (found,), (said,) = one_motion_per_force((recording,))
+    (found,), (said,) = convert_to_driven_motions((recording,))
 
     assert found.response.channels == ("q",)
     assert "w and i" in said
@@ -125,8 +125,8 @@ def test_of_several_forces_along_one_motion_the_strongest_is_balanced():
         [("q", "displacement", "m", way)], [("a", "force", "N", 2 * way), ("b", "force", "N", 5 * way)]
     )
 
-    formed, (said,) = one_motion_per_force((recording,))
-    (driven,) = all_as_force_driven(formed)
+    formed, (said,) = convert_to_driven_motions((recording,))
+    (driven,) = convert_all_to_force_driven(formed)
 
     assert (driven.command.channels, driven.response.channels) == (("b",), ("q",))
     assert "for a, import the recording" in said
@@ -139,7 +139,7 @@ def test_a_channel_without_a_single_number_is_no_motion_and_no_force():
     assert (moving := find_motion_signal(moved)) is not None
     assert moving.channels == ("y",)
     pushed = make_recording([("x", "position", "m", push)], [("f1", "force", "N", none), ("f2", "force", "N", push)])
-    assert one_motion_per_force((pushed,))[0][0].response.channels == ("f2",)
+    assert convert_to_driven_motions((pushed,))[0][0].response.channels == ("f2",)
 
 
 def test_one_force_along_two_imposed_motions_keeps_both():
@@ -148,7 +148,7 @@ def test_one_force_along_two_imposed_motions_keeps_both():
         [("q", "displacement", "m", way), ("r", "displacement", "m", far)], [("f", "force", "N", way - far)]
     )
 
-    (driven,) = all_as_force_driven(one_motion_per_force((recording,))[0])
+    (driven,) = convert_all_to_force_driven(convert_to_driven_motions((recording,))[0])
 
     assert (driven.command.channels, driven.response.channels) == (("f",), ("q", "r"))
 
@@ -160,7 +160,7 @@ def test_the_sign_of_an_absolute_speed_is_restored(seed):
     speed = simulate_speed(push, mass=0.1)
     seen = np.abs(speed) + 0.005 * speed.std() * rng.standard_normal(len(speed))
 
-    (found,), (said,) = one_motion_per_force(
+    (found,), (said,) = convert_to_driven_motions(
         (make_recording([("u", "voltage", "V", push)], [("w", "speed", "m/s", seen)]),)
     )
 
@@ -172,7 +172,7 @@ def test_a_speed_in_one_direction_is_not_taken_for_an_absolute_speed():
     push = 3.0 + np.abs(smooth_noise(1000, 3))
     recording = make_recording([("u", "voltage", "V", push)], [("w", "speed", "m/s", simulate_speed(push))])
 
-    assert one_motion_per_force((recording,)) == ((recording,), ())
+    assert convert_to_driven_motions((recording,)) == ((recording,), ())
 
 
 def test_a_device_whose_memory_is_longer_than_a_stretch_answers_its_command():

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.first_model.model_from_balance import law_power_share_in_band
+from analysis.diagnosis.first_model.model_from_balance import compute_law_power_share
 
 RATE_HZ, SAMPLES = 100.0, 1000
 
@@ -13,7 +13,8 @@ RATE_HZ, SAMPLES = 100.0, 1000
 def make_balance(*courses):
     """A balance with one named law, whose force in each take is a course."""
     regression = SimpleNamespace(
-        columns_of=lambda laws: list(laws), weights=lambda columns: np.ones(1), base=0, places=[slice(0, 1)],
+        select_columns=lambda laws: list(laws), fit_weights=lambda columns: np.ones(1), base=0,
+        places=[slice(0, 1)],
         columns=[course[:, None] for course in courses],
         motions=[SimpleNamespace(step=1, rate_hz=RATE_HZ) for _ in courses],
     )  # fmt: skip
@@ -25,6 +26,6 @@ def make_balance(*courses):
 )
 def test_only_a_law_that_differs_between_takes_has_power_below_their_band(levels, share):
     ripple = 0.1 * np.where(np.arange(SAMPLES) % 2, 1.0, -1.0)
-    assert law_power_share_in_band([make_balance(*(level + ripple for level in levels))], 2.0) == pytest.approx(
+    assert compute_law_power_share([make_balance(*(level + ripple for level in levels))], 2.0) == pytest.approx(
         share, abs=1e-6
     )

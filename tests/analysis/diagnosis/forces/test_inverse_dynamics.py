@@ -6,14 +6,14 @@ import pytest
 from analysis.diagnosis.data import motion_smoother
 from analysis.diagnosis.data.motion_smoother import smooth_motion
 from analysis.diagnosis.data.observed import observe
-from analysis.diagnosis.errors.choose_measure import measure_by_force
-from analysis.diagnosis.forces.inverse_dynamics import band_motion, compute_required_force
+from analysis.diagnosis.errors.choose_measure import make_force_measure
+from analysis.diagnosis.forces.inverse_dynamics import compute_band_motion, compute_required_force
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
 from equalizer.effects.simulation.forces_along_motion import effect_forces_along_motion
 from equalizer.effects.simulation.simulator import simulate_mechanism
-from equalizer.plant.linear_simulation import LinearSteps, discretise_model
+from equalizer.plant.linear_simulation import DiscreteModel, discretise_model
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.band_limited import filter_low_pass
 from equalizer.signals.recording import Recording
@@ -34,7 +34,7 @@ def _raise_singular(*_of: object) -> None:
 def test_a_sine_needs_the_force_of_the_books() -> None:
     omega = 2 * np.pi * 2.0
     x = 0.03 * np.sin(omega * TIME_S)
-    needed = compute_required_force(make_body(), band_motion(x[:, None], RATE_HZ, 50.0))
+    needed = compute_required_force(make_body(), compute_band_motion(x[:, None], RATE_HZ, 50.0))
     wanted = (300.0 - 2.0 * omega**2) * x + 5.0 * 0.03 * omega * np.cos(omega * TIME_S)
     inside = slice(200, -200)
     assert np.allclose(needed.force[inside, 0], wanted[inside], atol=2e-3 * np.abs(wanted).max())
@@ -43,7 +43,7 @@ def test_a_sine_needs_the_force_of_the_books() -> None:
 
 def test_a_steady_slide_needs_its_damping_and_spring() -> None:
     x = 0.1 + 0.2 * TIME_S
-    needed = compute_required_force(make_body(), band_motion(x[:, None], RATE_HZ, 50.0))
+    needed = compute_required_force(make_body(), compute_band_motion(x[:, None], RATE_HZ, 50.0))
     assert np.allclose(needed.force[:, 0], 300.0 * x + 5.0 * 0.2, atol=1e-6)
     assert np.allclose(needed.axis_velocity, 0.2, atol=1e-6)
 
@@ -56,8 +56,8 @@ def test_bodies_that_are_not_measured_are_moved_along() -> None:
     force = filter_low_pass(np.random.default_rng(1).standard_normal((4000, 1)), RATE_HZ, 10.0)
     force *= np.clip(np.minimum(TIME_S, TIME_S[::-1]) / 0.5, 0, 1)[:, None]
     moved = simulate_mechanism(two, force, RATE_HZ).response
-    needed = compute_required_force(two, band_motion(moved, RATE_HZ, 60.0)).force
-    entered = filter_low_pass(force, RATE_HZ, 60.0, late_s=0.5 / RATE_HZ)
+    needed = compute_required_force(two, compute_band_motion(moved, RATE_HZ, 60.0)).force
+    entered = filter_low_pass(force, RATE_HZ, 60.0, delay_s=0.5 / RATE_HZ)
     assert np.std((needed - entered)[300:-600]) < 0.01 * np.std(entered)
 
 
@@ -65,7 +65,7 @@ def test_a_band_limited_signal_keeps_its_place_and_comes_late_when_asked() -> No
     slow, fast = np.sin(2 * np.pi * 3 * TIME_S), np.sin(2 * np.pi * 200 * TIME_S)
     inside = slice(300, -300)
     assert np.allclose(filter_low_pass((slow + fast)[:, None], RATE_HZ, 30.0)[inside, 0], slow[inside], atol=2e-3)
-    late = filter_low_pass(slow[:, None], RATE_HZ, 30.0, late_s=0.01)
+    late = filter_low_pass(slow[:, None], RATE_HZ, 30.0, delay_s=0.01)
     assert np.allclose(late[inside, 0], np.sin(2 * np.pi * 3 * (TIME_S - 0.01))[inside], atol=2e-3)
 
 
@@ -117,7 +117,7 @@ def test_the_smoother_finds_motion_and_missing_force_of_a_drifting_plant(
 ) -> None:
     """by_doubling: where that breaks down, an ordered Schur form finds the same."""
     if not by_doubling:
-        monkeypatch.setattr(motion_smoother, "_steady_covariance", _raise_singular)
+        monkeypatch.setattr(motion_smoother, "_solve_riccati_by_doubling", _raise_singular)
     plant = make_body(stiffness=0.0 if quantity != "acceleration" else 300.0, quantity=quantity)
     rng = np.random.default_rng(4)
     force = 3.0 * np.sin(2 * np.pi * 1.1 * TIME_S)[:, None]
@@ -141,9 +141,9 @@ def test_a_smoother_of_what_is_not_finite_says_that_there_is_none(monkeypatch: p
         smooth_motion(make_body(), observe(recording, 1), np.ones((50, 1)), np.array([1.0]))
 
 
-def _steps_of_nan(model: MechanicalModel, step_s: float) -> LinearSteps:
+def _steps_of_nan(model: MechanicalModel, step_s: float) -> DiscreteModel:
     steps = discretise_model(model, step_s)
-    return replace(steps, advance=np.full_like(steps.advance, np.nan))
+    return replace(steps, transition=np.full_like(steps.transition, np.nan))
 
 
 def test_the_noise_of_an_idle_axis_is_not_capped_by_its_own_force() -> None:
@@ -153,7 +153,7 @@ def test_the_noise_of_an_idle_axis_is_not_capped_by_its_own_force() -> None:
     command = np.stack([3 * np.sin(2 * np.pi * 1.1 * TIME_S), np.zeros(4000)], axis=1)
     moved = simulate_mechanism(both, command, RATE_HZ).response + noise
     signals = (Signal(each, RATE_HZ, what, "1", ("x", "y")) for each, what in ((command, "force"), (moved, "position")))
-    measure = measure_by_force([Recording("two", *signals)], both, None).measure
+    measure = make_force_measure([Recording("two", *signals)], both, None).measure
     (left,) = measure.residuals(both, ())
     inside = slice(500, -500)
     assert np.std(left[inside, 1]) < 3

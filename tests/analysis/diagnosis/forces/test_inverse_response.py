@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.forces import inverse_response as module
-from analysis.diagnosis.forces.inverse_response import fast_inverse_response, inverse_response
+from analysis.diagnosis.forces.inverse_response import compute_inverse_response, make_fast_inverse_response
 from equalizer.plant.mechanical_model import MechanicalModel
 
 RATE_HZ = 1000.0
@@ -27,7 +27,10 @@ def make_device(coupling_n_s_per_m: float) -> MechanicalModel:
 @pytest.mark.parametrize("coupling", [0.0, 8.0])
 def test_all_lines_follow_from_a_few(coupling):
     model = make_device(coupling)
-    wanted, found = inverse_response(model, LINES), fast_inverse_response(model, len(LINES), RATE_HZ / 2)(LINES)
+    wanted, found = (
+        compute_inverse_response(model, LINES),
+        make_fast_inverse_response(model, len(LINES), RATE_HZ / 2)(LINES),
+    )
     for part in (slice(0, 2), slice(2, 4)):
         scale = np.abs(wanted[:, part]).max(axis=(1, 2), keepdims=True)
         assert (np.abs(found - wanted)[:, part] / scale).max() < 1e-7
@@ -35,6 +38,6 @@ def test_all_lines_follow_from_a_few(coupling):
 
 
 def test_where_few_lines_do_not_determine_the_others_all_are_solved_for(monkeypatch):
-    monkeypatch.setattr(module, "transmission_zeros", lambda model, largest: np.array([-3.0 + 40.0j]))
-    found = fast_inverse_response(make_device(8.0), len(LINES), RATE_HZ / 2)(LINES)
-    assert np.array_equal(found, inverse_response(make_device(8.0), LINES))
+    monkeypatch.setattr(module, "compute_transmission_zeros", lambda model, largest: np.array([-3.0 + 40.0j]))
+    found = make_fast_inverse_response(make_device(8.0), len(LINES), RATE_HZ / 2)(LINES)
+    assert np.array_equal(found, compute_inverse_response(make_device(8.0), LINES))

@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.data.spectral_lines import detection_lines, hold_length
+from analysis.diagnosis.data.spectral_lines import compute_hold_samples, find_detection_lines
 from analysis.diagnosis.localisation.distortion import find_distortions
-from analysis.diagnosis.localisation.level_trends import level_trends
+from analysis.diagnosis.localisation.level_trends import compute_level_trends
 from analysis.diagnosis.noise.noise_floor import estimate_noise_floor
 from analysis.diagnosis.settings import DISTORTION_P
 
@@ -22,7 +22,7 @@ def test_a_clean_device_has_no_distortion(device):
     cells = distortions_of(device().recorded()).cells
     assert len(cells) > 200
     assert np.mean([cell.p_value < 0.05 for cell in cells]) < 0.08
-    assert not any(trend.present for trend in level_trends(cells))
+    assert not any(trend.present for trend in compute_level_trends(cells))
 
 
 def test_invented_odd_distortion_is_recovered_with_its_size(device):
@@ -45,8 +45,12 @@ def test_invented_odd_distortion_is_recovered_with_its_size(device):
 
 
 def test_odd_distortion_that_rises_is_distinguished_from_friction_that_falls(device):
-    rising = whole_band_trends(level_trends(distortions_of(device(cubic=0.02, axes=1).recorded()).cells), "ax", "fx")
-    falling = whole_band_trends(level_trends(distortions_of(device(coulomb=0.3, axes=1).recorded()).cells), "ax", "fx")
+    rising = whole_band_trends(
+        compute_level_trends(distortions_of(device(cubic=0.02, axes=1).recorded()).cells), "ax", "fx"
+    )
+    falling = whole_band_trends(
+        compute_level_trends(distortions_of(device(coulomb=0.3, axes=1).recorded()).cells), "ax", "fx"
+    )
     assert rising["odd"].level_dependence in ("rises", "rises from nothing")
     assert falling["odd"].level_dependence == "falls"
     assert falling["odd"].db_per_doubling == pytest.approx(-6, abs=1.5)
@@ -55,7 +59,9 @@ def test_odd_distortion_that_rises_is_distinguished_from_friction_that_falls(dev
 
 
 def test_even_distortion_falls_on_even_lines(device):
-    found = whole_band_trends(level_trends(distortions_of(device(square=0.05, axes=1).recorded()).cells), "ax", "fx")
+    found = whole_band_trends(
+        compute_level_trends(distortions_of(device(square=0.05, axes=1).recorded()).cells), "ax", "fx"
+    )
     assert found["even"].present
     assert found["even"].db_per_doubling == pytest.approx(6, abs=1.5)
     assert not found["odd"].present
@@ -63,7 +69,7 @@ def test_even_distortion_falls_on_even_lines(device):
 
 def test_a_device_that_sways_varies_between_periods(device):
     found = whole_band_trends(
-        level_trends(distortions_of(device(swaying=0.3, axes=1, noise=0.01).recorded()).cells), "ax", "fx"
+        compute_level_trends(distortions_of(device(swaying=0.3, axes=1, noise=0.01).recorded()).cells), "ax", "fx"
     )
     assert found["varying"].present
     assert found["varying"].level_dependence == "stays"
@@ -113,9 +119,9 @@ def test_distortion_that_a_feedback_brings_back_is_not_counted_twice(device):
 def test_images_of_a_held_command_are_no_driven_lines():
     random = np.random.default_rng(5)
     held = np.repeat(random.standard_normal((500, 1)), 2, axis=0)
-    assert hold_length(held) == 2
-    assert hold_length(random.standard_normal((500, 1))) == 1
-    driven = detection_lines(np.fft.rfft(held, axis=0)[1:500] / 1000, hold_length(held)).driven
+    assert compute_hold_samples(held) == 2
+    assert compute_hold_samples(random.standard_normal((500, 1))) == 1
+    driven = find_detection_lines(np.fft.rfft(held, axis=0)[1:500] / 1000, compute_hold_samples(held)).driven
     assert driven[:240].mean() > 0.9
     assert not driven[250:].any()
 
@@ -134,7 +140,9 @@ def test_the_shared_cases_show_the_signature_of_their_effect(shared, number, out
     from study.store.formats.recording_file import read_recording
 
     found = whole_band_trends(
-        level_trends(distortions_of(read_recording(shared / "cases" / f"open-{number:02d}.h5")).cells), output, input
+        compute_level_trends(distortions_of(read_recording(shared / "cases" / f"open-{number:02d}.h5")).cells),
+        output,
+        input,
     )
     assert found[kind].level_dependence == level_dependence
 
@@ -143,5 +151,5 @@ def test_the_shared_cases_show_the_signature_of_their_effect(shared, number, out
 def test_linear_shared_cases_have_no_distortion(shared, number):
     from study.store.formats.recording_file import read_recording
 
-    trends = level_trends(distortions_of(read_recording(shared / "cases" / f"open-{number:02d}.h5")).cells)
+    trends = compute_level_trends(distortions_of(read_recording(shared / "cases" / f"open-{number:02d}.h5")).cells)
     assert not any(trend.present for trend in trends)

@@ -5,7 +5,7 @@ import pytest
 
 from analysis.diagnosis.localisation.entry_point import Entry, compare_sensors, rank_entries
 from analysis.diagnosis.localisation.mismatch_cells import Prediction
-from analysis.diagnosis.localisation.residual_spectra import ResidualSpectra, residual_spectra
+from analysis.diagnosis.localisation.residual_spectra import ResidualSpectra, compute_residual_spectra
 from analysis.diagnosis.noise.noise_floor import estimate_noise_floor
 
 FREQUENCY_HZ = np.arange(2.0, 120.0, 0.5)
@@ -107,16 +107,16 @@ def test_a_recordings_residual_is_taken_over_the_driven_band(device):
     command, segments = bench.command(1)
     truth = Prediction(*bench.linear(command, segments))
     floor = estimate_noise_floor(recording)
-    spectra = residual_spectra(recording, truth, floor, model_error=0.0)
+    spectra = compute_residual_spectra(recording, truth, floor, model_error=0.0)
     assert spectra.residual.shape == (6, len(spectra.frequency_hz), 4)
     assert (spectra.frequency_hz[[0, -1]] == [3, 197]).all()
     assert np.mean(np.abs(spectra.residual) ** 2 / spectra.noise) == pytest.approx(1, abs=0.05)
-    doubted = residual_spectra(recording, truth, floor)
+    doubted = compute_residual_spectra(recording, truth, floor)
     assert (doubted.noise > spectra.noise).all()
     used = np.zeros(len(recording), dtype=bool)
-    assert residual_spectra(recording, truth, floor, used) is None
+    assert compute_residual_spectra(recording, truth, floor, used) is None
     used[: segments[0].stop] = True
-    assert len(residual_spectra(recording, truth, floor, used).residual) == 1
+    assert len(compute_residual_spectra(recording, truth, floor, used).residual) == 1
 
 
 def test_what_is_not_periodic_is_taken_in_windows(device):
@@ -124,7 +124,7 @@ def test_what_is_not_periodic_is_taken_in_windows(device):
     recording = bench.recorded()
     command, segments = bench.command(1)
     swept = replace(recording, segments=tuple(replace(s, period=0, kind="sweep") for s in segments))
-    spectra = residual_spectra(
+    spectra = compute_residual_spectra(
         swept, Prediction(*bench.linear(command, segments)), estimate_noise_floor(recording), model_error=0.0
     )
     assert len(spectra.residual) == 12

@@ -3,7 +3,11 @@ from dataclasses import replace
 import pytest
 
 from analysis.diagnosis.localisation.entry_point import EntryPoint, EntryScore, SensorRule
-from analysis.diagnosis.localisation.localisation_words import entry_sentence, localisation_sentences, states_sentence
+from analysis.diagnosis.localisation.localisation_words import (
+    write_entry_sentence,
+    write_localisation_sentences,
+    write_states_sentence,
+)
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
 from analysis.diagnosis.localisation.state_regions import StateRegion
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE
@@ -38,7 +42,7 @@ def test_distortion_is_told_per_channel_and_level(friction_findings):
 
 
 def test_the_entry_is_reported_with_what_comes_next():
-    assert entry_sentence(EntryPoint((ALONG_X, ALONG_ALL, OF_AX), MOVED, 1200)) == (
+    assert write_entry_sentence(EntryPoint((ALONG_X, ALONG_ALL, OF_AX), MOVED, 1200)) == (
         "The mismatch after re-tuning enters as a force along x (the drive, the mechanism and a hand all act there, "
         "and these channels do not distinguish them): this explains 90 % of it, at the median of 1200 frequency "
         "lines; the next best entry is an error of the ax channel with 40 % (p < 0.0001 for its being equally good). "
@@ -46,13 +50,13 @@ def test_the_entry_is_reported_with_what_comes_next():
         "of the response is at fault."
     )
     as_good = replace(OF_AX, p_value=0.3)
-    assert "would explain it about equally well (40 %, p = 0.3000)" in entry_sentence(
+    assert "would explain it about equally well (40 %, p = 0.3000)" in write_entry_sentence(
         EntryPoint((ALONG_X, as_good), None, 60)
     )
 
 
 def test_a_sensor_is_said_to_be_one():
-    said = entry_sentence(EntryPoint((OF_AX, ALONG_X), AT_SENSOR, 60))
+    said = write_entry_sentence(EntryPoint((OF_AX, ALONG_X), AT_SENSOR, 60))
     assert said.startswith(
         "The mismatch after re-tuning enters as an error of the ax channel: this explains 40 % of it"
     )
@@ -61,17 +65,17 @@ def test_a_sensor_is_said_to_be_one():
 
 @pytest.mark.parametrize("entry", [None, EntryPoint((), None, 0), EntryPoint((ALONG_X,), None, 39)])
 def test_where_too_little_is_there_no_entry_is_reported(entry):
-    assert entry_sentence(entry) == ""
+    assert write_entry_sentence(entry) == ""
 
 
 def test_states_are_said_with_share_and_chance():
-    assert states_sentence([StateMismatch("ax", "fx", (1.0, 256.0), RUBS)]) == (
+    assert write_states_sentence([StateMismatch("ax", "fx", (1.0, 256.0), RUBS)]) == (
         "The mismatch depends on a state: ax, driven by fx, by the sign of v (86 % of the mismatch, p < 0.0001)."
     )
-    assert states_sentence([]) == ""
+    assert write_states_sentence([]) == ""
 
 
 def test_the_page_gets_both_sentences(friction_findings):
-    entry, states = localisation_sentences(friction_findings.localisation)
+    entry, states = write_localisation_sentences(friction_findings.localisation)
     assert entry.startswith("The mismatch after re-tuning enters as a force along x")
     assert "by the sign of v" in states

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.localisation.mismatch_cells import Margin, Prediction, learn_floor, mismatch_cells
+from analysis.diagnosis.localisation.mismatch_cells import Margin, Prediction, compute_mismatch_cells, learn_floor
 from analysis.diagnosis.noise.noise_floor import estimate_noise_floor
 
 
@@ -13,7 +13,7 @@ def record_with_prediction(bench, seed=1):
 
 
 def find_cells(recording, prediction, **options):
-    return mismatch_cells(recording, prediction, estimate_noise_floor(recording), **options)
+    return compute_mismatch_cells(recording, prediction, estimate_noise_floor(recording), **options)
 
 
 def test_the_true_model_has_no_mismatch(device):
@@ -60,11 +60,15 @@ def test_what_is_not_periodic_is_compared_in_windows(device):
     recording, truth = record_with_prediction(device(noise=0.02))
     swept = replace(recording, segments=tuple(replace(s, period=0, kind="sweep") for s in recording.segments))
     floor = estimate_noise_floor(recording)
-    clean = mismatch_cells(swept, truth, floor)
+    clean = compute_mismatch_cells(swept, truth, floor)
     assert len(clean) > 100
     assert not any(cell.significant for cell in clean)
-    assert 0.01 < np.mean([c.p_value < 0.05 for c in mismatch_cells(swept, truth, floor, margin=Margin(0.0))]) < 0.15
-    off = mismatch_cells(swept, Prediction(1.1 * truth.response, truth.position), floor)
+    assert (
+        0.01
+        < np.mean([c.p_value < 0.05 for c in compute_mismatch_cells(swept, truth, floor, margin=Margin(0.0))])
+        < 0.15
+    )
+    off = compute_mismatch_cells(swept, Prediction(1.1 * truth.response, truth.position), floor)
     assert {cell.quantity for cell in off if cell.significant} == {"acceleration"}
     own = [cell.share for cell in off if cell.significant and cell.output == "a" + cell.input[1]]
     assert np.median(own) == pytest.approx(0.1, rel=0.1)
@@ -109,7 +113,7 @@ def test_a_floor_knows_a_channel_by_its_other_inputs(device):
 def test_noise_that_is_not_known_gives_no_cells(device):
     recording, truth = record_with_prediction(device())
     unknown = replace(estimate_noise_floor(recording), method="unknown")
-    assert mismatch_cells(recording, truth, unknown) == ()
+    assert compute_mismatch_cells(recording, truth, unknown) == ()
 
 
 def test_predictions_of_another_shape_are_refused(device):

@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
-from analysis.diagnosis.localisation.mismatch_rows import MOST_ROWS, StateMismatch, mismatch_rows
+from analysis.diagnosis.localisation.mismatch_rows import MOST_ROWS, StateMismatch, list_mismatch_rows
 from analysis.diagnosis.localisation.state_regions import StateRegion
 
 
@@ -18,7 +18,7 @@ def make_state(share, p_value):
 
 
 def test_rows_come_by_what_they_miss_of_the_signal_and_only_where_significant():
-    rows = mismatch_rows([make_cell(0.1), make_cell(0.3), make_cell(0.9, p_value=0.02)])
+    rows = list_mismatch_rows([make_cell(0.1), make_cell(0.3), make_cell(0.9, p_value=0.02)])
     assert [row.share for row in rows] == [0.3, 0.1]
     assert rows[0].state is None
     assert rows[0].amplitude == 1.0
@@ -27,27 +27,27 @@ def test_rows_come_by_what_they_miss_of_the_signal_and_only_where_significant():
 def test_a_band_without_signal_comes_after_a_smaller_share_of_the_loud_one():
     faint = replace(make_cell(0.9), band_hz=(256.0, 512.0), rms=0.009, signal_rms=0.01)
     assert faint.share == pytest.approx(0.9)
-    assert [row.band_hz[0] for row in mismatch_rows([faint, make_cell(0.1)])] == [2.0, 256.0]
+    assert [row.band_hz[0] for row in list_mismatch_rows([faint, make_cell(0.1)])] == [2.0, 256.0]
     loud = replace(faint, rms=0.9, signal_rms=1.0)
-    assert [row.band_hz[0] for row in mismatch_rows([loud, make_cell(0.1)])] == [256.0, 2.0]
+    assert [row.band_hz[0] for row in list_mismatch_rows([loud, make_cell(0.1)])] == [256.0, 2.0]
 
 
 def test_a_prediction_that_is_worse_than_none_is_a_share_of_one():
-    assert mismatch_rows([make_cell(2.5)])[0].share == 1.0
+    assert list_mismatch_rows([make_cell(2.5)])[0].share == 1.0
 
 
 def test_states_are_rows_over_all_levels():
-    rows = mismatch_rows([make_cell(0.1)], [make_state(0.6, 1e-4), make_state(0.9, 0.5)])
+    rows = list_mismatch_rows([make_cell(0.1)], [make_state(0.6, 1e-4), make_state(0.9, 0.5)])
     assert [row.state for row in rows] == ["near v = 0", None]
     assert rows[0].amplitude is None
 
 
 def test_a_level_that_is_not_known_is_none():
-    assert mismatch_rows([make_cell(0.1, amplitude=0.0)])[0].amplitude is None
+    assert list_mismatch_rows([make_cell(0.1, amplitude=0.0)])[0].amplitude is None
 
 
 def test_no_more_rows_are_kept_than_a_page_holds():
-    rows = mismatch_rows([make_cell(0.1 + k / 1000) for k in range(100)], [make_state(0.01, 1e-4)])
+    rows = list_mismatch_rows([make_cell(0.1 + k / 1000) for k in range(100)], [make_state(0.01, 1e-4)])
     assert len(rows) == MOST_ROWS
     assert rows[0].state == "near v = 0"
-    assert mismatch_rows([]) == ()
+    assert list_mismatch_rows([]) == ()

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.localisation.block_permutation import SMALLEST, correlation_time, shuffle_blocks
+from analysis.diagnosis.localisation.block_permutation import LEAST_P_VALUE, compute_correlation_time, shuffle_blocks
 from analysis.diagnosis.localisation.state_regions import Disturbance, State, find_state_regions
 
 
@@ -102,7 +102,7 @@ def test_the_seed_decides_and_no_p_value_is_smaller_than_shuffles_can_say():
     _, states, strata = make_states(8)
     force = Disturbance(np.sign(states[1].values), strata)
     assert find_state_regions(force, states, seed=3) == find_state_regions(force, states, seed=3)
-    assert min(region.p_value for region in find_state_regions(force, states, seed=3)) >= SMALLEST
+    assert min(region.p_value for region in find_state_regions(force, states, seed=3)) >= LEAST_P_VALUE
 
 
 def test_too_little_or_nothing_has_no_regions():
@@ -132,5 +132,5 @@ def test_a_correlation_time_is_that_of_an_autoregression():
     for k, step in enumerate(steps):
         last = series[k] = 0.9 * last + step
     # Sum over all lags of 0.81^|k|.
-    assert correlation_time(series) == pytest.approx((1 + 0.81) / (1 - 0.81), rel=0.15)
-    assert correlation_time(np.zeros(100)) == 1.0
+    assert compute_correlation_time(series) == pytest.approx((1 + 0.81) / (1 - 0.81), rel=0.15)
+    assert compute_correlation_time(np.zeros(100)) == 1.0

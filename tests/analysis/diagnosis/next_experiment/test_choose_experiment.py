@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.data.recorded_conditions import add_mass
-from analysis.diagnosis.errors.hypothesis import Claim, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import Claim, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import Fitted
-from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.next_experiment.choose_experiment import (
     MOST_RECORDINGS,
     Bench,
@@ -17,11 +17,11 @@ from analysis.diagnosis.next_experiment.choose_experiment import (
     make_document_entry,
     predict_gains,
 )
-from analysis.diagnosis.next_experiment.experiment_menu import experiment_menu
+from analysis.diagnosis.next_experiment.experiment_menu import list_experiments
 from analysis.diagnosis.settings import TELLING_GAIN
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.simulation.simulator import simulate_mechanism
-from equalizer.plant.linear_simulation import driven_axes
+from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, SensorLimits, Tolerance
 from equalizer.signals.recording import Hold
 
@@ -36,12 +36,12 @@ def make_bench(tolerance=KNOWN):
     model = MechanicalModel(
         "small", "acceleration", [[0.25]], [[4.0]], [[130.0]], unit, unit, SensorLimits(400.0, 0.0), tolerance=tolerance
     )
-    return Bench(tuning_of(model, ("fx",)), RATE_HZ, Hold.ZERO_ORDER, NOISE)
+    return Bench(make_tuning(model, ("fx",)), RATE_HZ, Hold.ZERO_ORDER, NOISE)
 
 
 def make_fit(bench, name, values):
     effect = EFFECTS[name]
-    whole = hypothesis_of_claim(Claim(effect, "one", (0,)), [values])
+    whole = make_claim_hypothesis(Claim(effect, "one", (0,)), [values])
     return Fitted(whole, np.zeros(len(bench.tuning.names)), (), 0.0)
 
 
@@ -52,13 +52,13 @@ def known_precision(bench, fitted, numbers=0.0):
 
 
 def predict_menu_gains(bench, named, rival, numbers=0.0):
-    menu = experiment_menu(bench.tuning.model, RATE_HZ, 0, LEVEL_N)
+    menu = list_experiments(bench.tuning.model, RATE_HZ, 0, LEVEL_N)
     return predict_gains(bench, named, rival, known_precision(bench, rival, numbers), menu)
 
 
 @pytest.mark.parametrize("rate_hz", [0.5, 1.74, 20.0, 400.0, 20_000.0])
 def test_experiments_suit_the_sample_rate(rate_hz):
-    for experiment in experiment_menu(make_bench().tuning.model, rate_hz, 0, LEVEL_N):
+    for experiment in list_experiments(make_bench().tuning.model, rate_hz, 0, LEVEL_N):
         assert 60 <= len(experiment.commands) <= max(40 * rate_hz, 2000)
         assert np.abs(experiment.commands).max() <= LEVEL_N
 
@@ -107,12 +107,12 @@ def test_a_law_and_itself_are_never_told_apart(friction_choice):
 
 def make_gains(*rows):
     """Per rival, invented gains of the first recordings of a menu."""
-    menu = experiment_menu(make_bench().tuning.model, RATE_HZ, 0, LEVEL_N)
+    menu = list_experiments(make_bench().tuning.model, RATE_HZ, 0, LEVEL_N)
     return [[PredictedGain(menu[number], gain, gain) for number, gain in enumerate(row)] for row in rows]
 
 
 def menu_numbers(chosen):
-    menu = [each.words for each in experiment_menu(make_bench().tuning.model, RATE_HZ, 0, LEVEL_N)]
+    menu = [each.words for each in list_experiments(make_bench().tuning.model, RATE_HZ, 0, LEVEL_N)]
     return [menu.index(experiment.words) for experiment in chosen.experiments]
 
 
@@ -163,7 +163,7 @@ def test_a_recording_that_no_rival_needs_is_not_proposed():
 def test_the_prior_is_counted_once_for_several_recordings():
     """Two equal recordings, whose difference the tolerance of a calibration can hide: r = d - s * theta, K = 1."""
     bench, named, rival = compare_mass_and_gain(LOOSE)
-    menu = experiment_menu(bench.tuning.model, RATE_HZ, 0, LEVEL_N)[:2]
+    menu = list_experiments(bench.tuning.model, RATE_HZ, 0, LEVEL_N)[:2]
     gains = predict_gains(bench, named, rival, known_precision(bench, rival, 1e9), menu)
     assert all(0 <= each.shared <= each.gain for each in gains)
     assert any(each.shared < 0.9 * each.gain for each in gains)
@@ -197,7 +197,7 @@ def test_what_the_tolerance_can_hide_tells_nothing():
 
 def test_a_weight_strapped_on_tells_what_no_louder_sweep_can():
     bench, named, rival = compare_mass_and_gain(LOOSE)
-    menu = experiment_menu(bench.tuning.model, RATE_HZ, 0, LEVEL_N)
+    menu = list_experiments(bench.tuning.model, RATE_HZ, 0, LEVEL_N)
     size = len(bench.tuning.names) + 1
     gains = predict_gains(bench, named, rival, np.diag([1e9] * size), menu)
     *others, weight = gains
@@ -216,7 +216,7 @@ def test_what_was_recorded_so_far_holds_the_rival(friction_choice):
 
 def test_nothing_louder_than_before_is_proposed():
     bench = make_bench()
-    for each in experiment_menu(bench.tuning.model, RATE_HZ, 0, LEVEL_N):
+    for each in list_experiments(bench.tuning.model, RATE_HZ, 0, LEVEL_N):
         assert np.abs(each.commands).max() <= LEVEL_N * (1 + 1e-9)
         assert each.commands[0, 0] == pytest.approx(0.0, abs=1e-6)
 
@@ -225,13 +225,13 @@ def test_a_weight_is_the_same_along_every_driven_axis():
     turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
     eye = np.eye(3)
     model = MechanicalModel("three", "acceleration", eye, eye, eye, turn, turn.T)
-    axes = driven_axes(model)
+    axes = compute_driven_axes(model)
     assert axes.T @ (add_mass(model, 0.03).mass - model.mass) @ axes == pytest.approx(0.03 * eye)
 
 
 def test_an_informative_expensive_recording_ranks_before_a_cheap_uninformative_one():
     bench, named, rival = compare_mass_and_gain(LOOSE)
-    sweep, *_, weight = experiment_menu(bench.tuning.model, RATE_HZ, 0, LEVEL_N)
+    sweep, *_, weight = list_experiments(bench.tuning.model, RATE_HZ, 0, LEVEL_N)
     known = np.diag([1e9] * (len(bench.tuning.names) + 1))
     dear = replace(weight, minutes=1e6)
     small = replace(sweep, commands=sweep.commands / 50)
@@ -244,11 +244,11 @@ def test_an_axis_that_no_stiffness_holds_is_not_pushed_away():
     held = make_bench().tuning.model
     free = replace(held, stiffness=np.zeros((1, 1)))
     pushes = [
-        sum(np.abs(each.commands.mean()) > 0.1 for each in experiment_menu(m, RATE_HZ, 0, LEVEL_N))
+        sum(np.abs(each.commands.mean()) > 0.1 for each in list_experiments(m, RATE_HZ, 0, LEVEL_N))
         for m in (held, free)
     ]
     assert pushes == [1, 0]
-    assert [each.kind for each in experiment_menu(held, RATE_HZ, 0, LEVEL_N)].count("step") == 1
+    assert [each.kind for each in list_experiments(held, RATE_HZ, 0, LEVEL_N)].count("step") == 1
 
 
 def test_a_body_on_a_spring_to_another_free_body_is_not_held():
@@ -258,13 +258,13 @@ def test_a_body_on_a_spring_to_another_free_body_is_not_held():
     free = MechanicalModel("two", "acceleration", mass, 0.4 * np.eye(2), spring, one, np.transpose(one))
     soft = replace(free, stiffness=spring + 0.05 * np.eye(2))
     held = replace(free, stiffness=spring + 500.0 * np.eye(2))
-    kinds = [[each.kind for each in experiment_menu(model, RATE_HZ, 0, LEVEL_N)] for model in (free, soft, held)]
+    kinds = [[each.kind for each in list_experiments(model, RATE_HZ, 0, LEVEL_N)] for model in (free, soft, held)]
     assert [each.count("step") for each in kinds] == [0, 0, 1]
 
 
 def test_a_release_ends_at_once_and_leaves_time_to_move_freely():
     (release,) = (
-        each for each in experiment_menu(make_bench().tuning.model, RATE_HZ, 0, LEVEL_N) if each.kind == "step"
+        each for each in list_experiments(make_bench().tuning.model, RATE_HZ, 0, LEVEL_N) if each.kind == "step"
     )
     command = release.commands[:, 0]
     (ends,) = np.nonzero(np.abs(np.diff(command)) > 0.9 * LEVEL_N)

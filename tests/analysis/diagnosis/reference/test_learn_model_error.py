@@ -7,7 +7,7 @@ import pytest
 
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
-from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, combine, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.localisation.clean_floor import CleanFloor, NothingLearned, clean_floor_sentence
 from analysis.diagnosis.reference.learn_model_error import (
     learn_model_error,
@@ -92,15 +92,15 @@ def test_what_mends_the_model_itself_counts_against_an_explanation(diagnosed, cl
         clean_recordings, diagnosed.device(1), (diagnosed.recorded(1, (LAG,), seed=4),), map, ignore_progress
     )
     lag, rubbing = (
-        hypothesis_of_claim(Claim(placed.effect, "one", (0,)), [{**placed.values}]) for placed in (LAG, RUBBING)
+        make_claim_hypothesis(Claim(placed.effect, "one", (0,)), [{**placed.values}]) for placed in (LAG, RUBBING)
     )
     assert learned.references.compute_clean_gain(lag).mean() > 0.2
     assert learned.references.compute_clean_gain(rubbing).mean() < 0.01
     assert not learned.references.compute_clean_gain(NO_EFFECTS).any()
-    assert learned.references.is_present_on_clean(combine(rubbing, lag), 1)
-    assert not learned.references.is_present_on_clean(combine(rubbing, lag), 0)
+    assert learned.references.is_present_on_clean(combine_hypotheses(rubbing, lag), 1)
+    assert not learned.references.is_present_on_clean(combine_hypotheses(rubbing, lag), 0)
     idle = Claim(BY_NAME["end_stop"], "one", (0,))  # never reached
-    stop = hypothesis_of_claim(idle, [{"position": 10.0, "stiffness": 1e3, "opposite": 0.0}])
+    stop = make_claim_hypothesis(idle, [{"position": 10.0, "stiffness": 1e3, "opposite": 0.0}])
     assert not learned.references.is_present_on_clean(stop, 0)
 
 

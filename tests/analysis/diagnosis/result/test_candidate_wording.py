@@ -3,14 +3,14 @@ from dataclasses import replace
 import pytest
 
 from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, Rival
-from analysis.diagnosis.effect_words import EFFECT_WORDS, LAW_WORDS, noun_of, unit_of
+from analysis.diagnosis.effect_words import EFFECT_WORDS, LAW_WORDS, get_noun, get_parameter_unit
 from analysis.diagnosis.result.candidate_wording import (
-    SENTENCES,
+    SENTENCE_COUNT,
     Device,
-    best_candidate_sentence,
-    candidate_sentences,
-    candidate_title,
-    class_sentence,
+    describe_best_candidate,
+    describe_candidates,
+    describe_class,
+    format_candidate,
 )
 from analysis.diagnosis.result.ceiling_wording import describe_ceiling
 from analysis.diagnosis.result.findings import BalanceErrors
@@ -49,7 +49,7 @@ def test_where_nothing_is_named_the_verdict_says_the_best_candidate_with_its_num
 
 def test_no_candidate_is_said_to_be_best_where_something_is_named_or_nothing_is_there():
     assert "candidate" not in describe_verdict(make_diagnosis("unexplained", ()), device=DEVICE)
-    assert best_candidate_sentence(make_diagnosis("partly_explained", (DRY,), (NAMED,)), DEVICE) == ""
+    assert describe_best_candidate(make_diagnosis("partly_explained", (DRY,), (NAMED,)), DEVICE) == ""
 
 
 def test_each_candidate_is_said_once():
@@ -57,31 +57,31 @@ def test_each_candidate_is_said_once():
         make_diagnosis("unexplained", (DRY, STICKY)),
         make_diagnosis("partly_explained", (STICKY,), (NAMED,)),
     )
-    (other,) = candidate_sentences(nothing, DEVICE)
+    (other,) = describe_candidates(nothing, DEVICE)
     assert other.startswith("Not confirmed: viscoelastic relaxation of a spring on the x drive, ")
     assert "120 N/m, time constant 20.0 ms." in other
-    assert candidate_sentences(something, DEVICE) == (other,)
+    assert describe_candidates(something, DEVICE) == (other,)
 
 
 def test_sentences_are_few_however_many_candidates_there_are():
     many = tuple(replace(STICKY, effect=name) for name in ("cogging", "backlash", "end_stop", "constant_force"))
-    assert len(candidate_sentences(make_diagnosis("partly_explained", many, (NAMED,)), DEVICE)) == SENTENCES
+    assert len(describe_candidates(make_diagnosis("partly_explained", many, (NAMED,)), DEVICE)) == SENTENCE_COUNT
 
 
 def test_numbers_have_units_only_where_the_device_is_known():
-    assert candidate_title(DRY, Device(False, ROTATIONAL)) == "dry friction on the x drive, 211 mN m"
-    assert candidate_title(DRY) == "dry friction on the x drive, level 0.211 (SI)"
+    assert format_candidate(DRY, Device(False, ROTATIONAL)) == "dry friction on the x drive, 211 mN m"
+    assert format_candidate(DRY) == "dry friction on the x drive, level 0.211 (SI)"
 
 
 @pytest.mark.parametrize("effect", LAW_WORDS)
 def test_laws_beyond_the_vocabulary_have_nouns_and_units(effect):
-    assert "_" not in noun_of(effect)
+    assert "_" not in get_noun(effect)
     assert effect not in EFFECT_WORDS
     law = LAW_WORDS[effect]
     # The parameters of a sensor are in the unit of what it reads.
     numbers = set() if law.place == "sensor" else set(law.words.parameters) - set(law.words.shares)
     assert numbers == set(law.units)
-    assert {unit_of(effect, name, system) for name in law.units for system in (LINEAR, ROTATIONAL)} != {"1"}
+    assert {get_parameter_unit(effect, name, system) for name in law.units for system in (LINEAR, ROTATIONAL)} != {"1"}
 
 
 def test_a_class_is_called_by_what_its_laws_have_in_common():
@@ -101,11 +101,11 @@ def test_a_class_is_called_by_what_its_laws_have_in_common():
 def test_a_class_of_different_kinds_and_rivals_as_good_are_listed():
     mixed = effect_of_class("coulomb_friction", "backlash", rivals=(Rival("stribeck_friction", 0.3, True, ""),))
     assert format_effect_title(mixed, True) == "dry friction on the x drive"
-    assert "play (backlash) or friction that is larger at rest (Stribeck) would" in class_sentence(mixed)
+    assert "play (backlash) or friction that is larger at rest (Stribeck) would" in describe_class(mixed)
 
 
 def test_an_effect_without_a_class_is_called_by_its_own_name():
-    assert class_sentence(NAMED) == describe_equivalents(NAMED) == ""
+    assert describe_class(NAMED) == describe_equivalents(NAMED) == ""
     assert format_effect_title(NAMED) == "dry friction on the x drive"
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.result.retuned_parameters import (
     MovedParameter,
     describe_doubtful_parameters,
@@ -47,7 +47,7 @@ def test_many_doubtful_numbers_are_counted_in_one_sentence():
 
 def test_a_parameter_is_at_the_bound_of_its_own_search():
     eye = np.eye(1)
-    tuning = tuning_of(MechanicalModel("m", "velocity", eye, eye, eye, eye, eye), ("fx",))
+    tuning = make_tuning(MechanicalModel("m", "velocity", eye, eye, eye, eye, eye), ("fx",))
     deviations = np.zeros(len(tuning.names))
     deviations[0] = -tuning.bound
     assert [each.at_bound for each in list_parameters(tuning, deviations)][:2] == [True, False]

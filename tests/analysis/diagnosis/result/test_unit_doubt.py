@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.result.findings import TimeSeries
-from analysis.diagnosis.result.unit_doubt import unit_sentences
+from analysis.diagnosis.result.unit_doubt import describe_unit_doubts
 
 WAVE = np.random.default_rng(1).standard_normal((500, 1))
 
@@ -21,14 +21,14 @@ def make_series(measured, predicted=WAVE):
     ids=["millimetres", "g", "degrees"],
 )
 def test_a_channel_of_the_right_shape_and_another_size_is_doubted(measured, words):
-    (said,) = unit_sentences([make_series(measured)])
+    (said,) = describe_unit_doubts([make_series(measured)])
     assert said.startswith("ax has the shape that the model predicts, ")
     assert words in said
     assert said.endswith("its unit, the command's or one in the model may be wrong.")
 
 
 def test_so_is_one_with_the_other_sign():
-    (said,) = unit_sentences([make_series(-1.1 * WAVE)])
+    (said,) = describe_unit_doubts([make_series(-1.1 * WAVE)])
     assert "predicts, but with the other sign: its sign, the command's or one in the model may be wrong." in said
 
 
@@ -38,14 +38,14 @@ def test_so_is_one_with_the_other_sign():
     ids=["a little off", "another shape", "nothing", "missing"],
 )
 def test_no_other_channel_is(measured):
-    assert unit_sentences([make_series(measured)]) == ()
+    assert describe_unit_doubts([make_series(measured)]) == ()
 
 
 def test_a_channel_is_doubted_once():
-    assert len(unit_sentences([make_series(1000 * WAVE), make_series(1000 * WAVE)])) == 1
+    assert len(describe_unit_doubts([make_series(1000 * WAVE), make_series(1000 * WAVE)])) == 1
 
 
 def test_missing_samples_are_passed_over():
     gaps = 1000 * WAVE
     gaps[10:20] = np.nan
-    assert len(unit_sentences([make_series(gaps)])) == 1
+    assert len(describe_unit_doubts([make_series(gaps)])) == 1

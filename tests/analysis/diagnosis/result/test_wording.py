@@ -3,13 +3,13 @@ from dataclasses import replace
 import pytest
 
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, NextExperiment, Rival
-from analysis.diagnosis.effect_words import EFFECT_WORDS, noun_of, parameters_text, place_words
+from analysis.diagnosis.effect_words import EFFECT_WORDS, format_parameters, format_place, get_noun
 from analysis.diagnosis.result.candidate_wording import Device
-from analysis.diagnosis.result.ceiling_wording import black_box_sentence
+from analysis.diagnosis.result.ceiling_wording import describe_black_box
 from analysis.diagnosis.result.findings import BlackBox
 from analysis.diagnosis.result.retuned_parameters import MovedParameter, describe_raised_error
 from analysis.diagnosis.result.wording import (
-    confirmation_sentence,
+    describe_confirmation,
     describe_effect,
     describe_equivalents,
     describe_next_experiment,
@@ -53,8 +53,8 @@ def test_an_effect_is_named_with_its_place_number_and_signature():
 @pytest.mark.parametrize("name", EFFECT_NAMES, ids=lambda each: each.name)
 def test_every_effect_of_the_vocabulary_has_a_name_that_people_use_and_reads_out_its_main_number(name):
     assert name.name in EFFECT_WORDS
-    assert "_" not in noun_of(name.name)
-    numbers = {p.name: Estimate(0.1234, p.unit_in(LINEAR, "m/s^2")) for p in name.parameters}
+    assert "_" not in get_noun(name.name)
+    numbers = {p.name: Estimate(0.1234, p.find_unit(LINEAR, "m/s^2")) for p in name.parameters}
     effect = NamedEffect(name.name, name.place, "x", 1.0, 1.0, numbers)
     sentence = describe_effect(effect, "this is seen")
     assert "12" in sentence.split(":")[0]
@@ -98,27 +98,28 @@ def test_an_effect_without_words_is_called_by_its_own_name():
     ],
 )
 def test_places_are_said_as_people_say_them(place, axis, single, words):
-    assert place_words(place, axis, single) == words
+    assert format_place(place, axis, single) == words
 
 
 def test_several_numbers_are_each_explained():
     numbers = {"coulomb": Estimate(0.15, "N"), "static": Estimate(0.21, "N"), "speed": Estimate(0.0045, "m/s")}
-    assert parameters_text("stribeck_friction", numbers) == (
+    assert format_parameters("stribeck_friction", numbers) == (
         "0.150 N in motion, 0.210 N at rest, a transition over 4.50 mm/s"
     )
 
 
 def test_a_share_of_samples_is_read_as_per_cent():
     assert (
-        parameters_text("lost_samples", {"fraction": Estimate(0.02, "1", (0.018, 0.022))}) == "2.0 % [1.8, 2.2] of all"
+        format_parameters("lost_samples", {"fraction": Estimate(0.02, "1", (0.018, 0.022))})
+        == "2.0 % [1.8, 2.2] of all"
     )
 
 
 def test_a_stop_on_the_far_side_of_zero_says_from_where_it_is_reached():
     numbers = {"position": Estimate(-0.0035, "m", None), "stiffness": Estimate(1e4, "N/m", None)}
-    plain = parameters_text("end_stop", numbers)
+    plain = format_parameters("end_stop", numbers)
     for side, way in ((1.0, "positive"), (-1.0, "negative")):
-        said = parameters_text("end_stop", numbers | {"side": Estimate(side, "1", None)})
+        said = format_parameters("end_stop", numbers | {"side": Estimate(side, "1", None)})
         assert said == f"{plain}, reached in the {way} direction"
 
 
@@ -241,21 +242,21 @@ def test_the_next_recording_says_what_it_would_tell_apart():
     ],
 )
 def test_a_black_box_that_beats_the_physics_is_said_to(test, physics, end):
-    said = black_box_sentence(BlackBox("ARX", 12, test, physics), named=True)
+    said = describe_black_box(BlackBox("ARX", 12, test, physics), named=True)
     assert said.startswith("A black box (ARX, 12 parameters), fitted to the same samples, has an error of")
     assert said.endswith(end)
-    assert "the re-tuned model has" in black_box_sentence(BlackBox("ARX", 12, test, physics), named=False)
+    assert "the re-tuned model has" in describe_black_box(BlackBox("ARX", 12, test, physics), named=False)
 
 
 def test_held_out_data_that_do_not_confirm_are_said_not_to():
     fit = Errors(0.5, 0.36, 0.027, 0.0265)
-    assert confirmation_sentence(fit, ERRORS) == ""
-    assert confirmation_sentence(fit, replace(ERRORS, after=0.4)).startswith("The held-out data do not confirm this")
-    assert confirmation_sentence(fit, replace(ERRORS, after=0.06)) == (
+    assert describe_confirmation(fit, ERRORS) == ""
+    assert describe_confirmation(fit, replace(ERRORS, after=0.4)).startswith("The held-out data do not confirm this")
+    assert describe_confirmation(fit, replace(ERRORS, after=0.06)) == (
         "The held-out data confirm this only in part: the error is 2.26 times the noise there and 1.02 times the "
         "noise on the fitted data."
     )
-    assert confirmation_sentence(fit, Errors(None, None, None, None)) == ""
+    assert describe_confirmation(fit, Errors(None, None, None, None)) == ""
 
 
 def test_the_title_of_an_effect_stands_alone():

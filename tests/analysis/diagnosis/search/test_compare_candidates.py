@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.hypothesis import Claim, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import Claim, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit, fit
 from analysis.diagnosis.search.compare_candidates import (
     FULL_FIT_ROUNDS,
@@ -33,7 +33,7 @@ def refine_law(context, law, known):
 
 
 def start_fit(context, name, values):
-    law = hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values])
+    law = make_claim_hypothesis(Claim(EFFECTS[name], "one", (0,)), [values])
     return evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), law)
 
 

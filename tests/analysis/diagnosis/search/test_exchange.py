@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import Claim, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, explain, is_worth_searching, retune_alone
@@ -36,7 +36,7 @@ def with_error(candidate, error):
 
 
 def claim(name, **values):
-    return hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values])
+    return make_claim_hypothesis(Claim(EFFECTS[name], "one", (0,)), [values])
 
 
 def effect_names(found):
@@ -55,12 +55,12 @@ def saturated_lag(make_context):
 
 def explain_by(context, *claims):
     """An explanation that forward selection left, each step refitted."""
-    base = context.candidate(retune_alone(context))
+    base = context.score_fit(retune_alone(context))
     steps, fitted = [], base.fitted
     for each in claims:
-        whole = combine(fitted.hypothesis, each) if fitted.hypothesis.claims else each
+        whole = combine_hypotheses(fitted.hypothesis, each) if fitted.hypothesis.claims else each
         fitted = refine(context, evaluate_fit(context.measure, context.tuning, fitted.deviations, whole))
-        steps.append(context.candidate(fitted))
+        steps.append(context.score_fit(fitted))
     ends = (context.with_test_score(item) for item in (base, base, steps[-1]))
     return Explanation(*ends, tuple((step,) for step in steps), tuple(steps))
 
@@ -217,7 +217,7 @@ def test_a_third_goes_though_it_shows_where_two_leave_as_little_as_laws_of_real_
     assert effect_names(drop_needless(context, found, unlimited_time)) == ["force_saturation", "sensor_lag"]
     # So it is not looked for, but in samples that were opened: few among many.
     assert not is_worth_searching(context, found, two)
-    assert is_worth_searching(replace(context, opened=True), found, two)
+    assert is_worth_searching(replace(context, has_opened_samples=True), found, two)
     # Nor is one of the two exchanged.
     pair = replace(found, after=context.with_test_score(two), steps=found.steps[:2], rounds=found.rounds[:2])
     assert exchange_effects(context, pair, list(EFFECTS.values()), ignore_progress, unlimited_time) is pair
@@ -257,7 +257,7 @@ def test_no_fourth_effect_is_looked_for_beside_three_that_are_taken_over(saturat
         claim("hardening_stiffness", k3=10.0),
         claim("sensor_lag", bandwidth=900.0),
     )
-    again = explain(replace(saturated_lag, opened=True), [], ignore_progress, previous_steps=found.rounds)
+    again = explain(replace(saturated_lag, has_opened_samples=True), [], ignore_progress, previous_steps=found.rounds)
     assert again.after.score.worst_channel > EXPLAINED_ERROR
     assert [step.newest for step in again.steps] == [step.newest for step in found.steps]
 
@@ -266,7 +266,7 @@ def test_the_last_goes_where_it_only_led_the_others_out_of_a_local_minimum(satur
     right = explain_by(saturated_lag, claim("force_saturation", limit=LIMIT_N), claim("sensor_lag", bandwidth=LAG_HZ))
     worse = right.steps[1].fitted
     moved = replace(worse.hypothesis, point=worse.hypothesis.point + 0.2)
-    stuck = saturated_lag.candidate(evaluate_fit(saturated_lag.measure, saturated_lag.tuning, worse.deviations, moved))
+    stuck = saturated_lag.score_fit(evaluate_fit(saturated_lag.measure, saturated_lag.tuning, worse.deviations, moved))
     helped = explain_by(
         saturated_lag,
         claim("force_saturation", limit=LIMIT_N),

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from analysis.diagnosis.search.explain import explain
-from analysis.diagnosis.search.guard import Guard, Part
+from analysis.diagnosis.search.guard import Guard, WorkPart
 from analysis.diagnosis.search.time_budget import OutOfTimeError
 from equalizer.effects.catalogue import EFFECTS
 
@@ -23,7 +23,7 @@ def ignore_progress(what, share):
 
 
 def test_the_others_are_searched_and_the_crash_is_reported(diagnosed, make_context):
-    context = replace(make_context(diagnosed.RUBBING), guard=Guard(on=True))
+    context = replace(make_context(diagnosed.RUBBING), guard=Guard(enabled=True))
     found = explain(context, [BROKEN, RUBS], ignore_progress)
     assert found.after.newest == "coulomb_friction"
     (said,) = context.guard.sentences
@@ -37,7 +37,7 @@ def test_without_the_guard_a_crash_is_an_error(diagnosed, make_context):
 
 
 def test_each_item_that_crashes_is_dropped_and_named_once():
-    guard = Guard(on=True)
+    guard = Guard(enabled=True)
     effects = [EFFECTS["backlash"], RUBS, EFFECTS["backlash"]]
 
     def work(effect):
@@ -51,10 +51,10 @@ def test_each_item_that_crashes_is_dropped_and_named_once():
 
 def test_of_pieces_beside_each_other_the_crashed_one_is_replaced_and_said():
     pieces = [
-        Part("the black box", "its fit", raise_value_error, "none"),
-        Part("the curves", "their making", lambda: 7, 0),
+        WorkPart("the black box", "its fit", raise_value_error, "none"),
+        WorkPart("the curves", "their making", lambda: 7, 0),
     ]
-    guard = Guard(on=True)
+    guard = Guard(enabled=True)
     assert guard.run_parts(map, pieces) == ["none", 7]
     assert len(guard.sentences) == 1 and guard.sentences[0].startswith("The black box was left out")
     with pytest.raises(ValueError, match="broadcast"):
@@ -65,7 +65,7 @@ def test_a_search_that_ends_for_lack_of_time_is_no_crash():
     def late():
         raise OutOfTimeError
 
-    guard = Guard(on=True)
+    guard = Guard(enabled=True)
     with pytest.raises(OutOfTimeError):
         guard.run("backlash", "its fit", late, None)
     assert guard.sentences == ()

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import Claim, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, retune_alone
@@ -25,17 +25,17 @@ FRICTION_N = 0.15
 
 
 def make_hypothesis(name, **values):
-    return hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values])
+    return make_claim_hypothesis(Claim(EFFECTS[name], "one", (0,)), [values])
 
 
 def make_candidate(context, base, *claims):
-    whole = claims[0] if len(claims) == 1 else combine(*claims)
-    return context.candidate(evaluate_fit(context.measure, context.tuning, base.fitted.deviations, whole))
+    whole = claims[0] if len(claims) == 1 else combine_hypotheses(*claims)
+    return context.score_fit(evaluate_fit(context.measure, context.tuning, base.fitted.deviations, whole))
 
 
 def make_explanation(context, *rivals):
     """rivals: of the one round, the named one first; all as good as it."""
-    base = context.candidate(retune_alone(context))
+    base = context.score_fit(retune_alone(context))
     found = [make_candidate(context, base, rival) for rival in rivals]
     found = [replace(each, score=found[0].score) for each in found]
     return Explanation(
@@ -78,7 +78,7 @@ def test_with_nothing_as_good_nothing_is_named_and_what_was_left_out_is_known(fr
 
 @pytest.mark.parametrize("order", [(FRICTION, OPEN), (OPEN, FRICTION)])
 def test_of_two_the_one_that_is_open_goes_whichever_came_first(friction_context, order):
-    base = friction_context.candidate(retune_alone(friction_context))
+    base = friction_context.score_fit(retune_alone(friction_context))
     first, both = make_candidate(friction_context, base, order[0]), make_candidate(friction_context, base, *order)
     ends = [friction_context.with_test_score(each) for each in (base, base, both)]
     left = keep_identifiable(friction_context, Explanation(*ends, ((first,), (both,)), (first, both)), unlimited_time)
@@ -110,13 +110,13 @@ def test_it_is_said_that_numbers_were_left_open(friction_context, monkeypatch):
 
 def fit_claims(context, *claims):
     """As a search ends: each claim fitted beside those before it."""
-    base = context.candidate(retune_alone(context))
+    base = context.score_fit(retune_alone(context))
     steps, at = [], base
     for newest in claims:
         start = evaluate_fit(
-            context.measure, context.tuning, at.fitted.deviations, combine(at.fitted.hypothesis, newest)
+            context.measure, context.tuning, at.fitted.deviations, combine_hypotheses(at.fitted.hypothesis, newest)
         )
-        at = context.candidate(refine(context, start))
+        at = context.score_fit(refine(context, start))
         steps.append(at)
     ends = [context.with_test_score(each) for each in (base, base, at)]
     return Explanation(*ends, tuple((step,) for step in steps), tuple(steps))
@@ -149,7 +149,7 @@ def test_an_interval_that_contains_zero_is_corrected_by_the_profile_likelihood(f
     plain = compute_final_errors(friction_context, found)
     wide = plain.copy()
     wide[place] = np.log1p(2 / (1.96 * INTERVAL_FACTOR))
-    monkeypatch.setattr("analysis.diagnosis.search.identifiability.standard_errors", lambda *given: wide)
+    monkeypatch.setattr("analysis.diagnosis.search.identifiability.compute_standard_errors", lambda *given: wide)
     named = keep_identifiable(friction_context, found, unlimited_time)
     assert effect_names(named) == ["coulomb_friction"]
     assert 1.96 * INTERVAL_FACTOR * level * np.expm1(named.errors[1][place]) < level
@@ -161,7 +161,7 @@ def test_numbers_whose_intervals_all_hold_none_are_not_named(friction_context, m
     )
     wide = compute_final_errors(friction_context, found).copy()
     wide[len(friction_context.tuning.names) :] = np.log1p(2 / (1.96 * INTERVAL_FACTOR))
-    monkeypatch.setattr("analysis.diagnosis.search.identifiability.standard_errors", lambda *given: wide)
+    monkeypatch.setattr("analysis.diagnosis.search.identifiability.compute_standard_errors", lambda *given: wide)
     assert keep_identifiable(friction_context, found, unlimited_time).undetermined == ("asymmetric_friction",)
 
 
@@ -179,7 +179,9 @@ def test_one_segment_tells_nothing_between_segments(friction_context):
         records = (replace(each, recording=replace(each.recording, segments=())) for each in measure.records)
         return measure.with_records(tuple(records))
 
-    alone = replace(friction_context, measure=joined(friction_context.measure), whole=joined(friction_context.whole))
+    alone = replace(
+        friction_context, measure=joined(friction_context.measure), full_measure=joined(friction_context.full_measure)
+    )
     found = fit_claims(friction_context, FRICTION)
     noise = compute_final_errors(alone, found)
     assert compute_interval_errors(alone, found, noise) == pytest.approx(INTERVAL_FACTOR * noise)
@@ -187,11 +189,11 @@ def test_one_segment_tells_nothing_between_segments(friction_context):
 
 def test_a_jump_that_no_sample_shows_does_not_leave_a_dead_band_open(make_context):
     dead = make_context((PlacedEffect(EFFECTS["force_deadband"], (0,), {"width": 0.02, "jump": 0.0}),))
-    base = dead.candidate(retune_alone(dead))
+    base = dead.score_fit(retune_alone(dead))
     start = evaluate_fit(
         dead.measure, dead.tuning, base.fitted.deviations, make_hypothesis("force_deadband", width=0.02, jump=1e-3)
     )
-    step = dead.candidate(start)
+    step = dead.score_fit(start)
     found = Explanation(*(dead.with_test_score(each) for each in (base, base, step)), ((step,),), (step,))
     left = keep_identifiable(dead, found, unlimited_time)
     assert effect_names(left) == ["force_deadband"]

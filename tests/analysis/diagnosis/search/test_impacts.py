@@ -11,14 +11,14 @@ from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.document import diagnosis_from_json, diagnosis_to_json
 from analysis.diagnosis.errors.band_power import BandPower
 from analysis.diagnosis.errors.band_power_fit import BandPowerProblem, _estimate_errors, _step, evaluate_hypothesis
-from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.errors.choose_measure import make_measure
 from analysis.diagnosis.errors.fit_score import FitScore
-from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
-from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.result.assemble_findings import list_impact_remainder
 from analysis.diagnosis.result.wording import write_summary_lines
-from analysis.diagnosis.search.band_power_comparison import comparison_of
+from analysis.diagnosis.search.band_power_comparison import make_comparison
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import find_undetermined
 from analysis.diagnosis.search.impacts import _needs_gap, explain_impacts, is_irregular
@@ -42,10 +42,10 @@ def searched(real, effects, repeats=True):
     recording = real.recorded(2, effects)
     if not repeats:
         recording = replace(recording, segments=tuple(replace(segment, period=0) for segment in recording.segments))
-    chosen = measure_of([recording], real.device(2))
-    context = SearchContext(chosen.measure.shorten(), chosen.measure, tuning_of(real.device(2), ("fx", "fy")), map)
+    chosen = make_measure([recording], real.device(2))
+    context = SearchContext(chosen.measure.shorten(), chosen.measure, make_tuning(real.device(2), ("fx", "fy")), map)
     unchanged = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NO_EFFECTS)
-    whole = context.with_test_score(context.candidate(unchanged))  # as a search hands it over: with the sealed samples
+    whole = context.with_test_score(context.score_fit(unchanged))  # as a search hands it over: with the sealed samples
     return context, Explanation(whole, whole, whole, (), ()), chosen.floors
 
 
@@ -68,7 +68,7 @@ def test_play_that_rattles_is_named_at_its_axis_with_its_gap(told):
 
 def test_errors_stay_small_where_parameters_are_correlated():
     """Two columns with a correlation of 0.95, of whose information a third is chance."""
-    number = hypothesis_of_claim(Claim(PLAY, "one", (AXIS,)), [LOOSE[0].values]).parameters[0]
+    number = make_claim_hypothesis(Claim(PLAY, "one", (AXIS,)), [LOOSE[0].values]).parameters[0]
     power = 2 * _step(number) ** 2
     problem = SimpleNamespace(spread=np.sqrt(power * 30.0), ensemble=1, weights=np.ones((1, 1, 1)))
     at = SimpleNamespace(
@@ -125,9 +125,9 @@ def test_a_friction_that_the_search_tried_is_named_beside_play(diagnosed):
     context, found, floors = searched(diagnosed, (*LOOSE, PlacedEffect(DRY, (AXIS,), {"level": 0.3})))
     # The wrong one was likelier where waveforms were compared, and is refuted by the powers.
     laws = (("viscous_damping", {"damping": 2.0}), ("coulomb_friction", {"level": 0.2}))
-    claims = [hypothesis_of_claim(Claim(EFFECTS[name], "one", (AXIS,)), [values]) for name, values in laws]
+    claims = [make_claim_hypothesis(Claim(EFFECTS[name], "one", (AXIS,)), [values]) for name, values in laws]
     at = found.retuned.fitted.deviations
-    tried = tuple(context.candidate(evaluate_fit(context.measure, context.tuning, at, each)) for each in claims)
+    tried = tuple(context.score_fit(evaluate_fit(context.measure, context.tuning, at, each)) for each in claims)
     rubbed = explain_impacts(context, replace(found, rounds=(tried,)), floors, CATALOGUE)
     assert [each.effect.name for each in rubbed.after.fitted.hypothesis.claims] == ["backlash", "coulomb_friction"]
     level = rubbed.after.fitted.hypothesis.list_placed_effects()[-1].values["level"]
@@ -152,9 +152,9 @@ def asks_gap(real, gap_m, supposed_m):
     (played,) = LOOSE
     context, *_ = searched(real, (replace(played, values={**played.values, "gap": gap_m}),))
     problem = BandPowerProblem(BandPower(context.measure), context.tuning, map)
-    supposed = hypothesis_of_claim(Claim(PLAY, "one", (AXIS,)), [{**played.values, "gap": supposed_m}])
+    supposed = make_claim_hypothesis(Claim(PLAY, "one", (AXIS,)), [{**played.values, "gap": supposed_m}])
     fitted = evaluate_hypothesis(problem, np.zeros(len(context.tuning.names)), supposed)
-    return _needs_gap(comparison_of(context, fitted), problem, fitted)
+    return _needs_gap(make_comparison(context, fitted), problem, fitted)
 
 
 @pytest.mark.slow
@@ -183,18 +183,18 @@ def test_commands_that_are_skipped_are_no_play():
 def test_two_courses_of_one_play_agree_in_their_band_powers_but_not_sample_by_sample(loose):
     context = loose[0]
     apart = tuple(replace(each, values={**each.values, "gap": GAP_M * (1 + 1e-9)}) for each in LOOSE)
-    courses = [context.whole.residuals(context.tuning.model, effects) for effects in (LOOSE, apart)]
-    power = BandPower(context.whole)
-    off = power.misfits(power.predict(courses[0]) - power.predict(courses[1]))
+    courses = [context.full_measure.residuals(context.tuning.model, effects) for effects in (LOOSE, apart)]
+    power = BandPower(context.full_measure)
+    off = power.compute_misfits(power.predict(courses[0]) - power.predict(courses[1]))
     assert max(off.fit.max(), off.choose.max(), off.test.max()) < 0.2
     assert np.std(courses[0][0] - courses[1][0], axis=0)[AXIS] > 10
 
 
 @pytest.mark.slow
 def test_what_is_left_is_reported_by_channel_and_not_by_the_sequence_of_impacts(loose, told):
-    assert list_impact_remainder(loose[0].whole, told) == ()
+    assert list_impact_remainder(loose[0].full_measure, told) == ()
     further = replace(told, after=replace(told.after, score=FitScore(*np.array([[1, 4, 1, 1.0]] * 3))))
-    (left,) = list_impact_remainder(loose[0].whole, further)
+    (left,) = list_impact_remainder(loose[0].full_measure, further)
     assert (left.output, left.band_hz) == ("ay", (0.0, 500.0))
     assert left.share == pytest.approx(4 * told.statistic.chance[1])
     assert judge(further).verdict == "partly_explained"
@@ -228,11 +228,11 @@ def test_play_is_looked_for_before_a_third_effect_and_once(loose, told, looked):
     result = search_effects(context, few, lambda said, share: None, further=thirds)
     assert (result.found, result.judgement.verdict) == (told, "explained")
     assert len(asked) == 1 and len(asked[0].steps) <= 2
-    assert impacts.at_end(SearchResult(context, loose[1], Judgement("unexplained", False))).found is told
+    assert impacts.explain_at_end(SearchResult(context, loose[1], Judgement("unexplained", False))).found is told
     assert len(asked) == 1
     # More effects by then are rivals that were not compared.
     more = replace(loose[1], steps=(*asked[0].steps, loose[1].after))
-    assert impacts.at_end(SearchResult(context, more, Judgement("unexplained", False))).found is told
+    assert impacts.explain_at_end(SearchResult(context, more, Judgement("unexplained", False))).found is told
     assert len(asked) == 2
 
 
@@ -243,13 +243,13 @@ def test_play_is_not_looked_for_beside_what_explains_or_is_named_or_without_time
         SearchResult(context, told, Judgement("explained", True)),
         SearchResult(context, replace(loose[1], after=told.after, statistic=told.statistic), Judgement("", False)),
     ):
-        assert impacts.before_thirds(seen) is seen
+        assert impacts.explain_before_third_effect(seen) is seen
     varied = SimpleNamespace(chosen=SimpleNamespace(floors=()))
     unrepeated = _ImpactSearch(varied, CATALOGUE, DiagnosisSettings(), lambda said, share: None)
     open_ended = SearchResult(context, loose[1], Judgement("unexplained", False))
-    assert unrepeated.before_thirds(open_ended) is open_ended
+    assert unrepeated.explain_before_third_effect(open_ended) is open_ended
     late = _ImpactSearch(varied, CATALOGUE, DiagnosisSettings(time_left=lambda: False), lambda said, share: None)
-    assert late.before_thirds(open_ended) is open_ended and late.at_end(open_ended) is open_ended
+    assert late.explain_before_third_effect(open_ended) is open_ended and late.explain_at_end(open_ended) is open_ended
     assert asked == []
 
 

@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.fit_score import fit_score
-from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, hypothesis_of_claim
+from analysis.diagnosis.errors.fit_score import compute_fit_score
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
-from analysis.diagnosis.search.no_prediction import is_without_prediction, predicts_nothing
+from analysis.diagnosis.search.no_prediction import is_newest_without_prediction, is_without_prediction
 from analysis.diagnosis.search.search_context import FittedCandidate
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import PlacedEffect
@@ -18,36 +18,36 @@ GAIN = next(effect for effect in CATALOGUE if effect.name == "force_gain")
 @pytest.mark.parametrize(("gain", "nothing"), [(0.7, False), (1e-6, True)])
 def test_a_force_that_never_reaches_the_device_predicts_nothing(make_context, gain, nothing):
     context = make_context()
-    held = hypothesis_of_claim(Claim(GAIN, "one", (0,)), [{"gain": gain}])
-    assert is_without_prediction(context.whole, _make_candidate(context, held)) is nothing
+    held = make_claim_hypothesis(Claim(GAIN, "one", (0,)), [{"gain": gain}])
+    assert is_without_prediction(context.full_measure, _make_candidate(context, held)) is nothing
 
 
 def test_a_model_as_it_is_foresees_something(make_context):
     context = make_context()
-    assert not is_without_prediction(context.whole, _make_candidate(context, NO_EFFECTS))
+    assert not is_without_prediction(context.full_measure, _make_candidate(context, NO_EFFECTS))
 
 
 def _make_candidate(context, hypothesis):
-    fitted = evaluate_fit(context.whole, context.tuning, np.zeros(len(context.tuning.names)), hypothesis)
-    return FittedCandidate(fitted, fit_score(context.whole, fitted.residuals))
+    fitted = evaluate_fit(context.full_measure, context.tuning, np.zeros(len(context.tuning.names)), hypothesis)
+    return FittedCandidate(fitted, compute_fit_score(context.full_measure, fitted.residuals))
 
 
 def test_where_noise_is_as_large_as_the_signal_a_foreseen_course_is_asked_for_all_the_same(make_context):
     context = make_context()
-    record = context.whole.records[0]
+    record = context.full_measure.records[0]
     shuffled = replace(record, measured=np.random.default_rng(1).permutation(record.measured))
-    measure = replace(context.whole, records=(shuffled,), noise=shuffled.measured.std(axis=0))
-    held = hypothesis_of_claim(Claim(GAIN, "one", (0,)), [{"gain": 1e-6}])
-    assert is_without_prediction(measure, _make_candidate(replace(context, whole=measure), held))
+    measure = replace(context.full_measure, records=(shuffled,), noise=shuffled.measured.std(axis=0))
+    held = make_claim_hypothesis(Claim(GAIN, "one", (0,)), [{"gain": 1e-6}])
+    assert is_without_prediction(measure, _make_candidate(replace(context, full_measure=measure), held))
 
 
 def test_a_low_pass_far_below_the_band_silences_its_channel(make_context):
     context = make_context()
-    record = context.whole.records[0]
+    record = context.full_measure.records[0]
     backwards = record.measured.copy()
     backwards[:, 0] = 2 * backwards[::-1, 0]
     assert _predicts_nothing(
-        replace(context.whole, records=(replace(record, measured=backwards),)), context.tuning, 0.01
+        replace(context.full_measure, records=(replace(record, measured=backwards),)), context.tuning, 0.01
     )
 
 
@@ -55,19 +55,22 @@ def test_a_claim_that_silences_a_channel_predicts_nothing_even_if_another_channe
     context = make_context()
     none = np.zeros(len(context.tuning.names))
     lag = evaluate_fit(
-        context.whole, context.tuning, none, hypothesis_of_claim(Claim(LAG, "one", (0,)), [{"bandwidth": 0.01}])
+        context.full_measure,
+        context.tuning,
+        none,
+        make_claim_hypothesis(Claim(LAG, "one", (0,)), [{"bandwidth": 0.01}]),
     )
     wrenched = replace(lag, residuals=tuple(residual * [1.1, 1e6] for residual in lag.residuals))
-    assert predicts_nothing(context.whole, wrenched, lag)
+    assert is_newest_without_prediction(context.full_measure, wrenched, lag)
 
 
 def test_a_low_pass_of_the_device_itself_silences_no_channel(make_context):
     context = make_context(effects=(PlacedEffect(LAG, (0,), {"bandwidth": 10.0}),))
-    assert not _predicts_nothing(context.whole, context.tuning, 10.0)
+    assert not _predicts_nothing(context.full_measure, context.tuning, 10.0)
 
 
 def _predicts_nothing(measure, tuning, bandwidth):
-    lag = hypothesis_of_claim(Claim(LAG, "one", (0,)), [{"bandwidth": bandwidth}])
-    return predicts_nothing(
+    lag = make_claim_hypothesis(Claim(LAG, "one", (0,)), [{"bandwidth": bandwidth}])
+    return is_newest_without_prediction(
         measure, *(evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), each) for each in (NO_EFFECTS, lag))
     )

@@ -31,7 +31,7 @@ def test_all_but_the_loudest_is_opened_and_the_loudest_stays_sealed(sweep_record
     opened = context.open_milder(known.retuned)
     assert opened is not None
     sweep, loud = (slice(s.start, s.stop) for s in sweep_recording.segments[-2:])
-    record = opened.whole.records[0]
+    record = opened.full_measure.records[0]
     assert not record.test[sweep].any() and (record.fit | record.choose)[sweep].all()
     assert record.test[loud].all() and not (record.fit | record.choose)[loud].any()
     assert len(opened.measure.records[0].fit) <= loud.start
@@ -67,7 +67,7 @@ def test_the_milder_part_is_opened_only_where_the_loudest_can_confirm(sweep_reco
 
 def test_opened_samples_are_to_fit_and_the_last_third_to_choose_by(sweep_recording):
     record = observe(sweep_recording, 1)
-    opened = record.unseal(record.every_other_part(2))
+    opened = record.unseal(record.mask_alternate_parts(2))
     both = opened.fit | opened.choose
     assert not (both & opened.test).any()
     assert (both | opened.test).sum() == (record.fit | record.choose | record.test).sum()
@@ -98,7 +98,7 @@ def test_stretches_that_show_it_in_one_half_alone_are_opened_in_finer_parts(swee
     early = replace(known.retuned, fitted=replace(known.retuned.fitted, residuals=(residuals,)))
     opened, parts = context.open_alternate(early)
     assert parts == FINER_PARTS[0]
-    record, before = opened.whole.records[0], context.whole.records[0]
+    record, before = opened.full_measure.records[0], context.full_measure.records[0]
     loud = sweep_recording.segments[-1]
     length = (loud.stop - loud.start) // parts
     for number in range(parts):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.hypothesis import Claim, combine, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import Claim, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.search.explain import Explanation, retune_alone
 from analysis.diagnosis.search.search import prune, search_effects
@@ -23,15 +23,15 @@ def place_effect(name, **values):
 
 
 def make_hypothesis(name, **values):
-    return hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values])
+    return make_claim_hypothesis(Claim(EFFECTS[name], "one", (0,)), [values])
 
 
 def make_explanation(context, *claims):
     """An explanation as a search leaves it that added these in this order."""
-    base, steps, whole = context.candidate(retune_alone(context)), [], None
+    base, steps, whole = context.score_fit(retune_alone(context)), [], None
     for each in claims:
-        whole = each if whole is None else combine(whole, each)
-        steps.append(context.candidate(evaluate_fit(context.measure, context.tuning, base.fitted.deviations, whole)))
+        whole = each if whole is None else combine_hypotheses(whole, each)
+        steps.append(context.score_fit(evaluate_fit(context.measure, context.tuning, base.fitted.deviations, whole)))
     ends = (context.with_test_score(item) for item in (base, base, steps[-1]))
     return Explanation(*ends, tuple((step,) for step in steps), tuple(steps))
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.hypothesis import Claim, hypothesis_of_claim
-from analysis.diagnosis.errors.intervals import sensitivity_to_all, standard_errors
+from analysis.diagnosis.errors.hypothesis import Claim, make_claim_hypothesis
+from analysis.diagnosis.errors.intervals import compute_full_sensitivity, compute_standard_errors
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from equalizer.effects.catalogue import EFFECTS
@@ -23,7 +23,7 @@ def context(make_context):
 
 
 def refine_from(context, width, jump):
-    start = hypothesis_of_claim(Claim(EFFECTS["force_deadband"], "one", (0,)), [{"width": width, "jump": jump}])
+    start = make_claim_hypothesis(Claim(EFFECTS["force_deadband"], "one", (0,)), [{"width": width, "jump": jump}])
     here = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), start)
     return refine(context, here)
 
@@ -36,8 +36,8 @@ def test_a_wider_band_with_a_jump_is_found_to_be_a_plain_one(context):
 
 def test_a_number_at_the_end_of_its_range_is_held_there_and_leaves_the_others_sure(context):
     fitted = refine_from(context, TRUE_N, 0.0)
-    known = sensitivity_to_all(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
-    width, jump = standard_errors(context.measure, fitted, known)[-2:]
+    known = compute_full_sensitivity(context.measure, context.tuning, fitted.deviations, fitted.hypothesis)
+    width, jump = compute_standard_errors(context.measure, fitted, known)[-2:]
     assert jump == 0.0
     assert 0.0 < width < 0.02  # of the logarithm
 

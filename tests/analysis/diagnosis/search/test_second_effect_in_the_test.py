@@ -5,8 +5,8 @@ import pytest
 
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
-from analysis.diagnosis.errors.choose_measure import measure_of
-from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.errors.choose_measure import make_measure
+from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.search import search
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME, OutOfTimeError, unlimited_time
@@ -57,8 +57,8 @@ def test_time_that_ends_there_hides_no_mismatch_of_the_held_out_samples(case, mo
 
     monkeypatch.setattr(search, "_find_in_parts", ends)
     monkeypatch.setattr(search, "_judge_with_prediction", lambda *found: Judgement("no_mismatch", False))
-    measure = measure_of([case.recording], case.model).measure
-    tuning = tuning_of(case.model, case.recording.command.channels)
+    measure = make_measure([case.recording], case.model).measure
+    tuning = make_tuning(case.model, case.recording.command.channels)
     context = SearchContext(measure.shorten(), measure, tuning, map)
     found = search.search_effects(context, [EFFECTS["sensor_lag"]], lambda what, share: None)
     assert found.judgement == Judgement("unexplained", False)

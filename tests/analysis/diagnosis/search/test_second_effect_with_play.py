@@ -11,10 +11,10 @@ import analysis.diagnosis.search.impacts as impacts
 import analysis.diagnosis.search.second_effect_with_play as second_effect
 import analysis.diagnosis.search_by_simulation as search_by_simulation
 from analysis.diagnosis.errors.band_power_fit import BandPowerProblem
-from analysis.diagnosis.errors.choose_measure import measure_of
-from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, hypothesis_of_claim
+from analysis.diagnosis.errors.choose_measure import make_measure
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
-from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.search_context import SearchContext
@@ -26,11 +26,11 @@ from equalizer.effects.effect import PlacedEffect
 
 PLAY = SimpleNamespace(hypothesis=NO_EFFECTS, deviations=np.zeros(0), cost=9.0)
 VIEW = SimpleNamespace(map_=map)
-GAINS = [hypothesis_of_claim(Claim(EFFECTS["sensor_gain"], "one", (0,)), [{"gain": 1.1}])]
+GAINS = [make_claim_hypothesis(Claim(EFFECTS["sensor_gain"], "one", (0,)), [{"gain": 1.1}])]
 
 
 def friction(level_n: float):
-    return hypothesis_of_claim(Claim(DRY, "one", (0,)), [{"level": level_n}])
+    return make_claim_hypothesis(Claim(DRY, "one", (0,)), [{"level": level_n}])
 
 
 def level_of(fit) -> float:
@@ -62,7 +62,7 @@ def test_a_strength_is_found_from_a_wrong_start(true_level, true_n):
 @pytest.mark.parametrize("changes", [{"parameters": ()}, {"parameters": (replace(DRY.parameters[0], fixed=True),)}])
 def test_an_effect_without_a_free_strength_keeps_its_start(true_level, changes):
     effect = replace(DRY, **changes)
-    hypothesis = hypothesis_of_claim(Claim(effect, "one", (0,)), [{"level": 0.5}])
+    hypothesis = make_claim_hypothesis(Claim(effect, "one", (0,)), [{"level": 0.5}])
     fit = second_effect._search_strength(VIEW, PLAY, hypothesis)
     assert fit.hypothesis.list_placed_effects()[0].values == {"level": 0.5}
 
@@ -70,7 +70,7 @@ def test_an_effect_without_a_free_strength_keeps_its_start(true_level, changes):
 def test_an_effect_that_does_not_vanish_at_zero_keeps_its_start(true_level):
     gain = EFFECTS["sensor_gain"]
     assert gain.parameters[0].none != 0
-    hypothesis = hypothesis_of_claim(Claim(gain, "one", (0,)), [{"gain": 1.1}])
+    hypothesis = make_claim_hypothesis(Claim(gain, "one", (0,)), [{"gain": 1.1}])
     fit = second_effect._search_strength(VIEW, PLAY, hypothesis)
     assert fit.hypothesis.list_placed_effects()[0].values["gain"] == pytest.approx(1.1)
 
@@ -144,11 +144,11 @@ def recorded(diagnosed):
         PlacedEffect(EFFECTS["backlash"], (1,), play),
         PlacedEffect(EFFECTS["force_deadband"], (1,), {"width": 0.3, "jump": 0.0}),
     ]
-    chosen = measure_of([diagnosed.recorded(2, effects)], diagnosed.device(2))
-    tuning = tuning_of(diagnosed.device(2), ("fx", "fy"))
+    chosen = make_measure([diagnosed.recorded(2, effects)], diagnosed.device(2))
+    tuning = make_tuning(diagnosed.device(2), ("fx", "fy"))
     context = SearchContext(chosen.measure.shorten(), chosen.measure, tuning, map)
     unchanged = evaluate_fit(context.measure, context.tuning, np.zeros(len(context.tuning.names)), NO_EFFECTS)
-    given = context.with_test_score(context.candidate(unchanged))
+    given = context.with_test_score(context.score_fit(unchanged))
     return context, Explanation(given, given, given, (), ()), chosen.floors
 
 
@@ -178,12 +178,12 @@ def test_play_is_not_refined_once_the_time_has_ended(recorded, monkeypatch):
 @pytest.mark.parametrize(("calls", "said"), [(1, (OUT_OF_TIME,)), (2, ())], ids=["out of time", "no play"])
 def test_a_search_for_play_that_ends_early_is_reported(monkeypatch, calls, said):
     monkeypatch.setattr(impacts, "explain_impacts", lambda *_: None)
-    monkeypatch.setattr(search_by_simulation, "names_discovered_law", lambda result: False)
+    monkeypatch.setattr(search_by_simulation, "has_discovered_law", lambda result: False)
     fitting = SimpleNamespace(chosen=SimpleNamespace(floors=()))
     settings = SimpleNamespace(time_left=CountedBudget(calls))
     search = search_by_simulation._ImpactSearch(fitting, CATALOGUE, settings, lambda said, share: None)
     context, explanation = SimpleNamespace(certain=()), SimpleNamespace(steps=())
-    result = search.at_end(SearchResult(context, explanation, Judgement("unexplained", named=False)))
+    result = search.explain_at_end(SearchResult(context, explanation, Judgement("unexplained", named=False)))
     assert (result.judgement.verdict, result.remarks) == ("unexplained", said)
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, hypothesis_of_claim
-from analysis.diagnosis.errors.output_error import sensitivity
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, make_claim_hypothesis
+from analysis.diagnosis.errors.output_error import build_jacobian
 from analysis.diagnosis.search.search_context import compute_sensitivity, find_sensitive_parameters
 from equalizer.effects.catalogue import EFFECTS
 
@@ -20,11 +20,11 @@ def zero_deviations(context):
 
 
 def friction_hypothesis(*sites):
-    return hypothesis_of_claim(Claim(EFFECTS["coulomb_friction"], "one", sites), [{"level": 0.1}])
+    return make_claim_hypothesis(Claim(EFFECTS["coulomb_friction"], "one", sites), [{"level": 0.1}])
 
 
 def sensitive_names(context, zero_deviations, hypothesis):
-    plain = sensitivity(context.measure, context.tuning, zero_deviations, NO_EFFECTS)
+    plain = build_jacobian(context.measure, context.tuning, zero_deviations, NO_EFFECTS)
     return {
         context.tuning.names[n] for n in find_sensitive_parameters(context.measure, context.tuning, plain, hypothesis)
     }
@@ -41,7 +41,7 @@ def test_nothing_is_left_out_where_no_axis_is_known(context, zero_deviations):
 
 
 def test_columns_beside_friction_are_those_of_all_numbers_moved_beside_it(context, zero_deviations):
-    whole = sensitivity(context.measure, context.tuning, zero_deviations, friction_hypothesis(0))
+    whole = build_jacobian(context.measure, context.tuning, zero_deviations, friction_hypothesis(0))
     saved = compute_sensitivity(context, zero_deviations, friction_hypothesis(0), with_forces=True)
     apart = np.linalg.norm(whole.columns - saved.columns, axis=1)
     assert (apart <= 0.1 * np.linalg.norm(whole.columns, axis=1)).all()
@@ -52,9 +52,9 @@ def test_columns_beside_friction_are_those_of_all_numbers_moved_beside_it(contex
 
 
 def test_columns_that_were_known_stay_as_they_were(context, zero_deviations):
-    plain = sensitivity(context.measure, context.tuning, zero_deviations, NO_EFFECTS)
+    plain = build_jacobian(context.measure, context.tuning, zero_deviations, NO_EFFECTS)
     before = plain.columns.copy()
-    sensitivity(
+    build_jacobian(
         context.measure, context.tuning, zero_deviations, friction_hypothesis(0), known_columns=(plain.columns, [0])
     )
     assert np.array_equal(plain.columns, before)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.errors.choose_measure import measure_by_force
-from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, hypothesis_of_claim
-from analysis.diagnosis.errors.output_error import evaluate_fit, sensitivity
+from analysis.diagnosis.errors.choose_measure import make_force_measure
+from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, make_claim_hypothesis
+from analysis.diagnosis.errors.output_error import build_jacobian, evaluate_fit
 from analysis.diagnosis.search import short_recordings
 from analysis.diagnosis.search.screening import ScreenedHypothesis
 from analysis.diagnosis.search.short_recordings import _keep_promising, shorten_recordings
@@ -20,7 +20,7 @@ LAG = {"time_constant": 0.002}
 
 
 def make_hypothesis(name, **values):
-    return hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values])
+    return make_claim_hypothesis(Claim(EFFECTS[name], "one", (0,)), [values])
 
 
 @pytest.fixture(scope="module")
@@ -105,8 +105,8 @@ def test_a_fit_that_ran_away_agrees_with_no_run_in_and_the_whole_is_compared(lag
 def test_the_sensitivities_of_one_period_stand_for_those_of_all(lag_context):
     short, at = shorten_recordings(lag_context, evaluate_at_zero(lag_context)), np.zeros(len(lag_context.tuning.names))
     (record,) = lag_context.measure.records
-    whole = sensitivity(lag_context.measure, lag_context.tuning, at, NO_EFFECTS)
-    found = short.repeat_sensitivity(sensitivity(short.context.measure, short.context.tuning, at, NO_EFFECTS))
+    whole = build_jacobian(lag_context.measure, lag_context.tuning, at, NO_EFFECTS)
+    found = short.repeat_sensitivity(build_jacobian(short.context.measure, short.context.tuning, at, NO_EFFECTS))
     everywhere = found.select_samples(0, whole.columns.shape[1])
     later = np.ones(len(record.fit), dtype=bool)
     for segment in record.recording.segments:
@@ -126,9 +126,9 @@ def test_the_sensitivities_of_one_period_stand_for_those_of_all(lag_context):
 
 @pytest.fixture(scope="module")
 def force_context(lag_context):
-    recordings = [record.recording for record in lag_context.whole.records]
-    measure = measure_by_force(recordings, lag_context.tuning.model, None).measure
-    return replace(lag_context, measure=measure.shorten(), whole=measure)
+    recordings = [record.recording for record in lag_context.full_measure.records]
+    measure = make_force_measure(recordings, lag_context.tuning.model, None).measure
+    return replace(lag_context, measure=measure.shorten(), full_measure=measure)
 
 
 def force_difference(context):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.hypothesis import Claim, hypothesis_of_claim
+from analysis.diagnosis.errors.hypothesis import Claim, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import gather_evidence
 from analysis.diagnosis.search.explain import retune_alone
 from analysis.diagnosis.search.starting_hypotheses import is_newest_within_data
@@ -19,7 +19,7 @@ def evidence(diagnosed, make_context):
 
 
 def make_hypothesis(name, **values):
-    return hypothesis_of_claim(Claim(EFFECTS[name], "one", (0,)), [values])
+    return make_claim_hypothesis(Claim(EFFECTS[name], "one", (0,)), [values])
 
 
 def test_a_ripple_repeats_within_the_travel(evidence):

@@ -5,7 +5,7 @@ import pytest
 
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, Rival
 from analysis.evaluation.blind_test.calibration import compute_calibration
-from analysis.evaluation.blind_test.confidence_intervals import pool_share, share, statistic
+from analysis.evaluation.blind_test.confidence_intervals import compute_share, compute_statistic, pool_share
 from analysis.evaluation.blind_test.detection import (
     classify_outcome,
     compute_ideal_threshold,
@@ -16,7 +16,7 @@ from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Concealed, Outcome
 from analysis.evaluation.blind_test.score import compute_score, is_wrong_answer
 from analysis.evaluation.blind_test.wording import describe_answer, describe_concealed, format_figure
-from analysis.figures.blind_test_pictures import blind_test_pictures
+from analysis.figures.blind_test_pictures import make_blind_test_pictures
 from analysis.reports.blind_test_report import BlindTestFacts, render_blind_test_report
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
@@ -127,20 +127,23 @@ def test_a_right_name_on_another_axis_is_a_miss_where_there_are_several():
 
 def test_what_hangs_together_is_resampled_together():
     whole = [[True] * 10, [False] * 10] * 10
-    found, alone = pool_share("together", whole), share("alone", [each for group in whole for each in group], bool)
+    found, alone = (
+        pool_share("together", whole),
+        compute_share("alone", [each for group in whole for each in group], bool),
+    )
     assert found.value == alone.value == 0.5
     assert found.high - found.low > 2 * (alone.high - alone.low)
     assert pool_share("none", [[], []]).value is None
 
 
 def test_shares_of_nothing_have_no_value():
-    assert share("none", [], bool).value is None
-    assert format_figure(share("none", [], bool)) == "none drawn"
-    assert statistic("none", [], np.median).value is None
+    assert compute_share("none", [], bool).value is None
+    assert format_figure(compute_share("none", [], bool)) == "none drawn"
+    assert compute_statistic("none", [], np.median).value is None
 
 
 def test_an_interval_holds_its_share():
-    found = share("half", [True, False] * 50, bool)
+    found = compute_share("half", [True, False] * 50, bool)
     assert found.low < 0.5 < found.high
     assert format_figure(found).startswith("50.0 % [40, 60]")
 
@@ -182,7 +185,7 @@ def test_larger_effects_come_later():
 
 def test_the_page_lists_misses_before_figures_and_shows_all_pictures():
     whole = compute_score(ALL)
-    pictures = blind_test_pictures(ALL, whole.calibration)
+    pictures = make_blind_test_pictures(ALL, whole.calibration)
     assert [picture.name for picture in pictures] == ["detection", "detection-by-size", "confusion", "reliability"]
     both = ("sensor_lag", "logger_offset")
     followed = (
@@ -197,7 +200,7 @@ def test_the_page_lists_misses_before_figures_and_shows_all_pictures():
 
 
 def test_a_bank_of_nothing_has_no_pictures():
-    assert blind_test_pictures([CLEAN], compute_calibration([CLEAN])) == ()
+    assert make_blind_test_pictures([CLEAN], compute_calibration([CLEAN])) == ()
 
 
 def test_sentences_say_truth_and_answer():

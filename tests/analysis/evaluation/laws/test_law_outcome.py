@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.document import diagnosis_from_json
-from analysis.evaluation.laws.law_error import FreshMotion, law_error
+from analysis.evaluation.laws.law_error import FreshMotion, compute_law_error
 from analysis.evaluation.laws.law_outcome import LawOutcome, TrueLaw
-from analysis.evaluation.laws.law_score import law_score
-from equalizer.laws.law import law_of
+from analysis.evaluation.laws.law_score import compute_law_score
+from equalizer.laws.law import parse_law
 
 RATE_HZ = 1000.0
 T = np.arange(4000) / RATE_HZ
@@ -21,7 +21,7 @@ TRUTH = TrueLaw("drag of a power", "-k |v|^a sgn v", ("y",), ("force",), (("vy",
 
 
 def make_diagnosis(expression, verdict="explained", acts_on="force", key="effects"):
-    law = {"expression": expression, "variables": sorted(law_of(expression, acts_on, "y").variables),
+    law = {"expression": expression, "variables": sorted(parse_law(expression, acts_on, "y").variables),
            "acts_on": acts_on, "axis": "y"}  # fmt: skip
     entry = {"effect": "discovered_law", "place": "mechanism", "axis": "y", "law": law}
     effect = {**entry, "share": 1.0, "probability": 0.9, "parameters": {}, "rivals": []}
@@ -45,14 +45,16 @@ def make_outcome(expression, errors=(0.01, 0.2), **how):
 
 
 def test_the_same_law_is_right_and_near():
-    exact = law_of("-3.0*abs(vy)**1.5*sign(vy)", "force", "y")
-    assert law_error((exact,), DRAG) < 1e-9
-    assert law_error((law_of("-3.3*abs(vy)**1.5*sign(vy)", "force", "y"),), DRAG) == pytest.approx(0.1, rel=1e-6)
+    exact = parse_law("-3.0*abs(vy)**1.5*sign(vy)", "force", "y")
+    assert compute_law_error((exact,), DRAG) < 1e-9
+    assert compute_law_error((parse_law("-3.3*abs(vy)**1.5*sign(vy)", "force", "y"),), DRAG) == pytest.approx(
+        0.1, rel=1e-6
+    )
 
 
 def test_what_the_model_fits_itself_counts_for_nothing():
-    both = law_of("-3.0*abs(vy)**1.5*sign(vy) + 2.0*vy - 5.0*y", "force", "y")
-    assert law_error((both,), DRAG) < 1e-6
+    both = parse_law("-3.0*abs(vy)**1.5*sign(vy) + 2.0*vy - 5.0*y", "force", "y")
+    assert compute_law_error((both,), DRAG) < 1e-6
 
 
 def test_what_a_law_remembers_began_at_rest():
@@ -60,16 +62,16 @@ def test_what_a_law_remembers_began_at_rest():
     for k in range(1, len(T)):  # exact for a held signal
         lag[k] = lag[k - 1] + (1 - np.exp(-1 / (RATE_HZ * 0.5))) * (COLUMNS["fy"][k - 1] - lag[k - 1])
     remembers = FreshMotion(COLUMNS, {"y": -2.0 * lag}, False, RATE_HZ)
-    assert law_error((law_of("-2.0*lag(fy, 0.5)", "force", "y"),), remembers) < 5e-3
+    assert compute_law_error((parse_law("-2.0*lag(fy, 0.5)", "force", "y"),), remembers) < 5e-3
 
 
 def test_another_axis_or_place_is_all_off():
-    for law in (law_of("-3.0*abs(vy)**1.5*sign(vy)", "force", "x"), law_of("0.9*ay", "response", "y")):
-        assert law_error((law,), DRAG) == pytest.approx(1.0)
+    for law in (parse_law("-3.0*abs(vy)**1.5*sign(vy)", "force", "x"), parse_law("0.9*ay", "response", "y")):
+        assert compute_law_error((law,), DRAG) == pytest.approx(1.0)
 
 
 def test_a_law_that_is_not_finite_has_an_infinite_error():
-    assert law_error((law_of("log(y)", "force", "y"),), DRAG) == float("inf")
+    assert compute_law_error((parse_law("log(y)", "force", "y"),), DRAG) == float("inf")
 
 
 def test_structure_asks_for_variables_axis_place_and_memory():
@@ -94,6 +96,8 @@ def test_a_law_on_a_null_is_false():
     null = replace(make_outcome("1.0*vy*abs(vy)"), kind="nothing", truth=None)
     assert null.false_law
     assert null.missed
-    figures = {each.name: each for each in law_score([null, make_outcome("-3.0*abs(vy)**1.5*sign(vy)")]).figures}
+    figures = {
+        each.name: each for each in compute_law_score([null, make_outcome("-3.0*abs(vy)**1.5*sign(vy)")]).figures
+    }
     assert figures["a law named where nothing is missing"].hits == 1
     assert figures["structure right and named"].value == 1.0

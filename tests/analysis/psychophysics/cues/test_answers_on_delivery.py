@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from analysis.psychophysics.cues.answers_on_delivery import CUE_ONLY_SLOPE, answers_on_delivery
-from analysis.psychophysics.cues.cue_findings import cue_findings, cue_warnings
+from analysis.psychophysics.cues.answers_on_delivery import CUE_ONLY_SLOPE, regress_answers_on_delivery
+from analysis.psychophysics.cues.cue_findings import compute_cue_findings, make_cue_warnings
 from analysis.psychophysics.cues.delivered_cues import Cue, select_delivered_trials
 
 TRIALS = 60
@@ -42,7 +42,7 @@ def template(simulate):
 
 def strength_regression(trials):
     (group,) = select_delivered_trials(trials)
-    (found,) = (each for each in answers_on_delivery(group) if each.cue is Cue.INTENSITY)
+    (found,) = (each for each in regress_answers_on_delivery(group) if each.cue is Cue.INTENSITY)
     return found
 
 
@@ -53,7 +53,7 @@ def test_a_participant_who_goes_by_strength_is_found_with_the_slope_of_his_noise
     assert found.lower < CUE_ONLY_SLOPE < found.upper
     assert found.lower > 0.5
     assert found.is_conclusive
-    said = cue_warnings(cue_findings(trials))[-1]
+    said = make_cue_warnings(compute_cue_findings(trials))[-1]
     assert said.startswith("Within a direction, answers followed what was delivered")
 
 
@@ -99,7 +99,7 @@ def simulate_roved_answers(template, seed, by_strength):
                 harmonics_mps2=0.3 * 10 ** (random.normal(0.0, 0.3) / 20),
             )
         )  # fmt: skip
-    return {found.cue: found.followed for found in cue_findings(trials)}
+    return {found.cue: found.followed for found in compute_cue_findings(trials)}
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.psychophysics.cues.cue_ability import INTERNAL_NOISE_DB, same_level_difference
-from analysis.psychophysics.cues.cue_findings import cue_findings, cue_warnings
-from analysis.psychophysics.cues.delivered_cues import Cue, cue_gaps, select_delivered_trials
+from analysis.psychophysics.cues.cue_findings import compute_cue_findings, make_cue_warnings
+from analysis.psychophysics.cues.cue_sensitivity import INTERNAL_NOISE_DB, fit_same_level_difference
+from analysis.psychophysics.cues.delivered_cues import Cue, find_cue_gaps, select_delivered_trials
 from analysis.psychophysics.study_analysis import analyse_study, make_anova_document
 from analysis.reports.study_report import render_study_report
 
@@ -35,25 +35,25 @@ def deliver(trials, planted_db, cue=Cue.INTENSITY, at_hz=25.0, seed=5, per_newto
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("cue", list(Cue))
 def test_a_planted_mismatch_of_3_db_is_named_where_it_is_and_nowhere_else(simulate_study, seed, cue):
-    found = cue_findings(deliver(simulate_study(4, ABLE_N, seed), 3.0, cue, seed=seed))
+    found = compute_cue_findings(deliver(simulate_study(4, ABLE_N, seed), 3.0, cue, seed=seed))
     assert [(each.cue, each.frequency_hz) for each in found if each.noticed_by] == [(cue, 25.0)]
     (named,) = (each for each in found if each.noticed_by)
     assert named.difference_db == pytest.approx(3.0, abs=0.2)
     assert named.spread_db == pytest.approx(SCATTER_DB, abs=0.05)
     assert named.abilities == pytest.approx([3.0 / np.hypot(noise, SCATTER_DB) for noise in INTERNAL_NOISE_DB], rel=0.1)
     assert len(named.noticed_by) == 4
-    (sentence,) = cue_warnings(found)
+    (sentence,) = make_cue_warnings(found)
     assert f"{cue.value} at 25 Hz (+" in sentence
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
 def test_a_tenth_of_a_decibel_is_not_named_though_it_is_told_from_none(simulate_study, seed):
     trials = deliver(simulate_study(4, ABLE_N, seed), 0.1, seed=seed)
-    found = cue_findings(trials)
-    assert cue_warnings(found) == ()
-    exact = cue_findings(deliver_exactly(trials, 0.1))
+    found = compute_cue_findings(trials)
+    assert make_cue_warnings(found) == ()
+    exact = compute_cue_findings(deliver_exactly(trials, 0.1))
     assert exact[0].people[0].lower_db == pytest.approx(exact[0].people[0].upper_db) == pytest.approx(0.1)
-    assert cue_warnings(exact) == ()
+    assert make_cue_warnings(exact) == ()
 
 
 def deliver_exactly(trials, difference_db):
@@ -68,7 +68,7 @@ def test_friction_that_eats_weak_forces_is_no_spread_and_no_difference(simulate_
         replace(trial, delivered_mps2=4.0 * trial.level_n * 10 ** (-3.0 * (1.0 - np.log10(trial.level_n)) / 20))
         for trial in simulate_study(3, ABLE_N, 8)
     ]
-    for each in cue_findings(trials):
+    for each in compute_cue_findings(trials):
         if each.cue is Cue.INTENSITY:
             assert each.spread_db == pytest.approx(0.0, abs=1e-9)
             assert each.difference_db == pytest.approx(0.0, abs=1e-9)
@@ -82,7 +82,7 @@ def test_swapped_labels_do_not_cancel_a_difference_of_the_device(simulate_study)
         plus = (trial.direction_shown == 1) != swapped
         strength = 4.0 * trial.level_n * (2.0 if plus else 1.0)
         trials.append(replace(trial, angle_deg=45.0 if plus else -45.0, delivered_mps2=strength))
-    first = next(each for each in cue_findings(trials) if each.cue is Cue.INTENSITY)
+    first = next(each for each in compute_cue_findings(trials) if each.cue is Cue.INTENSITY)
     assert [each.difference_db for each in first.people] == pytest.approx([-20 * np.log10(2.0)] * 4)
 
 
@@ -94,7 +94,7 @@ def test_labels_may_be_the_other_way_round_in_a_second_session_of_the_same_perso
         strength = 4.0 * trial.level_n * (2.0 if plus else 1.0)
         angle = 45.0 if plus else -45.0
         trials.append(replace(trial, subject="s01", session=trial.subject, angle_deg=angle, delivered_mps2=strength))
-    first = next(each for each in cue_findings(trials) if each.cue is Cue.INTENSITY)
+    first = next(each for each in compute_cue_findings(trials) if each.cue is Cue.INTENSITY)
     assert [each.difference_db for each in first.people] == pytest.approx([-20 * np.log10(2.0)])
 
 
@@ -115,16 +115,17 @@ def test_a_session_with_a_single_direction_is_turned_by_the_angles_of_the_others
 def test_directions_that_were_played_at_levels_of_their_own_have_no_difference():
     """Three trials, the other direction once, louder: level or direction, the data do not say which."""
     assert (
-        same_level_difference(np.array([0.0, 0.1, 6.0]), np.array([0.0, 0.0, 4.0]), np.array([1.0, 1.0, -1.0])) is None
+        fit_same_level_difference(np.array([0.0, 0.1, 6.0]), np.array([0.0, 0.0, 4.0]), np.array([1.0, 1.0, -1.0]))
+        is None
     )
     # As many levels, but one of them in both directions.
     values, level, side = np.array([0.0, 3.0, 0.2, 3.3, 6.0]), np.array([0.0, 0.0, 0.0, 0.0, 4.0]), [1, -1, 1, -1, -1]
-    fit = same_level_difference(values, level, np.array(side, dtype=float))
+    fit = fit_same_level_difference(values, level, np.array(side, dtype=float))
     assert fit.difference_db == pytest.approx(-3.05) and fit.df == 2
 
 
 def test_without_measurements_nothing_is_said(simulate_study):
-    assert cue_findings([replace(trial, delivered_mps2=None) for trial in simulate_study(2, ABLE_N, 1)]) == ()
+    assert compute_cue_findings([replace(trial, delivered_mps2=None) for trial in simulate_study(2, ABLE_N, 1)]) == ()
 
 
 @pytest.mark.slow
@@ -137,14 +138,14 @@ def test_trials_without_harmonics_are_counted_and_the_others_are_judged(simulate
     for number, trial in enumerate(some):
         if trial.frequency_hz == 45.0:
             some[number] = replace(trial, off_axis_mps2=None)
-    gaps = {(gap.frequency_hz, gap.cue): (gap.missing, gap.trials) for gap in cue_gaps(some)}
+    gaps = {(gap.frequency_hz, gap.cue): (gap.missing, gap.trials) for gap in find_cue_gaps(some)}
     lost, slow = len(at_25[::20]), sum(trial.frequency_hz == 45.0 for trial in some)
     assert gaps == {(25.0, Cue.SPECTRUM): (lost, len(at_25)), (45.0, Cue.COUPLING): (slow, slow)}
     analysis = analyse_study(some, protocol)
     (named,) = (each for each in analysis.cues if each.noticed_by)
     assert (named.cue, named.frequency_hz, len(named.noticed_by)) == (Cue.SPECTRUM, 25.0, 4)
     assert sum(each.trials for each in named.people) == named.answers.trials == len(at_25) - lost
-    other = {(each.frequency_hz, each.cue): each for each in cue_findings(whole)}
+    other = {(each.frequency_hz, each.cue): each for each in compute_cue_findings(whole)}
     for each in analysis.cues:  # nothing else changes but Holm's correction, which has a test less
         if each is not named:
             assert replace(each, p_holm=None) == replace(other[each.frequency_hz, each.cue], p_holm=None)

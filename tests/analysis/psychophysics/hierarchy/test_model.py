@@ -6,7 +6,14 @@ from scipy.special import expit
 from scipy.stats import norm
 
 from analysis.psychophysics.hierarchy.answers import count_answers
-from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, TARGET, Family, sensitivity, share_right
+from analysis.psychophysics.hierarchy.curve import (
+    NEPER_PER_DB,
+    T_AT_THRESHOLD,
+    TARGET_PROPORTION,
+    Family,
+    compute_proportion_correct,
+    compute_sensitivity,
+)
 from analysis.psychophysics.hierarchy.likelihood import TrialLikelihood
 from analysis.psychophysics.hierarchy.objective import Objective, Prior
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
@@ -28,16 +35,24 @@ def answers():
 @pytest.mark.parametrize("family", list(Family))
 def test_a_curve_passes_through_the_target_and_has_the_stated_slopes(family):
     t = np.linspace(-4.0, 2.0, 41)
-    q, q1, q2 = sensitivity(t, family)
+    q, q1, q2 = compute_sensitivity(t, family)
     np.testing.assert_allclose(norm.cdf(q), 0.5 + SHARES[family](t) / 2, rtol=1e-9)
-    np.testing.assert_allclose(q1, (sensitivity(t + 1e-6, family)[0] - sensitivity(t - 1e-6, family)[0]) / 2e-6, 1e-5)
-    np.testing.assert_allclose(q2, (sensitivity(t + 1e-5, family)[1] - sensitivity(t - 1e-5, family)[1]) / 2e-5, 1e-4)
-    assert norm.cdf(sensitivity(np.array([AT_THRESHOLD[family]]), family)[0][0]) == pytest.approx(TARGET)
-    assert all(np.isfinite(part).all() for part in sensitivity(np.array([-700.0, 700.0]), family))
+    np.testing.assert_allclose(
+        q1, (compute_sensitivity(t + 1e-6, family)[0] - compute_sensitivity(t - 1e-6, family)[0]) / 2e-6, 1e-5
+    )
+    np.testing.assert_allclose(
+        q2, (compute_sensitivity(t + 1e-5, family)[1] - compute_sensitivity(t - 1e-5, family)[1]) / 2e-5, 1e-4
+    )
+    assert norm.cdf(compute_sensitivity(np.array([T_AT_THRESHOLD[family]]), family)[0][0]) == pytest.approx(
+        TARGET_PROPORTION
+    )
+    assert all(np.isfinite(part).all() for part in compute_sensitivity(np.array([-700.0, 700.0]), family))
 
 
 def test_a_share_runs_from_lapse_to_lapse():
-    np.testing.assert_allclose(share_right(np.array([-40.0, 0.0, 1.0, 40.0]), 0.04), [0.04, 0.5, 0.8140370, 0.96], 1e-6)
+    np.testing.assert_allclose(
+        compute_proportion_correct(np.array([-40.0, 0.0, 1.0, 40.0]), 0.04), [0.04, 0.5, 0.8140370, 0.96], 1e-6
+    )
 
 
 def test_the_likelihood_is_the_sum_over_trials():
@@ -49,7 +64,7 @@ def test_the_likelihood_is_the_sum_over_trials():
     theta, slope, lapse, c = {15.0: -1.0, 35.0: 5.0}, 1.7, 0.03, 0.2
     expected = 0.0
     for trial in trials:
-        t = AT_THRESHOLD[Family.WEIBULL] + slope * NEPER_PER_DB * (
+        t = T_AT_THRESHOLD[Family.WEIBULL] + slope * NEPER_PER_DB * (
             20 * np.log10(trial.level_n) - theta[trial.frequency_hz]
         )
         evidence = norm.ppf(0.5 + SHARES[Family.WEIBULL](t) / 2)
@@ -90,10 +105,10 @@ def test_information_is_what_the_curvature_is_on_average(answers):
 
     k, lapse = 3, 0.02
     latent = np.tile([-8.0, -1.0, 7.0, 0.7, 0.1], (4, 1))
-    t = AT_THRESHOLD[Family.WEIBULL] + np.exp(0.7) * NEPER_PER_DB * (
+    t = T_AT_THRESHOLD[Family.WEIBULL] + np.exp(0.7) * NEPER_PER_DB * (
         answers.level_db - latent[:, :k].ravel()[answers.run]
     )
-    share = lapse + (1 - 2 * lapse) * ndtr(sensitivity(t, Family.WEIBULL)[0] - answers.side * 0.1)
+    share = lapse + (1 - 2 * lapse) * ndtr(compute_sensitivity(t, Family.WEIBULL)[0] - answers.side * 0.1)
     n = answers.right + answers.wrong
     expected = replace(answers, right=n * share, wrong=n * (1 - share))  # the curvature is linear in the counts
     found = TrialLikelihood(expected, Family.WEIBULL).evaluate(latent, lapse)

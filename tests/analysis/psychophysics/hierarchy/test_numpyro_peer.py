@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.special import expit
 
-from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family
+from analysis.psychophysics.hierarchy.curve import NEPER_PER_DB, T_AT_THRESHOLD, Family
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
-from analysis.psychophysics.hierarchy.nodes import FINE, laplace_moments
+from analysis.psychophysics.hierarchy.nodes import FINE_COUNTS, compute_laplace_moments
 from analysis.psychophysics.hierarchy.objective import Objective, Prior
 from analysis.psychophysics.hierarchy.quadrature import Quadrature, integrate
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
@@ -56,7 +56,7 @@ def sample_people(answers, means, logs, slope, lapse):
     b, c = slope + slope_sd * raw[:, K + 1], criterion_sd * raw[:, K + 2]
     person = answers.person
     above_db = answers.level_db - theta.ravel()[answers.run]
-    t = AT_THRESHOLD[Family.WEIBULL] + jnp.exp(b)[person] * NEPER_PER_DB * above_db
+    t = T_AT_THRESHOLD[Family.WEIBULL] + jnp.exp(b)[person] * NEPER_PER_DB * above_db
     tail = jnp.maximum(jnp.exp(-jnp.exp(jnp.minimum(t, 5.0))) / 2.0, 1e-60)
     p = lapse + (1.0 - 2.0 * lapse) * ndtr(-ndtri(tail) - answers.side * c[person])
     numpyro.factor("answers", (answers.right * jnp.log(p) + answers.wrong * jnp.log1p(-p)).sum())
@@ -65,9 +65,9 @@ def sample_people(answers, means, logs, slope, lapse):
 def test_thresholds_of_people_are_those_that_a_sampler_finds(fit, posterior_draws):
     """Means and spreads of each person's thresholds, over what 4000 draws tell them."""
     objective, quadrature = Objective(fit.answers, Family.WEIBULL, Prior()), Quadrature(fit.answers, Family.WEIBULL)
-    moments = laplace_moments(fit.parameters, *objective.marginal.find_modes(fit.parameters))
+    moments = compute_laplace_moments(fit.parameters, *objective.marginal.find_modes(fit.parameters))
     for _ in range(3):
-        moments = integrate(quadrature, fit.parameters, moments, FINE).moments
+        moments = integrate(quadrature, fit.parameters, moments, FINE_COUNTS).moments
     by_shared = np.einsum("nka,nab,nkb->nk", moments.regression, moments.covariance, moments.regression)
     spread, theta = np.sqrt(moments.variance + by_shared), posterior_draws["theta"]
     np.testing.assert_allclose((moments.threshold - theta.mean(axis=0)) / spread, 0.0, atol=0.1)

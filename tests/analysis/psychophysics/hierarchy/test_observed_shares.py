@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.psychophysics.hierarchy.answers import count_answers
-from analysis.psychophysics.hierarchy.curve import TARGET, Family
+from analysis.psychophysics.hierarchy.curve import TARGET_PROPORTION, Family
 from analysis.psychophysics.hierarchy.observed_shares import (
     BIN_DB,
     average_person_curves,
@@ -12,7 +12,7 @@ from analysis.psychophysics.hierarchy.observed_shares import (
     compute_person_shares,
     evaluate_person_curve,
 )
-from analysis.psychophysics.hierarchy.primary import PersonEstimate, primary_analysis
+from analysis.psychophysics.hierarchy.primary import PersonEstimate, compute_primary_analysis
 
 HZ = (5.0, 15.0, 25.0, 35.0, 45.0)
 
@@ -31,7 +31,7 @@ def make_person(slope: float = 2.0, criterion: float = 0.0) -> PersonEstimate:
 @pytest.fixture(scope="module")
 def study(simulate_study):
     answers = count_answers(simulate_study(subjects=4), HZ)
-    return answers, primary_analysis(answers, 3.0)
+    return answers, compute_primary_analysis(answers, 3.0)
 
 
 @pytest.mark.slow
@@ -53,16 +53,19 @@ def test_points_lie_within_their_bins_and_their_intervals(study):
 
 def test_without_lapse_and_bias_the_curve_is_weibulls_and_meets_its_target_at_the_threshold():
     above_db = np.array([-30.0, -6.0, 0.0, 3.0, 12.0])
-    scale = (-np.log(2 - 2 * TARGET)) ** -0.5  # of a Weibull curve of slope 2 whose target lies at 1 N
+    scale = (-np.log(2 - 2 * TARGET_PROPORTION)) ** -0.5  # of a Weibull curve of slope 2 whose target lies at 1 N
     expected = 1 - 0.5 * np.exp(-((10 ** (above_db / 20) / scale) ** 2))
     np.testing.assert_allclose(
         evaluate_person_curve(above_db, make_person(), StubFit(make_person())), expected, rtol=1e-12
     )
-    assert expected[2] == pytest.approx(TARGET)
+    assert expected[2] == pytest.approx(TARGET_PROPORTION)
 
 
 def test_a_bias_to_one_answer_lowers_the_curve():
-    assert evaluate_person_curve(np.zeros(1), make_person(criterion=0.5), StubFit(make_person()))[0] < TARGET - 0.02
+    assert (
+        evaluate_person_curve(np.zeros(1), make_person(criterion=0.5), StubFit(make_person()))[0]
+        < TARGET_PROPORTION - 0.02
+    )
 
 
 def test_the_curve_of_all_people_weighs_each_by_the_trials_at_the_frequency(study):

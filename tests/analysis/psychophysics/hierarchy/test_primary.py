@@ -13,7 +13,7 @@ from analysis.psychophysics.hierarchy.inference import (
     estimate_direction_limit,
     estimate_medians,
 )
-from analysis.psychophysics.hierarchy.primary import FAR_ABOVE_NOTE, primary_analysis
+from analysis.psychophysics.hierarchy.primary import FAR_ABOVE_NOTE, compute_primary_analysis
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from tests.analysis.conftest import PUBLISHED, simulate_run
 
@@ -48,7 +48,7 @@ def test_medians_are_recovered_for_each_shape_of_the_curves(family):
 def test_spreads_slope_and_criterion_are_recovered():
     crowd = Crowd((5.0, 15.0, 25.0), (0.5, 0.7, 0.9), person_sd_db=3.0, frequency_sd_db=1.5, criterion_sd=0.4)
     (study,) = simulate_studies(crowd, 1, people=40)
-    found = primary_analysis(study.answers, 3.0)
+    found = compute_primary_analysis(study.answers, 3.0)
     assert found.person_sd_db == pytest.approx(3.0, rel=0.4)
     assert found.frequency_sd_db == pytest.approx(1.5, rel=0.4)
     assert found.slope == pytest.approx(2.0, rel=0.25)
@@ -66,7 +66,7 @@ def test_pseudo_thresholds_average_to_the_estimate():
 
 def test_above_the_cap_there_is_a_bound_and_no_size():
     (study,) = simulate_studies(Crowd((5.0, 45.0), (0.5, 8.0)), 1)
-    low, high = primary_analysis(study.answers, 3.0).medians
+    low, high = compute_primary_analysis(study.answers, 3.0).medians
     assert low.upper_db is not None and low.lower_db < low.db < low.upper_db
     assert high.above_cap and high.upper_db is None and high.upper_n is None
     assert high.lower_db < 20 * np.log10(8.0)
@@ -87,7 +87,7 @@ def test_answers_that_contradict_nothing_give_no_lower_bound():
 @pytest.mark.slow
 def test_guessers_leave_everything_finite():
     (study,) = simulate_studies(Crowd((5.0, 45.0), (0.5, 1e4)), 1, people=5)
-    found = primary_analysis(study.answers, 3.0)
+    found = compute_primary_analysis(study.answers, 3.0)
     assert found.converged
     assert np.isfinite([m.db for m in found.medians]).all()
     assert found.medians[1].above_cap
@@ -97,14 +97,14 @@ def test_guessers_leave_everything_finite():
 def test_nothing_is_known_of_differences_between_frequencies_that_no_one_tells():
     """Two medians of 30 dB above the cap have no difference: of guessers, half of such contrasts had p below 0.05."""
     (study,) = simulate_studies(Crowd((5.0, 35.0, 45.0), (0.5, 1e4, 1e4)), 1, people=6)
-    found = primary_analysis(study.answers, 3.0, declared_hz=(45.0, 35.0))
+    found = compute_primary_analysis(study.answers, 3.0, declared_hz=(45.0, 35.0))
     assert found.far_above_hz == (35.0, 45.0)
     assert found.declared_contrast is None
     assert [c.frequency_hz for c in found.contrasts] == [35.0, 45.0]  # to 5 Hz, which is known
     assert all(c.lower_db > 6.0 for c in found.contrasts)
     assert found.overall.f is None and found.overall.notes == (FAR_ABOVE_NOTE,)  # it would test 45 against 35 Hz, too
     (nothing,) = simulate_studies(Crowd((5.0, 45.0), (1e4, 1e4)), 1, people=6)
-    found = primary_analysis(nothing.answers, 3.0)
+    found = compute_primary_analysis(nothing.answers, 3.0)
     assert found.far_above_hz == (5.0, 45.0)
     assert found.contrasts == () and found.overall.f is None and found.overall.p_huynh_feldt is None
     assert found.overall.notes == (FAR_ABOVE_NOTE,)
@@ -114,7 +114,7 @@ def test_nothing_is_known_of_differences_between_frequencies_that_no_one_tells()
 def test_a_contrast_that_is_not_told_stays_in_holms_family():
     """The data choose which contrasts are told; the family that they are corrected for was planned."""
     (study,) = simulate_studies(Crowd((5.0, 35.0, 45.0), (1e4, 2.5, 1e4)), 1, people=6)
-    found = primary_analysis(study.answers, 3.0)
+    found = compute_primary_analysis(study.answers, 3.0)
     assert found.far_above_hz == (5.0, 45.0)
     (told,) = found.contrasts
     assert told.frequency_hz == 35.0 and told.p > 0.0
@@ -127,7 +127,7 @@ def test_people_with_the_same_answers_have_no_spread_and_no_error_is_raised():
     answers = count_cells(
         ("a", "b", "c"), (5.0, 45.0), np.repeat(np.arange(6), 24), level, np.tile([1.0, -1.0], 72), right
     )
-    found = primary_analysis(answers, 3.0)
+    found = compute_primary_analysis(answers, 3.0)
     assert found.contrasts == ()
     for median in found.medians:
         assert median.lower_db == pytest.approx(median.db) == pytest.approx(median.upper_db)
@@ -137,7 +137,7 @@ def test_people_with_the_same_answers_have_no_spread_and_no_error_is_raised():
 def test_flat_thresholds_are_equal_and_equivalent():
     crowd = Crowd((5.0, 15.0, 25.0), (0.5, 0.5, 0.5), frequency_sd_db=0.5)
     (study,) = simulate_studies(crowd, 1, people=24)
-    found = primary_analysis(study.answers, 3.0)
+    found = compute_primary_analysis(study.answers, 3.0)
     assert found.overall.p_huynh_feldt > 0.01
     assert all(c.p_equivalence < 0.05 for c in found.contrasts)
 
@@ -153,14 +153,14 @@ def test_answers_at_the_cap_count_and_unfinished_runs_too():
     answers = count_answers(trials, (5.0, 45.0))
     assert answers.trials == len(trials)
     assert (answers.level_db > 20 * np.log10(2.999)).any()
-    assert primary_analysis(answers, 3.0).medians[1].above_cap
+    assert compute_primary_analysis(answers, 3.0).medians[1].above_cap
 
 
 def test_one_person_or_no_answer_gives_no_group():
     trials = simulate_run(1.0, np.random.default_rng(0), frequency_hz=5.0)
-    assert primary_analysis(count_answers(trials, (5.0,)), 3.0) is None
+    assert compute_primary_analysis(count_answers(trials, (5.0,)), 3.0) is None
     assert count_answers([], (5.0,)) is None
-    assert primary_analysis(None, 3.0) is None
+    assert compute_primary_analysis(None, 3.0) is None
 
 
 def test_the_direction_limit_lies_where_the_line_meets_the_cap():
@@ -191,7 +191,7 @@ def test_the_limit_is_below_a_frequency_whose_median_is_shown_to_be_above_the_ca
     found = estimate_direction_limit(HZ, pseudo, 10.0, 0.95, above_cap_hz=(45.0,))
     assert 40.0 < found.upper_hz < 45.0
     (study,) = simulate_studies(Crowd((5.0, 25.0, 45.0), (0.3, 0.5, 8.0)), 1)
-    analysis = primary_analysis(study.answers, 3.0)
+    analysis = compute_primary_analysis(study.answers, 3.0)
     assert analysis.medians[2].lower_n > 3.0 and analysis.limit.upper_hz < 45.0
 
 

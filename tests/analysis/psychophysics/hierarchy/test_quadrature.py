@@ -4,15 +4,21 @@ import numpy as np
 import pytest
 from scipy.special import expit
 
-from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family, sensitivity, share_right
+from analysis.psychophysics.hierarchy.curve import (
+    NEPER_PER_DB,
+    T_AT_THRESHOLD,
+    Family,
+    compute_proportion_correct,
+    compute_sensitivity,
+)
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
-from analysis.psychophysics.hierarchy.nodes import FINE, Counts, laplace_moments
+from analysis.psychophysics.hierarchy.nodes import FINE_COUNTS, NodeCounts, compute_laplace_moments
 from analysis.psychophysics.hierarchy.objective import Objective, Prior, maximise
 from analysis.psychophysics.hierarchy.quadrature import Quadrature, integrate
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from tests.analysis.conftest import PUBLISHED
 
-MANY = Counts(9, 11, 7, 13)
+MANY = NodeCounts(9, 11, 7, 13)
 NEAR_CAP = Crowd((5.0, 45.0), (0.7, 2.7), slope_log_sd=0.4, lapse=0.03)
 
 
@@ -34,8 +40,8 @@ def grid_integral(answers, person, numbers, family=Family.WEIBULL):
             rows = []
             for place, theta in enumerate(thetas):
                 cells = answers.run == 2 * person + place
-                t = AT_THRESHOLD[family] + np.exp(b) * NEPER_PER_DB * (answers.level_db[cells] - theta[:, None])
-                p = share_right(sensitivity(t, family)[0] - c * answers.side[cells], lapse)
+                t = T_AT_THRESHOLD[family] + np.exp(b) * NEPER_PER_DB * (answers.level_db[cells] - theta[:, None])
+                p = compute_proportion_correct(compute_sensitivity(t, family)[0] - c * answers.side[cells], lapse)
                 rows.append(np.log(p) @ answers.right[cells] + np.log1p(-p) @ answers.wrong[cells])
             terms = log_prior + rows[0][:, None] + rows[1]
             high = terms.max()
@@ -43,9 +49,9 @@ def grid_integral(answers, person, numbers, family=Family.WEIBULL):
     return total
 
 
-def settled_integrals(objective, quadrature, numbers, counts=FINE):
+def settled_integrals(objective, quadrature, numbers, counts=FINE_COUNTS):
     """Integrals with nodes that have found their place."""
-    moments = laplace_moments(numbers, *objective.marginal.find_modes(numbers))
+    moments = compute_laplace_moments(numbers, *objective.marginal.find_modes(numbers))
     for _ in range(3):
         moments = integrate(quadrature, numbers, moments, counts).moments
     return integrate(quadrature, numbers, moments, counts)
@@ -69,8 +75,8 @@ def test_an_integral_is_the_sum_over_a_grid(prepared_quadrature):
 
 def test_with_single_nodes_it_is_the_method_of_laplace(prepared_quadrature):
     _, objective, quadrature, numbers = prepared_quadrature
-    moments = laplace_moments(numbers, *objective.marginal.find_modes(numbers))
-    found = integrate(quadrature, numbers, moments, Counts(1, 1, 1, 1))
+    moments = compute_laplace_moments(numbers, *objective.marginal.find_modes(numbers))
+    found = integrate(quadrature, numbers, moments, NodeCounts(1, 1, 1, 1))
     np.testing.assert_allclose(found.value, objective.marginal.evaluate(numbers)[0], atol=1e-8)
 
 

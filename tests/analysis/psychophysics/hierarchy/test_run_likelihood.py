@@ -5,7 +5,7 @@ import pytest
 
 from analysis.psychophysics.hierarchy.answers import count_cells
 from analysis.psychophysics.hierarchy.curve import Family
-from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, newton_or_none, run_likelihoods
+from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, compute_run_likelihoods, convert_to_newton
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from analysis.reports.primary_tables import run_words
 from tests.analysis.conftest import PUBLISHED
@@ -16,7 +16,7 @@ SAME = {"person_sd_db": 0.0, "frequency_sd_db": 0.0, "slope_log_sd": 0.0, "crite
 
 def simulate_runs(true_n, people=300):
     study = simulate_study(Crowd((35.0,), (true_n,), **SAME), PUBLISHED, people, (8,))
-    return run_likelihoods(study.answers, [Nuisance(2.0, 0.0, (0.02,))] * people, CAP_DB)
+    return compute_run_likelihoods(study.answers, [Nuisance(2.0, 0.0, (0.02,))] * people, CAP_DB)
 
 
 @pytest.mark.parametrize("true_n", [0.3, 1.0])
@@ -39,15 +39,15 @@ def test_above_the_cap_there_is_a_bound():
 def test_a_guesser_has_no_upper_end_and_newtons_are_of_decibels():
     found = simulate_runs(1e4, people=20)
     assert sum(r.upper_db is None for r in found) >= 19
-    assert newton_or_none(20.0) == pytest.approx(10.0)
-    assert newton_or_none(None) is None
+    assert convert_to_newton(20.0) == pytest.approx(10.0)
+    assert convert_to_newton(None) is None
 
 
 def likelihood_of_run(levels_n, right, family=Family.WEIBULL, slope=2.0):
     levels_db, n = 20 * np.log10(np.asarray(levels_n)), len(levels_n)
     side = np.where(np.arange(n) % 2, 1.0, -1.0)
     answers = count_cells(("a",), (35.0,), np.zeros(n, dtype=np.intp), levels_db, side, np.asarray(right))
-    (run,) = run_likelihoods(answers, [Nuisance(slope, 0.1, (0.02,))], CAP_DB, family)
+    (run,) = compute_run_likelihoods(answers, [Nuisance(slope, 0.1, (0.02,))], CAP_DB, family)
     return run
 
 
@@ -66,7 +66,7 @@ def test_an_upper_bound_after_right_answers_alone_excludes_what_it_should():
     """At the bound, so many right answers have the probability exp(-1.92) of the highest possible: the end that a
     two-sided interval of 95 % has."""
     run = likelihood_of_run(np.full(10, 0.5), np.ones(10, dtype=bool))
-    t = np.log(-np.log(2 - 2 * 0.5 ** (1 / 3))) + 2.0 * np.log(0.5 / newton_or_none(run.upper_db))
+    t = np.log(-np.log(2 - 2 * 0.5 ** (1 / 3))) + 2.0 * np.log(0.5 / convert_to_newton(run.upper_db))
     share = 0.02 + 0.96 * (1.0 - 0.5 * np.exp(-np.exp(t)))
     assert 10 * np.log(share / 0.98) == pytest.approx(-(1.96**2) / 2, abs=0.1)  # the criterion of 0.1 left out here
 

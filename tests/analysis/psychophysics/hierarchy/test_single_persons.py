@@ -9,8 +9,14 @@ from scipy.stats import norm
 
 from analysis.figures.study_pictures import study_pictures
 from analysis.psychophysics.hierarchy.answers import count_cells
-from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family, sensitivity, share_right
-from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, _likelihood_on_grid
+from analysis.psychophysics.hierarchy.curve import (
+    NEPER_PER_DB,
+    T_AT_THRESHOLD,
+    Family,
+    compute_proportion_correct,
+    compute_sensitivity,
+)
+from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, _compute_likelihood_on_grid
 from analysis.psychophysics.hierarchy.single_persons import fit_single_persons
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from analysis.psychophysics.study_analysis import analyse_study, make_anova_document
@@ -45,12 +51,12 @@ def test_what_is_not_known_is_averaged_over_as_an_integral_does_it():
         ("a",), (5.0,), np.zeros(6, dtype=np.intp), np.zeros(6), np.tile([1.0, -1.0], 3), np.arange(6) > 1
     )
     person = Nuisance(2.0, 0.0, (0.02,), slope_log_sd=0.4, criterion_sd=0.0)
-    grid, height = _likelihood_on_grid(answers, 0, person, 9.5, Family.WEIBULL)
+    grid, height = _compute_likelihood_on_grid(answers, 0, person, 9.5, Family.WEIBULL)
     at = int(np.argmin(np.abs(grid + 4.0)))
 
     def likelihood(u: float) -> float:
-        t = np.array([AT_THRESHOLD[Family.WEIBULL] - 2.0 * np.exp(u) * NEPER_PER_DB * grid[at]])
-        p = share_right(sensitivity(t, Family.WEIBULL)[0], 0.02)[0]
+        t = np.array([T_AT_THRESHOLD[Family.WEIBULL] - 2.0 * np.exp(u) * NEPER_PER_DB * grid[at]])
+        p = compute_proportion_correct(compute_sensitivity(t, Family.WEIBULL)[0], 0.02)[0]
         return p**4 * (1 - p) ** 2 * norm.pdf(u, scale=0.4)
 
     assert np.exp(height[at]) == pytest.approx(quad(likelihood, -3, 3)[0], rel=1e-3)

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from analysis.psychophysics.power.compare_rules import compare_rules, list_compared_rules, simulate_person
 from analysis.psychophysics.power.simulated_study import Crowd
-from analysis.psychophysics.thresholds import thresholds
+from analysis.psychophysics.thresholds import compute_thresholds
 from protocols.definition.staircase_rule import BayesianPlacement
 from protocols.document.dumping import dump_protocol
 from protocols.procedure.psi import compute_posterior, estimate_threshold
@@ -70,7 +70,7 @@ def test_the_same_seed_compares_the_same_people():
 
 def test_sessions_analyse_such_runs(simulate):
     def found(true_n, seed):
-        (row,) = thresholds(simulate(true_n, np.random.default_rng(seed), rule=RULE), RULE)
+        (row,) = compute_thresholds(simulate(true_n, np.random.default_rng(seed), rule=RULE), RULE)
         return row
 
     below, guesser = found(0.6, 1), found(GUESSER, 2)

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family
-from analysis.psychophysics.power.felt_delivery import FeltDelivery, felt_delivery
+from analysis.psychophysics.hierarchy.curve import NEPER_PER_DB, T_AT_THRESHOLD, Family
+from analysis.psychophysics.power.felt_delivery import FeltDelivery, tabulate_felt_delivery
 from analysis.psychophysics.power.simulated_study import Crowd, _apply_delivery, simulate_study
 from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track, pack_rule, play_run
 from protocols.procedure.staircase import begin_staircase, is_finished, step
@@ -40,7 +40,7 @@ def reference_run(delivery, threshold_n, seed, rule=PUBLISHED, rove_db=0.0):
         flawless = PER_NEWTON * level_n
         measured = Delivered(along * flawless, across * flawless, 0.1, harmonics * flawless)
         felt = PerceivedStimulus(0, trial, 0, Phase.TEST, HZ, level_n, direction, trial, delivered=measured)
-        right = random.random_sample() < observer.share_right(felt)
+        right = random.random_sample() < observer.compute_right_share(felt)
         found.append((level_db, direction, right))
         state = step(rule, state, bool(right))
     return found
@@ -49,7 +49,7 @@ def reference_run(delivery, threshold_n, seed, rule=PUBLISHED, rove_db=0.0):
 @pytest.mark.parametrize("delivery", [FLAWLESS, ROUGH, CIRCLE])
 @pytest.mark.parametrize("threshold_n", [0.3, 0.9, 2.2])
 def test_a_compiled_run_is_that_of_the_observer_of_sessions(delivery, threshold_n):
-    t0, pace, threshold_db = AT_THRESHOLD[Family.WEIBULL], 1.7 * NEPER_PER_DB, 20 * np.log10(threshold_n)
+    t0, pace, threshold_db = T_AT_THRESHOLD[Family.WEIBULL], 1.7 * NEPER_PER_DB, 20 * np.log10(threshold_n)
     who = _apply_delivery(Participant(t0, pace, threshold_db, 0.03, 0.2, 0), delivery, 0)
     for seed in range(8):
         track = Track(*(np.empty(MOST_TRIALS) for _ in range(3)), np.full(PUBLISHED.reversals, np.nan))
@@ -89,7 +89,7 @@ def test_the_table_is_that_of_the_measured_trials_by_the_angle_of_the_direction(
                 harmonics_mps2=None if trial.frequency_hz == 45.0 else 0.1 * along,
             )
         )  # fmt: skip
-    found = felt_delivery(trials, (5.0, 45.0), (2.0, 4.0))
+    found = tabulate_felt_delivery(trials, (5.0, 45.0), (2.0, 4.0))
     # By angle, so that swapped labels do not mix the directions.
     for tables, flawless, share in zip(found.tables, (2.0, 4.0), (0.1, 0.0), strict=True):
         assert sorted({round(row[1] * flawless, 9) for table in tables for row in table}) == [2.0, 3.0]
@@ -99,7 +99,7 @@ def test_the_table_is_that_of_the_measured_trials_by_the_angle_of_the_direction(
             for _, along, across, harmonics in table:
                 assert (across, harmonics) == (pytest.approx(along / 2), pytest.approx(share * along))
     with pytest.raises(ValueError, match=r"directions at 15 Hz"):
-        felt_delivery([trial for trial in trials if trial.frequency_hz != 15.0], (5.0, 15.0), (2.0, 4.0))
+        tabulate_felt_delivery([trial for trial in trials if trial.frequency_hz != 15.0], (5.0, 15.0), (2.0, 4.0))
 
 
 def test_trials_that_were_not_measured_for_a_cue_do_not_count_as_flawless(simulate_study):
@@ -109,6 +109,6 @@ def test_trials_that_were_not_measured_for_a_cue_do_not_count_as_flawless(simula
         for trial in simulate_study(2, (0.4, 0.4, 0.4, 0.4, 0.4), 3)
     ]  # fmt: skip
     unmeasured = [replace(trial, harmonics_mps2=None, off_axis_mps2=None) for trial in measured]
-    alone = felt_delivery(measured, (5.0, 45.0), (2.0, 4.0))
+    alone = tabulate_felt_delivery(measured, (5.0, 45.0), (2.0, 4.0))
     assert alone.tables[0][0][0][3] > 0.0
-    assert felt_delivery([*measured, *unmeasured], (5.0, 45.0), (2.0, 4.0)) == alone
+    assert tabulate_felt_delivery([*measured, *unmeasured], (5.0, 45.0), (2.0, 4.0)) == alone

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family
+from analysis.psychophysics.hierarchy.curve import NEPER_PER_DB, T_AT_THRESHOLD, Family
 from analysis.psychophysics.power.compare_rules import estimate_db
 from analysis.psychophysics.power.psi_kernel import pack_psi, play_psi
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
@@ -29,7 +29,7 @@ def test_levels_and_estimates_are_those_of_step(rule, threshold_n):
     cap_db = to_db(rule.cap_n)
     for seed in range(8):
         track = Track(*(np.empty(MOST_TRIALS) for _ in range(3)), np.full(rule.reversals, np.nan))
-        who = Participant(AT_THRESHOLD[Family.WEIBULL], 2.0 * NEPER_PER_DB, to_db(threshold_n), 0.02, 0.1, 0)
+        who = Participant(T_AT_THRESHOLD[Family.WEIBULL], 2.0 * NEPER_PER_DB, to_db(threshold_n), 0.02, 0.1, 0)
         trials, _, mean_db, above = play_psi(pack_psi(rule), who, seed, track)
         state = begin_staircase(rule)
         for index in range(trials):

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.psychophysics.hierarchy.curve import AT_THRESHOLD, NEPER_PER_DB, Family
+from analysis.psychophysics.hierarchy.curve import NEPER_PER_DB, T_AT_THRESHOLD, Family
 from analysis.psychophysics.power.compare_rules import ComparedPerson, answer_trials, compare_rules, list_compared_rules
-from analysis.psychophysics.power.felt_delivery import felt_delivery
+from analysis.psychophysics.power.felt_delivery import tabulate_felt_delivery
 from analysis.psychophysics.power.simulated_study import FAMILIES, Crowd, _apply_delivery, simulate_study
 from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track, pack_rule, play_run
 from protocols.procedure.staircase import begin_staircase, is_finished, step, to_db
@@ -30,7 +30,7 @@ def play_compiled(who, rule, rove_db, seed):
 def test_a_compiled_run_is_the_plain_one_trial_by_trial(family, rove_db):
     crowd = Crowd((HZ,), (0.7,), lapse=0.03, family=family, rove_db=rove_db)
     person = ComparedPerson(to_db(0.7), 1.7, 0.2)
-    who = Participant(AT_THRESHOLD[family], 1.7 * NEPER_PER_DB, to_db(0.7), 0.03, 0.2, FAMILIES.index(family))
+    who = Participant(T_AT_THRESHOLD[family], 1.7 * NEPER_PER_DB, to_db(0.7), 0.03, 0.2, FAMILIES.index(family))
     for seed in SEEDS:
         n, track = play_compiled(who, RULE, rove_db, seed)
         order = (1, 2, 0) if rove_db else (0, 1)  # the compiled run draws the amplitude first, and only where it roves
@@ -44,7 +44,7 @@ def test_a_compiled_run_is_the_plain_one_trial_by_trial(family, rove_db):
 @pytest.mark.parametrize("delivery", [FLAWLESS, ROUGH])
 @pytest.mark.parametrize("threshold_n", [0.3, 0.9, 2.2])
 def test_a_roved_run_is_that_of_the_observer_of_sessions(delivery, threshold_n):
-    t0, pace = AT_THRESHOLD[Family.WEIBULL], 1.7 * NEPER_PER_DB
+    t0, pace = T_AT_THRESHOLD[Family.WEIBULL], 1.7 * NEPER_PER_DB
     who = _apply_delivery(Participant(t0, pace, to_db(threshold_n), 0.03, 0.2, 0), delivery, 0)
     for seed in SEEDS:
         n, track = play_compiled(who, RULE, ROVE_DB, seed)
@@ -56,7 +56,7 @@ def test_a_roved_run_is_that_of_the_observer_of_sessions(delivery, threshold_n):
 
 
 def test_the_staircase_moves_its_own_level_and_amplitudes_are_even_around_it():
-    who, off_db, sides = Participant(AT_THRESHOLD[Family.WEIBULL], 2.0 * NEPER_PER_DB, -3.0, 0.02, 0.0, 0), [], []
+    who, off_db, sides = Participant(T_AT_THRESHOLD[Family.WEIBULL], 2.0 * NEPER_PER_DB, -3.0, 0.02, 0.0, 0), [], []
     for seed in SEEDS:
         n, track = play_compiled(who, RULE, ROVE_DB, seed)
         state = begin_staircase(RULE)
@@ -100,7 +100,7 @@ def test_what_a_device_delivers_is_told_by_the_levels_it_was_given(simulate_stud
 
     study = simulate_study(2, (0.4, 0.4, 0.4, 0.4, 0.4), 3)
     shifts_db = np.random.default_rng(2).uniform(-3.0, 3.0, len(study))
-    plain, roved = (felt_delivery(measured(off_db), (5.0,), (2.0,)) for off_db in (0.0 * shifts_db, shifts_db))
+    plain, roved = (tabulate_felt_delivery(measured(off_db), (5.0,), (2.0,)) for off_db in (0.0 * shifts_db, shifts_db))
     for delivery in (plain, roved):
         for table in delivery.tables[0]:
             np.testing.assert_allclose([row[1:] for row in table], [(1.0, 0.25, 0.05)] * len(table), atol=1e-9)

@@ -57,7 +57,7 @@ def plainly(bodies, driven, size, step_s):
     nothing = np.zeros_like(linear.position)
     by_u = np.vstack([linear.motion_by_command, linear.response_by_command, nothing[:, : driven.mean.shape[1]]])
     by_f = np.vstack([linear.motion_by_axis_force, linear.response_by_axis_force, np.zeros((len(nothing), r))])
-    state, force_end, shown = np.zeros(len(linear.advance)), np.zeros(r), np.zeros(driven.mean.shape[1])
+    state, force_end, shown = np.zeros(len(linear.transition)), np.zeros(r), np.zeros(driven.mean.shape[1])
     memories = [np.zeros(act.memory) for act in bodies.actions]
     looked, added = np.empty((n, len(rows))), np.empty((n, r))
     for k in range(n):
@@ -82,7 +82,7 @@ def _one_step(bodies, linear, state, u, memories, at):
                 force[port] -= own[item, 0]
                 end[port] -= own[item, 1]
                 memories[item][:] = before[item]
-            free = linear.advance @ state + linear.by_command @ u + linear.by_axis_force @ force
+            free = linear.transition @ state + linear.by_command @ u + linear.by_axis_force @ force
             unit = linear.by_axis_force[:, port]
             at[X], at[V] = motion[port] @ state, motion[r + port] @ state
             at[X_FREE], at[V_FREE] = motion[port] @ free, motion[r + port] @ free
@@ -95,7 +95,7 @@ def _one_step(bodies, linear, state, u, memories, at):
             own[item] = mean, mean if np.isnan(at[F_END]) else at[F_END]
             force[port] += own[item, 0]
             end[port] += own[item, 1]
-    return linear.advance @ state + linear.by_command @ u + linear.by_axis_force @ force, end
+    return linear.transition @ state + linear.by_command @ u + linear.by_axis_force @ force, end
 
 
 def assert_same(model, effects, commands, steps, fine=1):
@@ -218,7 +218,7 @@ def test_a_law_knows_the_acceleration_if_its_effect_asks_for_it(bench, asked):
     [(springs(CRITICAL), True), (springs(0.1), True), (free_masses(1), True), (free_masses(3), False)],
 )
 def test_pairs_are_used_where_they_are_well_apart_and_say_the_same(model, pairs):
-    advance = discretise_model(model, 1 / RATE_HZ).advance
+    advance = discretise_model(model, 1 / RATE_HZ).transition
     form = step_form(advance)
     half = len(advance) // 2
     assert (form.advance.shape == (4, half)) is pairs

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.identification.frequency_response.coupling import worst_coupling
+from equalizer.identification.frequency_response.coupling import compute_worst_coupling
 from equalizer.identification.frequency_response.coupling_onset import OnsetRule, coupling_onset
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
@@ -56,7 +56,7 @@ def test_no_coupling_has_no_onset():
 def test_noise_alone_is_no_coupling():
     onsets = [coupling_onset(response_of(0.05 + 0 * LINES, LINES, 0.12, seed)).frequency_hz for seed in range(9)]
     assert onsets == [None] * 9
-    assert np.any(worst_coupling(response_of(0.05 + 0 * LINES, LINES, 0.12).response) > 0.25)
+    assert np.any(compute_worst_coupling(response_of(0.05 + 0 * LINES, LINES, 0.12).response) > 0.25)
 
 
 def test_lines_that_are_too_noisy_are_not_judged():
@@ -102,7 +102,7 @@ def test_the_same_seed_gives_the_same_interval():
 
 def test_the_synthetic_device_couples_from_nine_hertz_on(plants, synthetic):
     fine = np.arange(8.0, 11.0, 0.002)
-    exact = worst_coupling(plants.omega_like().response(fine))
+    exact = compute_worst_coupling(plants.omega_like().response(fine))
     mean = [exact[np.abs(np.log2(fine / at)) < 1 / 24].mean() for at in fine]
     true = fine[np.argmax(np.array(mean) > 0.25)]
     found = coupling_onset(estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 30.0),)))

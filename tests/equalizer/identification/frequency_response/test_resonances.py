@@ -69,7 +69,7 @@ def test_intervals_are_as_wide_as_the_estimates_spread(found):
 
 
 def test_nothing_is_found_where_there_is_only_a_slope(plants, synthetic):
-    band = estimate_transfer((synthetic.sweeps(plants, 4.5, 8.5, 10.0),)).within(4.6, 8.4)
+    band = estimate_transfer((synthetic.sweeps(plants, 4.5, 8.5, 10.0),)).select_band(4.6, 8.4)
     assert find_resonances(band) == ()
 
 
@@ -81,4 +81,4 @@ def test_peaks_lower_than_asked_are_passed_over(plants, synthetic):
 
 def test_without_a_reliable_line_there_is_nothing_to_find(plants, synthetic):
     estimate = estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 5.0),))
-    assert find_resonances(estimate.of_lines(~estimate.reliable).within(0.0, 3.0)) == ()
+    assert find_resonances(estimate.select_lines(~estimate.reliable).select_band(0.0, 3.0)) == ()

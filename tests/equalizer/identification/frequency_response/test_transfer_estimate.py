@@ -10,7 +10,7 @@ from equalizer.identification.frequency_response.transfer_estimate import (
     TransferEstimateError,
     estimate_transfer,
 )
-from equalizer.signals.multisine import lines_between, multisines
+from equalizer.signals.multisine import list_lines_between, make_multisines
 from equalizer.signals.recording import Segment
 from equalizer.signals.signal import Signal
 
@@ -53,14 +53,14 @@ def test_the_stated_variance_is_the_variance_of_the_errors(plants, synthetic, pe
     truth, ratios = plants.omega_like(), []
     for seed in range(5):
         recording = synthetic.sweeps(plants, 4.5, 37.0, 5.0, seed=seed, periods=periods)
-        band = estimate_transfer((recording,), EstimateSettings()).within(5.0, 35.0)
+        band = estimate_transfer((recording,), EstimateSettings()).select_band(5.0, 35.0)
         ratios.append(np.abs(band.response - truth.response(band.frequency_hz)) ** 2 / band.noise_variance)
     assert lowest < np.mean(ratios) < highest
 
 
 def test_noise_that_is_ten_times_smaller_is_said_to_be(plants, synthetic):
     loud, quiet = (
-        estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 5.0, periods=3, noise=noise),)).within(5.0, 35.0)
+        estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 5.0, periods=3, noise=noise),)).select_band(5.0, 35.0)
         for noise in (1.0, 0.1)
     )
     assert np.median(loud.noise_variance / quiet.noise_variance) == pytest.approx(100.0, rel=0.05)
@@ -72,7 +72,7 @@ def test_a_smooth_estimate_of_one_period_is_at_least_as_noisy_as_the_rest_before
     samples = recording.response.samples.copy()
     samples[: synthetic.REST] = np.random.default_rng(3).standard_normal((synthetic.REST, 3)) * plants.SENSOR_RMS
     noisy = replace(recording, response=replace(recording.response, samples=samples))
-    without, with_rest = (estimate_transfer((each,)).within(5.0, 35.0) for each in (recording, noisy))
+    without, with_rest = (estimate_transfer((each,)).select_band(5.0, 35.0) for each in (recording, noisy))
     assert np.median(with_rest.noise_variance) > 20 * np.median(without.noise_variance)
 
 
@@ -116,7 +116,7 @@ def test_lines_that_drown_in_noise_are_not_reliable(plants, synthetic):
 
 
 def test_coherence_is_high_where_the_noise_is_low(plants, synthetic):
-    band = estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 5.0, periods=3),)).within(5.0, 35.0)
+    band = estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 5.0, periods=3),)).select_band(5.0, 35.0)
     assert band.coherence.min() > 0.98
 
 
@@ -127,18 +127,18 @@ def test_multisines_with_phases_of_their_own_tell_all_axes(plants, synthetic):
 
 def test_lines_that_an_odd_multisine_leaves_silent_are_left_out(plants, synthetic):
     recording = synthetic.played(plants, random_multisines(plants, odd=True), kind="multisine")
-    band = estimate_transfer((recording,)).within(5.0, 35.0)
+    band = estimate_transfer((recording,)).select_band(5.0, 35.0)
     assert np.allclose(np.round(band.frequency_hz * 5.0) % 2, 1)
     # Phases drawn at random are nearly the same in two experiments at some lines.
     assert 0.5 < band.reliable.mean() < 1.0
-    assert synthetic.errors(band.of_lines(band.reliable), plants.omega_like()).max() < 0.2
+    assert synthetic.errors(band.select_lines(band.reliable), plants.omega_like()).max() < 0.2
 
 
 def test_recordings_of_different_periods_meet_at_the_lines_that_they_share(plants, synthetic):
     long, short = (synthetic.sweeps(plants, 4.5, 37.0, seconds, seed=int(seconds)) for seconds in (6.0, 4.0))
     alone, together = estimate_transfer((long,)), estimate_transfer((long, short))
     # Every sixth of a hertz, every fourth, and once where both meet: at the halves.
-    assert len(together.within(5.0, 34.9)) == 180 + 120 - 60
+    assert len(together.select_band(5.0, 34.9)) == 180 + 120 - 60
     shared = np.isclose(together.frequency_hz * 2 % 1, 0) & together.reliable
     halves = np.isclose(alone.frequency_hz * 2 % 1, 0) & alone.reliable
     assert np.median(together.noise_variance[shared]) < 0.8 * np.median(alone.noise_variance[halves])
@@ -175,7 +175,7 @@ def test_noise_of_others_is_averaged_over_windows(plants, synthetic):
     command = np.random.default_rng(5).standard_normal((60_000, 3))
     sensor = np.random.default_rng(6).standard_normal(command.shape) * plants.SENSOR_RMS
     recording = synthetic.recording_of(command, plants.omega_like().play(command) + sensor)
-    band = estimate_transfer((recording,)).within(5.0, 35.0)
+    band = estimate_transfer((recording,)).select_band(5.0, 35.0)
     true = plants.omega_like().response(band.frequency_hz)
     assert synthetic.rms_error(band, plants.omega_like()) < 0.12
     assert 0.5 < np.mean(np.abs(band.response - true) ** 2 / band.noise_variance) < 2.0
@@ -188,7 +188,7 @@ def test_a_single_axis_device_needs_one_experiment(plants, synthetic):
     one = replace(
         synthetic.recording_of(whole.command.samples[:, :1], whole.response.samples[:, :2]), segments=whole.segments[:1]
     )
-    band = estimate_transfer((one,)).within(5.0, 35.0)
+    band = estimate_transfer((one,)).select_band(5.0, 35.0)
     true = plants.omega_like().response(band.frequency_hz)[:, :2, :1]
     assert np.abs(band.response / true - 1).max() < 1e-4
 
@@ -216,8 +216,8 @@ def test_recordings_that_do_not_belong_together_are_refused(plants, synthetic):
 
 
 def test_orthogonal_multisines_leave_no_line_without_all_directions(plants, synthetic):
-    lines = lines_between(4.5, 37.0, 5000, synthetic.RATE, odd_only=True)
-    waves = multisines(lines, 5000, 1.5, 3, 3, seed=4)
-    band = estimate_transfer((synthetic.played(plants, waves, kind="multisine"),)).within(5.0, 35.0)
+    lines = list_lines_between(4.5, 37.0, 5000, synthetic.RATE, odd_only=True)
+    waves = make_multisines(lines, 5000, 1.5, 3, 3, seed=4)
+    band = estimate_transfer((synthetic.played(plants, waves, kind="multisine"),)).select_band(5.0, 35.0)
     assert band.reliable.all()
     assert synthetic.errors(band, plants.omega_like()).max() < 0.06

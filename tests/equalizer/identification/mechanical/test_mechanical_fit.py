@@ -8,7 +8,11 @@ from scipy.linalg import expm
 
 from equalizer.identification.mechanical.mechanical_fit import fit_mechanical_model
 from equalizer.identification.mechanical.mechanical_fit_result import MechanicalFitRefused, MechanicalFitSettings
-from equalizer.identification.mechanical.mechanical_response import free_response, pole_form, sample_response
+from equalizer.identification.mechanical.mechanical_response import (
+    compute_free_response,
+    compute_pole_form,
+    compute_sampled_response,
+)
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
 from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.signal import Signal
@@ -175,7 +179,7 @@ def test_sampled_responses_agree_with_stepping(two_axes):
         settled = stepped(M, D, K, model.input, model.output, quantity, commands)[-1000:]
         lines = np.arange(2, 300)
         measured = np.fft.rfft(settled, axis=0)[lines] / np.fft.rfft(commands[-1000:, 0])[lines, None]
-        found = sample_response(model, lines * RATE_HZ / 1000, RATE_HZ, Hold.ZERO_ORDER)[:, :, 0]
+        found = compute_sampled_response(model, lines * RATE_HZ / 1000, RATE_HZ, Hold.ZERO_ORDER)[:, :, 0]
         np.testing.assert_allclose(found, measured, atol=2e-3 * np.abs(measured).max())
 
 
@@ -184,7 +188,7 @@ def test_the_sensor_pole_is_the_recursion_of_the_format():
     lagging = replace(model, sensor=SensorLimits(bandwidth_hz=40.0))
     lines = np.array([3.0, 60.0])
     step = 1 - np.exp(-2 * np.pi * 40 / RATE_HZ)
-    ratio = sample_response(lagging, lines, RATE_HZ, Hold.ZERO_ORDER) / sample_response(
+    ratio = compute_sampled_response(lagging, lines, RATE_HZ, Hold.ZERO_ORDER) / compute_sampled_response(
         model, lines, RATE_HZ, Hold.ZERO_ORDER
     )
     expected = step / (1 - (1 - step) * np.exp(-2j * np.pi * lines / RATE_HZ))
@@ -196,12 +200,14 @@ def test_a_whole_sample_of_delay_is_one_turn_of_z():
     lines = np.array([1.0, 70.0])
     late = replace(model, actuator=ActuatorLimits(delay_s=1 / RATE_HZ))
     for hold in Hold:
-        ratio = sample_response(late, lines, RATE_HZ, hold) / sample_response(model, lines, RATE_HZ, hold)
+        ratio = compute_sampled_response(late, lines, RATE_HZ, hold) / compute_sampled_response(
+            model, lines, RATE_HZ, hold
+        )
         np.testing.assert_allclose(ratio[:, 0, 0], np.exp(-2j * np.pi * lines / RATE_HZ))
 
 
 def test_fits_have_no_pole_that_grows(two_axes):
-    assert pole_form(two_axes[0].model).poles.real.max() <= 1e-6
+    assert compute_pole_form(two_axes[0].model).poles.real.max() <= 1e-6
 
 
 def test_modes_that_the_sensor_sees_otherwise_are_fitted_by_shapes_of_their_own():
@@ -290,4 +296,4 @@ def test_a_motor_axis_with_friction_is_within_a_fifth_of_its_known_mass(shared):
 def test_a_model_that_runs_away_within_a_sample_answers_with_numbers():
     model = MechanicalModel("thrown", "position", 1e-9 * np.eye(1), np.eye(1), np.eye(1), np.eye(1), np.eye(1))
     thrown = replace(model, damping=-np.eye(1))
-    assert np.isfinite(free_response(thrown, np.array([1.0, 70.0]), RATE_HZ)).all()
+    assert np.isfinite(compute_free_response(thrown, np.array([1.0, 70.0]), RATE_HZ)).all()

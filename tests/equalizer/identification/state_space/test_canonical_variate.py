@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from equalizer.identification.state_space.canonical_variate import (
-    canonical_variate,
-    decimation_factor,
-    driven_records,
-    poles_and_shapes,
+    choose_decimation_factor,
+    collect_driven_records,
+    estimate_observability,
+    estimate_poles_and_shapes,
 )
 from equalizer.signals.recording import Segment
 
@@ -31,8 +31,8 @@ def pole_error(form, plant):
 
 
 def test_poles_of_a_small_plant_are_recovered_from_one_record(plant):
-    observed = canonical_variate([record(plant, 4000, 1, 1e-6)], 3, 6)
-    assert pole_error(poles_and_shapes(observed, 3, 6, 1, 0.9999), plant) < 1e-5
+    observed = estimate_observability([record(plant, 4000, 1, 1e-6)], 3, 6)
+    assert pole_error(estimate_poles_and_shapes(observed, 3, 6, 1, 0.9999), plant) < 1e-5
 
 
 def test_records_are_not_joined_where_they_do_not_meet(plant):
@@ -40,7 +40,7 @@ def test_records_are_not_joined_where_they_do_not_meet(plant):
     short = [record(plant, 800, seed, 1.0) for seed in range(10)]
     long = [record(plant, 8000, 50, 1.0)]
     errors = [
-        pole_error(poles_and_shapes(canonical_variate(records, 3, 8), 3, 6, 1, 0.9999), plant)
+        pole_error(estimate_poles_and_shapes(estimate_observability(records, 3, 8), 3, 6, 1, 0.9999), plant)
         for records in (short, long)
     ]
     assert errors[0] < 2.5 * errors[1]
@@ -50,7 +50,7 @@ def test_records_are_not_joined_where_they_do_not_meet(plant):
 def test_a_decimated_pole_becomes_its_root():
     pole = np.exp((-9 + 60j) / 1000)
     observed = np.vstack([[[1.0, 0.0]] @ np.linalg.matrix_power(turned(pole**8), k) for k in range(6)])
-    form = poles_and_shapes(observed, 1, 2, 8, 0.9999)
+    form = estimate_poles_and_shapes(observed, 1, 2, 8, 0.9999)
     np.testing.assert_allclose(np.sort_complex(form.poles), np.sort_complex([pole, pole.conjugate()]), atol=1e-12)
 
 
@@ -59,13 +59,13 @@ def turned(pole):
 
 
 def test_the_rate_is_brought_down_to_the_band():
-    assert decimation_factor(1000.0, 35.0) == 8
-    assert decimation_factor(1000.0, 450.0) == 1
+    assert choose_decimation_factor(1000.0, 35.0) == 8
+    assert choose_decimation_factor(1000.0, 450.0) == 1
 
 
 def test_test_segments_rest_and_holes_are_left_out(plants, synthetic):
     recording = synthetic.sweeps(plants, 4.5, 37.0, 2.0)
-    assert [len(part) for part in driven_records([recording], 8)] == [500, 500, 500]
+    assert [len(part) for part in collect_driven_records([recording], 8)] == [500, 500, 500]
     first, second, third = recording.segments
     holes = recording.response.samples.copy()
     holes[third.start + 5] = np.nan
@@ -74,9 +74,9 @@ def test_test_segments_rest_and_holes_are_left_out(plants, synthetic):
         response=replace(recording.response, samples=holes),
         segments=(replace(first, role="test"), second, third, Segment(0, 1000, "rest")),
     )
-    assert len(driven_records([changed], 8)) == 1
+    assert len(collect_driven_records([changed], 8)) == 1
 
 
 def test_too_short_records_give_no_start(plant):
-    assert canonical_variate([record(plant, 100, 1, 0.1)], 3, 16) is None
-    assert canonical_variate([], 3, 16) is None
+    assert estimate_observability([record(plant, 100, 1, 0.1)], 3, 16) is None
+    assert estimate_observability([], 3, 16) is None

@@ -24,7 +24,7 @@ def refusal(response, settings=SETTINGS) -> str:
 
 
 def test_good_data_are_not_refused(good):
-    assert identify(good, SETTINGS).lines == len(good.within(5.0, 35.0))
+    assert identify(good, SETTINGS).lines == len(good.select_band(5.0, 35.0))
 
 
 @pytest.mark.parametrize("told", [True, False])
@@ -58,13 +58,13 @@ def test_a_band_that_is_wider_than_the_sweep(good):
 
 def test_a_hole_in_the_band(good):
     hole = (good.frequency_hz < 12) | (good.frequency_hz > 18)
-    text = refusal(good.of_lines(hole))
+    text = refusal(good.select_lines(hole))
     assert "between 11.8 and 18 Hz no line can be used" in text
     assert "a band that the lines cover (5 to 11.8 Hz)" in text
 
 
 def test_a_single_line(good):
-    assert "no line can be used" in refusal(good.within(20.0, 20.1))
+    assert "no line can be used" in refusal(good.select_band(20.0, 20.1))
 
 
 def test_an_input_that_no_experiment_drove(good):

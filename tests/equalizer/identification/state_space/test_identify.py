@@ -111,7 +111,7 @@ def test_records_of_something_else_are_refused(plants, synthetic, response):
 
 
 def test_a_fit_by_cancellation_is_chosen_last_and_named(response, found):
-    assert found.chosen.sane
+    assert found.chosen.has_acceptable_gain
     wild = [replace(found.chosen, outside_gain=1e4, cost=0.1), found.chosen]
     assert choose_best(wild) is found.chosen
     assert choose_best(wild[:1]) is wild[0]

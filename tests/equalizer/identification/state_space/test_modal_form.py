@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from equalizer.identification.state_space.modal_form import ModalForm, from_poles, modal_form
+from equalizer.identification.state_space.modal_form import ModalForm, compute_modal_form, from_poles
 
 
 @given(seed=st.integers(0, 10_000), order=st.sampled_from([2, 4, 8]))
@@ -13,7 +13,7 @@ from equalizer.identification.state_space.modal_form import ModalForm, from_pole
 def test_a_model_in_blocks_keeps_its_poles_and_what_its_outputs_see(seed, order):
     random = np.random.default_rng(seed)
     A, C = random.standard_normal((order, order)), random.standard_normal((2, order))
-    form = modal_form(A, C)
+    form = compute_modal_form(A, C)
     np.testing.assert_allclose(np.sort_complex(form.poles), np.sort_complex(np.linalg.eigvals(A)), atol=1e-9)
     # Same A and C up to a change of states: what one sees of any state over time spans the same space.
     observed, in_blocks = (
@@ -30,8 +30,8 @@ def test_both_sides_of_the_resolvent_agree_with_a_dense_solution(b):
     form = ModalForm(np.array([0.5, -0.2]), np.array(b), random.standard_normal((3, 4)))
     B, z = random.standard_normal((4, 2)), np.exp(1j * np.array([0.1, 1.0, 2.0]))
     inverse = np.linalg.inv(z[:, None, None] * np.eye(4) - form.state_matrix)
-    np.testing.assert_allclose(form.from_states(z), form.C @ inverse, atol=1e-12)
-    np.testing.assert_allclose(form.to_states(z, B), inverse @ B, atol=1e-12)
+    np.testing.assert_allclose(form.compute_state_outputs(z), form.C @ inverse, atol=1e-12)
+    np.testing.assert_allclose(form.compute_state_responses(z, B), inverse @ B, atol=1e-12)
 
 
 def test_poles_that_form_no_pairs_are_refused():

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from equalizer.identification.state_space.modal_form import ModalForm, modal_form
+from equalizer.identification.state_space.modal_form import ModalForm, compute_modal_form
 from equalizer.identification.state_space.refinement import complete_form, refine, solve_input_matrices
-from equalizer.identification.state_space.stable_poles import largest_radius
+from equalizer.identification.state_space.stable_poles import compute_pole_radius
 from equalizer.identification.state_space.weighted_lines import weight_lines
 
-RADIUS = largest_radius(0.5, 1000.0)
+RADIUS = compute_pole_radius(0.5, 1000.0)
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def lines(measuring, plant):
 
 
 def disturbed(plant, seed, size):
-    form = modal_form(plant.A, plant.C)
+    form = compute_modal_form(plant.A, plant.C)
     random = np.random.default_rng(seed)
     shaken = [part * (1 + size * random.standard_normal(part.shape)) for part in (form.b, form.C)]
     return ModalForm(form.a, *shaken)
@@ -31,9 +31,11 @@ def disturbed(plant, seed, size):
 
 def test_input_matrices_are_exact_where_poles_and_outputs_are(measuring, plant):
     exact = weight_lines([measuring.exact(plant, np.arange(5, 35, 0.2))], (5.0, 35.0))
-    form = modal_form(plant.A, plant.C)
+    form = compute_modal_form(plant.A, plant.C)
     B, D = solve_input_matrices(form, exact)
-    assert np.abs(form.from_states(exact.z) @ B + D - exact.response).max() < 1e-9 * np.abs(exact.response).max()
+    assert (
+        np.abs(form.compute_state_outputs(exact.z) @ B + D - exact.response).max() < 1e-9 * np.abs(exact.response).max()
+    )
     assert np.abs(D).max() < 1e-8 * np.abs(exact.response).max()
 
 
@@ -45,10 +47,12 @@ def test_a_general_optimizer_finds_nothing_cheaper(plant, lines):
     def residuals(numbers):
         a, b, C, B, D = np.split(numbers, [3, 6, 24, 42])
         form = ModalForm(a, b, C.reshape(3, 6))
-        errors = (form.from_states(lines.z) @ B.reshape(6, 3) + D.reshape(3, 3) - lines.response) * lines.weight
+        errors = (
+            form.compute_state_outputs(lines.z) @ B.reshape(6, 3) + D.reshape(3, 3) - lines.response
+        ) * lines.weight
         return np.concatenate([errors.real.ravel(), errors.imag.ravel()])
 
-    ours = lines.cost(found.response(lines.z))
+    ours = lines.compute_cost(found.compute_response(lines.z))
     for each in (found, complete_form(start, lines)):
         numbers = np.concatenate([part.ravel() for part in (each.form.a, each.form.b, each.form.C, each.B, each.D)])
         theirs = 2 * least_squares(residuals, numbers, x_scale="jac", max_nfev=60).cost
@@ -57,24 +61,26 @@ def test_a_general_optimizer_finds_nothing_cheaper(plant, lines):
 
 def test_a_step_is_taken_only_if_it_lowers_the_cost(plant, lines):
     start = disturbed(plant, 2, 0.05)
-    costs = [lines.cost(refine(start, lines, RADIUS, steps).response(lines.z)) for steps in (1, 2, 4, 8, 30)]
+    costs = [
+        lines.compute_cost(refine(start, lines, RADIUS, steps).compute_response(lines.z)) for steps in (1, 2, 4, 8, 30)
+    ]
     assert costs == sorted(costs, reverse=True)
-    assert costs[-1] < 0.5 * lines.cost(complete_form(start, lines).response(lines.z))
+    assert costs[-1] < 0.5 * lines.compute_cost(complete_form(start, lines).compute_response(lines.z))
 
 
 def test_the_bound_holds_where_the_data_ask_for_a_slower_pole(measuring, plant):
     lines = weight_lines([measuring.exact(plant, np.arange(5, 35, 0.2))], (5.0, 35.0))
-    radius = largest_radius(0.02, 1000.0)
+    radius = compute_pole_radius(0.02, 1000.0)
     assert np.abs(np.linalg.eigvals(plant.A)).max() > radius
-    found = refine(modal_form(0.9 * plant.A, plant.C), lines, radius)
+    found = refine(compute_modal_form(0.9 * plant.A, plant.C), lines, radius)
     assert np.abs(found.form.poles).max() <= radius * (1 + 1e-7)
 
 
 def test_states_that_nothing_shows_do_not_stop_the_search(plant, lines):
-    known = modal_form(plant.A, plant.C)
+    known = compute_modal_form(plant.A, plant.C)
     twice = ModalForm(
         np.append(known.a, known.a[0]), np.append(known.b, known.b[0]), np.hstack([known.C, 0 * known.C[:, :2]])
     )
     found = refine(twice, lines, RADIUS)
     assert np.isfinite(found.B).all()
-    assert lines.cost(found.response(lines.z)) / lines.response.size < 1.05
+    assert lines.compute_cost(found.compute_response(lines.z)) / lines.response.size < 1.05

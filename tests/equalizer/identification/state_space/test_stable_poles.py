@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from equalizer.identification.state_space.stable_poles import largest_radius, stabilise_blocks, stabilise_poles
+from equalizer.identification.state_space.stable_poles import compute_pole_radius, stabilise_blocks, stabilise_poles
 
 PARTS = st.floats(-3, 3)
 
 
 def test_a_pole_at_the_bound_falls_to_one_over_e_in_the_time_given():
-    assert largest_radius(0.5, 1000.0) ** 500 == pytest.approx(np.exp(-1))
+    assert compute_pole_radius(0.5, 1000.0) ** 500 == pytest.approx(np.exp(-1))
 
 
 def test_an_unstable_pole_is_mirrored_and_a_stable_one_left_alone():

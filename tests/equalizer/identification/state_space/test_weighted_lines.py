@@ -7,9 +7,9 @@ import pytest
 
 from equalizer.identification.state_space.weighted_lines import (
     average_bins,
-    bin_centres_hz,
+    compute_bin_centres_hz,
+    estimate_scatter_variance,
     group_lines,
-    scatter_variance,
     weight_lines,
 )
 
@@ -28,7 +28,7 @@ def test_all_reliable_lines_of_the_band_are_taken_and_weighted_by_their_noise(pl
 def test_noise_that_is_not_told_is_read_from_the_scatter_of_neighbours(plants, measuring):
     plant = measuring.small_plant(plants)
     noisy = measuring.noisy(plant, np.arange(5, 35, 0.02), 0.5, seed=1)
-    assert scatter_variance(noisy.response).mean() == pytest.approx(0.25, rel=0.1)
+    assert estimate_scatter_variance(noisy.response).mean() == pytest.approx(0.25, rel=0.1)
     untold = replace(noisy, noise_variance=np.full_like(noisy.noise_variance, np.nan))
     assert weight_lines([untold], (5.0, 35.0)).weight.mean() == pytest.approx(2.0, rel=0.1)
 
@@ -37,7 +37,7 @@ def test_bins_about_the_truth_hold_the_truth_at_a_resonance(plants, measuring):
     plant = measuring.small_plant(plants)
     lines = weight_lines([measuring.exact(plant, np.arange(5, 35, 0.1))], (5.0, 35.0))
     bins = group_lines(lines, 5, 0.0)
-    middles = bin_centres_hz(lines, bins)
+    middles = compute_bin_centres_hz(lines, bins)
     truth = plant.response(middles)
     about = average_bins(lines, bins, plant.response(lines.frequency_hz), truth)
     np.testing.assert_allclose(about.response, truth, rtol=1e-9)

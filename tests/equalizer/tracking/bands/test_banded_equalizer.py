@@ -100,8 +100,8 @@ def above_band(played, wanted):
 
 def test_an_impact_with_content_above_the_band_is_played_as_strongly_as_wanted(band_model, low, high, impact, in_time):
     split = LinearPhaseSplit(BandEdges(), RATE_HZ, 4.0)
-    banded = in_time(BandedEqualizer(band_model, split, low, high).play(impact), impact)
-    plain = in_time(BandedEqualizer(band_model, LinearPhaseSplit(WHOLE, RATE_HZ)).play(impact), impact)
+    banded = in_time(BandedEqualizer(band_model, split, low, high).compute_forces(impact), impact)
+    plain = in_time(BandedEqualizer(band_model, LinearPhaseSplit(WHOLE, RATE_HZ)).compute_forces(impact), impact)
     assert above_band(*plain) > 5
     assert above_band(*banded) == pytest.approx(1.0, abs=0.03)
     assert in_band_error(*banded) < 0.005 < in_band_error(*plain)
@@ -117,7 +117,7 @@ def test_the_split_leaves_the_middle_band_flat_and_without_coupling(device, band
     equalizer = BandedEqualizer(band_model, LinearPhaseSplit(BandEdges(), RATE_HZ), low, high)
     for axis in range(3):
         wanted = wave[:, None] * np.eye(3)[axis]
-        found = equalizer.play(wanted)
+        found = equalizer.compute_forces(wanted)
         middle = device.play(found.entering)[found.rows_of_wanted(len(wanted))][period : 2 * period]
         delivered[:, :, axis] = np.fft.rfft(middle, axis=0)[lines] / spectrum[lines, None]
     found = measure_quality(delivered)
@@ -129,9 +129,9 @@ def test_from_a_contact_on_a_wide_band_model_beats_the_causal_split(
     band_model, device_model, low, high, impact, in_time
 ):
     split = CausalSplit(BandEdges(), RATE_HZ)
-    banded = in_time(BandedEqualizer(band_model, split, low, high).play(impact), impact)
-    plain = in_time(BandedEqualizer(band_model, CausalSplit(WHOLE, RATE_HZ)).play(impact), impact)
-    wide = in_time(BandedEqualizer(device_model, CausalSplit(WHOLE, RATE_HZ)).play(impact), impact)
+    banded = in_time(BandedEqualizer(band_model, split, low, high).compute_forces(impact), impact)
+    plain = in_time(BandedEqualizer(band_model, CausalSplit(WHOLE, RATE_HZ)).compute_forces(impact), impact)
+    wide = in_time(BandedEqualizer(device_model, CausalSplit(WHOLE, RATE_HZ)).compute_forces(impact), impact)
 
     def error(pair):
         return np.linalg.norm(pair[0] - pair[1]) / np.linalg.norm(pair[1])
@@ -144,11 +144,11 @@ def test_latency_is_that_of_the_split_and_of_the_room_before(band_model, low, hi
     at_once = BandedEqualizer(band_model, CausalSplit(BandEdges(), RATE_HZ), low, high)
     only_above = BandedEqualizer(band_model, LinearPhaseSplit(BandEdges(None, 36.0), RATE_HZ, 4.0), None, high)
     assert [late.latency_ms, only_above.latency_ms, at_once.latency_ms] == pytest.approx([2364, 754, 0])
-    assert late.play(impact).latency_samples == 2364
+    assert late.compute_forces(impact).latency_samples == 2364
 
 
 def test_the_predicted_acceleration_is_that_of_the_device(band_model, low, high, impact, in_time):
-    found = BandedEqualizer(band_model, LinearPhaseSplit(BandEdges(), RATE_HZ, 4.0), low, high).play(impact)
+    found = BandedEqualizer(band_model, LinearPhaseSplit(BandEdges(), RATE_HZ, 4.0), low, high).compute_forces(impact)
     played, _ = in_time(found, impact)
     assert np.linalg.norm(found.predicted_total - played) < 1e-3 * np.linalg.norm(played)
     assert np.allclose(sum(found.by_band), found.entering)
@@ -157,22 +157,22 @@ def test_the_predicted_acceleration_is_that_of_the_device(band_model, low, high,
 @pytest.mark.slow
 def test_above_the_cap_is_refused_or_solved_for(band_model, high, impact):
     equalizer = BandedEqualizer(band_model, LinearPhaseSplit(BandEdges(None, 36.0), RATE_HZ, 8.0), None, high)
-    free = equalizer.play(impact)
+    free = equalizer.compute_forces(impact)
     peak_n = float(np.linalg.norm(free.entering, axis=1).max())
     with pytest.raises(ForceLimitError, match="nothing was clipped"):
-        equalizer.play(impact, CapPolicy(0.8 * peak_n))
-    capped = equalizer.play(impact, CapPolicy(0.8 * peak_n, constrain=True))
+        equalizer.compute_forces(impact, CapPolicy(0.8 * peak_n))
+    capped = equalizer.compute_forces(impact, CapPolicy(0.8 * peak_n, constrain=True))
     assert np.linalg.norm(capped.entering, axis=1).max() <= 0.8 * peak_n
     assert capped.loss.error_free < capped.loss.error_capped < capped.loss.error_clipped
-    assert equalizer.play(impact, CapPolicy(1.01 * peak_n)).peaks.fits
+    assert equalizer.compute_forces(impact, CapPolicy(1.01 * peak_n)).peaks.is_under_cap
 
 
 def test_a_stylus_takes_force_off_the_motors(band_model, high, impact):
     lines = np.arange(40.0, 450.0, 5.0)
     stylus = StylusActuator(lines, np.full(len(lines), 30 + 5j), 50.0, 10.0)
     split = LinearPhaseSplit(BandEdges(None, 36.0), RATE_HZ, 4.0)
-    without = BandedEqualizer(band_model, split, None, high).play(impact)
-    with_it = BandedEqualizer(band_model, split, None, HighBand(high.source, stylus=stylus)).play(impact)
+    without = BandedEqualizer(band_model, split, None, high).compute_forces(impact)
+    with_it = BandedEqualizer(band_model, split, None, HighBand(high.source, stylus=stylus)).compute_forces(impact)
     assert with_it.stylus.command.shape == (len(with_it.commands),)
     assert np.linalg.norm(with_it.by_band[2]) < 0.8 * np.linalg.norm(without.by_band[2])
 
@@ -188,12 +188,12 @@ def test_the_rendered_spring_is_left_its_part(band_model, low, high):
     t, spring = np.arange(2000) / RATE_HZ, VirtualSpring(200.0, 3.0)
     wanted = (np.sin(2 * np.pi * 10 * t) * np.hanning(2000))[:, None] * np.array([1.0, 0, 0])
     split = LinearPhaseSplit(BandEdges(), RATE_HZ, 4.0)
-    found = BandedEqualizer(band_model, split, low, high, spring=spring).play(wanted)
+    found = BandedEqualizer(band_model, split, low, high, spring=spring).compute_forces(wanted)
     by_spring = (found.entering - found.commands)[found.rows_of_wanted(2000)]
     turning = np.exp(-2j * np.pi * 10 * t)
     expected = spring.force_per_acceleration(np.array([10.0]))[0] * (turning @ wanted[:, 0])
     assert abs(turning @ by_spring[:, 0] - expected) < 0.01 * abs(expected)
-    bare = BandedEqualizer(band_model, split, low, high).play(wanted)
+    bare = BandedEqualizer(band_model, split, low, high).compute_forces(wanted)
     assert np.array_equal(bare.commands, bare.entering)
     assert np.allclose(bare.entering, found.entering)
 

@@ -6,8 +6,8 @@ from equalizer.tracking.bands.high_band import (
     HighBandSettings,
     MeasuredResponse,
     ModelledResponse,
-    high_band_forces,
-    minimum_phase,
+    compute_high_band_forces,
+    compute_minimum_phase,
     predict_acceleration,
     project_to_one_dof,
     reduce_to_one_dof,
@@ -52,14 +52,14 @@ def test_one_degree_of_freedom_at_once_keeps_energy_and_onset():
 
 @pytest.mark.parametrize("shared", [True, False])
 def test_the_device_vibrates_as_strongly_as_wanted_at_every_line(plants, source, burst, shared):
-    forces = high_band_forces(burst, RATE_HZ, source, settings=HighBandSettings(shared=shared)).forces
+    forces = compute_high_band_forces(burst, RATE_HZ, source, settings=HighBandSettings(shared=shared)).forces
     played, wanted = levels(plants.omega_like().play(forces)), levels(burst)
     strong = wanted > 0.05 * wanted.max()
     assert np.abs(20 * np.log10(played / wanted)[strong]).max() < 1.0
 
 
 def test_from_a_contact_on_no_force_comes_early_and_the_level_is_matched(plants, source, burst):
-    found = high_band_forces(burst, RATE_HZ, source, settings=HighBandSettings(causal=True))
+    found = compute_high_band_forces(burst, RATE_HZ, source, settings=HighBandSettings(causal=True))
     assert np.abs(found.forces[:1490]).max() < 1e-6 * np.abs(found.forces).max()
     played, wanted = levels(plants.omega_like().play(found.forces)), levels(burst)
     strong = wanted > 0.05 * wanted.max()
@@ -67,19 +67,19 @@ def test_from_a_contact_on_no_force_comes_early_and_the_level_is_matched(plants,
 
 
 def test_the_direction_with_the_least_peak_force_is_taken(source, burst):
-    single = high_band_forces(burst, RATE_HZ, source, settings=HighBandSettings(shared=False))
-    shared = high_band_forces(burst, RATE_HZ, source)
+    single = compute_high_band_forces(burst, RATE_HZ, source, settings=HighBandSettings(shared=False))
+    shared = compute_high_band_forces(burst, RATE_HZ, source)
     assert single.peak_n == single.peak_by_axis_n.min() < 0.8 * single.peak_by_axis_n.max()
     assert shared.peak_n < single.peak_n
     assert np.linalg.norm(shared.direction) == pytest.approx(1)
 
 
 def test_an_axis_that_is_near_its_limit_is_spared(source, burst):
-    alone = high_band_forces(burst, RATE_HZ, source, settings=HighBandSettings(shared=False))
+    alone = compute_high_band_forces(burst, RATE_HZ, source, settings=HighBandSettings(shared=False))
     busy = int(np.abs(alone.direction).argmax())
     others = np.zeros((len(burst), 3))
     others[:, busy] = 4 * alone.peak_n
-    beside = high_band_forces(burst, RATE_HZ, source, others, HighBandSettings(shared=False))
+    beside = compute_high_band_forces(burst, RATE_HZ, source, others, HighBandSettings(shared=False))
     assert int(np.abs(beside.direction).argmax()) != busy
     assert beside.peak_n < np.linalg.norm(alone.forces + others, axis=1).max()
     assert beside.peak_n == pytest.approx(np.linalg.norm(beside.forces + others, axis=1).max())
@@ -88,20 +88,20 @@ def test_an_axis_that_is_near_its_limit_is_spared(source, burst):
 def test_a_response_measured_at_lines_serves_like_a_model(device_model, source, burst):
     lines = np.arange(1.0, 500.0, 0.25)
     measured = MeasuredResponse(lines, model_response(device_model, lines))
-    by_lines = high_band_forces(burst, RATE_HZ, measured, settings=HighBandSettings(shared=False)).forces
-    by_model = high_band_forces(burst, RATE_HZ, source, settings=HighBandSettings(shared=False)).forces
+    by_lines = compute_high_band_forces(burst, RATE_HZ, measured, settings=HighBandSettings(shared=False)).forces
+    by_model = compute_high_band_forces(burst, RATE_HZ, source, settings=HighBandSettings(shared=False)).forces
     assert np.linalg.norm(by_lines - by_model) < 0.02 * np.linalg.norm(by_model)
 
 
 def test_what_is_delivered_is_what_the_device_plays(plants, source, burst):
-    forces = high_band_forces(burst, RATE_HZ, source).forces
+    forces = compute_high_band_forces(burst, RATE_HZ, source).forces
     played = plants.omega_like().play(forces)
     assert np.linalg.norm(predict_acceleration(forces, RATE_HZ, source) - played) < 1e-6 * np.linalg.norm(played)
 
 
 def test_minimum_phase_keeps_the_gain_and_is_causal():
     gain = 1 / (0.1 + np.abs(1 - 0.9 * np.exp(-2j * np.pi * LINES_HZ / RATE_HZ)))
-    response = minimum_phase(gain)
+    response = compute_minimum_phase(gain)
     assert np.abs(response) == pytest.approx(gain, rel=1e-9)
     impulse = np.fft.irfft(response, 4096)
     assert np.abs(impulse[2048:]).max() < 1e-6 * np.abs(impulse).max()
@@ -112,7 +112,7 @@ def test_from_a_contact_on_a_device_that_gives_nothing_at_0_hz_is_played(burst):
     turning = 2 * np.pi * lines
     gain = -(turning**2) / (200 + 3j * turning - 0.3 * turning**2)
     measured = MeasuredResponse(lines, gain[:, None, None] * np.eye(3))
-    found = high_band_forces(burst, RATE_HZ, measured, settings=HighBandSettings(causal=True))
+    found = compute_high_band_forces(burst, RATE_HZ, measured, settings=HighBandSettings(causal=True))
     played = predict_acceleration(found.forces, RATE_HZ, measured)
     assert np.linalg.norm(played) == pytest.approx(np.linalg.norm(burst), rel=0.01)
 

@@ -15,7 +15,7 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 from equalizer.tracking.compensation.effect_compensation import compensate
 from equalizer.tracking.compensation.effect_roles import IN_MODEL, SENSOR_REASON
-from equalizer.tracking.compensation.known_forces import LAWS, deadband_share, equivalent_impedance
+from equalizer.tracking.compensation.known_forces import LAWS, compute_deadband_share, compute_equivalent_impedance
 from equalizer.tracking.compensation.subtract_effects import subtract_effects
 from equalizer.tracking.feedforward.band_part import band_part
 from equalizer.tracking.feedforward.planned_motion import integrate_motion
@@ -224,12 +224,12 @@ def test_a_motion_about_a_resting_place_needs_a_band_above_zero(wanted):
 
 def test_equivalents_are_those_of_the_literature():
     lines, speed = np.array([5.0, 20.0]), np.array([0.02, 0.05])
-    coulomb = equivalent_impedance(LAWS["coulomb_friction"], {"level": 0.1}, lines, speed, 1e-4)
+    coulomb = compute_equivalent_impedance(LAWS["coulomb_friction"], {"level": 0.1}, lines, speed, 1e-4)
     np.testing.assert_allclose(coulomb, 4 * 0.1 / (np.pi * speed), rtol=1e-3)
-    cubic = equivalent_impedance(LAWS["hardening_stiffness"], {"k3": 1e5}, lines, speed, 1e-4)
+    cubic = compute_equivalent_impedance(LAWS["hardening_stiffness"], {"k3": 1e5}, lines, speed, 1e-4)
     reach = speed / (2 * np.pi * lines)
     np.testing.assert_allclose(cubic, 0.75e5 * reach**2 / (2j * np.pi * lines), rtol=1e-9)
-    drag = equivalent_impedance(LAWS["quadratic_damping"], {"coefficient": 3.0}, lines, speed, 1e-4)
+    drag = compute_equivalent_impedance(LAWS["quadratic_damping"], {"coefficient": 3.0}, lines, speed, 1e-4)
     np.testing.assert_allclose(drag, 8 / (3 * np.pi) * 3.0 * speed, rtol=1e-4)
 
 
@@ -254,8 +254,8 @@ def test_other_frictions_have_their_shape():
 
 
 def test_a_dead_band_wider_than_the_amplitude_lets_nothing_through():
-    assert deadband_share({"width": 0.5}, 0.4) == 0
-    assert deadband_share({"width": 0.0}, 0.4) == 1
+    assert compute_deadband_share({"width": 0.5}, 0.4) == 0
+    assert compute_deadband_share({"width": 0.0}, 0.4) == 1
 
 
 @pytest.mark.parametrize("jump", [0.0, 0.4, 1.0])
@@ -263,7 +263,9 @@ def test_a_dead_bands_describing_function_is_its_fundamental(jump):
     angle = np.linspace(0, 2 * np.pi, 10_000, endpoint=False)
     wave = np.sin(angle)
     through = np.where(np.abs(wave) > 0.3, wave - (1 - jump) * 0.3 * np.sign(wave), 0.0)
-    assert deadband_share({"width": 0.3, "jump": jump}, 1.0) == pytest.approx(2 * np.mean(through * wave), rel=1e-3)
+    assert compute_deadband_share({"width": 0.3, "jump": jump}, 1.0) == pytest.approx(
+        2 * np.mean(through * wave), rel=1e-3
+    )
 
 
 def test_only_whole_recordings_of_accelerations_can_be_freed(rubbing, plants):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from equalizer.laws.evaluate import evaluate
-from equalizer.laws.law import law_of
+from equalizer.laws.law import parse_law
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
@@ -36,7 +36,7 @@ def physics(*effects: ModelEffect) -> MechanicalModel:
 
 
 def found(text: str, acts_on: str = "force") -> ModelEffect:
-    return ModelEffect("discovered_law", "y", {}, law_of(text, acts_on, "y"))
+    return ModelEffect("discovered_law", "y", {}, parse_law(text, acts_on, "y"))
 
 
 SAME = [

@@ -61,7 +61,7 @@ def test_forces_above_the_cap_are_refused_with_the_factor_that_fits(model, noise
     with pytest.raises(ForceLimitError, match="above the cap of 3 N") as refusal:
         feedforward(model, loud)
     factor = refusal.value.peaks.largest_scale
-    assert feedforward(model, replace(loud, samples=0.999 * factor * loud.samples)).peaks.fits
+    assert feedforward(model, replace(loud, samples=0.999 * factor * loud.samples)).peaks.is_under_cap
 
 
 def test_forces_above_the_cap_are_solved_under_it_with_the_loss_stated(model, noise):

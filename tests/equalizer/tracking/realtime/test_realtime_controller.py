@@ -6,12 +6,16 @@ import pytest
 from equalizer.tracking.lqr.lqr import stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingError
 from equalizer.tracking.realtime.controller_cases import controller_cases
-from equalizer.tracking.realtime.realtime_controller import RealtimeSettings, realtime_controller, tap
+from equalizer.tracking.realtime.realtime_controller import (
+    RealtimeSettings,
+    make_default_transient,
+    make_realtime_controller,
+)
 
 
 @pytest.fixture(scope="module")
 def controller(device_model):
-    return realtime_controller(device_model, settings=RealtimeSettings(preview_s=0.05))
+    return make_realtime_controller(device_model, settings=RealtimeSettings(preview_s=0.05))
 
 
 def test_a_stream_is_the_preview_tracker_one_sample_after_the_other(controller):
@@ -28,7 +32,7 @@ def test_a_stream_is_the_preview_tracker_one_sample_after_the_other(controller):
 
 def test_a_stream_is_played_late_by_its_preview_less_a_sample(device_model):
     """In the middle of the band, where the causal split hardly touches what is wanted."""
-    controller = realtime_controller(device_model, settings=RealtimeSettings(preview_s=0.2))
+    controller = make_realtime_controller(device_model, settings=RealtimeSettings(preview_s=0.2))
     time_s = np.arange(3000) / 1000
     wanted = np.zeros((3000, 3))
     wanted[:, 1] = np.sin(2 * np.pi * 15 * time_s)
@@ -41,7 +45,7 @@ def test_a_stream_is_played_late_by_its_preview_less_a_sample(device_model):
 
 
 def test_the_transient_is_the_best_forces_for_the_table_with_room_behind_it(controller, device_model):
-    wanted = np.pad(tap(device_model), ((0, 300), (0, 0)))
+    wanted = np.pad(make_default_transient(device_model), ((0, 300), (0, 0)))
     assert len(controller.transient) == len(wanted)
     cases = controller_cases(controller, seed=5)
     best = track(stored_gains(controller.problem, len(wanted)), wanted)
@@ -58,9 +62,11 @@ def test_cases_stay_below_the_cap_and_come_near_to_it(controller):
 
 
 def test_a_transient_of_nothing_is_refused_and_a_faint_one_is_not(device_model):
-    faint = realtime_controller(device_model, 1e-9 * tap(device_model), RealtimeSettings(preview_s=0.05))
+    faint = make_realtime_controller(
+        device_model, 1e-9 * make_default_transient(device_model), RealtimeSettings(preview_s=0.05)
+    )
     assert np.isfinite(controller_cases(faint).rotations).all()
-    silent = realtime_controller(device_model, np.zeros((40, 3)), RealtimeSettings(preview_s=0.05))
+    silent = make_realtime_controller(device_model, np.zeros((40, 3)), RealtimeSettings(preview_s=0.05))
     with pytest.raises(TrackingError, match="the transient comes to no force"):
         controller_cases(silent)
 

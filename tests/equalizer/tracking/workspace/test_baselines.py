@@ -101,7 +101,7 @@ def test_costs_are_counted(three, measured):
 def test_a_raw_estimate_says_nothing_beyond_its_lines(measured):
     with pytest.raises(ValueError, match="reliable lines from 4.5 to 37 Hz, but 30 to 40 Hz is wanted"):
         raw_estimate(measured, np.array([30.0, 40.0]))
-    nowhere = measured.of_lines(measured.frequency_hz > 100)
+    nowhere = measured.select_lines(measured.frequency_hz > 100)
     with pytest.raises(ValueError, match="reliable lines"):
         raw_estimate(nowhere, np.array([30.0]))
 

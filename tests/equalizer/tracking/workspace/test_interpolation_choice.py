@@ -48,14 +48,14 @@ def test_modes_that_match_only_with_the_place_left_out_are_no_reason_to_trust_th
     from equalizer.tracking.workspace import interpolation_choice as module
     from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError
 
-    real = module.modal_interpolation
+    real = module.build_modal_interpolation
 
     def only_whole(workspace):
         if len(workspace) < 3:
             raise ModesDoNotMatchError("too far apart")
         return real(workspace)
 
-    monkeypatch.setattr(module, "modal_interpolation", only_whole)
+    monkeypatch.setattr(module, "build_modal_interpolation", only_whole)
     choice = choose_interpolation(three)
     assert choice.interpolation == "blended forces"
     assert "with a check place left out" in choice.reason

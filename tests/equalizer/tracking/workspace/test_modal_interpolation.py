@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from equalizer.plant.model_response import model_response
-from equalizer.tracking.workspace.modal_interpolation import modal_interpolation
+from equalizer.tracking.workspace.modal_interpolation import build_modal_interpolation
 from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError
 from equalizer.tracking.workspace.workspace_models import WorkspaceModels
 
@@ -17,12 +17,12 @@ def relative(found, truth):
 
 def test_at_a_given_place_the_given_model_comes_back(three):
     for model in three.models:
-        found = modal_interpolation(three).at(model.place_m).models[0]
+        found = build_modal_interpolation(three).at(model.place_m).models[0]
         assert relative(model_response(found, LINES), model_response(model, LINES)) < 0.01
 
 
 def test_the_model_is_stable_small_and_says_what_it_is_made_of(three):
-    at = modal_interpolation(three).at((0.02, 0.01, 0.0))
+    at = build_modal_interpolation(three).at((0.02, 0.01, 0.0))
     (model,) = at.models
     assert at.weights == (1.0,)
     assert at.remarks == ()
@@ -36,15 +36,15 @@ def test_the_model_is_stable_small_and_says_what_it_is_made_of(three):
 
 def test_the_order_in_which_models_are_given_does_not_matter(three):
     place = (0.041, 0.01, 0.0)
-    one = modal_interpolation(three).at(place).models[0]
-    other = modal_interpolation(WorkspaceModels(three.models[::-1])).at(place).models[0]
+    one = build_modal_interpolation(three).at(place).models[0]
+    other = build_modal_interpolation(WorkspaceModels(three.models[::-1])).at(place).models[0]
     np.testing.assert_allclose(model_response(one, LINES), model_response(other, LINES), rtol=1e-6, atol=1e-6)
 
 
 def test_outside_the_nearest_place_is_used_and_reported(three):
-    at = modal_interpolation(three).at((0.09, 0.01, 0.0))
+    at = build_modal_interpolation(three).at((0.09, 0.01, 0.0))
     assert "30.0 mm outside" in at.remarks[0]
-    edge = modal_interpolation(three).at((0.06, 0.01, 0.0)).models[0]
+    edge = build_modal_interpolation(three).at((0.06, 0.01, 0.0)).models[0]
     np.testing.assert_allclose(model_response(at.models[0], LINES), model_response(edge, LINES), rtol=1e-4, atol=1e-4)
 
 
@@ -52,11 +52,11 @@ def test_devices_that_share_no_modes_are_refused_by_number(three):
     first, middle, last = three.models
     flipped = replace(last, C=last.C[[1, 2, 0]], B=last.B[:, [2, 0, 1]])
     with pytest.raises(ModesDoNotMatchError, match=r"models 2 \(first\) and 3 \(second\): "):
-        modal_interpolation(WorkspaceModels((first, middle, flipped)))
+        build_modal_interpolation(WorkspaceModels((first, middle, flipped)))
 
 
 def test_a_remainder_that_no_smooth_model_holds_is_reported(three, monkeypatch):
     from equalizer.tracking.workspace import modal_interpolation as module
 
     monkeypatch.setattr(module, "REAL_POLES_PER_OCTAVE", 0.1)
-    assert "% off where it is worst" in modal_interpolation(three).at((0.02, 0.01, 0.0)).remarks[0]
+    assert "% off where it is worst" in build_modal_interpolation(three).at((0.02, 0.01, 0.0)).remarks[0]

@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 
 from equalizer.tracking.workspace.blended_inverse import blend_at
-from equalizer.tracking.workspace.modal_interpolation import modal_interpolation
+from equalizer.tracking.workspace.modal_interpolation import build_modal_interpolation
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 
 SEEDS = range(1, 6)
 
 
 def test_between_three_models_the_worst_place_is_flat_and_uncoupled(workspaces, three):
-    worst = workspaces.worst(modal_interpolation(three).at)
+    worst = workspaces.worst(build_modal_interpolation(three).at)
     assert worst.flatness_db <= 0.2
     assert worst.coupling_db <= -36
 
 
 def test_also_where_modes_do_not_change_linearly_along_the_way(workspaces, three_bent):
-    worst = workspaces.worst(modal_interpolation(three_bent).at, bend=1.0)
+    worst = workspaces.worst(build_modal_interpolation(three_bent).at, bend=1.0)
     assert worst.flatness_db <= 0.3
     assert worst.coupling_db <= -32
 
@@ -42,9 +42,9 @@ def test_figures_of_the_workspace_over_five_seeds(workspaces, order):
         three = type(five)(five.models[::2])
         middle = workspaces.models((0.5,), seed, bend=1.0, order=order).models
         bent = type(five)((five.models[0], *middle, five.models[4]))
-        found["three"].append(workspaces.worst(modal_interpolation(three).at))
-        found["three, bent"].append(workspaces.worst(modal_interpolation(bent).at, bend=1.0))
-        found["five"].append(workspaces.worst(modal_interpolation(five).at))
+        found["three"].append(workspaces.worst(build_modal_interpolation(three).at))
+        found["three, bent"].append(workspaces.worst(build_modal_interpolation(bent).at, bend=1.0))
+        found["five"].append(workspaces.worst(build_modal_interpolation(five).at))
     for name, rows in found.items():
         numbers = np.array([(row.flatness_db, row.coupling_db) for row in rows])
         flat, coupled = (0.3, -35) if name == "five" else (0.5, -28)

@@ -19,7 +19,8 @@ from study.devices.force_dimension.lab import SensorSettings
 from study.errors import DeviceError
 from tests.study.devices.accelerometer.pty_board import AT_REST, IDEAL, RAW_RANGE, SCALE, Board, table_of, within
 
-pytestmark = pytest.mark.real_time
+# The board is a thread of this process behind a pseudo-terminal: with all cores full it may send late.
+pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.linkage.grid import arm_azimuths, difference_error, difference_positions
+from equalizer.linkage.grid import compute_difference_error, estimate_arm_azimuths, list_difference_positions
 from study.devices.clock import VirtualClock
 from study.devices.opening import open_device, open_linkage
 from study.devices.simulated.simulated_linkage import fit_linkage
@@ -43,7 +43,7 @@ def test_the_readings_are_of_the_linkage_behind_the_library(calibrated, tmp_path
     np.testing.assert_array_equal(calibration.inertia_kg, written.calibration.inertia_kg)
     assert (calibration.device, calibration.details) == ("omega.3", "serial 4242, firmware 2.41, SDK 3.17.5.0")
     np.testing.assert_allclose(calibration.line_deg, [90.0, -150.0, -30.0], atol=0.2)
-    assert calibration.asymmetry.max() < 1e-3 and written.warnings == () and written.unknown == 0
+    assert calibration.asymmetry.max() < 1e-3 and written.warnings == () and written.unknown_count == 0
     assert calibration.difference < 0.01
     rates = np.linalg.inv(calibration.jacobian)
     inertia = HANDLE_KG * np.eye(3) + TURNING_KG_M2 * np.einsum("nki,nkj->nij", rates, rates)
@@ -57,8 +57,8 @@ def test_the_jacobian_is_the_derivative_of_positions_by_joint_angles(stub):
     """Oracle: central differences of the library's own positions, by its encoder counts."""
     with open_linkage("omega3") as linkage:
         for place in np.array([[0.0, 0, 0], [0.03, -0.02, 0.04], [-0.04, 0.05, 0.0]]):
-            angles = np.array([linkage.angles_at(each) for each in difference_positions(place)])
-            assert difference_error(linkage.at(place).jacobian, difference_positions(place), angles) < 0.01
+            angles = np.array([linkage.angles_at(each) for each in list_difference_positions(place)])
+            assert compute_difference_error(linkage.at(place).jacobian, list_difference_positions(place), angles) < 0.01
 
 
 def test_lengths_and_masses_are_recovered(calibrated):
@@ -90,7 +90,7 @@ def test_what_is_out_of_reach_is_filled_in_by_mirror_lines(calibrated, tmp_path)
     (tmp_path / "cal.h5").unlink()
     part = calibrated(reach_z_m=0.03)
     found = part.calibration
-    assert found.filled.sum() == 20 and part.unknown == 0
+    assert found.filled.sum() == 20 and part.unknown_count == 0
     for number in np.flatnonzero(found.filled):
         same = int(np.argmin(np.linalg.norm(whole.position_m - found.position_m[number], axis=1)))
         np.testing.assert_allclose(found.inertia_kg[number], whole.inertia_kg[same], rtol=0.01, atol=1e-3)
@@ -156,4 +156,4 @@ def test_the_calibrated_device_is_simulated_by_its_name(calibrated, rigs, tmp_pa
         assert device.info.effective_mass_kg == pytest.approx(mass_kg, rel=1e-3)
     finally:
         device.close()
-    assert np.degrees(arm_azimuths(calibration.jacobian[0]))[0] == pytest.approx(90.0, abs=0.2)
+    assert np.degrees(estimate_arm_azimuths(calibration.jacobian[0]))[0] == pytest.approx(90.0, abs=0.2)

@@ -8,7 +8,13 @@ import pytest
 from numba import njit
 
 from study.devices.force_dimension import loop_cells
-from study.devices.force_dimension.loop_cells import CELLS_SIZE, FORCE_MISMATCH, MEMORY, REPORTED, check_status
+from study.devices.force_dimension.loop_cells import (
+    CELLS_SIZE,
+    FORCE_MEMORY,
+    FORCE_MISMATCH,
+    REPORTED_FORCE,
+    check_status,
+)
 from study.devices.force_dimension.tick_io import LOOKS_AT, LOOKS_OF
 
 AMPLITUDES_N = (0.2, 0.25, 0.3, 0.5, 1.0, 1.9, 3.0)
@@ -25,7 +31,7 @@ def suspected_after(force, told):
     cells = np.zeros(CELLS_SIZE)
     for tick in range(force.shape[0]):
         if tick % LOOKS_OF in LOOKS_AT:
-            cells[REPORTED : REPORTED + 3] = told[tick]
+            cells[REPORTED_FORCE : REPORTED_FORCE + 3] = told[tick]
             add_to_sums(cells)
             if gain_is_off(cells):
                 return tick
@@ -46,7 +52,7 @@ def draw_trials(random, gain: float, age: int, step_n: float, noise_n: float, am
     return force, step_n * np.round(told / step_n) if step_n else told
 
 
-@pytest.mark.parametrize("age", [pytest.param(0, marks=pytest.mark.slow), *range(1, MEMORY)])
+@pytest.mark.parametrize("age", [pytest.param(0, marks=pytest.mark.slow), *range(1, FORCE_MEMORY)])
 def test_a_report_that_is_late_rounded_noisy_and_off_by_a_weight_is_not_suspected(age):
     random = np.random.default_rng(age)
     for _ in range(200):
@@ -55,7 +61,7 @@ def test_a_report_that_is_late_rounded_noisy_and_off_by_a_weight_is_not_suspecte
         assert suspected_after(*drawn) == -1
 
 
-@pytest.mark.parametrize("age", range(MEMORY))
+@pytest.mark.parametrize("age", range(FORCE_MEMORY))
 @pytest.mark.parametrize("gain", [0.7, 1.3])
 def test_a_gain_that_is_off_by_30_percent_is_suspected_in_the_first_trial(age, gain):
     random = np.random.default_rng(age)

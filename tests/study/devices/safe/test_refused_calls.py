@@ -45,7 +45,7 @@ def test_an_interruption_in_the_middle_of_a_tick_turns_the_force_off(rigs, clock
 REFUSED = {
     "made for 500 Hz": lambda s: replace(s, loop=replace(s.loop, sample_rate_hz=500.0)),
     r"shape \(200, 2\)": lambda s: replace(s, loop=Signal(s.loop.samples[:, :2], 1000.0, "force", "N", ("fx", "fy"))),
-    r"shape \(0, 3\)": lambda s: replace(s, loop=s.loop.part(0, 0)),
+    r"shape \(0, 3\)": lambda s: replace(s, loop=s.loop.select_samples(0, 0)),
     "acceleration in m/s": lambda s: replace(s, loop=replace(s.loop, quantity="acceleration", unit="m/s^2")),
     "not numbers": lambda s: replace(s, loop=replace(s.loop, samples=s.loop.samples + np.nan)),
     "cap of the stimulus is 3 N": lambda s: replace(s, loop=replace(s.loop, samples=s.loop.samples * 3.01)),

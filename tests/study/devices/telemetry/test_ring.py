@@ -34,7 +34,7 @@ class Writer:
     """Ticks whose every cell follows from their number."""
 
     def __init__(self, ring: Ring) -> None:
-        self.rows = ring.rows(1000.0)
+        self.rows = ring.map_rows(1000.0)
         self.state, self.settings = np.zeros(cells.STATE_SIZE), np.zeros(cells.SETTINGS_SIZE)
         self.reading = np.zeros(10)
 
@@ -204,7 +204,7 @@ def test_without_room_for_a_ring_a_device_works_all_the_same(rigs, monkeypatch):
 
     monkeypatch.setattr(telemetry.Path, "write_bytes", full)
     ring = Ring()
-    assert ring.path == "" and ring.rows(1000.0) is None
+    assert ring.path == "" and ring.map_rows(1000.0) is None
     clock = VirtualClock()
     with contextlib.closing(SafeDevice(rigs.ScriptedRig(), rigs.SETTINGS, clock, ring)) as device:
         device.hold(rigs.sine(2.0))
@@ -231,11 +231,11 @@ def test_a_pipe_in_the_place_of_a_ring_holds_up_nothing(tmp_path):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such locks")
 def test_the_ring_of_a_killed_program_is_removed_by_the_next_one(tmp_path, monkeypatch):
-    monkeypatch.setattr(telemetry, "_ring_folder", lambda: str(tmp_path))
-    monkeypatch.setattr(telemetry, "ABANDONED_AFTER_S", -1.0)
+    monkeypatch.setattr(telemetry, "_choose_ring_folder", lambda: str(tmp_path))
+    monkeypatch.setattr(telemetry, "MIN_ABANDONED_AGE_S", -1.0)
     alive = Ring(rows=2)
     program = (
-        "import os, sys; from study.devices import telemetry; telemetry._ring_folder = lambda: sys.argv[1];"
+        "import os, sys; from study.devices import telemetry; telemetry._choose_ring_folder = lambda: sys.argv[1];"
         "telemetry.Ring(rows=2); os.kill(os.getpid(), 9)"
     )
     subprocess.run([sys.executable, "-c", program, str(tmp_path)], check=False, timeout=60)

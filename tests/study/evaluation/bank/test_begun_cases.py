@@ -25,8 +25,8 @@ def die(path, text):
     if path.name != sealing.SETTINGS:
         os.kill(os.getpid(), signal.SIGKILL)
 sealing.write_text = die
-(drawn,) = sealing.drawable_cases(sealing.BankPlan(51_401, 1, brief=True))
-sealing.seal_one(ProofFolder(Path(sys.argv[1])), drawn)
+(drawn,) = sealing.list_drawable_cases(sealing.BankPlan(51_401, 1, brief=True))
+sealing.write_sealed_case(ProofFolder(Path(sys.argv[1])), drawn)
 """
 """Before or after the label is written."""
 

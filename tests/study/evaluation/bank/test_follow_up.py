@@ -7,7 +7,7 @@ import json
 
 import pytest
 
-from analysis.diagnosis.next_experiment.experiment_menu import experiment_menu
+from analysis.diagnosis.next_experiment.experiment_menu import list_experiments
 from analysis.evaluation.blind_test.follow_up import FollowUp, compute_follow_up_figures
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES
 from study.errors import StudyError
@@ -23,7 +23,7 @@ from study.evaluation.bank.proof_folder import (
     open_proof_folder,
 )
 from study.evaluation.bank.prove import outcome_of
-from study.evaluation.bank.seal_cases import BankPlan, seal_one, settings_text
+from study.evaluation.bank.seal_cases import BankPlan, format_settings, write_sealed_case
 from study.evaluation.challenge.draw_bank import draw_case_plan
 from study.store.disk.provenance import sha256_of
 from study.store.formats.mechanical_model_file import read_mechanical_model
@@ -59,12 +59,12 @@ def answer(place, effect="sensor_gain", rival="force_gain", best=""):
 
 def started(path, best):
     folder = open_proof_folder(path, SEED, True)
-    seal_one(folder, draw_case_plan(SEED, NUMBER, True))
+    write_sealed_case(folder, draw_case_plan(SEED, NUMBER, True))
     label = json.loads(folder.label_file(NUMBER).read_text())
     place = folder.open / label["name"]
     without = [effect.name for effect in EFFECT_NAMES if effect.name not in CONSIDERED]
-    (place / SETTINGS).write_text(settings_text(without))
-    menu = experiment_menu(read_mechanical_model(place / MODEL), 1000.0, 0, LEVEL_N)
+    (place / SETTINGS).write_text(format_settings(without))
+    menu = list_experiments(read_mechanical_model(place / MODEL), 1000.0, 0, LEVEL_N)
     answer(place, best=menu[0].words if best else "")
     outcome = outcome_of(label, json.loads((place / ANSWER).read_text()))
     (place / RECORDING).unlink()  # as a bank leaves it

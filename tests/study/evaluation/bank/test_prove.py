@@ -12,9 +12,9 @@ import pytest
 from study.errors import StudyError, UserInterruptError
 from study.evaluation.bank.proof_folder import ANSWER, RECORDING, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import read_answer
-from study.evaluation.bank.proof_summary import blind_test_lines, summary
+from study.evaluation.bank.proof_summary import format_blind_test, summarise_blind_test
 from study.evaluation.bank.prove import outcome_of, prove
-from study.evaluation.bank.seal_cases import BankPlan, drawable_cases
+from study.evaluation.bank.seal_cases import BankPlan, list_drawable_cases
 from study.evaluation.bank.sealed_bank import BankOptions, reveal_bank
 from study.evaluation.bank.write_proof import read_current_commit, write_proof, write_table
 from study.evaluation.challenge.draw_bank import draw_case_plan
@@ -34,7 +34,7 @@ def proof(tmp_path_factory):
 
 def test_a_bank_is_sealed_answered_and_revealed(proof):
     done, seen = proof
-    assert len(done.outcomes) == len(drawable_cases(PLAN))
+    assert len(done.outcomes) == len(list_drawable_cases(PLAN))
     assert seen[-1] == ("diagnosing", len(done.outcomes), len(done.outcomes))
     assert [outcome.verdict for outcome in done.outcomes if outcome.verdict == "failed"] == []
     assert len(done.engines) == 1
@@ -42,11 +42,13 @@ def test_a_bank_is_sealed_answered_and_revealed(proof):
 
 def test_a_case_without_an_answer_is_said_and_how_to_go_on(proof):
     done, _ = proof
-    assert summary(done)["unanswered"] == 0 and not any("no answer" in line for line in blind_test_lines(done))
+    assert summarise_blind_test(done)["unanswered"] == 0 and not any(
+        "no answer" in line for line in format_blind_test(done)
+    )
     lost = replace(done.outcomes[0], diagnosis=None, seconds=math.nan)
     missing = replace(done, outcomes=(lost, *done.outcomes[1:]))
-    assert summary(missing)["unanswered"] == 1
-    assert any("1 case has no answer" in line and "same command again" in line for line in blind_test_lines(missing))
+    assert summarise_blind_test(missing)["unanswered"] == 1
+    assert any("1 case has no answer" in line and "same command again" in line for line in format_blind_test(missing))
 
 
 def test_seals_are_read_by_sha256sum_and_come_before_any_answer(proof):
@@ -119,8 +121,8 @@ def test_a_proof_leaves_a_document_a_row_per_case_and_a_small_table(proof, tmp_p
     write_proof(replace(done, engines=("another",)))
     assert json.loads((done.folder.path / "proof.json").read_text())["commit"] == "unknown: the code has changed since"
     assert document["commit"] == read_current_commit()
-    assert next(blind_test_lines(done)).endswith(f"misses in {len(done.outcomes)} cases")
-    assert summary(done)["cases"] == len(done.outcomes)
+    assert next(format_blind_test(done)).endswith(f"misses in {len(done.outcomes)} cases")
+    assert summarise_blind_test(done)["cases"] == len(done.outcomes)
 
 
 @pytest.fixture
@@ -170,7 +172,7 @@ def test_an_error_that_is_not_known_is_read(copied):
     said = json.loads(path.read_text())
     path.write_text(json.dumps(said | {"channel_errors": {"retuned": {"ax": float("nan")}}}))
     assert "NaN" in path.read_text()
-    assert len(reveal_bank(copied, 100, outcome_of)) == len(drawable_cases(PLAN))
+    assert len(reveal_bank(copied, 100, outcome_of)) == len(list_drawable_cases(PLAN))
 
 
 @pytest.mark.slow
@@ -179,7 +181,7 @@ def test_an_answer_that_was_removed_is_given_again(copied):
     before = json.loads(path.read_text())
     path.unlink()
     again = prove(copied.path, PLAN, BankOptions(workers=1), lambda *_: None)
-    assert len(again.outcomes) == len(drawable_cases(PLAN))
+    assert len(again.outcomes) == len(list_drawable_cases(PLAN))
     assert json.loads(path.read_text())["diagnosis"] == before["diagnosis"]
 
 
@@ -199,7 +201,9 @@ def test_ctrl_c_keeps_what_is_sealed(tmp_path):
 
     with pytest.raises(UserInterruptError, match="Interrupted"):
         prove(tmp_path / "bank", BankPlan(SEED, 1, brief=True), BankOptions(workers=1), interrupt)
-    assert len(list((tmp_path / "bank" / "sealed").iterdir())) == len(drawable_cases(BankPlan(SEED, 1, brief=True)))
+    assert len(list((tmp_path / "bank" / "sealed").iterdir())) == len(
+        list_drawable_cases(BankPlan(SEED, 1, brief=True))
+    )
 
 
 def test_the_short_bank_is_of_this_kind():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from study.evaluation.challenge.bench import draw_bench
-from study.evaluation.challenge.drive_plan import multisine
+from study.evaluation.challenge.drive_plan import draw_multisine
 
 
 @pytest.fixture(scope="session")
@@ -16,4 +16,4 @@ def bench():
 def command():
     """A multisine on all axes, (2000, 3), N."""
     random = np.random.default_rng(8)
-    return np.column_stack([multisine(random, 3.0) for _ in range(3)])
+    return np.column_stack([draw_multisine(random, 3.0) for _ in range(3)])

@@ -10,7 +10,7 @@ from study.evaluation.challenge.bench import draw_bench
 from study.evaluation.challenge.device import Device, simulate_motion
 from study.evaluation.challenge.draw_case import draw_case
 from study.evaluation.challenge.drive_plan import DrivePlan, draw_plan
-from study.evaluation.challenge.nominal import WIDE, draw_calibration, retune, shift_diagonals
+from study.evaluation.challenge.nominal import RETUNED_TOLERANCE, draw_calibration, retune, shift_diagonals
 from study.evaluation.challenge.sensor_kernel import one_pole
 
 
@@ -81,6 +81,6 @@ def test_retuning_finds_the_bench_when_nothing_hides():
     each = [simulate_motion(Device(bench), plan.command[s.start : s.stop])[0] for s in plan.segments]
     response = np.vstack([one_pole(part, 1.0 - np.exp(-np.pi)) for part in each])
     found, tolerance = retune(start, response, plan)
-    assert tolerance == WIDE
+    assert tolerance == RETUNED_TOLERANCE
     np.testing.assert_allclose(found.mass, bench.mass, atol=2e-4)
     np.testing.assert_allclose(found.stiffness, bench.stiffness, atol=0.3)

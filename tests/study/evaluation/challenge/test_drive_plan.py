@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 
-from study.evaluation.challenge.drive_plan import PERIOD, draw_plan, multisine
+from study.evaluation.challenge.drive_plan import PERIOD_SAMPLES, draw_multisine, draw_plan
 from study.store.formats.recording_file import read_recording
 
 
 def test_a_multisine_has_odd_lines_and_one_of_four_silent():
-    spectrum = np.abs(np.fft.rfft(multisine(np.random.default_rng(1), 1.5)))
+    spectrum = np.abs(np.fft.rfft(draw_multisine(np.random.default_rng(1), 1.5)))
     lines = np.flatnonzero(spectrum > 1e-9 * spectrum.max())
     assert (lines % 2 == 1).all()
     assert (lines.min() >= 3) and (lines.max() <= 479)
@@ -18,7 +18,7 @@ def test_a_multisine_has_odd_lines_and_one_of_four_silent():
 
 
 def test_a_multisine_peaks_at_its_level_and_falls_with_the_root_of_frequency():
-    wave = multisine(np.random.default_rng(2), 1.5)
+    wave = draw_multisine(np.random.default_rng(2), 1.5)
     spectrum = np.abs(np.fft.rfft(wave))
     lines = np.flatnonzero(spectrum > 1e-9 * spectrum.max())
     scaled = spectrum[lines] * np.sqrt(lines)
@@ -39,6 +39,6 @@ def test_segments_and_fixed_waves_are_those_of_the_labelled_cases(shared):
 
 def test_the_first_level_is_driven_for_four_equal_periods_and_then_rests():
     plan = draw_plan(np.random.default_rng(3))
-    first = plan.command[:PERIOD]
-    np.testing.assert_array_equal(plan.command[: 4 * PERIOD], np.tile(first, (4, 1)))
-    assert not plan.command[4 * PERIOD : 4 * PERIOD + 500].any()
+    first = plan.command[:PERIOD_SAMPLES]
+    np.testing.assert_array_equal(plan.command[: 4 * PERIOD_SAMPLES], np.tile(first, (4, 1)))
+    assert not plan.command[4 * PERIOD_SAMPLES : 4 * PERIOD_SAMPLES + 500].any()

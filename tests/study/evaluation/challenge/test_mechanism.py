@@ -15,7 +15,7 @@ from study.evaluation.challenge.handle_force_kernel import DRAG
 
 def exactly(bench, command):
     """Acceleration and position of the linear bench, held forces, by the matrix exponential."""
-    mass, damping, stiffness = bench.matrices()
+    mass, damping, stiffness = bench.assemble_matrices()
     n = len(mass)
     inverse = np.linalg.inv(mass)
     whole = np.zeros((2 * n + 3,) * 2)
@@ -44,7 +44,7 @@ def test_a_sample_is_read_before_its_own_command_acts(bench):
     command[2:, 0] = 1.0
     acceleration, _ = simulate_motion(Device(bench), command)
     assert not acceleration[:3].any()
-    assert acceleration[3, 0] == pytest.approx(np.linalg.inv(bench.matrices()[0])[0, 0], rel=0.2)
+    assert acceleration[3, 0] == pytest.approx(np.linalg.inv(bench.assemble_matrices()[0])[0, 0], rel=0.2)
 
 
 def test_friction_above_the_drive_holds_the_handle(bench, command):

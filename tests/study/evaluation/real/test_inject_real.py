@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.prediction_error import prediction_error
+from analysis.diagnosis.errors.prediction_error import compute_prediction_error
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.mechanical_model import MechanicalModel, SensorLimits
 from equalizer.signals.recording import Recording, Segment
@@ -72,7 +72,7 @@ def test_what_was_commanded_before_the_later_half_goes_before_it(recording, spli
 
 
 def test_both_halves_are_played_from_rest_equally_well(split, model):
-    errors = [prediction_error(blank_lead_responses(half), model, "all").without_gain for half in split]
+    errors = [compute_prediction_error(blank_lead_responses(half), model, "all").without_gain for half in split]
     assert errors == pytest.approx([0.002, 0.002], rel=0.2)
 
 

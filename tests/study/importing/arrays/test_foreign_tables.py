@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from study.importing.header_map import header_map, header_problems
+from study.importing.header_map import find_header_problems, make_header_map
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError
 from tests.whole_arrays import read_whole
@@ -40,7 +40,7 @@ def test_units_stand_below_the_header_or_in_it_and_decimal_signs_are_seen(tmp_pa
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "cp1252", "latin-1"])
 def test_letters_beyond_ascii_are_read_in_the_usual_encodings(tmp_path, encoding):
-    found = header_map(
+    found = make_header_map(
         read(tmp_path, f"time,Kraft (N),angle\nµs,,°\n{ROWS}".replace("Kraft", "force").encode(encoding))
     )
     assert found is not None
@@ -49,7 +49,7 @@ def test_letters_beyond_ascii_are_read_in_the_usual_encodings(tmp_path, encoding
 
 
 def test_a_unit_that_is_not_known_is_named_and_not_taken_for_a_number(tmp_path):
-    assert header_problems(read(tmp_path, f"time,force,travel\n[s],[N],[furlong]\n{ROWS}")) == (
+    assert find_header_problems(read(tmp_path, f"time,force,travel\n[s],[N],[furlong]\n{ROWS}")) == (
         "'travel [furlong]': 'furlong' is not a unit known here",
     )
 

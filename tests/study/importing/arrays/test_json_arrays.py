@@ -7,7 +7,7 @@ import pytest
 
 from study.importing.arrays.arrays import read_arrays
 from study.importing.arrays.json_arrays import is_own_document
-from study.importing.header_map import header_map, header_notes
+from study.importing.header_map import describe_header_choices, make_header_map
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError
 
@@ -66,10 +66,10 @@ def test_units_beside_values_need_no_map(tmp_path):
         },
     )
     assert [name for name, array in found.by_name.items() if array.ndim] == ["time [ms]", "force [N]", "speed [rad/s]"]
-    wanted = header_map(found)
+    wanted = make_header_map(found)
     assert wanted is not None
     assert [(channel.role, channel.unit) for channel in wanted.channel] == [("command", "N"), ("response", "rad/s")]
-    assert "Left out: 'force/name' is no column." in header_notes(found, wanted)
+    assert "Left out: 'force/name' is no column." in describe_header_choices(found, wanted)
 
 
 def test_dates_become_seconds(tmp_path):

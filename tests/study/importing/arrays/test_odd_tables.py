@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from study.importing.header_map import header_map, header_problems
+from study.importing.header_map import find_header_problems, make_header_map
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError
 from tests.whole_arrays import read_whole
@@ -94,7 +94,7 @@ ROWS = "\n".join(f"{k / 100},{k % 3},{k % 5}" for k in range(20))
 )
 def test_headers_of_strangers_need_no_map(tmp_path, header, units):
     rows = ROWS if units else "\n".join(f"{k},{row}" for k, row in enumerate(ROWS.splitlines()))
-    wanted = header_map(read(tmp_path, f"{header}\n{rows}\n"))
+    wanted = make_header_map(read(tmp_path, f"{header}\n{rows}\n"))
     assert wanted is not None
     found = (wanted.clock[0].time_unit, *(channel.unit for channel in wanted.channel))
     assert found == (units or ("s", "N", "deg"))
@@ -111,7 +111,7 @@ def test_headers_of_strangers_need_no_map(tmp_path, header, units):
     ],
 )
 def test_a_unit_that_is_unclear_is_refused_by_name(tmp_path, column, said):
-    found = header_problems(read(tmp_path, f"time [s],{column},angle [deg]\n{ROWS}\n"))
+    found = find_header_problems(read(tmp_path, f"time [s],{column},angle [deg]\n{ROWS}\n"))
     assert any(said in problem for problem in found)
 
 

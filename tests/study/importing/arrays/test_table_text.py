@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from study.importing.arrays.arrays import read_arrays
-from study.importing.header_map import header_map
+from study.importing.header_map import make_header_map
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError
 
@@ -29,7 +29,7 @@ def test_a_header_in_an_encoding_of_its_language_is_read_and_understood(tmp_path
     arrays = read(tmp_path, header, encoding)
     assert list(arrays.by_name) == header.split(",")
     assert arrays.notes == (f"Read in the encoding {found}, in which its words are understood.",)
-    wanted = header_map(arrays)
+    wanted = make_header_map(arrays)
     assert wanted is not None
     assert [channel.role for channel in wanted.channel] == ["command", "response"]
 

@@ -9,7 +9,7 @@ from openpyxl import Workbook, load_workbook
 
 from study.importing.arrays.arrays import read_arrays
 from study.importing.build_recording import build_recording
-from study.importing.header_map import header_map, header_notes, header_problems
+from study.importing.header_map import describe_header_choices, find_header_problems, make_header_map
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError
 from tests.whole_arrays import read_whole
@@ -62,7 +62,7 @@ def test_a_sheet_that_begins_further_in_and_misses_cells_is_read(book):
 def test_sheets_that_are_alike_are_parts_and_one_without_numbers_is_left_out(book):
     second = [(time, force, travel + 1) for time, force, travel in ROWS]
     arrays = read_arrays(book(About=[["made", "by hand"]], Run1=[NAMES, *ROWS], Run2=[NAMES, *second]), CsvMap())
-    wanted = header_map(arrays)
+    wanted = make_header_map(arrays)
     assert wanted is not None
     made = build_recording(wanted, [arrays.path])
     assert arrays.notes == ("Left out: the sheet 'About' holds no rows of numbers.",)
@@ -74,12 +74,14 @@ def test_sheets_that_are_alike_are_parts_and_one_without_numbers_is_left_out(boo
 @pytest.mark.parametrize(("names", "joined"), [(("Run1", "Run2"), True), (("Raw", "Filtered"), False)])
 def test_only_numbered_sheets_are_put_one_after_another_and_it_is_said(book, names, joined):
     arrays = read_arrays(book(**{name: [NAMES, *ROWS] for name in names}), CsvMap())
-    wanted = header_map(arrays)
+    wanted = make_header_map(arrays)
     assert (wanted is not None) == joined
     if wanted is None:
-        assert "2 parts are alike ('Raw' and 'Filtered')" in header_problems(arrays)[0]
+        assert "2 parts are alike ('Raw' and 'Filtered')" in find_header_problems(arrays)[0]
     else:
-        assert "Put one after another, as parts of one recording: 'Run1', 'Run2'." in header_notes(arrays, wanted)
+        assert "Put one after another, as parts of one recording: 'Run1', 'Run2'." in describe_header_choices(
+            arrays, wanted
+        )
 
 
 def test_a_hidden_sheet_is_left_out_with_a_note(book):

@@ -120,7 +120,7 @@ LONG = np.arange(100_000.0)
 
 
 def of_definitions(text, definitions):
-    return Namespace({"u": LONG, "empty": LONG[:0]}, definitions, "a.npz", Budget()).value_of(text, Millisecond())
+    return Namespace({"u": LONG, "empty": LONG[:0]}, definitions, "a.npz", Budget()).compute_value(text, Millisecond())
 
 
 def chained(count, text):
@@ -164,21 +164,23 @@ def test_an_outer_product_is_refused_before_it_is_made():
     space = Namespace({"c": np.zeros((40000, 1)), "r": np.zeros((1, 40000))}, {}, "a.npz", Budget())
     for text in ("c * r", "c < r", "clip(c, r, 1)", "c + r + r"):
         with pytest.raises(ImportProblemError, match="would give more than 20000000 numbers"):
-            space.value_of(text, Millisecond())
+            space.compute_value(text, Millisecond())
 
 
 def test_arrays_that_wait_for_another_count_too():
     """Ten of these are held while the innermost is computed."""
     text = "(-u + " * 10 + "u" + ")" * 10
     small = Budget()
-    np.testing.assert_array_equal(Namespace({"u": LONG}, {}, "a.npz", small).value_of(text, Millisecond()), -9.0 * LONG)
+    np.testing.assert_array_equal(
+        Namespace({"u": LONG}, {}, "a.npz", small).compute_value(text, Millisecond()), -9.0 * LONG
+    )
     long = np.zeros(3_000_000)
     with pytest.raises(ImportProblemError, match="would give more than 20000000 numbers"):
-        Namespace({"u": long}, {}, "a.npz", Budget()).value_of(text, Millisecond())
+        Namespace({"u": long}, {}, "a.npz", Budget()).compute_value(text, Millisecond())
 
 
 def test_a_larger_file_may_cost_more():
     budget = Budget()
     budget.allow_for(3_000_000)
     text = "(-u + " * 10 + "u" + ")" * 10
-    Namespace({"u": np.zeros(3_000_000)}, {}, "a.npz", budget).value_of(text, Millisecond())
+    Namespace({"u": np.zeros(3_000_000)}, {}, "a.npz", budget).compute_value(text, Millisecond())

@@ -8,7 +8,7 @@ import pytest
 
 from protocols.definition.exposure import SittingLimits
 from study.session.facts.events import DemoPlayed, NoteTaken, SessionInterrupted, SessionResumed
-from study.session.facts.log_time import ClockStep, Moment, clock_step, elapsed_s
+from study.session.facts.log_time import ClockStep, Moment, compute_elapsed_s, find_clock_step
 from study.session.state.fold import apply_event
 from study.session.state.machine import find_reached_limit
 from study.session.state.sitting_state import NIGHT_H, compute_daily_dose, pass_time
@@ -145,9 +145,9 @@ def test_a_log_without_monotonic_times_folds_by_the_wall_clock_but_never_backwar
 def test_small_corrections_of_the_clock_are_not_worth_a_word():
     before = Moment(START.isoformat(), 0.0)
     late = Moment((START + timedelta(seconds=4)).isoformat(), 1.0)
-    assert clock_step(before, late) is None
-    assert elapsed_s(before, late) == 1.0
-    assert elapsed_s(late, before) == 0.0
+    assert find_clock_step(before, late) is None
+    assert compute_elapsed_s(before, late) == 1.0
+    assert compute_elapsed_s(late, before) == 0.0
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,8 @@ from study.session.facts.void_reasons import (
     explain_silent_screen,
     is_computer_busy,
 )
-from study.tui.trial_words import void_words
-from study.workflows.trial.judge_trial import judge
+from study.tui.trial_words import describe_void_trial
+from study.workflows.trial.judge_trial import judge_trial
 
 MISSED = "12.0 % of the 1 kHz ticks were missed"
 
@@ -34,11 +34,11 @@ def test_a_silent_screen_is_put_down_to_the_computer_only_where_something_shows_
 
 
 def test_what_a_busy_computer_does_to_a_trial_is_counted_as_that(small_protocol):
-    late = judge(Health(Fault.NONE, 1000, 120, 0, 0, 0, 0, 1.0), small_protocol.measurement, True)
+    late = judge_trial(Health(Fault.NONE, 1000, 120, 0, 0, 0, 0, 1.0), small_protocol.measurement, True)
     assert late.void_reason == MISSED
     for reason in (SCREEN_LATE, Fault.STALLED.value, late.void_reason):
         assert is_computer_busy(reason)
-        words = void_words(reason)
+        words = describe_void_trial(reason)
         assert words.startswith("The computer was too busy for a moment")
         assert words.endswith("This was not your fault, and the trial is repeated.")
     for reason in (SCREEN_SILENT, Fault.LOST.value, "the participant asked for it again", ""):
@@ -60,7 +60,7 @@ def test_what_a_busy_computer_does_to_a_trial_is_counted_as_that(small_protocol)
 def test_above_a_limit_of_the_protocol_late_ticks_make_a_trial_void(small_protocol, missed, late, latest_s, spoiled):
     health = Health(Fault.NONE, 1000, missed, 0, 0, 0, 0, 1.0, late_ticks=late, latest_s=latest_s)
     limited = replace(small_protocol.measurement, late_ticks_limit=0.02, longest_late_ms=10.0)
-    found = judge(health, limited, True)
+    found = judge_trial(health, limited, True)
     assert found.void_reason == spoiled
     assert is_computer_busy(found.void_reason) is bool(spoiled)
 
@@ -69,20 +69,20 @@ def test_late_ticks_are_judged_as_they_were_at_the_answer(small_protocol):
     at_answer = Health(Fault.NONE, 1000, 0, 0, 0, 0, 0, 1.0, late_ticks=1, latest_s=0.002)
     released = replace(at_answer, ticks=1100, late_ticks=50, latest_s=0.05)
     limited = replace(small_protocol.measurement, late_ticks_limit=0.02, longest_late_ms=10.0)
-    assert judge(released, limited, True, at_answer).void_reason == ""
-    assert judge(released, limited, True).void_reason != ""
+    assert judge_trial(released, limited, True, at_answer).void_reason == ""
+    assert judge_trial(released, limited, True).void_reason != ""
 
 
 def test_a_protocol_that_limits_no_late_ticks_counts_such_trials(small_protocol):
     late = Health(Fault.NONE, 1000, 0, 0, 0, 0, 0, 1.0, late_ticks=900, latest_s=0.09)
-    assert judge(late, small_protocol.measurement, True).void_reason == ""
+    assert judge_trial(late, small_protocol.measurement, True).void_reason == ""
 
 
 def test_a_silent_screen_is_not_the_participants_fault_either():
-    words = void_words(SCREEN_SILENT)
+    words = describe_void_trial(SCREEN_SILENT)
     assert "it was stopped, or the computer was too busy" in words
     assert words.endswith("This was not your fault, and the trial is repeated.")
-    assert void_words("the handle was let go") == "It is void: the handle was let go."
+    assert describe_void_trial("the handle was let go") == "It is void: the handle was let go."
 
 
 def test_three_void_trials_end_a_sitting_for_the_reason_that_they_had():

@@ -24,7 +24,7 @@ from study.session.state.machine import (
     next_action,
 )
 from study.session.state.progress import estimate_progress
-from study.session.state.vibration_dose import a8_mps2
+from study.session.state.vibration_dose import compute_a8_mps2
 from tests.study.session.sitting.preparation import UTC, prepared
 
 LATER = "2026-01-01T02:00:00.000+00:00"
@@ -114,7 +114,7 @@ def test_the_dose_counts_every_vibration_at_the_hand(begun, small_protocol, fact
     state = apply_event(state, TrialSpoiled(UTC, action.run, action.trial, action.attempt, "a pause", vibrated_s=10.0))
     assert state.sitting.dose.vibrated_s == 20.0
     assert state.sitting.dose.squared_s > first.squared_s  # at the ratio that was measured before
-    assert a8_mps2(state.sitting.dose) < 1.0
+    assert compute_a8_mps2(state.sitting.dose) < 1.0
 
 
 def test_a_stimulus_without_a_measurement_is_marked_in_the_dose(begun, small_protocol, facts):

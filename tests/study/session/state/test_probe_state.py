@@ -7,15 +7,15 @@ from protocols.definition.probes import ProbeSettings
 from study.session.facts.sitting_events import ProbePlayed
 from study.session.state.draw_check import LogContradiction
 from study.session.state.probe_state import LARGEST_WEIGHT_HZ, ProbeState, begin_probe
-from study.session.state.vibration_dose import hand_arm_weight
+from study.session.state.vibration_dose import compute_hand_arm_weight
 
 UTC = "2026-01-01T00:00:00.000+00:00"
 PROBES = ProbeSettings(levels_n=(0.2, 0.4))
 
 
 def test_no_frequency_has_a_larger_weight_than_the_one_by_which_probes_count():
-    largest = max(hand_arm_weight(f) for f in np.geomspace(1.0, 1000.0, 5000))
-    assert hand_arm_weight(LARGEST_WEIGHT_HZ) == pytest.approx(largest, rel=1e-4)
+    largest = max(compute_hand_arm_weight(f) for f in np.geomspace(1.0, 1000.0, 5000))
+    assert compute_hand_arm_weight(LARGEST_WEIGHT_HZ) == pytest.approx(largest, rel=1e-4)
 
 
 @pytest.mark.parametrize(

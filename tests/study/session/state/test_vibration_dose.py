@@ -5,9 +5,9 @@ import pytest
 from study.session.state.vibration_dose import (
     NO_DOSE,
     Dose,
-    a8_mps2,
     add_sinusoid,
-    hand_arm_weight,
+    compute_a8_mps2,
+    compute_hand_arm_weight,
 )
 
 ISO_5349_1 = {
@@ -21,28 +21,28 @@ ISO_5349_1 = {
 @pytest.mark.parametrize(("nominal_hz", "factor"), ISO_5349_1.items())
 def test_the_filter_gives_the_tabulated_factor_of_each_third_octave(nominal_hz: float, factor: float) -> None:
     exact_hz = 10 ** (round(10 * math.log10(nominal_hz)) / 10)
-    assert hand_arm_weight(exact_hz) == pytest.approx(factor, rel=0.005)
+    assert compute_hand_arm_weight(exact_hz) == pytest.approx(factor, rel=0.005)
 
 
 def test_below_the_standard_the_filter_continues_falling() -> None:
-    assert hand_arm_weight(5.0) == pytest.approx(0.545, abs=0.01)
-    assert hand_arm_weight(2.0) < hand_arm_weight(4.0) / 3.5
+    assert compute_hand_arm_weight(5.0) == pytest.approx(0.545, abs=0.01)
+    assert compute_hand_arm_weight(2.0) < compute_hand_arm_weight(4.0) / 3.5
 
 
 @pytest.mark.parametrize("frequency_hz", [0.0, -5.0])
 def test_without_a_frequency_there_is_no_weight(frequency_hz: float) -> None:
     with pytest.raises(ValueError, match="above 0 Hz"):
-        hand_arm_weight(frequency_hz)
+        compute_hand_arm_weight(frequency_hz)
 
 
 def test_eight_hours_give_the_weighted_rms_itself() -> None:
     dose = add_sinusoid(NO_DOSE, 12.5, 4.0, 8 * 3600.0)
-    assert a8_mps2(dose) == pytest.approx(hand_arm_weight(12.5) * 4.0 / math.sqrt(2))
+    assert compute_a8_mps2(dose) == pytest.approx(compute_hand_arm_weight(12.5) * 4.0 / math.sqrt(2))
 
 
 def test_a_quarter_of_the_time_halves_the_exposure() -> None:
     whole, quarter = (add_sinusoid(NO_DOSE, 35.0, 10.0, seconds) for seconds in (1200.0, 300.0))
-    assert a8_mps2(quarter) == pytest.approx(a8_mps2(whole) / 2)
+    assert compute_a8_mps2(quarter) == pytest.approx(compute_a8_mps2(whole) / 2)
 
 
 def test_time_without_a_measured_amplitude_is_distinguished() -> None:

@@ -7,7 +7,7 @@ from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.equalizer import Identity
 from protocols.definition.apparatus import TestDirections
 from study.session.stimulus.limits import make_study_limits
-from study.session.stimulus.stimulus import direction_vector, loop_length, make_held_stimulus
+from study.session.stimulus.stimulus import compute_direction_vector, count_loop_samples, make_held_stimulus
 
 RATE_HZ = 1000.0
 
@@ -15,7 +15,7 @@ RATE_HZ = 1000.0
 @given(st.sampled_from(["xy", "yz", "zx"]), st.floats(-180, 180))
 def test_the_directions_are_orthogonal_unit_vectors_mirrored_about_the_line(plane, symmetry_deg):
     directions = TestDirections(plane=plane, symmetry_deg=symmetry_deg)
-    one, two = direction_vector(directions, 1), direction_vector(directions, 2)
+    one, two = compute_direction_vector(directions, 1), compute_direction_vector(directions, 2)
     line = one + two
     assert one @ two == pytest.approx(0.0, abs=1e-12)
     assert [one @ one, two @ two] == pytest.approx([1.0, 1.0])
@@ -24,24 +24,24 @@ def test_the_directions_are_orthogonal_unit_vectors_mirrored_about_the_line(plan
 
 def test_by_default_they_lean_left_and_right_of_upright_in_the_frontal_plane():
     directions = TestDirections()
-    assert direction_vector(directions, 1) == pytest.approx(np.array([0.0, -1.0, 1.0]) / np.sqrt(2))
-    assert direction_vector(directions, 2) == pytest.approx(np.array([0.0, 1.0, 1.0]) / np.sqrt(2))
+    assert compute_direction_vector(directions, 1) == pytest.approx(np.array([0.0, -1.0, 1.0]) / np.sqrt(2))
+    assert compute_direction_vector(directions, 2) == pytest.approx(np.array([0.0, 1.0, 1.0]) / np.sqrt(2))
 
 
 def test_there_is_no_third_direction():
     with pytest.raises(ValueError, match="directions 1 and 2, not 3"):
-        direction_vector(TestDirections(), 3)
+        compute_direction_vector(TestDirections(), 3)
 
 
 @given(st.integers(5, 5000).map(lambda tenths: tenths / 10))
 def test_a_loop_holds_whole_periods(frequency_hz):
-    periods = loop_length(frequency_hz, RATE_HZ) * frequency_hz / RATE_HZ
+    periods = count_loop_samples(frequency_hz, RATE_HZ) * frequency_hz / RATE_HZ
     assert periods == pytest.approx(round(periods), abs=1e-9)
     assert periods >= 1 - 1e-9
 
 
 def test_the_loop_is_a_sinusoid_along_the_direction_with_the_polarity_in_its_sign(small_protocol):
-    vector = direction_vector(small_protocol.directions, 2)
+    vector = compute_direction_vector(small_protocol.directions, 2)
     plus, minus = (
         make_held_stimulus(small_protocol.stimulus, vector, 25.0, level, Identity(), RATE_HZ).loop.samples
         for level in (2.0, -2.0)
@@ -63,7 +63,7 @@ def test_a_stimulus_in_acceleration_goes_through_the_equalizer(small_protocol):
         def onset(self, wanted: Signal, envelope) -> None:
             return None
 
-    vector = direction_vector(small_protocol.directions, 1)
+    vector = compute_direction_vector(small_protocol.directions, 1)
     held = make_held_stimulus(small_protocol.stimulus, vector, 25.0, 4.0, HalfKilogram(), RATE_HZ)
     assert np.abs(held.loop.samples @ vector).max() == pytest.approx(2.0)
 

@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta, timezone
 import pytest
 
 from study.local_clock import local_now, machine_zone
-from study.session.views.local_time import in_utc, local_column, local_parts, local_time
+from study.session.views.local_time import format_time_in_zone, format_times_in_zone, split_time_in_zone, to_utc
 
 
 def india(time: datetime) -> datetime:
@@ -15,29 +15,29 @@ def india(time: datetime) -> datetime:
 @pytest.mark.parametrize(
     ("utc", "zone", "expected"),
     [
-        ("2026-11-22T13:05:59.999+00:00", in_utc, "2026-11-22 13:05 +00:00"),
+        ("2026-11-22T13:05:59.999+00:00", to_utc, "2026-11-22 13:05 +00:00"),
         ("2026-11-22T13:05:59.999+00:00", india, "2026-11-22 18:35 +05:30"),
         ("2026-11-22T20:05:00+00:00", india, "2026-11-23 01:35 +05:30"),
         ("2026-11-22T13:05:00Z", india, "2026-11-22 18:35 +05:30"),
-        ("2026-11-22T13:05:00+02:00", in_utc, "2026-11-22 11:05 +00:00"),
+        ("2026-11-22T13:05:00+02:00", to_utc, "2026-11-22 11:05 +00:00"),
         ("2026-11-22T13:05:00", india, "2026-11-22 18:35 +05:30"),
     ],
 )
 def test_a_time_is_that_of_the_place_with_its_offset(utc, zone, expected):
-    assert local_time(utc, zone) == expected
+    assert format_time_in_zone(utc, zone) == expected
 
 
 @pytest.mark.parametrize("text", ["", "T10;01", "yesterday", "9999-12-31T23:59:59+00:00", "0001-01-01T00:00:00+14:00"])
 @pytest.mark.parametrize("zone", [machine_zone, india])
 def test_what_cannot_be_converted_stays_as_it_is_or_is_converted(text, zone, summer_and_winter):
-    assert local_time(text, zone)[:4] in (text[:4], "1000")
+    assert format_time_in_zone(text, zone)[:4] in (text[:4], "1000")
 
 
 def test_a_zone_that_breaks_down_leaves_the_time_as_it_is():
     def broken(time: datetime) -> datetime:
         raise OSError("no zone")
 
-    assert local_time("2026-11-22T13:05:00+00:00", broken) == "2026-11-22T13:05:00+00:00"
+    assert format_time_in_zone("2026-11-22T13:05:00+00:00", broken) == "2026-11-22T13:05:00+00:00"
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_a_zone_that_breaks_down_leaves_the_time_as_it_is():
     ],
 )
 def test_the_machine_knows_summer_time(utc, expected, summer_and_winter):
-    assert local_parts(utc, machine_zone) == expected
+    assert split_time_in_zone(utc, machine_zone) == expected
 
 
 def test_now_is_local(summer_and_winter):
@@ -62,8 +62,8 @@ def test_an_offset_that_times_share_stands_in_the_header_alone():
         return time.astimezone(timezone(timedelta(hours=2 if time.month > 3 else 1)))
 
     utcs = ("2026-05-04T09:30:12+00:00", "2026-02-04T09:30:12+00:00", "2026-05-05T09:30:12+00:00", "no time")
-    assert local_column(utcs, summer_from_april) == (
+    assert format_times_in_zone(utcs, summer_from_april) == (
         "+02:00",
         ("2026-05-04 11:30", "2026-02-04 10:30 +01:00", "2026-05-05 11:30", "no time"),
     )
-    assert local_column((), summer_from_april) == ("", ())
+    assert format_times_in_zone((), summer_from_april) == ("", ())

@@ -12,8 +12,8 @@ from study.cli.main import app
 from study.session.watching.live import Live
 from study.session.watching.requests import NoteAsked
 from study.store.disk.atomic_write import write_atomically
-from study.store.disk.privacy import close_to_others, data_folder_warning, is_open_to_others, make_folder
-from study.store.sessions.archive import new_session_folder
+from study.store.disk.privacy import close_to_others, format_data_folder_warning, is_open_to_others, make_folder
+from study.store.sessions.archive import create_session_folder
 from study.store.sessions.live_file import write_live
 from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.checks.check_installation import check_privacy
@@ -109,20 +109,20 @@ def test_a_folder_that_is_not_closed_is_reported(opened, why, monkeypatch, tmp_p
         opened.chmod(0o2775)
     else:
         monkeypatch.chdir(opened)
-    assert data_folder_warning(opened).endswith(
+    assert format_data_folder_warning(opened).endswith(
         f"A session leaves them: {why}. Remove these rights: chmod 700 {opened}"
     )
     assert plan_sitting(str(CORPUS / "corpus_study.toml"), "P09", None, 3, opened).notes == (
-        data_folder_warning(opened),
+        format_data_folder_warning(opened),
     )
-    folder = new_session_folder(opened, "P09")
+    folder = create_session_folder(opened, "P09")
     assert is_open_to_others(opened)
     assert exposed(folder.path) == []
 
 
 def test_going_on_in_a_folder_that_is_not_closed_says_so(opened):
     opened.chmod(0o2775)
-    assert f"Note: {data_folder_warning(opened)}" in run("resume", "P04_001", "--data", opened)
+    assert f"Note: {format_data_folder_warning(opened)}" in run("resume", "P04_001", "--data", opened)
     assert exposed(opened / "P04_001") == []
 
 

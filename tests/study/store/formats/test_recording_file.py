@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from equalizer.signals.recording import SEGMENT_KINDS, SEGMENT_ROLES, Hold, Recording, Segment
-from equalizer.signals.recording_checks import signals_of
+from equalizer.signals.recording_checks import collect_signals
 from equalizer.signals.signal import Signal
 from study.store.disk.file_errors import AlreadyThereError
 from study.store.formats.recording_file import read_recording, write_recording
@@ -126,7 +126,7 @@ def test_the_shared_cases_are_read_and_written_without_loss(shared, number, tmp_
     assert read.response.unit == "m/s^2"
     write_recording(tmp_path / "again.h5", read, precision="float32")
     again = read_recording(tmp_path / "again.h5")
-    assert all(same(signal, signals_of(again)[name]) for name, signal in signals_of(read).items())
+    assert all(same(signal, collect_signals(again)[name]) for name, signal in collect_signals(read).items())
     assert again.segments == read.segments
 
 

@@ -1,22 +1,22 @@
 import pytest
 
 from study.errors import StudyError, WrongUseError
-from study.store.sessions.archive import check_subject, find_session, list_session_folders, new_session_folder
+from study.store.sessions.archive import check_subject, create_session_folder, find_session, list_session_folders
 from study.store.sessions.session_lock import PLACES_NAME, hold_places_lock, hold_session_lock
 
 
 def test_every_session_gets_a_folder_of_its_own(tmp_path):
-    names = [new_session_folder(tmp_path / "data", code).name for code in ("P01", "P01", "P02", "P01")]
+    names = [create_session_folder(tmp_path / "data", code).name for code in ("P01", "P01", "P02", "P01")]
     assert names == ["P01_001", "P01_002", "P02_001", "P01_003"]
     assert [f.name for f in list_session_folders(tmp_path / "data")] == sorted(names)
 
 
 def test_a_number_is_not_used_again_after_a_folder_was_moved_away(tmp_path):
-    new_session_folder(tmp_path, "P01")
-    second = new_session_folder(tmp_path, "P01")
+    create_session_folder(tmp_path, "P01")
+    second = create_session_folder(tmp_path, "P01")
     (tmp_path / "P01_001" / "recordings").rmdir()
     (tmp_path / "P01_001").rmdir()
-    assert new_session_folder(tmp_path, "P01").name == "P01_003"
+    assert create_session_folder(tmp_path, "P01").name == "P01_003"
     assert second.name == "P01_002"
 
 
@@ -28,20 +28,20 @@ def test_a_participant_is_a_code_and_never_a_name(code):
 
 
 def test_a_session_that_does_not_exist_is_named_with_those_that_do(tmp_path):
-    new_session_folder(tmp_path, "P01").log.touch()
+    create_session_folder(tmp_path, "P01").log.touch()
     with pytest.raises(WrongUseError, match="'P09_001' is neither.*Sessions there: P01_001"):
         find_session("P09_001", tmp_path)
 
 
 def test_a_session_is_found_by_folder_and_by_name(tmp_path):
-    folder = new_session_folder(tmp_path, "P01")
+    folder = create_session_folder(tmp_path, "P01")
     folder.log.touch()
     assert find_session("P01_001", tmp_path).path == folder.path.resolve()
     assert find_session(str(folder.path), tmp_path / "elsewhere").path == folder.path.resolve()
 
 
 def test_a_withdrawn_session_says_so(tmp_path):
-    folder = new_session_folder(tmp_path, "P01")
+    folder = create_session_folder(tmp_path, "P01")
     folder.tombstone.write_text("{}")
     with pytest.raises(StudyError, match="withdrew; the data were erased"):
         find_session("P01_001", tmp_path)
@@ -53,11 +53,11 @@ def test_a_withdrawn_session_says_so(tmp_path):
 def test_a_data_folder_that_cannot_be_made_is_said_so(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(StudyError, match="The session folder cannot be made"):
-        new_session_folder(tmp_path / "file" / "data", "P01")
+        create_session_folder(tmp_path / "file" / "data", "P01")
 
 
 def test_a_session_has_one_writer(tmp_path):
-    folder = new_session_folder(tmp_path, "P01")
+    folder = create_session_folder(tmp_path, "P01")
     with (
         hold_session_lock(folder.path),
         pytest.raises(StudyError, match="running elsewhere.*Another program is writing to P01_001"),

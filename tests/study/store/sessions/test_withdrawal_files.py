@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from study.store.sessions.archive import new_session_folder
+from study.store.sessions.archive import create_session_folder
 from study.store.sessions.withdrawal_files import SessionParticipant, read_participant, write_tombstone
 
 BEGUN = SessionParticipant("paper", False, 3)
@@ -12,7 +12,7 @@ BEGUN = SessionParticipant("paper", False, 3)
 
 @pytest.fixture
 def folder(tmp_path):
-    folder = new_session_folder(tmp_path, "P01")
+    folder = create_session_folder(tmp_path, "P01")
     write_tombstone(folder, "2026-11-01T10:00:00Z", BEGUN)
     return folder
 

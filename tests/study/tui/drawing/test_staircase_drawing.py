@@ -11,8 +11,8 @@ from study.tui.drawing.staircase_drawing import (
     RIGHT_MARK,
     VALLEY_MARK,
     WRONG_MARK,
-    staircase_lines,
-    summary,
+    draw_staircase,
+    summarize_staircase,
 )
 
 SMALL = Staircase("Run", (1.0, 1.0, 0.5, 1.0), (True, True, False, True), (False, True, True, False), 0.75, 3.0)
@@ -23,7 +23,7 @@ def marks(lines):
 
 
 def test_every_trial_has_its_mark_and_a_higher_level_stands_higher():
-    lines = staircase_lines(SMALL, 60, 12)
+    lines = draw_staircase(SMALL, 60, 12)
     by_column = dict(sorted((column, (row, c)) for (column, row), c in marks(lines).items()))
     assert [c for _, c in by_column.values()] == [RIGHT_MARK, PEAK_MARK, VALLEY_MARK, RIGHT_MARK]
     rows = [row for row, _ in by_column.values()]
@@ -31,12 +31,12 @@ def test_every_trial_has_its_mark_and_a_higher_level_stands_higher():
 
 
 def test_a_wrong_answer_that_turns_nothing_is_a_cross():
-    lines = staircase_lines(replace(SMALL, reversals=(False,) * 4), 60, 12)
+    lines = draw_staircase(replace(SMALL, reversals=(False,) * 4), 60, 12)
     assert sorted(marks(lines).values()) == sorted([RIGHT_MARK, RIGHT_MARK, WRONG_MARK, RIGHT_MARK])
 
 
 def test_cap_threshold_and_lowest_level_have_their_numbers():
-    lines = staircase_lines(SMALL, 60, 12)
+    lines = draw_staircase(SMALL, 60, 12)
     labels = [text[:LABEL_COLUMNS].strip() for text in lines[:-1] if text[:LABEL_COLUMNS].strip()]
     assert labels == ["3 N", "0.75 N", "0.425 N"]
     assert lines[-1].split() == ["1", "trial", "4"]
@@ -47,21 +47,21 @@ def test_cap_threshold_and_lowest_level_have_their_numbers():
 def test_it_fits_into_its_room(size, trials):
     levels = tuple(0.1 + (n % 7) * 0.4 for n in range(trials))
     staircase = Staircase("Run", levels, (True,) * trials, (False,) * trials, None, 3.0)
-    lines = staircase_lines(staircase, *size)
+    lines = draw_staircase(staircase, *size)
     assert len(lines) == size[1]
     assert max(map(len, lines)) <= size[0]
 
 
 def test_levels_at_and_above_the_cap_stay_in_the_picture():
-    lines = staircase_lines(replace(SMALL, levels_n=(3.0, 3.5, 3.0, 3.0)), 60, 12)
+    lines = draw_staircase(replace(SMALL, levels_n=(3.0, 3.5, 3.0, 3.0)), 60, 12)
     assert {row for _, row in marks(lines)} == {0}
 
 
 def test_without_room_or_answers_it_says_so():
-    assert staircase_lines(SMALL, 10, 3) == ("No room to draw.",)
-    assert staircase_lines(Staircase("Run", (), (), (), None, 3.0), 60, 12) == ("Nothing was answered in this run.",)
+    assert draw_staircase(SMALL, 10, 3) == ("No room to draw.",)
+    assert draw_staircase(Staircase("Run", (), (), (), None, 3.0), 60, 12) == ("Nothing was answered in this run.",)
 
 
 def test_the_summary_counts():
-    assert summary(SMALL) == "4 trials, 3 right, 2 reversals; threshold 0.750 N."
-    assert summary(replace(SMALL, threshold_n=None)) == "4 trials, 3 right, 2 reversals."
+    assert summarize_staircase(SMALL) == "4 trials, 3 right, 2 reversals; threshold 0.750 N."
+    assert summarize_staircase(replace(SMALL, threshold_n=None)) == "4 trials, 3 right, 2 reversals."

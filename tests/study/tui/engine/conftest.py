@@ -12,25 +12,25 @@ import pytest
 from study.session.views.form_views import FormReply
 from study.session.views.views import AfterPause, Answered, DemoDone
 from study.tui.engine.client import EngineClient
-from study.tui.engine.from_engine import Ask, Call, Failed, Finished, FromEngine
+from study.tui.engine.from_engine import DisplayCall, Failed, Finished, FromEngine, ScreenRequest
 from study.tui.engine.to_engine import BeginSession, Heartbeat, Reply, SessionOrder, ToEngine
 
 SHORT = {"after_run_s = 2.0": "after_run_s = 0.1", "trial_limit = 4": "trial_limit = 1"}
 
 
-def ordinary_reply(ask: Ask) -> Any:
+def ordinary_reply(ask: ScreenRequest) -> Any:
     match ask.call:
-        case Call.ASK:
+        case DisplayCall.ASK:
             return Answered(1 + ask.number % 2, time.monotonic())
-        case Call.FILL_IN:
+        case DisplayCall.FILL_IN:
             return FormReply({field.key: (*field.choices, "fine")[0] for field in ask.content.fields})
-        case Call.DEVICE_CHECKED:
+        case DisplayCall.DEVICE_CHECKED:
             return True
-        case Call.CHOOSE_DEMO:
+        case DisplayCall.CHOOSE_DEMO:
             return DemoDone()
-        case Call.PAUSE:
+        case DisplayCall.PAUSE:
             return AfterPause.CONTINUE_SITTING
-        case Call.REST:
+        case DisplayCall.REST:
             return ask.content.seconds
     return None
 
@@ -64,11 +64,11 @@ class ScriptedScreen:
         """Answers all that comes before what is wanted."""
         while not wanted(message := self.next()):
             assert not isinstance(message, Failed | Finished), message
-            if reply and isinstance(message, Ask):
+            if reply and isinstance(message, ScreenRequest):
                 self.reply(message)
         return message
 
-    def reply(self, ask: Ask) -> None:
+    def reply(self, ask: ScreenRequest) -> None:
         self.send(Reply(ask.number, ordinary_reply(ask)))
 
     def close(self) -> None:

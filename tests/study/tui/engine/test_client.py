@@ -58,7 +58,7 @@ def test_an_engine_that_talks_nonsense_is_told_as_ended_and_does_end(engine, cap
     failure = heard.get(timeout=20.0)
     assert isinstance(failure, Failed)
     assert failure.error.title == "The device program ended"
-    assert client.dead
+    assert client.has_failed
     assert "UnpicklingError" in capfd.readouterr().err
 
 

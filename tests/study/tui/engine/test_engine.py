@@ -14,7 +14,16 @@ from study.session.facts.void_reasons import SCREEN_LATE, SCREEN_SILENT
 from study.session.views.views import Answered
 from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
 from study.store.sessions.log_writer import is_log_locked
-from study.tui.engine.from_engine import Ask, Call, CloseRequest, Failed, Finished, Home, Session, Withdrawn
+from study.tui.engine.from_engine import (
+    CloseRequest,
+    DisplayCall,
+    Failed,
+    Finished,
+    HomeContent,
+    ScreenRequest,
+    SessionContent,
+    Withdrawn,
+)
 from study.tui.engine.to_engine import (
     AskOtherSession,
     BeginSession,
@@ -33,18 +42,18 @@ pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 ROOT = Path(__file__).parents[4]
 
 
-def asks(call: Call):
-    return lambda message: isinstance(message, Ask) and message.call is call
+def asks(call: DisplayCall):
+    return lambda message: isinstance(message, ScreenRequest) and message.call is call
 
 
 def is_a(*kinds: type):
     return lambda message: isinstance(message, kinds)
 
 
-def third_trial(screen) -> Ask:
+def third_trial(screen) -> ScreenRequest:
     for _ in range(2):
-        screen.reply(screen.wait_for(asks(Call.ASK)))
-    return screen.wait_for(asks(Call.ASK))
+        screen.reply(screen.wait_for(asks(DisplayCall.ASK)))
+    return screen.wait_for(asks(DisplayCall.ASK))
 
 
 def log_of(session: Path) -> str:
@@ -66,11 +75,11 @@ def test_a_session_runs_to_its_report_and_is_listed(begun, order, session):
     assert Path(end.results.report).is_file()
     assert end.path == str(session)
     begun.send(ShowHome(order.data, order.protocol, order.device))
-    home = begun.wait_for(is_a(Home)).view
+    home = begun.wait_for(is_a(HomeContent)).view
     assert [line.name for line in home.sessions] == ["P01_001"]
     assert home.protocols[0].name == order.protocol
     begun.send(ShowSession(end.path))
-    assert begun.wait_for(is_a(Session)).view.line.standing == "finished"
+    assert begun.wait_for(is_a(SessionContent)).view.line.standing == "finished"
     begun.send(Withdraw(end.path))
     assert begun.wait_for(is_a(Withdrawn)).sessions == ("P01_001",)
     assert not session.joinpath("events.jsonl").exists()
@@ -90,7 +99,7 @@ def test_letting_go_ends_the_sitting_and_it_can_be_resumed(begun, order, session
     assert is_log_locked(session / "events.jsonl") is False
     begun.send(Reply(trial.number, Answered(1, time.monotonic())))
     begun.send(Resume("P01_001", "simulated", order.data))
-    assert begun.wait_for(asks(Call.WELCOME)).content.resumed_after == 2
+    assert begun.wait_for(asks(DisplayCall.WELCOME)).content.resumed_after == 2
 
 
 def test_letting_go_before_the_engine_has_begun_begins_nothing(screen, order, session):
@@ -101,13 +110,13 @@ def test_letting_go_before_the_engine_has_begun_begins_nothing(screen, order, se
     assert (failure.error.title, failure.path) == ("Interrupted", "")
     assert not session.exists()
     screen.send(BeginSession(order))
-    screen.wait_for(asks(Call.WELCOME))
+    screen.wait_for(asks(DisplayCall.WELCOME))
 
 
 def test_a_reply_of_an_earlier_sitting_answers_nothing_in_the_next(screen, order):
     screen.send(Reply(1, True))
     screen.send(BeginSession(order))
-    assert screen.wait_for(is_a(Ask)).number == 1
+    assert screen.wait_for(is_a(ScreenRequest)).number == 1
     with pytest.raises(queue.Empty):
         screen.next(1.0)
 
@@ -116,7 +125,7 @@ def test_a_reply_to_what_is_over_is_ignored(begun, session):
     trial = third_trial(begun)
     begun.send(Reply(trial.number - 1, Answered(2, time.monotonic())))
     begun.send(Reply(trial.number, Answered(1, time.monotonic())))
-    assert begun.wait_for(is_a(Ask)).number > trial.number
+    assert begun.wait_for(is_a(ScreenRequest)).number > trial.number
     answers = [line for line in log_of(session).splitlines() if "answer_given" in line]
     assert '"answer":1' in answers[-1]
 
@@ -128,8 +137,8 @@ def test_without_a_heartbeat_the_trial_is_void_and_waits_for_a_screen(begun, ses
     assert begun.next() == CloseRequest(trial.number)
     assert 0.3 < time.monotonic() - began_s < 1.2
     waiting = begun.next()
-    assert isinstance(waiting, Ask)
-    assert waiting.call is Call.AWAIT_RETURN
+    assert isinstance(waiting, ScreenRequest)
+    assert waiting.call is DisplayCall.AWAIT_RETURN
     assert waiting.content in (SCREEN_SILENT, SCREEN_LATE)  # by how busy this computer is
     assert "the screen gave no sign of life" in log_of(session).splitlines()[-1]
     begun.come_back()
@@ -138,7 +147,7 @@ def test_without_a_heartbeat_the_trial_is_void_and_waits_for_a_screen(begun, ses
 
 
 @pytest.mark.parametrize(
-    ("request_", "call"), [(PauseAsked("participant"), Call.PAUSE), (StopAsked("participant"), None)]
+    ("request_", "call"), [(PauseAsked("participant"), DisplayCall.PAUSE), (StopAsked("participant"), None)]
 )
 def test_requests_from_the_screen_reach_the_session(begun, session, request_, call):
     third_trial(begun)
@@ -146,9 +155,9 @@ def test_requests_from_the_screen_reach_the_session(begun, session, request_, ca
     begun.send(Relay(request_))
     if call is not None:
         begun.reply(begun.wait_for(asks(call)))
-        begun.wait_for(asks(Call.ASK))
+        begun.wait_for(asks(DisplayCall.ASK))
     else:
-        begun.wait_for(asks(Call.GOODBYE))
+        begun.wait_for(asks(DisplayCall.GOODBYE))
     assert "coughed" in log_of(session)
 
 
@@ -161,7 +170,7 @@ def test_what_cannot_be_begun_is_reported_and_the_engine_continues(screen, order
     screen.send(AskOtherSession(order.data, PauseAsked("experimenter")))
     assert isinstance(screen.next(), Failed)
     screen.send(ShowHome(order.data))
-    assert isinstance(screen.next(), Home)
+    assert isinstance(screen.next(), HomeContent)
 
 
 def test_a_killed_engine_says_what_is_safe_and_how_to_continue(begun, session):
@@ -174,7 +183,7 @@ def test_a_killed_engine_says_what_is_safe_and_how_to_continue(begun, session):
     assert failure.error.saved == "Every answer that was given is on disk."
     assert f"hapteq resume {session}" in failure.error.do_now
     assert failure.error.exit_code == 3
-    assert begun.engine.dead
+    assert begun.engine.has_failed
     assert is_log_locked(session / "events.jsonl") is False
 
 
@@ -195,12 +204,12 @@ import importlib.util
 spec = importlib.util.spec_from_file_location("scripted", {conftest!r})
 scripted = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(scripted)
-from study.tui.engine.from_engine import Ask, Call
+from study.tui.engine.from_engine import DisplayCall, ScreenRequest
 from study.tui.engine.to_engine import BeginSession, SessionOrder
 screen = scripted.ScriptedScreen()
 screen.send(BeginSession(SessionOrder({protocol!r}, "simulated", "P01", {data!r}, seed=4)))
 for _ in range(3):
-    trial = screen.wait_for(lambda m: isinstance(m, Ask) and m.call is Call.ASK)
+    trial = screen.wait_for(lambda m: isinstance(m, ScreenRequest) and m.call is DisplayCall.ASK)
     if _ < 2:
         screen.reply(trial)
 print(screen.engine.pid, flush=True)
@@ -222,4 +231,4 @@ def test_a_killed_screen_takes_the_engine_with_it_and_loses_nothing(screen, orde
     assert gone_within(engine, 4.5)  # about one on a machine that is not busy; its last resort comes at five
     assert "session_interrupted" in log_of(session).splitlines()[-1]
     screen.send(Resume("P01_001", "simulated", order.data))
-    assert screen.wait_for(asks(Call.WELCOME)).content.resumed_after == 2
+    assert screen.wait_for(asks(DisplayCall.WELCOME)).content.resumed_after == 2

@@ -22,8 +22,8 @@ from study.session.views.views import (
     RestNotice,
     Unanswered,
 )
-from study.tui.engine.from_engine import Ask, Call, CloseRequest, LookUpdate
-from study.tui.engine.remote_display import SILENT_AFTER_S, RemoteDisplay, make_silent_screen_reply
+from study.tui.engine.from_engine import CloseRequest, DisplayCall, HandleUpdate, ScreenRequest
+from study.tui.engine.remote_display import HEARTBEAT_TIMEOUT_S, RemoteDisplay, make_silent_screen_reply
 from study.tui.engine.screen_link import ScreenLink
 from study.tui.engine.to_engine import Heartbeat, Reply
 from study.tui.trial_replies import TIME_OVER
@@ -84,7 +84,7 @@ def test_the_answer_is_the_one_to_the_question_on_the_screen(screen):
     answer = Answered(2, time.monotonic())
     screen.soon(Reply(0, Answered(1, 0.0)), Reply(7, Answered(1, 0.0)), Reply(1, answer))
     assert screen.display.ask(QUESTION, alive) == answer
-    assert screen.hear() == Ask(1, Call.ASK, QUESTION)
+    assert screen.hear() == ScreenRequest(1, DisplayCall.ASK, QUESTION)
 
 
 def test_a_reply_wakes_the_engine_at_once(screen):
@@ -118,7 +118,7 @@ def test_a_silent_screen_ends_every_force_at_the_hand(screen, wait):
     screen.fall_silent()
     began_s = time.monotonic()
     reply = wait(screen.display)
-    assert SILENT_AFTER_S - 0.15 < time.monotonic() - began_s < SILENT_AFTER_S + 0.3
+    assert HEARTBEAT_TIMEOUT_S - 0.15 < time.monotonic() - began_s < HEARTBEAT_TIMEOUT_S + 0.3
     # Which of the two depends on how busy this computer is.
     assert reply in (make_silent_screen_reply(0.0, 0.1), make_silent_screen_reply(0.0, 4.0))
 
@@ -131,7 +131,7 @@ def test_a_silent_screen_of_a_busy_computer_is_distinguished(screen):
 
 def test_a_silent_screen_may_take_its_time_while_nothing_plays(screen):
     screen.fall_silent()
-    screen.soon(Reply(1, DemoDone()), Reply(2, None), delay_s=SILENT_AFTER_S + 0.3)
+    screen.soon(Reply(1, DemoDone()), Reply(2, None), delay_s=HEARTBEAT_TIMEOUT_S + 0.3)
     assert screen.display.choose_demo(MENU, alive) == DemoDone()
     assert screen.display.await_return("a reason") is None
 
@@ -148,7 +148,7 @@ def test_what_plays_is_closed_when_its_time_is_over(screen):
     began_s = time.monotonic()
     assert screen.display.show_playing(PlayingNotice("Interval 1", 1, 0.3, None), alive) is None
     assert time.monotonic() - began_s == pytest.approx(0.3, abs=0.06)
-    assert isinstance(screen.hear(), Ask)
+    assert isinstance(screen.hear(), ScreenRequest)
     assert screen.hear() == CloseRequest(1)
 
 
@@ -183,7 +183,11 @@ def test_the_screen_sees_the_handle_come_back(screen):
     coming = iter(views)
     assert screen.display.await_handle(lambda: next(coming), alive) is None
     heard = [screen.hear() for _ in range(5)]
-    assert heard == [Ask(1, Call.AWAIT_HANDLE, views[0]), *(LookUpdate(1, view) for view in views[1:]), CloseRequest(1)]
+    assert heard == [
+        ScreenRequest(1, DisplayCall.AWAIT_HANDLE, views[0]),
+        *(HandleUpdate(1, view) for view in views[1:]),
+        CloseRequest(1),
+    ]
 
 
 def test_a_wait_gives_signs_of_life_twenty_times_a_second(screen):

@@ -103,7 +103,7 @@ def test_the_form_looks_like_this(on_screen, looks_like, size):
 @pytest.mark.parametrize("size", [(80, 24), (132, 40)], ids=["80x24", "132x40"])
 def test_while_it_is_computed_it_looks_like_this(on_screen, looks_like, size):
     async def story(sight):
-        sight.app.screen.show("looking for the first effect", 0.4)
+        sight.app.screen.show_progress("looking for the first effect", 0.4)
         await sight.pilot.pause()
         assert sight.app.screen.query_one(ProgressBar).percentage == pytest.approx(0.4)
         looks_like(sight, f"diagnosing-{size[0]}x{size[1]}")

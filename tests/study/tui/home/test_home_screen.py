@@ -98,6 +98,18 @@ def test_a_protocol_of_accelerations_asks_for_a_model_and_no_other_does(on_scree
     assert messages_of(app) == [("BeginWanted", "P06", "equalized_threshold", "simulated", "/lab/centre.h5")]
 
 
+@pytest.mark.parametrize("name", ["centre[/red].h5", "[bold]centre.h5", "centre\x1b[2J\n.h5"])
+def test_the_name_of_a_models_file_is_no_markup_and_prints_no_control_character(on_screen, home, name):
+    shown = name.replace("\x1b", " ").replace("\n", " ")
+
+    async def story(sight):
+        await sight.until(lambda: shown in sight.text)
+        await sight.press("P", "0", "6", "f5")
+
+    app = on_screen(HomeScreen(with_equalized_first(home, f"/lab/{name}")), story)
+    assert messages_of(app) == [("BeginWanted", "P06", "equalized_threshold", "simulated", f"/lab/{name}")]
+
+
 def test_without_a_model_it_says_where_one_comes_from_and_begins_nothing(on_screen, home):
     async def story(sight):
         await sight.press("P", "0", "6", "f5")

@@ -3,7 +3,7 @@
 import pytest
 from textual.widgets import Input
 
-from study.tui.engine.from_engine import Calibrated, CalibrationStored, LayDown
+from study.tui.engine.from_engine import CalibrationComputed, CalibrationStored, PlacementRequest
 from study.tui.screens.home import HomeScreen
 from study.tui.screens.sensor import SensorScreen
 from tests.study.tui.home.conftest import messages_of
@@ -15,7 +15,7 @@ def story_of(*steps):
 
     async def story(sight):
         for step in steps:
-            if isinstance(step, LayDown | Calibrated | CalibrationStored):
+            if isinstance(step, PlacementRequest | CalibrationComputed | CalibrationStored):
                 sight.app.screen.handle_message(step)
                 await sight.pilot.pause()
             else:
@@ -32,11 +32,11 @@ def test_a_person_is_led_through_six_positions(on_screen):
     story, seen = story_of(
         PORT,
         ("f5",),
-        LayDown(1, "+x up", None),
+        PlacementRequest(1, "+x up", None),
         ("enter",),
-        LayDown(2, "-x up", (38_652.4, 32_768.0, 32_768.0)),
+        PlacementRequest(2, "-x up", (38_652.4, 32_768.0, 32_768.0)),
         ("enter", "enter"),
-        Calibrated('[accelerometer]\nport = "COM3"', "/lab/device.toml"),
+        CalibrationComputed('[accelerometer]\nport = "COM3"', "/lab/device.toml"),
         ("enter", "enter"),
         CalibrationStored("/lab/device.toml"),
     )
@@ -68,7 +68,7 @@ def test_what_cannot_be_meant_is_refused(on_screen, keys, said):
 
 @pytest.mark.slow
 def test_esc_stops_it_and_goes_back(on_screen, home):
-    story, seen = story_of(("f7",), (*PORT, "enter"), LayDown(1, "+x up", None), ("escape",))
+    story, seen = story_of(("f7",), (*PORT, "enter"), PlacementRequest(1, "+x up", None), ("escape",))
     app = on_screen(HomeScreen(home), story, (132, 40))
     assert "1 of 6" in seen[2] and "Sessions" in seen[3]
     assert [name for name, *_ in messages_of(app)] == ["CalibrateSensor", "LetGo"]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from textual.widgets import TabbedContent
 
-from study.tui.screens.session import SessionScreen, file_url
+from study.tui.screens.session import SessionScreen, make_file_url
 from study.tui.widgets.long_text import LongText
 from tests.study.tui.home.conftest import messages_of
 
@@ -96,7 +96,7 @@ def test_a_report_that_was_removed_is_reported_where_the_screen_is_in_a_browser(
 
 
 def test_a_path_with_blanks_is_a_url_that_a_browser_understands():
-    assert file_url("/data/my study/report.html") == "file:///data/my%20study/report.html"
+    assert make_file_url("/data/my study/report.html") == "file:///data/my%20study/report.html"
 
 
 def test_a_newer_view_stays_on_its_page(on_screen, session):

@@ -15,7 +15,7 @@ from study.session.views.views import (
     Unanswered,
     Welcome,
 )
-from study.tui.drawing.direction_picture import draw_directions, sentence
+from study.tui.drawing.direction_picture import describe_direction, draw_directions
 from study.tui.keys.answer_keys import AnswerKeys
 from study.tui.trial_replies import REPEAT, TIME_OVER
 
@@ -200,7 +200,7 @@ def test_the_end_is_told_finished_or_not(typed):
     ],
 )
 def test_a_direction_is_reported_in_words(plane, angle_deg, expected):
-    assert sentence(DirectionPicture(plane, (angle_deg, 0.0)), 1) == expected
+    assert describe_direction(DirectionPicture(plane, (angle_deg, 0.0)), 1) == expected
 
 
 def test_the_picture_shows_a_solid_and_a_dashed_segment_that_lean_opposite_ways():

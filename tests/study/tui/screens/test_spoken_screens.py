@@ -33,7 +33,7 @@ from study.session.views.views import (
 )
 from study.store.formats.protocol_files import read_protocol
 from study.tui.app import outcomes
-from study.tui.drawing.direction_picture import sentence
+from study.tui.drawing.direction_picture import describe_direction
 from study.tui.screens.await_return import AwaitReturnScreen
 from study.tui.screens.confirm_withdrawal import ConfirmWithdrawal
 from study.tui.screens.demo import DemoScreen
@@ -157,7 +157,7 @@ def test_directions_are_told_to_the_last_word(on_stage, plane, code):
         lines = [line.ljust(80) for line in stage.text.splitlines()]
         for number, half in ((1, slice(0, 40)), (2, slice(40, 80))):
             inside = " ".join(re.sub(r"[│┃⠀-⣿]", " ", line[half]) for line in lines)
-            assert sentence(picture, number, words) in " ".join(inside.split())
+            assert describe_direction(picture, number, words) in " ".join(inside.split())
 
     on_stage(armed(words, replace(QUESTION, picture=picture)), story)
 
@@ -170,12 +170,12 @@ def test_what_a_stop_tells_is_in_the_language(on_stage, code):
         assert english_in(stage.words, words.own) == []
         assert words["key_quit"] in stage.words
         assert words["key_leave"] in stage.text.splitlines()[-1]
-        stage.app.screen.show_outcome(outcomes.stop_unanswered_panel(words))
+        stage.app.screen.show_outcome(outcomes.make_stop_unanswered_outcome(words))
         await stage.pilot.pause()
         assert english_in(stage.words, words.own) == []
         assert words["stop_do_now"].split(":")[0] in re.sub(r"[\s│┃]+", " ", stage.words)
 
-    on_stage(OutcomeScreen(outcomes.stop_told_panel(words)), story)
+    on_stage(OutcomeScreen(outcomes.make_stop_sent_outcome(words)), story)
 
 
 @pytest.mark.parametrize("code", LANGUAGES)

@@ -22,7 +22,7 @@ def test_a_new_alarm_rings_at_once_and_again_until_it_is_seen(book):
     assert book.update([CLIPPED], BELL_INTERVAL_S)
     assert book.acknowledge(BELL_INTERVAL_S) == 1
     assert not book.update([CLIPPED], 3 * BELL_INTERVAL_S)
-    assert (book.new_alarms, book.seen_alarms) == ((), (CLIPPED,))
+    assert (book.new_alarms, book.acknowledged_alarms) == ((), (CLIPPED,))
 
 
 def test_one_that_is_not_urgent_rings_once(book):
@@ -35,7 +35,7 @@ def test_a_second_alarm_rings_although_the_first_was_seen(book):
     book.update([CLIPPED], 0.0)
     book.acknowledge(0.5)
     assert book.update([CLIPPED, QUIET], 1.0)
-    assert (book.new_alarms, book.seen_alarms) == ((QUIET,), (CLIPPED,))
+    assert (book.new_alarms, book.acknowledged_alarms) == ((QUIET,), (CLIPPED,))
 
 
 def test_an_alarm_that_flickers_stays_seen_and_one_that_comes_back_later_rings(book):

@@ -3,7 +3,7 @@
 import pytest
 
 from study.session.watching.watch_view import StaircasePoint
-from study.tui.watch.level_history import LEGEND, level_history
+from study.tui.watch.level_history import LEGEND, draw_level_history
 
 SIZE = (50, 12)
 
@@ -13,7 +13,7 @@ def point(trial: int, level_n: float, correct: bool = True, reversal: bool = Fal
 
 
 def drawn(points, next_n=None, cap_n=3.0, size=SIZE) -> list[str]:
-    return level_history(points, next_n, cap_n, size).plain.split("\n")
+    return draw_level_history(points, next_n, cap_n, size).plain.split("\n")
 
 
 def test_it_fills_its_room_and_no_more():

@@ -6,8 +6,8 @@ from datetime import UTC, datetime
 import pytest
 
 from study.store.sessions.event_log import LOG_NAME
-from study.tui.watch.watch_lines import changes, status
-from study.tui.watch.watch_words import duration
+from study.tui.watch.watch_lines import format_changes, format_view
+from study.tui.watch.watch_words import format_duration
 from study.workflows.views.watch_session import follow
 
 TEXT = (
@@ -45,7 +45,7 @@ def views(tmp_path_factory):
 
 
 def told(views) -> list[str]:
-    return [line for before, now in zip([None, *views], views, strict=False) for line in changes(before, now)]
+    return [line for before, now in zip([None, *views], views, strict=False) for line in format_changes(before, now)]
 
 
 @pytest.mark.slow
@@ -57,14 +57,14 @@ def test_each_trial_is_reported_once_when_it_is_closed(views):
 
 
 def test_nothing_is_told_twice(views):
-    assert changes(views[-1], views[-1]) == []
+    assert format_changes(views[-1], views[-1]) == []
 
 
 def test_motion_across_that_was_not_measured_is_not_reported_as_none(views):
     view = views[-1]
-    assert any(" across" in line for line in status(view))
+    assert any(" across" in line for line in format_view(view))
     unknown = replace(view, last=tuple(replace(trial, off_axis_mps2=None) for trial in view.last))
-    lines = [line for line in status(unknown) if line.startswith("Last")]
+    lines = [line for line in format_view(unknown) if line.startswith("Last")]
     assert any("m/s²" in line for line in lines)
     assert not any("across" in line for line in lines)
 
@@ -74,13 +74,13 @@ def test_the_end_is_reported(views):
 
 
 def test_an_alarm_comes_first_with_a_bell(views):
-    lines = changes(None, views[0])
+    lines = format_changes(None, views[0])
     assert lines[0].startswith("\aALARM The program that ran the session is gone.")
-    assert lines[0] not in changes(views[0], views[1])
+    assert lines[0] not in format_changes(views[0], views[1])
 
 
 def test_the_status_names_all_that_matters(views):
-    text = "\n".join(status(views[-1]))
+    text = "\n".join(format_view(views[-1]))
     for part in (
         "✓ FINISHED S1_001",
         "3/3 reversals",
@@ -97,7 +97,7 @@ def test_the_status_names_all_that_matters(views):
     ("seconds", "words"), [(4.9, "4 s"), (65.0, "1 min 05 s"), (3720.0, "1 h 02 min"), (0.0, "0 s")]
 )
 def test_durations_are_rounded_down(seconds, words):
-    assert duration(seconds) == words
+    assert format_duration(seconds) == words
 
 
 def test_too_little_to_measure_is_no_note_on_each_trial(tmp_path):
@@ -107,4 +107,4 @@ def test_too_little_to_measure_is_no_note_on_each_trial(tmp_path):
     early = tuple(trial for trial in view.last if trial.status == "unmeasured")
     assert early
     assert {(trial.remark, trial.delivered_mps2) for trial in early} == {("", None)}
-    assert sum("answered too early to measure" in line for line in status(replace(view, last=early))) == 1
+    assert sum("answered too early to measure" in line for line in format_view(replace(view, last=early))) == 1

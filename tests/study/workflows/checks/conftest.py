@@ -14,7 +14,7 @@ from study.devices.safe import SafeDevice
 from study.store.disk.provenance import sha256_of
 from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
-from study.workflows.checks.daily_check import MotionCallbacks, check_on
+from study.workflows.checks.daily_check import MotionCallbacks, check_on_device
 from study.workflows.recording.record_device import RecordingPlan, make_recording_settings, record_on_device
 
 AS_NEW = {"friction": 0.15, "damping": 1.0, "mode_hz": 60.0, "noise": 0.05}
@@ -86,6 +86,6 @@ def two_days(recorded, device_like, vendor):
 
     def again(seed: int, **changed: float):
         with device_like(seed, changed) as (device, plan):
-            return check_on(device, plan, QUIET)
+            return check_on_device(device, plan, QUIET)
 
     return baseline, again

@@ -8,13 +8,18 @@ import pytest
 
 from study.session.views.views import DeviceFinding
 from study.workflows.checks import bare_loop
-from study.workflows.checks.bare_loop import BareLoop, BareRun, compare_with_bare_loop, run_bare_loop_beside
+from study.workflows.checks.bare_loop import (
+    BareLoopRun,
+    BareLoopTiming,
+    compare_with_bare_loop,
+    run_bare_loop_in_parallel,
+)
 
 
 @pytest.mark.real_time
 @pytest.mark.parametrize("raised_priority", [False, True])
 def test_it_runs_beside_for_as_long_as_it_is_told(raised_priority):
-    with run_bare_loop_beside(0.3, 1000.0, raised_priority) as run:
+    with run_bare_loop_in_parallel(0.3, 1000.0, raised_priority) as run:
         assert run.result is None
     assert run.result is not None and run.result.ticks == 300
     assert 0 <= run.result.late_ticks <= 300 and run.result.latest_s > 0
@@ -27,7 +32,7 @@ def test_its_source_compiles_without_a_warning(vendor, tmp_path):
 
 
 def beside(late: int, bare_late: int, ticks: int = 60_000) -> DeviceFinding:
-    return compare_with_bare_loop(late, ticks, BareRun(BareLoop(60_000, bare_late, 0.0042, True)))
+    return compare_with_bare_loop(late, ticks, BareLoopRun(BareLoopTiming(60_000, bare_late, 0.0042, True)))
 
 
 @pytest.mark.parametrize(("late", "bare_late"), [(0, 0), (3, 0), (150, 100), (170, 100), (1500, 1000), (10, 500)])
@@ -56,8 +61,8 @@ def test_loops_of_different_lengths_are_compared_by_their_shares():
 
 
 def test_without_a_compiler_it_is_said_that_nothing_was_compared(monkeypatch):
-    monkeypatch.setattr(bare_loop, "_compiler", lambda: None)
-    with run_bare_loop_beside(1.0, 1000.0, True) as run:
+    monkeypatch.setattr(bare_loop, "_find_compiler", lambda: None)
+    with run_bare_loop_in_parallel(1.0, 1000.0, True) as run:
         pass
     found = compare_with_bare_loop(5, 1000, run)
     assert found.fine and "not compared: no C compiler" in found.value
@@ -65,8 +70,8 @@ def test_without_a_compiler_it_is_said_that_nothing_was_compared(monkeypatch):
 
 @pytest.mark.parametrize("tool", ["false", "true"])
 def test_a_compiler_that_fails_or_makes_nothing_is_told(monkeypatch, tool):
-    monkeypatch.setattr(bare_loop, "_compiler", lambda: [shutil.which(tool)])
-    with run_bare_loop_beside(1.0, 1000.0, True) as run:
+    monkeypatch.setattr(bare_loop, "_find_compiler", lambda: [shutil.which(tool)])
+    with run_bare_loop_in_parallel(1.0, 1000.0, True) as run:
         pass
     assert run.result is None and "not compared" in compare_with_bare_loop(5, 1000, run).value
 
@@ -81,6 +86,6 @@ def test_a_measurement_that_breaks_off_leaves_no_loop_behind():
 
     with pytest.MonkeyPatch().context() as patch, pytest.raises(ValueError, match="lost"):
         patch.setattr(bare_loop.subprocess, "Popen", Noted)
-        with run_bare_loop_beside(60.0, 1000.0, False):
+        with run_bare_loop_in_parallel(60.0, 1000.0, False):
             raise ValueError("lost")
     assert started[-1].poll() is not None

@@ -12,13 +12,13 @@ import study
 from study.workflows.checks import check_installation as module
 from study.workflows.checks.check_installation import (
     Terminal,
-    check_folder,
+    check_data_folder,
+    check_import_name,
     check_installation,
-    check_name,
     check_packages,
     check_requirement,
     check_terminal,
-    this_terminal,
+    detect_terminal,
 )
 
 HOME = Path(study.__file__).parents[1]
@@ -78,17 +78,17 @@ def distribution(tmp_path, monkeypatch):
 
 def test_another_program_that_owns_a_name_of_ours_is_named(distribution):
     distribution("other-program", top_level="analysis\n")
-    finding = check_name("analysis", packages_distributions(), HOME)
+    finding = check_import_name("analysis", packages_distributions(), HOME)
     assert finding.value == "belongs to other-program as well"
     assert finding.advice == "Install hapteq into an environment of its own: other-program must not share one with it."
-    assert check_name("study", packages_distributions(), HOME).fine
+    assert check_import_name("study", packages_distributions(), HOME).fine
 
 
 def test_a_package_that_comes_from_elsewhere_is_found(tmp_path):
-    finding = check_name("protocols", {}, tmp_path)
+    finding = check_import_name("protocols", {}, tmp_path)
     assert finding.value == f"taken from {HOME / 'protocols' / '__init__.py'}"
     assert finding.advice == "Rename that file, or start hapteq without its folder on PYTHONPATH."
-    assert check_name("no_such_package", {}, HOME).value == "nowhere to be found"
+    assert check_import_name("no_such_package", {}, HOME).value == "nowhere to be found"
 
 
 def test_a_good_terminal_is_fine():
@@ -134,7 +134,7 @@ def test_where_there_is_no_terminal_none_is_checked(tmp_path, monkeypatch):
     with (tmp_path / "out").open("w") as out:
         monkeypatch.setattr("sys.stdout", out)
         monkeypatch.setattr("sys.stderr", None)
-        assert this_terminal() is None
+        assert detect_terminal() is None
     (finding,) = check_terminal(None)
     assert (finding.value, finding.fine) == ("none here, so it was not checked", True)
 
@@ -147,7 +147,7 @@ def test_a_terminal_is_found_where_output_goes_to_one(monkeypatch):
     monkeypatch.setenv("TERM", "vt100")
     with open(follower, "w", encoding="utf-8") as out:  # noqa: PTH123 - a descriptor
         monkeypatch.setattr("sys.stdout", out)
-        terminal = this_terminal()
+        terminal = detect_terminal()
     os.close(leader)
     assert terminal is not None
     assert (terminal.encoding, terminal.kind) == ("utf-8", "vt100")
@@ -155,13 +155,13 @@ def test_a_terminal_is_found_where_output_goes_to_one(monkeypatch):
 
 def test_a_folder_that_can_be_written_is_fine_and_stays_as_it_was(tmp_path):
     for data in (tmp_path, tmp_path / "not" / "yet"):
-        assert ": can be written, " in check_folder(data).value
+        assert ": can be written, " in check_data_folder(data).value
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_folder_that_cannot_be_written_is_found(tmp_path):
     (tmp_path / "data").write_text("a file")
-    finding = check_folder(tmp_path / "data")
+    finding = check_data_folder(tmp_path / "data")
     assert finding.value == f"{tmp_path / 'data'}: Not a directory"
     assert finding.advice == "Choose another folder with --data, or change the rights of this one."
 
@@ -169,7 +169,7 @@ def test_a_folder_that_cannot_be_written_is_found(tmp_path):
 def test_a_full_disk_is_found(tmp_path, monkeypatch):
     usage = type(shutil.disk_usage(tmp_path))
     monkeypatch.setattr(shutil, "disk_usage", lambda _: usage(10**12, 10**12 - 10**8, 10**8))
-    finding = check_folder(tmp_path)
+    finding = check_data_folder(tmp_path)
     assert (finding.value, finding.fine) == (f"{tmp_path}: can be written, 0.1 GB free", False)
     assert finding.advice == "Make room, or choose another folder with --data."
 

@@ -14,7 +14,7 @@ from study.devices.opening import device_folder
 from study.errors import DeviceError, UserInterruptError
 from study.session.views.views import DeviceFinding, DeviceReport
 from study.workflows.checks import daily_check, examine_setup
-from study.workflows.checks.daily_check import MotionCallbacks, check_on, compare_recordings, last_check
+from study.workflows.checks.daily_check import MotionCallbacks, check_on_device, compare_recordings, judge_last_check
 from study.workflows.checks.device_changes import change_findings
 from study.workflows.checks.examine_setup import Examination
 from tests.study.workflows.checks.conftest import INFO, QUIET, short
@@ -78,7 +78,7 @@ def test_a_handle_that_does_not_move_any_more_has_changed():
 
 def test_a_check_leaves_a_file_that_the_check_before_a_sitting_finds(two_days, stepped_stub, capsys):
     _, check = two_days
-    assert last_check(INFO).value == "none yet" and last_check(INFO).warning
+    assert judge_last_check(INFO).value == "none yet" and judge_last_check(INFO).warning
     (device_folder() / "daily_checks").mkdir()
     for seed, noise, said in ((2, 0.05, "nothing changed"), (3, 0.2, "noise changed")):
         checked = check(seed, noise=noise)
@@ -92,19 +92,19 @@ def test_a_check_leaves_a_file_that_the_check_before_a_sitting_finds(two_days, s
         assert main(["validate", str(checked.file), str(checked.file.with_suffix(".h5"))]) == 0
         assert f"daily check of omega.3 at {document['utc']}" in capsys.readouterr().out
         checked.file.rename(device_folder() / "daily_checks" / checked.file.name)
-        found = last_check(INFO)
+        found = judge_last_check(INFO)
         assert said in found.value and checked.file.name in found.value
         assert found.fine == (seed == 2) and found.warning == (seed != 2)
         if found.fine:
-            assert last_check(INFO, required=True) == found
+            assert judge_last_check(INFO, required=True) == found
         else:
             with pytest.raises(DeviceError, match="requires a passed daily check.*noise changed.*--daily"):
-                last_check(INFO, required=True)
+                judge_last_check(INFO, required=True)
     other = replace(INFO, details="serial 7, firmware 2.41, SDK 3.17.5.0")
-    assert last_check(other).value == "none yet"
+    assert judge_last_check(other).value == "none yet"
     path = device_folder() / "daily_checks" / "3.json"
     path.write_text(path.read_text().replace(document["utc"], "2020-01-01T08:00:00+00:00"))
-    yesterday = last_check(INFO)
+    yesterday = judge_last_check(INFO)
     assert yesterday.warning and "none today; the last one was 2020-01-01" in yesterday.value
     assert "hapteq doctor --device omega3 --daily" in yesterday.advice
 
@@ -120,10 +120,10 @@ def test_another_baseline_than_the_accepted_one_is_refused_before_anything_moves
 
 def test_without_an_acceptance_or_its_recording_there_is_nothing_to_compare_with(device_like, stepped_stub):
     with device_like(2, {}) as (device, plan), pytest.raises(DeviceError, match="accepted without a recording"):
-        check_on(device, plan, QUIET)
+        check_on_device(device, plan, QUIET)
     acceptance_file().unlink()
     with device_like(2, {}) as (device, plan), pytest.raises(DeviceError, match="There is no acceptance of it"):
-        check_on(device, plan, QUIET)
+        check_on_device(device, plan, QUIET)
     assert stepped_stub.get("peak_n") == 0
 
 
@@ -134,7 +134,7 @@ def test_it_is_announced_and_a_no_keeps_the_device_still(two_days, device_like, 
 
     stepped_stub.set("peak_n", 0)
     with device_like(2, {}) as (device, plan), pytest.raises(UserInterruptError):
-        check_on(device, plan, MotionCallbacks(no, lambda done: None))
+        check_on_device(device, plan, MotionCallbacks(no, lambda done: None))
     assert stepped_stub.get("peak_n") == 0
 
 
@@ -168,15 +168,15 @@ def test_from_the_acceptance_to_the_first_day_at_the_command_line(device_like, m
     monkeypatch.setattr(examine_setup, "examine_setup", fine_setup)
     monkeypatch.setattr(examine_setup, "accept_device", sign)
     monkeypatch.setattr(daily_check, "_open_free_device", opened)
-    monkeypatch.setattr(daily_check, "_protocol", short)
+    monkeypatch.setattr(daily_check, "_read_protocol", short)
     doctor = ["doctor", "--device", "omega3", "--data", str(tmp_path), "--hands-off"]
     assert main([*doctor, "--accept", "Ada"]) == 0
     assert "No person may hold the handle" in capsys.readouterr().err
     for noise, code, word in ((0.05, 0, "fine"), (0.3, 3, "WRONG")):
         state |= {"seed": state["seed"] + 1, "noise": noise}
-        monkeypatch.setattr(daily_check, "_time_stamp", lambda seed=state["seed"]: f"{seed}")
+        monkeypatch.setattr(daily_check, "_format_time_stamp", lambda seed=state["seed"]: f"{seed}")
         assert main([*doctor, "--daily"]) == code
         shown = capsys.readouterr()
         assert "No person may hold the handle" in shown.err
         assert f"{word:<5}  Noise" in shown.out and shown.out.strip().endswith(".json")
-        assert last_check(INFO).fine == (code == 0)
+        assert judge_last_check(INFO).fine == (code == 0)

@@ -19,7 +19,7 @@ from study.store.disk.provenance import sha256_of
 from study.store.formats.daily_check_file import DailyCheck, write_daily_check
 from study.store.formats.recording_file import read_recording
 from study.workflows.checks import daily_check, examine_setup
-from study.workflows.checks.daily_check import MotionCallbacks, check_on, compare_recordings, last_check
+from study.workflows.checks.daily_check import MotionCallbacks, check_on_device, compare_recordings, judge_last_check
 from study.workflows.checks.device_changes import change_findings
 from study.workflows.checks.examine_setup import Examination, accept
 from tests.study.workflows.checks.conftest import INFO, QUIET
@@ -139,7 +139,7 @@ def test_what_was_played_otherwise_is_not_compared(two_days, device_like, record
     with device_like(2, {}) as (device, plan):
         other = replace(plan, protocol=replace(plan.protocol, rest_s=0.6))
         with pytest.raises(DeviceError, match="was played by another version of the protocol"):
-            check_on(device, other, MotionCallbacks(never, lambda done: None))
+            check_on_device(device, other, MotionCallbacks(never, lambda done: None))
 
 
 @pytest.mark.slow
@@ -155,11 +155,11 @@ def test_a_pass_ends_with_another_acceptance_and_with_a_check_that_broke_off(
     write_daily_check(
         checks / "1.json", DailyCheck(INFO.name, INFO.details, now, True, (), changes, "1.h5", "0", accepted[1])
     )
-    assert last_check(INFO).fine
+    assert judge_last_check(INFO).fine
     vendor.accept("omega.3", baseline=("other.h5", "1" * 64))
-    assert "none since it was accepted anew" in last_check(INFO).value and not last_check(INFO).fine
+    assert "none since it was accepted anew" in judge_last_check(INFO).value and not judge_last_check(INFO).fine
     vendor.accept("omega.3", baseline=accepted)
-    assert last_check(INFO).fine
+    assert judge_last_check(INFO).fine
 
     def broken(device, plan, show, announce):
         announce("It moves.")
@@ -167,6 +167,6 @@ def test_a_pass_ends_with_another_acceptance_and_with_a_check_that_broke_off(
 
     monkeypatch.setattr(daily_check, "record_on_device", broken)
     with device_like(2, {}) as (device, plan), pytest.raises(DeviceError, match="let go"):
-        check_on(device, replace(plan, out=checks / "2.h5"), QUIET)
-    assert "it broke off" in last_check(INFO).value and not last_check(INFO).fine
+        check_on_device(device, replace(plan, out=checks / "2.h5"), QUIET)
+    assert "it broke off" in judge_last_check(INFO).value and not judge_last_check(INFO).fine
     assert main(["validate", str(checks / "2.json")]) == 0

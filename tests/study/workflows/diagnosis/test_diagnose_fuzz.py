@@ -89,9 +89,9 @@ def test_where_the_force_balance_crashes_a_model_is_fitted_without_it_and_the_cr
     def broken(*arguments):
         raise ValueError("operands could not be broadcast together")
 
-    monkeypatch.setattr(fit_without_model, "first_model_of", broken)
+    monkeypatch.setattr(fit_without_model, "fit_first_model", broken)
     monkeypatch.setattr(fit_without_model, "fit_first_linear_model", lambda *arguments: ("a model", ("how",)))
-    guard, given = Guard(on=True), DiagnosisInput((), (), (), ())
+    guard, given = Guard(enabled=True), DiagnosisInput((), (), (), ())
     first = first_model_of(given, (), (lambda: True, guard), quiet)
     assert (first.model, first.remarks, first.balances) == ("a model", ("how",), ())
     (said,) = guard.sentences
@@ -104,8 +104,8 @@ def test_a_refusal_in_the_force_balance_is_no_crash(monkeypatch):
     def refused(*arguments):
         raise NothingToDiagnose(("the recordings carry no model",))
 
-    monkeypatch.setattr(fit_without_model, "first_model_of", refused)
-    guard = Guard(on=True)
+    monkeypatch.setattr(fit_without_model, "fit_first_model", refused)
+    guard = Guard(enabled=True)
     with pytest.raises(StudyError):
         first_model_of(DiagnosisInput((), (), (), ()), (), (lambda: True, guard), quiet)
     assert guard.sentences == ()

@@ -12,7 +12,7 @@ from equalizer.effects.discovered_law import Channels, law_effect, law_values
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.law_entry import effects_per_axis
 from equalizer.effects.simulation.simulator import simulate_mechanism
-from equalizer.laws.law import law_of
+from equalizer.laws.law import parse_law
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect, Tolerance
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
@@ -21,7 +21,7 @@ from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.workflows.diagnosis.effect_file import read_entry, write_entry
 
 RATE_HZ, N = 1000.0, 20_000
-LAW = law_of("-60.0*abs(vx)**1.5*sign(vx)", "force", "x")
+LAW = parse_law("-60.0*abs(vx)**1.5*sign(vx)", "force", "x")
 
 
 def body(*effects: ModelEffect) -> MechanicalModel:
@@ -77,11 +77,11 @@ def test_a_file_that_is_no_effect_is_refused(tmp_path, text, said):
 
 def test_at_other_axes_all_letters_turn_along(model_file, tmp_path):
     entry = write_entry(model_file, tmp_path / "drag.py")
-    turned = replace(entry, law=law_of("-2.0*vx*y + 0.1*fz + 0*t", "force", "x"))
+    turned = replace(entry, law=parse_law("-2.0*vx*y + 0.1*fz + 0*t", "force", "x"))
     assert [each.law.text for each in effects_per_axis(turned, Channels())] == [
         "-2.0*vx*y + 0.1*fz + 0*t", "-2.0*vy*z + 0.1*fx + 0*t", "-2.0*vz*x + 0.1*fy + 0*t"
     ]  # fmt: skip
-    only = replace(entry, law=law_of("-2.0*vy**3", "force", "y"))
+    only = replace(entry, law=parse_law("-2.0*vy**3", "force", "y"))
     assert [each.law.text for each in effects_per_axis(only, Channels(("u",), ("a",)))] == ["-2.0*vx**3"]
 
 

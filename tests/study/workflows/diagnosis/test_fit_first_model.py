@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.prediction_error import prediction_error
+from analysis.diagnosis.errors.prediction_error import compute_prediction_error
 from analysis.diagnosis.first_model.choose_structure import choose_structure
 from analysis.diagnosis.first_model.fit_without_model import _responds_to_commands
 from equalizer.effects.simulation.simulator import simulate_mechanism
@@ -166,8 +166,8 @@ def test_the_file_says_which_way_a_command_is_counted(tmp_path):
     model = read_mechanical_model(done.plan.out)
     assert model.input[0, 0] == -1
     assert any("counted against the motion" in remark for remark in done.remarks)
-    assert prediction_error(against, model, "test").without_gain < 0.02
-    assert prediction_error(plain, model, "test").without_gain > 1
+    assert compute_prediction_error(against, model, "test").without_gain < 0.02
+    assert compute_prediction_error(plain, model, "test").without_gain > 1
 
 
 def test_the_file_is_accepted_for_a_diagnosis(tmp_path):

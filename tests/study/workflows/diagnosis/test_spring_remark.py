@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from equalizer.plant.mechanical_model import MechanicalModel
-from study.workflows.diagnosis.diagnose_recordings import spring_remark, with_spring
+from study.workflows.diagnosis.diagnose_recordings import add_spring, describe_spring
 
 
 @pytest.fixture
@@ -15,18 +15,18 @@ def two_bodies() -> MechanicalModel:
 
 
 def test_the_spring_holds_the_driven_body_for_any_unit_of_the_command(two_bodies):
-    held = with_spring(two_bodies, 137.0)
+    held = add_spring(two_bodies, 137.0)
     np.testing.assert_array_equal(held.stiffness, [[187.0, 0.0], [0.0, 50.0]])
-    np.testing.assert_array_equal(with_spring(held, -137.0).stiffness, two_bodies.stiffness)
+    np.testing.assert_array_equal(add_spring(held, -137.0).stiffness, two_bodies.stiffness)
 
 
 def test_without_a_spring_nothing_is_changed_or_said(two_bodies):
-    assert with_spring(two_bodies, 0.0) is two_bodies
-    assert spring_remark(0.0) == ()
+    assert add_spring(two_bodies, 0.0) is two_bodies
+    assert describe_spring(0.0) == ()
 
 
 def test_what_was_done_is_reported():
-    assert spring_remark(136.6) == (
+    assert describe_spring(136.6) == (
         "A virtual spring of 137 N/m held the handle at its place. It was added to the model for the comparison, and "
         "is not in improved.toml.",
     )

@@ -7,12 +7,12 @@ from analysis.diagnosis.confirm.force_balance_measures import list_fitting_measu
 from analysis.diagnosis.data.measured_motion import is_quasi_static
 from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.document import Mismatch
-from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.errors.choose_measure import make_measure
 from analysis.diagnosis.errors.error_measure_rule import IN_SAMPLES, UNTIMED
 from analysis.diagnosis.result.candidate_wording import Device
 from analysis.diagnosis.result.wording import describe_place
 from analysis.diagnosis.search.guard import Guard
-from equalizer.plant.effect_vocabulary import matrix_unit
+from equalizer.plant.effect_vocabulary import find_matrix_unit
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from study.workflows.diagnosis.diagnosis_input import DiagnosisInput
@@ -56,12 +56,12 @@ def test_friction_is_weighed_and_forces_are_compared_once(first, recording):
 
 def test_a_timed_recording_of_the_same_is_played(first, recording):
     timed = Recording(recording.device, recording.command, recording.response)
-    assert UNTIMED not in measure_of((timed,), first.model).remarks
+    assert UNTIMED not in make_measure((timed,), first.model).remarks
 
 
 def test_no_unit_holds_a_second(first):
     system = first.model.system
-    assert [matrix_unit(part, system) for part in ("mass", "damping", "stiffness")] == [
+    assert [find_matrix_unit(part, system) for part in ("mass", "damping", "stiffness")] == [
         "N sample^2/m", "N sample/m", "N/m",
     ]  # fmt: skip
     assert (system.express("m/s"), system.express("s"), system.express("Hz")) == ("m/sample", "sample", "1/sample")
@@ -92,7 +92,7 @@ def test_a_speed_without_a_clock_is_diagnosed_with_samples_as_its_time():
     found = diagnose_values([motor])
     assert [effect.effect for effect in found.diagnosis.effects] == ["coulomb_friction"]
     assert found.improved.mass[0, 0] == pytest.approx(8.0, rel=0.05)
-    assert matrix_unit("mass", found.improved.system) == "N m sample^2/rad"
+    assert find_matrix_unit("mass", found.improved.system) == "N m sample^2/rad"
     assert IN_SAMPLES in found.remarks and UNTIMED not in found.remarks
     assert found.diagnosis.fit.test.after < 0.02
 

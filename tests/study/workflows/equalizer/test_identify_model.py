@@ -88,7 +88,7 @@ def test_what_is_said_is_what_was_measured(device):
 def test_the_file_keeps_how_good_the_model_is(device):
     quality = read_identified_model(device.plan.out).quality
     assert quality == device.model.quality
-    assert (quality.held_out_error, quality.held_out_noise) == (device.tested.error, device.tested.noise)
+    assert (quality.held_out_error, quality.held_out_noise) == (device.held_out_test.error, device.held_out_test.noise)
     assert quality.expected_error >= quality.held_out_error
     assert summary(device)["quality"]["expected_error"] == quality.expected_error
 

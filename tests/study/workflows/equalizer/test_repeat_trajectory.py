@@ -16,7 +16,12 @@ from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.repeats_file import read_repeats, repeats_path
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.equalize_trajectory import EqualizePlan
-from study.workflows.equalizer.repeat_trajectory import RepeatOrder, repeat_lines, repeat_summary, repeat_trajectory
+from study.workflows.equalizer.repeat_trajectory import (
+    RepeatOrder,
+    format_repeat_lines,
+    repeat_trajectory,
+    summarise_repeats,
+)
 
 BAND_HZ = (5.0, 35.0)
 ORDER = RepeatOrder(repeats=4, device="simulated")
@@ -66,12 +71,12 @@ def refusal(plan, order=ORDER, error=StudyError) -> StudyError:
 
 
 def test_repeats_make_it_better_and_say_so_play_by_play(done):
-    found = repeat_summary(done)
+    found = summarise_repeats(done)
     assert found["errors"][0] > 0.08
     assert min(found["errors"]) < 0.3 * found["errors"][0]
     assert found["noise_floor"] < min(found["errors"])
     assert found["peak_n"] <= 3.0
-    lines = repeat_lines(done)
+    lines = format_repeat_lines(done)
     assert lines[0].startswith("Quality not stored")
     assert lines[1].startswith("As the model itself predicts: error 0.")
     assert f"Play 0: error {100 * found['errors'][0]:.2f} % as measured." in lines
@@ -80,16 +85,16 @@ def test_repeats_make_it_better_and_say_so_play_by_play(done):
 
 
 def test_convergence_is_tested_before_anything_is_played(done):
-    assert 0 < repeat_summary(done)["surviving_error"] < 0.2
+    assert 0 < summarise_repeats(done)["surviving_error"] < 0.2
     assert done.gain == 1.0
-    assert any(line.startswith("If the device is linear") for line in repeat_lines(done))
+    assert any(line.startswith("If the device is linear") for line in format_repeat_lines(done))
 
 
 def test_forces_and_how_they_were_found_are_written(done):
     out = done.equalized.plan.out
     assert len(read_trajectory(out).signal) == 2000
     assert read_repeats(repeats_path(out)).errors == pytest.approx(done.repeated.errors)
-    assert repeat_summary(done)["repeats"] == str(repeats_path(out))
+    assert summarise_repeats(done)["repeats"] == str(repeats_path(out))
 
 
 def test_a_later_run_continues_from_them(done, plan):
@@ -134,8 +139,8 @@ def test_a_model_that_holds_the_spring_is_repeated_without_it(plan, tmp_path):
 
 def test_a_model_that_does_not_say_how_well_it_is_known_is_played_untested(plan, tmp_path):
     done = repeat_trajectory(changed(plan, tmp_path, samples=None), replace(ORDER, repeats=1), unheard)
-    assert repeat_summary(done)["surviving_error"] is None
-    assert any(line.startswith("Convergence was not tested") for line in repeat_lines(done))
+    assert summarise_repeats(done)["surviving_error"] is None
+    assert any(line.startswith("Convergence was not tested") for line in format_repeat_lines(done))
 
 
 def test_repeats_that_could_not_converge_are_refused(plan, tmp_path):
@@ -151,7 +156,7 @@ def test_an_uncertain_model_is_repeated_with_a_lower_gain(plan, tmp_path):
     strong = replace(model, C=2.5 * model.C, D=2.5 * model.D).parameters
     done = repeat_trajectory(changed(plan, tmp_path, samples=strong[None]), replace(ORDER, repeats=1), unheard)
     assert 0.4 < done.gain < 0.9 * 2 / 2.5 * 1.05
-    assert repeat_summary(done)["surviving_error"] < 1  # with this gain; with gain 1 it is 2.1
+    assert summarise_repeats(done)["surviving_error"] < 1  # with this gain; with gain 1 it is 2.1
 
 
 def test_two_bands_are_not_repeated(plan, tmp_path):
@@ -172,7 +177,7 @@ def test_named_friction_is_in_the_first_play(plan, tmp_path):
     write_mechanical_model(tmp_path / "improved.toml", physics)
     done = repeat_trajectory(replace(plan, physics=tmp_path / "improved.toml"), replace(ORDER, repeats=1), unheard)
     assert done.repeated.errors[0] < 0.3
-    assert "Compensated: coulomb_friction." in repeat_lines(done)
+    assert "Compensated: coulomb_friction." in format_repeat_lines(done)
 
 
 def test_a_device_that_is_not_there_is_named(plan):

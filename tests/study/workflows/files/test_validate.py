@@ -8,7 +8,7 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from protocols.trial import Trial
-from study.store.disk.csv_rows import rows_to_csv
+from study.store.disk.csv_rows import format_csv_table
 from study.store.disk.json_document import write_json
 from study.store.formats.identified_model_file import write_identified_model
 from study.store.formats.participant_texts import make_language_template
@@ -99,7 +99,7 @@ def test_a_table_is_known_by_its_header_under_any_name(tmp_path):
     assert sound(written(tmp_path / "a.txt", "time_s,fx,fy,fz\n0,1,2,3\n0.001,1,2,3\n")) == (
         "forces, 0.002 s at 1000 Hz (N)"
     )
-    assert sound(written(tmp_path / "b.csv", rows_to_csv([], Trial))) == "table of 0 trials"
+    assert sound(written(tmp_path / "b.csv", format_csv_table([], Trial))) == "table of 0 trials"
     write_thresholds(tmp_path / "c.csv", [])
     assert sound(tmp_path / "c.csv") == "table of 0 thresholds"
 

@@ -8,9 +8,9 @@ from tests.study.workflows.forked_map.child_processes import children, left_by_e
 
 @pytest.fixture(autouse=True)
 def two_cores_and_nothing_known(monkeypatch):
-    monkeypatch.setattr(module, "cores", lambda: 2)
-    monkeypatch.setattr(module, "_mean_s", {})
-    monkeypatch.setattr(module, "_lost", set())
+    monkeypatch.setattr(module, "count_cores", lambda: 2)
+    monkeypatch.setattr(module, "_mean_task_s", {})
+    monkeypatch.setattr(module, "_unforkable", set())
 
 
 @pytest.fixture(autouse=True)

@@ -14,9 +14,9 @@ from analysis.diagnosis.search.time_budget import CountedBudget, OutOfTimeError,
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.discovered_law import law_effect
 from equalizer.effects.effect import effects_by_address
-from equalizer.laws.law import law_of
+from equalizer.laws.law import parse_law
 from study.workflows import forked_map as module
-from study.workflows.forked_map import map_forked, processor_s
+from study.workflows.forked_map import map_forked, measure_processor_s
 from tests.study.workflows.forked_map.child_processes import slow
 
 
@@ -39,7 +39,7 @@ def test_arrays_and_effects_come_back_as_they_are():
 
 
 def test_a_law_that_was_there_before_comes_back_as_it_is_and_from_where_it_was_found():
-    law = law_effect(law_of("2*vx", "force", "x"))
+    law = law_effect(parse_law("2*vx", "force", "x"))
 
     def found(_: int) -> tuple[object, int]:
         time.sleep(0.02)
@@ -51,7 +51,7 @@ def test_a_law_that_was_there_before_comes_back_as_it_is_and_from_where_it_was_f
 
 
 def test_an_effect_without_references_is_not_kept_alive():
-    law = law_effect(law_of("2*vx", "force", "x"))
+    law = law_effect(parse_law("2*vx", "force", "x"))
     address = id(law)
     assert effects_by_address()[address] is law
     del law
@@ -71,7 +71,7 @@ def test_what_cannot_be_sent_is_done_here_and_not_tried_elsewhere_again():
         assert [found() for found in map_forked(function_of, range(6))] == list(range(6))
         assert len(processes) == 6
         processes.clear()
-        assert module._key(function_of) in module._lost
+        assert module._identify_function(function_of) in module._unforkable
 
 
 def of_seconds(seconds: float, _: int) -> int:
@@ -91,9 +91,9 @@ def test_functions_without_code_of_their_own_are_distinguished():
         def __call__(self) -> None: ...
 
     functions = (slow, of_seconds, Callable(), pow, Path)
-    assert len({module._key(function) for function in functions}) == len(functions)
-    assert module._key(partial(partial(slow), 1.0)) == module._key(slow)
-    assert module._key(Callable()) == module._key(Callable())
+    assert len({module._identify_function(function) for function in functions}) == len(functions)
+    assert module._identify_function(partial(partial(slow), 1.0)) == module._identify_function(slow)
+    assert module._identify_function(Callable()) == module._identify_function(Callable())
 
 
 def test_work_within_work_is_done_there():
@@ -104,7 +104,7 @@ def test_work_within_work_is_done_there():
 
 
 def test_crashes_in_a_process_are_noted_here():
-    guard = Guard(on=True)
+    guard = Guard(enabled=True)
 
     def broken(effect: object) -> str:
         time.sleep(0.02)
@@ -159,6 +159,6 @@ def test_processor_time_of_processes_counts():
         while time.process_time() < until:
             pass
 
-    before = processor_s()
+    before = measure_processor_s()
     map_forked(busy, range(4))
-    assert processor_s() - before > 0.35
+    assert measure_processor_s() - before > 0.35

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from analysis.psychophysics.anova import one_way_anova
+from analysis.psychophysics.anova import compute_one_way_anova
 from analysis.psychophysics.comparisons import compare_all
-from analysis.psychophysics.power.power_curve import judge_study, true_difference_db
+from analysis.psychophysics.power.power_curve import compute_true_difference_db, judge_study
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
 from study.cli.main import main
 from study.errors import StudyError
-from study.workflows.planning.simulate_power import FINISHED_NAME, RESULT_NAME, PowerPlan, simulate_power
+from study.workflows.planning.simulate_power import PROGRESS_NAME, RESULT_NAME, PowerPlan, simulate_power
 
 RULE = StaircaseRule(1.0, 3.0, 1, 3, (StepPhase(4.0, 3), StepPhase(1.0, 10)), 13, 10)
 CROWD = Crowd((5.0, 35.0, 45.0), (0.7, 1.4, 1.4))
@@ -22,9 +22,9 @@ PUBLISHED = (Path(__file__).parents[4] / "protocols" / "direction_threshold.toml
 
 
 def test_the_true_difference_is_that_of_the_pair():
-    assert true_difference_db(CROWD) == pytest.approx(6.0206, abs=1e-4)
-    assert true_difference_db(CROWD, (45.0, 35.0)) == 0.0
-    assert true_difference_db(CROWD, (5.0, 35.0)) == pytest.approx(-6.0206, abs=1e-4)
+    assert compute_true_difference_db(CROWD) == pytest.approx(6.0206, abs=1e-4)
+    assert compute_true_difference_db(CROWD, (45.0, 35.0)) == 0.0
+    assert compute_true_difference_db(CROWD, (5.0, 35.0)) == pytest.approx(-6.0206, abs=1e-4)
 
 
 def test_every_analysis_judges_the_declared_pair():
@@ -36,7 +36,7 @@ def test_every_analysis_judges_the_declared_pair():
     assert by_pair[35.0, 45.0].means_error_db == pytest.approx(means[1] - means[2])
     assert by_pair[35.0, 45.0].primary_error_db == pytest.approx(-by_pair[45.0, 35.0].primary_error_db)
     groups = {f"{f:g} Hz": list(n) for f, n in zip(CROWD.frequencies_hz, study.threshold_n.T, strict=True)}
-    tukey = {(pair.first, pair.second): pair.p for pair in compare_all(one_way_anova(groups)).pairs}
+    tukey = {(pair.first, pair.second): pair.p for pair in compare_all(compute_one_way_anova(groups)).pairs}
     assert by_pair[45.0, 35.0].published_found == (tukey["35 Hz", "45 Hz"] < 0.05)
     assert by_pair[()].published_found == (tukey["5 Hz", "45 Hz"] < 0.05)
 
@@ -50,7 +50,7 @@ def test_a_folder_goes_on_with_its_own_pair_alone(tmp_path):
             return simulate_power(plan, tmp_path, pool, lambda done: None)
 
     begun = run(plan)
-    assert "contrast_hz" not in (tmp_path / FINISHED_NAME).read_text("utf-8")
+    assert "contrast_hz" not in (tmp_path / PROGRESS_NAME).read_text("utf-8")
     assert run(replace(plan, contrast_hz=(45.0, 5.0))) == begun
     with pytest.raises(StudyError, match="another power simulation"):
         run(replace(plan, contrast_hz=(5.0, 45.0)))

@@ -6,19 +6,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.psychophysics.anova import one_way_anova
+from analysis.psychophysics.anova import compute_one_way_anova
 from analysis.psychophysics.comparisons import compare_all
-from analysis.psychophysics.group_contrasts import contrasts
+from analysis.psychophysics.group_contrasts import compute_contrasts
 from analysis.psychophysics.power.power_curve import judge_study
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
 from study.cli.power import parse_sample_sizes
 from study.errors import StudyError, WrongUseError
 from study.workflows.planning.simulate_power import (
-    FINISHED_NAME,
+    PROGRESS_NAME,
     PowerPlan,
+    format_power_lines,
     judge_chunk,
-    power_lines,
     simulate_power,
 )
 
@@ -42,7 +42,7 @@ def test_a_large_effect_is_found_more_often_by_more_people(run):
     assert many.primary.value >= few.primary.value
     assert many.primary.value > 0.8
     assert many.primary.lower < many.primary.value <= many.primary.upper
-    assert len(power_lines((few, many))) == 3
+    assert len(format_power_lines((few, many))) == 3
 
 
 @pytest.mark.slow
@@ -58,7 +58,9 @@ def test_the_published_verdict_is_that_of_the_pair_in_the_report():
         study = simulate_study(crowd, RULE, 8, (5, number))
         groups = {f"{f:g} Hz": list(column) for f, column in zip((5, 25, 45), study.threshold_n.T, strict=True)}
         (pair,) = [
-            pair for pair in compare_all(one_way_anova(groups)).pairs if (pair.first, pair.second) == ("5 Hz", "45 Hz")
+            pair
+            for pair in compare_all(compute_one_way_anova(groups)).pairs
+            if (pair.first, pair.second) == ("5 Hz", "45 Hz")
         ]
         found.append(judge_study(crowd, RULE, 8, (5, number)).published_found)
         assert found[-1] == (pair.p < 0.05)
@@ -86,7 +88,7 @@ def test_another_frequency_does_not_stand_in_for_the_highest():
     """Where 45 Hz differs by 8 dB in both people, 25 Hz alone can be judged."""
     crowd = Crowd((5.0, 25.0, 45.0), (0.7, 0.7, 1.4))
     study = simulate_study(crowd, SHORT, 2, (26,))
-    (other,) = contrasts(crowd.frequencies_hz, study.threshold_db, 0.95)
+    (other,) = compute_contrasts(crowd.frequencies_hz, study.threshold_db, 0.95)
     assert other.frequency_hz == 25.0
     verdict = judge_study(crowd, SHORT, 2, (26,))
     assert not verdict.means_found
@@ -97,11 +99,11 @@ def test_another_frequency_does_not_stand_in_for_the_highest():
 def test_a_broken_run_continues_and_any_number_of_workers_gives_the_same_numbers(run, tmp_path):
     plan = replace(PLAN, people=(3,))
     whole = run(plan)
-    path = tmp_path / "power" / FINISHED_NAME
+    path = tmp_path / "power" / PROGRESS_NAME
     lines = path.read_text("utf-8").splitlines()
     broken = tmp_path / "broken"
     broken.mkdir()
-    (broken / FINISHED_NAME).write_text("\n".join([*lines[:2], lines[2][:40]]), "utf-8")
+    (broken / PROGRESS_NAME).write_text("\n".join([*lines[:2], lines[2][:40]]), "utf-8")
     assert run(plan, "broken") == whole
     assert run(plan, "two", workers=2) == whole
     assert judge_chunk(plan, (3, 10)) == judge_chunk(plan, (3, 10))
@@ -112,12 +114,12 @@ def test_a_run_that_was_killed_anywhere_goes_on_with_the_same_numbers(run, tmp_p
     """Also where it had written nothing, or a part of the plan."""
     plan = replace(PLAN, people=(2,), studies=2)
     whole = run(plan)
-    text = (tmp_path / "power" / FINISHED_NAME).read_text("utf-8")
+    text = (tmp_path / "power" / PROGRESS_NAME).read_text("utf-8")
     plan_ends = text.index("\n")
     for number, length in enumerate((0, 1, plan_ends // 2, plan_ends, plan_ends + 1, plan_ends + 9, len(text) - 1)):
         broken = tmp_path / f"broken-{number}"
         broken.mkdir()
-        (broken / FINISHED_NAME).write_text(text[:length], "utf-8")
+        (broken / PROGRESS_NAME).write_text(text[:length], "utf-8")
         assert run(plan, broken.name) == whole
         assert run(plan, broken.name) == whole  # what it left is whole, too
 

@@ -9,7 +9,7 @@ from protocols.document.dumping import dump_protocol
 from study.devices.safe import SafeDevice
 from study.devices.simulated import layout, omega3
 from study.session.watching.followed_session import PlayedProbe
-from study.tui.watch.watch_lines import status
+from study.tui.watch.watch_lines import format_view
 from study.workflows.results.session_drift import DriftReader
 from study.workflows.views.watch_session import follow
 
@@ -59,7 +59,7 @@ def test_more_friction_in_mid_session_is_named_with_number_and_time(probed):
     assert view.probes >= 11
     assert {drift.sentence[:16] for drift in view.drifts} == {f"friction along {axis}" for axis in "xyz"}
     assert all(" N at minute " in drift.sentence for drift in view.drifts)
-    assert any(line.startswith("Drift      friction along x 0.") for line in status(view))
+    assert any(line.startswith("Drift      friction along x 0.") for line in format_view(view))
 
 
 @pytest.mark.slow
@@ -67,19 +67,19 @@ def test_where_nothing_changes_nothing_is_named(probed):
     view = view_of(probed(1.0))
     assert view.probes >= 11
     assert view.drifts == ()
-    assert any("none in" in line for line in status(view))
+    assert any("none in" in line for line in format_view(view))
 
 
 def test_a_session_without_probes_says_nothing_of_them(sitter):
     view = view_of(sitter.whole().folder)
     assert (view.probes, view.drifts) == (0, ())
-    assert not any(line.startswith("Drift") for line in status(view))
+    assert not any(line.startswith("Drift") for line in format_view(view))
 
 
 def test_a_recording_that_is_gone_is_left_out(sitter):
     folder = sitter.whole().folder
     lost = PlayedProbe(0, "hand", 0.2, 1.0, 0, "recordings/probe-000.h5")
-    assert DriftReader(folder).look((lost, replace(lost, number=1, recording=""))) == ()
+    assert DriftReader(folder).update((lost, replace(lost, number=1, recording=""))) == ()
 
 
 @pytest.mark.slow

@@ -12,9 +12,9 @@ from study.session.facts.sensor_facts import SensorFacts
 from study.session.facts.void_reasons import HARDLY_ARRIVED, is_computer_busy
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.event_log import read_log
-from study.tui.trial_words import void_words
+from study.tui.trial_words import describe_void_trial
 from study.workflows.session import conduct_session
-from study.workflows.trial.judge_trial import judge
+from study.workflows.trial.judge_trial import judge_trial
 
 GOOD = SensorFacts(packets=9900, lost=100, spoiled_bytes=1500, restarts=0, ticks=1000, unplaced_ticks=0, drift_ppm=31.5)
 BAD = replace(GOOD, packets=9000, lost=1000)
@@ -70,7 +70,7 @@ def heard(monkeypatch):
 
 def judged(sensor, protocol, **settings):
     health = Health(Fault.NONE, 1000, 0, 0, 0, 0, 0, 1.0, sensor=sensor)
-    return judge(health, replace(protocol.measurement, **settings), True)
+    return judge_trial(health, replace(protocol.measurement, **settings), True)
 
 
 @pytest.mark.parametrize(
@@ -99,7 +99,7 @@ def test_what_is_missing_above_the_limit_cannot_be_trusted(small_protocol, senso
 def test_a_participant_reads_that_the_sensor_was_not_heard(small_protocol):
     reason = judged(BAD, small_protocol, accelerometer_needed=True).void_reason
     assert reason == "10.0 % of the acceleration is missing" and not is_computer_busy(reason)
-    assert void_words(reason).startswith("The sensor at the handle gave too few readings")
+    assert describe_void_trial(reason).startswith("The sensor at the handle gave too few readings")
 
 
 def test_the_counts_stand_beside_each_trial_and_in_its_recording(sitter, heard):
@@ -115,7 +115,7 @@ def test_the_counts_stand_beside_each_trial_and_in_its_recording(sitter, heard):
 def test_a_trial_without_trustworthy_acceleration_counts_and_says_nothing_of_what_was_delivered(sitter, heard):
     heard[0][:] = [BAD, BAD, GOOD]
     done = sitter.whole()
-    first, second, *others = [row for row in done.state.trials if row.counts]
+    first, second, *others = [row for row in done.state.trials if row.is_valid]
     assert {(row.status, row.delivered_mps2) for row in (first, second)} == {(TrialStatus.FLAGGED, None)}
     assert all(row.delivered_mps2 is not None for row in others)
     assert done.state.closed
@@ -147,7 +147,7 @@ def test_a_strong_stimulus_of_which_nothing_arrives_is_flagged_and_its_answer_co
     """A device that answers that all is well and does not move, or a sensor that is dead."""
     dead[0] = share
     done = sitter.whole()
-    rows = [row for row in done.state.trials if row.counts and row.delivered_mps2 is not None]
+    rows = [row for row in done.state.trials if row.is_valid and row.delivered_mps2 is not None]
     measured = [event for event in read_log(done.folder.log).events if event.event == "trial_measured"]
     said = {row.level_n: HARDLY_ARRIVED in event.flags for row, event in zip(done.state.trials, measured, strict=True)}
     assert max(row.level_n for row in rows) >= 1.0

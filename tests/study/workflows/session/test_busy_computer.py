@@ -10,7 +10,7 @@ from study.store.sessions.event_log import read_log
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.conduct_session import Participant, conduct_new
 from study.workflows.session.end_sitting import end_sitting
-from study.workflows.views.session_facts import session_facts
+from study.workflows.views.session_facts import list_session_facts
 
 UTC = "2026-01-01T00:00:00.000+00:00"
 
@@ -61,7 +61,7 @@ def test_trials_that_a_busy_computer_spoiled_are_repeated_counted_and_told_at_th
     (told,) = screen.told
     assert told.startswith("The computer was too busy: 2 trials were void because of it in this sitting and repeated.")
     assert [note.text for note in of(end, NoteTaken)] == [told]
-    facts = dict(session_facts(fold_session(end.folder), lambda moment: moment))
+    facts = dict(list_session_facts(fold_session(end.folder), lambda moment: moment))
     assert facts["answers"].endswith("and 2 void presentations, 2 of them because the computer was too busy")
 
 

@@ -14,7 +14,7 @@ from study.workflows.files.validate import validate_file
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed
 from study.workflows.session.simulated_display import SimulatedDisplay
-from study.workflows.views.view_session import session_view
+from study.workflows.views.view_session import make_session_view
 
 NOON = datetime.fromisoformat("2026-06-01T12:00:00+00:00")
 
@@ -80,7 +80,7 @@ def test_a_clock_that_is_set_in_a_sitting_changes_nothing_and_is_said_everywhere
     (told,) = seat.display.told
     assert told.startswith("The computer's clock was ") and said in told
     assert notes(end.folder) == [told]
-    assert any(told in warning for warning in session_view(end.folder.path).warnings)
+    assert any(told in warning for warning in make_session_view(end.folder.path).warnings)
     checked = validate_file(end.folder.path)
     assert checked.problems == ()
     assert said in checked.kind

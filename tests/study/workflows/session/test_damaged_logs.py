@@ -23,10 +23,10 @@ from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import list_due_results, write_tables
 from study.workflows.results.write_results import write_results
-from study.workflows.session.end_sitting import finish_closed
+from study.workflows.session.end_sitting import write_missing_results
 from study.workflows.session.participant_number import read_begun_participant
-from study.workflows.views.session_line import session_line
-from study.workflows.views.view_session import session_view
+from study.workflows.views.session_line import make_session_line
+from study.workflows.views.view_session import make_session_view
 from study.workflows.views.watch_session import follow
 
 FROZEN = Path(__file__).parents[3] / "frozen" / "v0_1" / "study" / "P01_001"
@@ -57,9 +57,9 @@ def unseen_by(session: Path) -> list[str]:
     with contextlib.suppress(StudyError):
         collect_sessions(session)
         unseen.append("analyze")
-    if session_view(session).line.standing != "unreadable":
+    if make_session_view(session).line.standing != "unreadable":
         unseen.append("show")
-    if session_line(SessionFolder(session)).standing != "unreadable":
+    if make_session_line(SessionFolder(session)).standing != "unreadable":
         unseen.append("sessions")
     if not validate_file(session).problems:
         unseen.append("validate")
@@ -139,7 +139,7 @@ def test_what_a_kill_left_out_is_finished_and_said(session, name):
         if torn is not None and name != SEAL_NAME:
             (session / name).write_bytes(torn)
         assert list_due_results(folder, fold_session(folder)) == (name,)
-        (said,) = collect_sessions(session).finished
+        (said,) = collect_sessions(session).result_file_notes
         assert name in said
         assert list_due_results(folder, fold_session(folder)) == ()
     if name != "session.json":
@@ -149,10 +149,10 @@ def test_what_a_kill_left_out_is_finished_and_said(session, name):
 def test_a_finished_session_is_finished_by_resume_and_then_said_to_be(session):
     folder = SessionFolder(session)
     (session / SEAL_NAME).unlink()
-    written = finish_closed(folder, fold_session(folder))
+    written = write_missing_results(folder, fold_session(folder))
     assert "written now, because missing or out of date: seal.json, analysis/report.html" in written.warnings[0]
     with pytest.raises(StudyError, match="This session is finished"):
-        finish_closed(folder, fold_session(folder))
+        write_missing_results(folder, fold_session(folder))
 
 
 @pytest.mark.slow
@@ -162,7 +162,7 @@ def test_a_report_from_before_the_end_is_written_again_by_resume(session):
     statistics.parent.mkdir(exist_ok=True)
     (statistics.parent / "report.html").write_text("of the log as it was in the middle")
     write_json(statistics, "hapteq-anova", 1, {"provenance": {"parents": [{"file": LOG_NAME, "sha256": "0" * 64}]}})
-    assert "analysis/report.html" in finish_closed(folder, fold_session(folder)).warnings[0]
+    assert "analysis/report.html" in write_missing_results(folder, fold_session(folder)).warnings[0]
     assert sha256 in statistics.read_text()
 
 
@@ -217,8 +217,8 @@ def mutated(rng: random.Random, text: bytes) -> bytes:
 
 def read_by_all(session: Path) -> None:
     folder = SessionFolder(session)
-    session_line(folder)
-    session_view(session)
+    make_session_line(folder)
+    make_session_view(session)
     validate_file(session)
     read_begun_participant(folder)
     for read in (lambda: collect_sessions(session), lambda: follow(session).look(NOW), lambda: fold_session(folder)):
@@ -257,8 +257,8 @@ def test_a_bad_time_leaves_one_session_out_of_an_analysis_and_not_all(session, s
     session_logs.as_older(session, lambda text: text.replace(b"T13:4", b"T13;4", 5))
     collected = collect_sessions(session.parent)
     assert [folder.name for folder in collected.sessions] == ["P02_001"]
-    assert any(said.startswith("P01_001 cannot be used. Line 1 of events.jsonl") for said in collected.left_out)
-    assert session_line(SessionFolder(session)).standing == "unreadable"
+    assert any(said.startswith("P01_001 cannot be used. Line 1 of events.jsonl") for said in collected.exclusions)
+    assert make_session_line(SessionFolder(session)).standing == "unreadable"
 
 
 def test_a_torn_note_after_the_end_is_mended_and_the_seal_still_holds(session):

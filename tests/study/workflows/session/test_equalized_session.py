@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.plant.model_quality import NOT_STORED, ModelQuality, quality_sentence
+from equalizer.plant.model_quality import NOT_STORED, ModelQuality, write_quality_sentence
 from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
 from protocols.document.loading import load_protocol
 from study.devices.clock import VirtualClock
@@ -22,10 +22,10 @@ from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import write_tables
 from study.workflows.session import equalize_stimuli
 from study.workflows.session.conduct_session import conduct_new, conduct_resumed
-from study.workflows.session.equalize_stimuli import level_scales
+from study.workflows.session.equalize_stimuli import compute_level_scales
 from study.workflows.session.open_session import SessionPlan
 from study.workflows.session.simulated_participant import make_simulated_participant
-from study.workflows.views.session_facts import session_facts
+from study.workflows.views.session_facts import list_session_facts
 
 MASS_KG = np.array([0.3, 0.4, 0.5])
 
@@ -77,7 +77,7 @@ def test_a_level_is_the_highest_force_where_the_safety_cap_lies_above_that_of_th
     practice = replace(plan.protocol.practice, level_n=0.5)
     lower = replace(plan.protocol, staircase=staircase, demo=demo, practice=practice)
     model = ModelEqualizer(rigid())
-    levels, as_before = level_scales(lower, model, 1000.0), level_scales(plan.protocol, model, 1000.0)
+    levels, as_before = compute_level_scales(lower, model, 1000.0), compute_level_scales(plan.protocol, model, 1000.0)
     assert [s.n_per_mps2 for s in levels] == pytest.approx([s.n_per_mps2 for s in as_before])
 
 
@@ -96,19 +96,19 @@ def test_a_steep_stimulus_roved_to_its_highest_keeps_the_slew_limit(small_text, 
     def jagged(*arguments):
         """Every other sample halved: as high as before, and far steeper."""
         stimulus = make_held_stimulus(*arguments)
-        forces = stimulus.played_once_then_loop.copy()
+        forces = stimulus.onset_then_loop.copy()
         forces[1::2] /= 2
         played.append(float(np.linalg.norm(np.diff(forces, axis=0), axis=1).max()) * 1000.0)
-        return SimpleNamespace(played_once_then_loop=forces, loop=stimulus.loop)
+        return SimpleNamespace(onset_then_loop=forces, loop=stimulus.loop)
 
     monkeypatch.setattr(equalize_stimuli, "make_held_stimulus", jagged)
-    (scale, *_) = level_scales(protocol, ModelEqualizer(rigid()), 1000.0)
+    (scale, *_) = compute_level_scales(protocol, ModelEqualizer(rigid()), 1000.0)
     steepest = max(played[:2]) * highest_level_n(protocol) / scale.n_per_mps2 + SPRING_SLEW_N_PER_S
     assert steepest == pytest.approx(make_study_limits(protocol).slew_n_per_s)
 
 
 def test_what_is_within_reach_is_shown(conducted):
-    facts = dict(session_facts(fold_session(conducted.folder), lambda moment: moment))
+    facts = dict(list_session_facts(fold_session(conducted.folder), lambda moment: moment))
     reach = {scale.frequency_hz: scale.reachable_mps2 for scale in conducted.state.opened.equalized.levels}
     assert f"{reach[35.0]:.1f} m/s² at 35 Hz" in facts["within reach"]
     assert facts["equalizer"] == "identified model, order 3, 4 to 50 Hz"
@@ -166,7 +166,7 @@ def test_a_spring_that_is_in_the_model_is_not_accounted_for_twice(conducted, pla
     info = conducted.state.opened.device
     stiffness = 0.28173 * (2 * np.pi * 3.5) ** 2
     held = {"input": "excitation", "feedback": {"stiffness_n_per_m": stiffness, "damping_n_s_per_m": 0.0}}
-    bare = level_scales(plan.protocol, ModelEqualizer(rigid()), info.sample_rate_hz)
+    bare = compute_level_scales(plan.protocol, ModelEqualizer(rigid()), info.sample_rate_hz)
     assert equalized_levels(plan, held) == pytest.approx([scale.n_per_mps2 for scale in bare])
     other = {"input": "excitation", "feedback": {"stiffness_n_per_m": 50.0, "damping_n_s_per_m": 0.0}}
     assert "It holds a spring of 50 N/m" in refused(plan, provenance=other)
@@ -220,4 +220,4 @@ def test_the_report_gives_the_error_that_was_measured(plan, tmp_path):
     write_identified_model(tmp_path / "tested.h5", rigid(quality=quality))
     take(replace(plan, model=tmp_path / "tested.h5"))
     page = analyze_data(plan.data, tmp_path / "out").report.read_text()
-    assert f"S1_001: {quality_sentence(quality)}" in page
+    assert f"S1_001: {write_quality_sentence(quality)}" in page

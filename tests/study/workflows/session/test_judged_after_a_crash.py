@@ -7,7 +7,7 @@ import pytest
 from protocols.definition.exposure import DetectionSettings
 from protocols.trial import Phase, TrialStatus, VoidCause
 from study.session.facts.events import TrialMeasured, TrialPresented
-from study.session.stimulus.stimulus import direction_angle_deg
+from study.session.stimulus.stimulus import compute_direction_angle_deg
 from study.store.sessions.event_log import read_log
 
 
@@ -31,7 +31,7 @@ def test_a_detection_trial_is_measured_along_the_direction_that_was_played(sitte
         for event in read_log(done.folder.log).events
         if isinstance(event, TrialPresented)
         and event.phase is Phase.DETECTION
-        and event.angle_deg != direction_angle_deg(directions, event.direction)
+        and event.angle_deg != compute_direction_angle_deg(directions, event.direction)
     )
     place = (presented.run, presented.trial, presented.attempt)
     (before,) = [t for t in done.state.trials if (t.run, t.trial, t.attempt) == place]

@@ -21,7 +21,7 @@ from study.session.watching.followed_session import apply_followed_event, begin_
 from study.session.watching.make_watch_view import LiveInfo, make_watch_view
 from study.store.sessions.event_log import read_log
 from study.store.sessions.log_seal import find_seals
-from study.tui.session_status import describe
+from study.tui.session_status import describe_session
 from study.workflows.files.validate import validate_file
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed
@@ -29,8 +29,8 @@ from study.workflows.session.end_sitting import end_sitting
 from study.workflows.session.open_session import SessionPlan
 from study.workflows.session.plan_sitting import find_unfinished_sessions
 from study.workflows.session.simulated_display import SimulatedDisplay
-from study.workflows.views.view_home import session_lines
-from study.workflows.views.view_session import session_view
+from study.workflows.views.view_home import list_session_lines
+from study.workflows.views.view_session import make_session_view
 
 UTC = "2026-11-22T12:00:00+00:00"
 LEAVE = Unanswered("the participant left", ends_sitting=True)
@@ -146,14 +146,14 @@ def test_every_list_and_page_tells_the_outcome_and_nothing_suggests_to_resume(vi
     assert visitor.forms == []
     summary = json.loads((folder.path / "session.json").read_text())
     assert (summary["outcome"], summary["closed"], summary["participant_number"]) == (outcome, True, None)
-    (line,) = session_lines(data)
+    (line,) = list_session_lines(data)
     assert line.standing == outcome
-    view = session_view(folder.path)
+    view = make_session_view(folder.path)
     validation = validate_file(folder.path)
     assert validation.problems == ()
     assert outcome in validation.kind
     assert find_unfinished_sessions(data, "P01", "small") == ()
-    texts = (str(ended.value), str(resumed.value), describe(line), *view.events, str(view.facts))
+    texts = (str(ended.value), str(resumed.value), describe_session(line), *view.events, str(view.facts))
     assert not any("resume" in text.casefold() or "unfinished" in text for text in texts)
     assert any(INELIGIBILITY_REASONS[outcome] in text for text in texts)
     assert "without a place" in str(view.facts)
@@ -177,7 +177,7 @@ def test_an_analysis_leaves_them_out_by_name(visit, tmp_path, sitter):
     with pytest.raises(StudyError, match="P01_001 does not take part: consent was not given"):
         collect_sessions(tmp_path / "data")
     sitter.whole("ideal1")
-    assert [note for note in collect_sessions(tmp_path / "data").left_out if "P0" in note] == [
+    assert [note for note in collect_sessions(tmp_path / "data").exclusions if "P0" in note] == [
         "P01_001 does not take part: consent was not given.",
         "P02_001 does not take part: a question of the exclusion list was answered with yes.",
     ]

@@ -48,7 +48,7 @@ def events_of(folder):
 
 
 def trials_of(done):
-    return [(t.run, t.trial, t.level_n, t.answer) for t in done.state.trials if t.counts]
+    return [(t.run, t.trial, t.level_n, t.answer) for t in done.state.trials if t.is_valid]
 
 
 def test_no_probe_is_stronger_than_its_own_cap_and_all_come_between_trials(probed):
@@ -148,7 +148,7 @@ def test_a_stop_while_the_hand_lets_go_plays_nothing(probed, monkeypatch):
         begin(self, activity)
         if activity == "form" and "probe" in begun:
             self._device.stop()
-            self.stop_asked = "experimenter"
+            self.stop_requester = "experimenter"
 
     monkeypatch.setattr(SessionSupervisor, "start_activity", stop_at_the_form)
     done = probed.whole()
@@ -219,15 +219,15 @@ def test_the_forces_are_odd_lines_one_axis_each_and_the_same_in_probe_and_refere
 
 
 def test_a_reference_that_is_cut_short_by_a_pause_lets_go_and_the_session_goes_on_held(probed, monkeypatch):
-    glance, hands = SessionSupervisor.sign_of_life, []
+    glance, hands = SessionSupervisor.keep_alive, []
 
     def asks_for_a_pause(self):
         if self._activity == "reference":
-            self.pause_asked = "experimenter"
+            self.pause_requester = "experimenter"
         return glance(self)
 
     simulate = SafeDevice.simulate_hand
-    monkeypatch.setattr(SessionSupervisor, "sign_of_life", asks_for_a_pause)
+    monkeypatch.setattr(SessionSupervisor, "keep_alive", asks_for_a_pause)
     monkeypatch.setattr(SafeDevice, "simulate_hand", lambda self, on: hands.append(on) or simulate(self, on))
     done = probed.whole()
     assert done.end_reason == ""
@@ -239,15 +239,15 @@ def test_a_reference_that_is_cut_short_by_a_pause_lets_go_and_the_session_goes_o
 
 
 def test_a_stop_within_a_reference_ends_the_sitting_without_force(probed, monkeypatch):
-    glance = SessionSupervisor.sign_of_life
+    glance = SessionSupervisor.keep_alive
 
     def asks_for_a_stop(self):
         if self._activity == "reference":
             self._device.stop()
-            self.stop_asked = "experimenter"
+            self.stop_requester = "experimenter"
         return glance(self)
 
-    monkeypatch.setattr(SessionSupervisor, "sign_of_life", asks_for_a_stop)
+    monkeypatch.setattr(SessionSupervisor, "keep_alive", asks_for_a_stop)
     done = probed.whole()
     assert "the experimenter stopped the session" in done.end_reason
     assert done.state.answers == 0

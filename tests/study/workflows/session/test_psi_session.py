@@ -26,7 +26,7 @@ def placed(sitter):
 
 def test_a_session_is_played_folded_and_analysed(placed):
     done = placed.whole()
-    tested = [trial for trial in done.state.trials if trial.phase is Phase.TEST and trial.counts]
+    tested = [trial for trial in done.state.trials if trial.phase is Phase.TEST and trial.is_valid]
     runs = len(placed.protocol.stimulus.frequencies_hz)
     assert len(tested) == TRIALS * runs
     assert max(trial.level_n for trial in tested) <= placed.protocol.staircase.cap_n

@@ -23,7 +23,7 @@ def rehearsal(sitter) -> Rehearsal:
 
 
 def decisions(folder):
-    return [(t.run, t.trial, t.level_n, t.correct) for t in fold_session(folder).state.trials if t.counts]
+    return [(t.run, t.trial, t.level_n, t.correct) for t in fold_session(folder).state.trials if t.is_valid]
 
 
 @pytest.mark.slow
@@ -86,7 +86,7 @@ def equalized(small_text, tmp_path) -> Rehearsal:
 def test_a_rehearsal_says_whether_its_protocol_was_locked(sitter, locked):
     rehearsal = Rehearsal(sitter.protocol, sitter.text, subjects=1, seed=5, data=sitter.data, locked=locked)
     rehearse_study(rehearsal, workers=1, on_finished=lambda _: None)
-    assert collect_sessions(sitter.data).locked.startswith("yes" if locked else "no")
+    assert collect_sessions(sitter.data).lock_statement.startswith("yes" if locked else "no")
 
 
 @pytest.mark.slow

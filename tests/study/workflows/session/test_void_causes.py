@@ -18,7 +18,7 @@ from study.tui.trial_replies import LEAVING, PAUSE, REPEAT, TIME_OVER
 from study.workflows.files.validate import validate_file
 from study.workflows.results.session_results import write_tables
 from study.workflows.session.conduct_session import conduct_new
-from study.workflows.trial.judge_trial import cause_of
+from study.workflows.trial.judge_trial import get_void_cause
 
 CAUSES = [
     (REPEAT, VoidCause.ASKED),
@@ -53,8 +53,8 @@ def test_each_cause_is_logged_in_the_table_and_followed_by_the_same_stimulus(sit
 
 
 def test_a_stall_is_distinguished_from_other_faults():
-    assert cause_of(Fault.STALLED) is VoidCause.SCREEN_LATE
-    assert {cause_of(fault) for fault in Fault if fault is not Fault.STALLED} == {VoidCause.FAULT}
+    assert get_void_cause(Fault.STALLED) is VoidCause.SCREEN_LATE
+    assert {get_void_cause(fault) for fault in Fault if fault is not Fault.STALLED} == {VoidCause.FAULT}
 
 
 def test_a_display_that_lets_a_used_up_repeat_through_is_asked_again(sitter):

@@ -11,7 +11,7 @@ from study.session.views.views import Unanswered
 from study.store.sessions.archive import find_session
 from study.workflows.session.conduct_session import conduct_new
 from study.workflows.session.withdraw_participant import plan_withdrawal, withdraw
-from study.workflows.views.plan_study import document, lines, list_planned_studies
+from study.workflows.views.plan_study import format_plan_lines, list_planned_studies, summarise_plans
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def test_done_begun_and_withdrawn_participants_and_who_comes_next(sitter, begin)
     ]
     assert [(cell.frequencies_hz, cell.needed) for cell in study.plan.cells] == [((5.0, 15.0), 1), ((15.0, 5.0), 1)]
     assert (study.next_code, study.plan.next_number) == ("P04", 3)
-    said = lines(study)
+    said = format_plan_lines(study)
     assert said[0] == "small: 1 done of 4 planned, 1 begun, 1 left out"
     assert "to resume: P02" in said and "left out: P03 (withdrawn)" in said
     assert "orders still needed: 1, 2" in said
@@ -84,7 +84,7 @@ def test_people_and_simulated_participants_are_planned_apart(sitter, begin):
 def test_a_protocol_without_sessions_is_planned_from_its_file(tmp_path):
     study = only(tmp_path, "direction_threshold", simulated=False)
     assert (study.next_code, study.plan.participants) == ("P01", ())
-    assert any("drawn by lot" in line for line in lines(study))
+    assert any("drawn by lot" in line for line in format_plan_lines(study))
 
 
 def test_different_texts_of_one_protocol_are_reported(sitter, begin, balanced):
@@ -104,7 +104,7 @@ def test_where_all_logs_are_gone_the_protocol_is_asked_for(sitter, begin):
 
 def test_the_document_holds_the_same_facts(sitter, begin):
     begin("P01", to_the_end=True)
-    (study,) = document(list_planned_studies(sitter.data, None, simulated=True))["studies"]
+    (study,) = summarise_plans(list_planned_studies(sitter.data, None, simulated=True))["studies"]
     assert (study["planned"], study["done"], study["begun"], study["left_out"]) == (4, 1, 0, 0)
     assert [order["needed"] for order in study["orders"]] == [1, 2]
     assert study["next"] == {"code": "P02", "number": 1, "frequencies_hz": [15.0, 5.0], "swapped": False}

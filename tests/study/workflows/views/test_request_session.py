@@ -82,7 +82,7 @@ class Session:
 
 @pytest.fixture
 def soon(monkeypatch):
-    monkeypatch.setattr("study.workflows.views.send_request.HEARD_WITHIN_S", 0.1)
+    monkeypatch.setattr("study.workflows.views.send_request.RECEIVE_TIMEOUT_S", 0.1)
 
 
 @pytest.mark.parametrize("request_", [STOP, PAUSE, NOTE])

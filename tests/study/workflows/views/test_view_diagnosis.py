@@ -18,7 +18,7 @@ from analysis.diagnosis.document import (
 )
 from study.errors import StudyError
 from study.store.formats.diagnosis_file import write_diagnosis
-from study.workflows.views.view_diagnosis import diagnosis_view
+from study.workflows.views.view_diagnosis import make_diagnosis_view
 
 PLACE = Mismatch("ax", "fx", (5.0, 15.0), 1.5, "near v = 0", 0.8, 1e-9)
 FRICTION = NamedEffect(
@@ -38,7 +38,7 @@ FOUND = Diagnosis(
 @pytest.fixture
 def view(tmp_path):
     write_diagnosis(tmp_path / "diagnosis.json", FOUND)
-    return diagnosis_view(tmp_path / "diagnosis.json")
+    return make_diagnosis_view(tmp_path / "diagnosis.json")
 
 
 def test_each_effect_is_a_sentence_with_its_interval(view):
@@ -65,7 +65,7 @@ def test_tables_have_a_header_and_a_row_each(view):
 def test_a_p_value_of_zero_is_shown_as_an_upper_bound(tmp_path):
     sure = replace(FOUND, mismatch=(replace(PLACE, p_value=0.0), replace(PLACE, p_value=0.02)))
     write_diagnosis(tmp_path / "diagnosis.json", sure)
-    assert [row[-1] for row in diagnosis_view(tmp_path / "diagnosis.json").mismatch[1:]] == ["< 0.0001", "0.0200"]
+    assert [row[-1] for row in make_diagnosis_view(tmp_path / "diagnosis.json").mismatch[1:]] == ["< 0.0001", "0.0200"]
 
 
 def test_the_next_experiment_begins_with_its_command(view):
@@ -80,14 +80,14 @@ def test_the_next_experiment_begins_with_its_command(view):
 def test_agreement_has_neither_effects_nor_mismatch(tmp_path):
     nothing = Diagnosis("no_mismatch", (), (), {}, (), Fit(ERRORS, ERRORS), "free simulation", None)
     write_diagnosis(tmp_path / "diagnosis.json", nothing)
-    view = diagnosis_view(tmp_path / "diagnosis.json")
+    view = make_diagnosis_view(tmp_path / "diagnosis.json")
     assert (view.sentences, view.rivals, view.mismatch, view.remainder, view.next_experiment) == ((), (), (), (), "")
 
 
 def test_the_report_beside_it_is_found(tmp_path):
     write_diagnosis(tmp_path / "diagnosis.json", FOUND)
     (tmp_path / "report.html").write_text("")
-    assert diagnosis_view(tmp_path / "diagnosis.json").report == str(tmp_path / "report.html")
+    assert make_diagnosis_view(tmp_path / "diagnosis.json").report == str(tmp_path / "report.html")
 
 
 @pytest.mark.parametrize("content", ["", "[]", json.dumps({"format": "hapteq-diagnosis", "version": 1})])
@@ -95,4 +95,4 @@ def test_what_is_no_diagnosis_is_an_error_with_words(tmp_path, content):
     path = Path(tmp_path / "diagnosis.json")
     path.write_text(content)
     with pytest.raises(StudyError):
-        diagnosis_view(path)
+        make_diagnosis_view(path)

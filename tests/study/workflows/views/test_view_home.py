@@ -10,7 +10,7 @@ from study.devices.opening import DEVICES
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog
 from study.workflows.session.withdraw_participant import plan_withdrawal, withdraw
-from study.workflows.views.view_home import home_view, session_lines
+from study.workflows.views.view_home import list_session_lines, make_home_view
 
 
 @pytest.fixture(scope="module")
@@ -39,18 +39,18 @@ def unfinished(data, session_logs) -> Path:
 
 
 def only(data: Path):
-    (line,) = session_lines(data)
+    (line,) = list_session_lines(data)
     return line
 
 
 @pytest.mark.slow
 def test_a_finished_session_is_told_without_folding_it_and_like_folding_it(data):
     from study.workflows.results.fold_session import fold_session
-    from study.workflows.views.session_line import line_of
+    from study.workflows.views.session_line import make_line_from_state
 
     folder = SessionFolder(data / "P01_001")
     line = only(data)
-    assert line == line_of(fold_session(folder).state, folder)
+    assert line == make_line_from_state(fold_session(folder).state, folder)
     assert (line.standing, line.observer, line.runs_done, line.runs) == ("finished", "ideal", 3, 3)
 
 
@@ -72,7 +72,7 @@ def test_a_session_that_is_being_written_is_running_and_is_not_disturbed(unfinis
 
 def test_looking_leaves_every_file_as_it_was(unfinished):
     before = {p: (p.stat().st_mtime_ns, p.stat().st_size) for p in unfinished.rglob("*")}
-    home_view(unfinished)
+    make_home_view(unfinished)
     assert {p: (p.stat().st_mtime_ns, p.stat().st_size) for p in unfinished.rglob("*")} == before
 
 
@@ -99,7 +99,7 @@ def test_a_withdrawn_session_has_its_name_only(data):
 def test_a_log_that_cannot_be_read_is_listed_with_a_remark(data, content, remark):
     (data / "P09_001").mkdir()
     (data / "P09_001" / "events.jsonl").write_bytes(content)
-    lines = {line.name: line for line in session_lines(data)}
+    lines = {line.name: line for line in list_session_lines(data)}
     assert lines["P01_001"].standing == "finished"
     assert lines["P09_001"].standing == "unreadable"
     assert remark in lines["P09_001"].remark
@@ -117,28 +117,28 @@ def test_damage_in_the_middle_of_a_finished_log_is_seen(data):
 def test_a_folder_without_a_log_and_a_log_that_is_a_folder_are_listed(data):
     (data / "P08_001").mkdir()
     (data / "P09_001" / "events.jsonl").mkdir(parents=True)
-    remarks = {line.name: line.remark for line in session_lines(data)}
+    remarks = {line.name: line.remark for line in list_session_lines(data)}
     assert "no log" in remarks["P08_001"]
     assert remarks["P09_001"]
 
 
 def test_a_renamed_copy_is_no_second_session(data):
     shutil.copytree(data / "P01_001", data / "P02_001")
-    line = next(line for line in session_lines(data) if line.name == "P02_001")
+    line = next(line for line in list_session_lines(data) if line.name == "P02_001")
     assert line.standing == "unreadable"
     assert "copied or renamed" in line.remark
 
 
 def test_latest_first(data):
     (data / "P02_001").mkdir()  # younger than the simulated session's clock, or not: by its time
-    begun = [line.begun_utc for line in session_lines(data)]
+    begun = [line.begun_utc for line in list_session_lines(data)]
     assert begun == sorted(begun, reverse=True)
 
 
 @pytest.mark.parametrize("name", ["nothing", "file"])
 def test_a_data_folder_that_is_not_there_is_empty(tmp_path, name):
     (tmp_path / "file").write_text("")
-    view = home_view(tmp_path / name)
+    view = make_home_view(tmp_path / name)
     assert view.sessions == ()
     assert [protocol.name for protocol in view.protocols] == [
         "direction_threshold",
@@ -155,7 +155,7 @@ def test_protocols_beside_the_data_are_offered_and_bad_ones_with_their_problem(d
     (data / "bad.toml").write_text(small_text.replace("cap_n = 3.0", "cap_n = -3.0", 1))
     (beside / "pyproject.toml").write_text("[project]\nname = 'no protocol'\n")
     (beside / "torn.toml").write_text("kind = ")
-    titles = {Path(line.name).name: line.title for line in home_view(data).protocols}
+    titles = {Path(line.name).name: line.title for line in make_home_view(data).protocols}
     assert titles["mine.toml"] == "A small study for tests"
     assert titles["bad.toml"].startswith("Cannot be used: staircase.cap_n")
     assert not {"pyproject.toml", "torn.toml", "sweep"} & set(titles)
@@ -165,7 +165,7 @@ def test_a_locked_protocol_is_said_to_be_locked(data):
     from study.store.formats.protocol_files import lock_protocol, read_protocol
 
     lock_protocol(read_protocol("direction_threshold"), data, "2026-05-04T09:30:00+00:00", "1.0")
-    locked = {line.name: line.locked for line in home_view(data).protocols}
+    locked = {line.name: line.locked for line in make_home_view(data).protocols}
     assert locked.pop("direction_threshold")
     assert "direction_training" in locked and not any(locked.values())
 
@@ -175,5 +175,5 @@ def test_nothing_in_a_tombstone_reaches_the_terminal_as_a_command(data):
     folder.mkdir()
     left = {"format": "hapteq-tombstone", "version": 1, "withdrawn_utc": "\x1b[2J", "begun": {"protocol": "\x1b]0;x"}}
     (folder / "withdrawn.json").write_text(json.dumps(left))
-    line = next(line for line in session_lines(data) if line.name == "P07_001")
+    line = next(line for line in list_session_lines(data) if line.name == "P07_001")
     assert (line.standing, line.begun_utc, line.protocol) == ("withdrawn", " [2J", " ]0;x")

@@ -7,27 +7,27 @@ from analysis.diagnosis.data.observed import observe
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
-from analysis.diagnosis.errors.tuning import tuning_of
-from analysis.diagnosis.result.curves.law_curves import law_signature
+from analysis.diagnosis.errors.tuning import make_tuning
+from analysis.diagnosis.result.curves.law_curves import compute_law_signature
 from analysis.diagnosis.result.curves.signature_bins import compute_correlation_ratio
 from analysis.figures.diagnosis.signature import draw_signature
 from equalizer.effects.discovered_law import Channels, law_effect, law_values
 from equalizer.effects.effect import PlacedEffect
-from equalizer.laws.law import law_of
+from equalizer.laws.law import parse_law
 from equalizer.signals.unit_system import LINEAR
 
 
 @pytest.fixture
 def make_curve(diagnosed):
     def of(text, acts_on="force", axis="x", there=True, axes=("x",)):
-        law = law_of(text, acts_on, axis)
+        law = parse_law(text, acts_on, axis)
         placed = PlacedEffect(law_effect(law, Channels(("fx",), ("ax",))), (0,), law_values(law))
         recording, model = diagnosed.recorded(1, (placed,) if there else ()), diagnosed.device(1)
         noise = np.array(diagnosed.NOISE)
         measure = FreeSimulation((observe(recording, 1),), noise, noise)
-        tuning = tuning_of(model, recording.command.channels)
+        tuning = make_tuning(model, recording.command.channels)
         without = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NO_EFFECTS)
-        return law_signature(gather_evidence(measure, tuning, without)[0], placed, axes, LINEAR)
+        return compute_law_signature(gather_evidence(measure, tuning, without)[0], placed, axes, LINEAR)
 
     return of
 

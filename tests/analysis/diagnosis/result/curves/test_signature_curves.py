@@ -5,9 +5,9 @@ from analysis.diagnosis.data.observed import observe
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
-from analysis.diagnosis.errors.tuning import tuning_of
+from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.result.curves.signature_bins import bin_law_means
-from analysis.diagnosis.result.curves.signature_curves import Names, signature_of
+from analysis.diagnosis.result.curves.signature_curves import Names, compute_signature
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.simulation.simulator import simulate_response
@@ -25,13 +25,13 @@ def make_signature(diagnosed):
         model = diagnosed.device(axes)
         seen = observe(recording, axes)
         noise = np.repeat(diagnosed.NOISE, axes)
-        measure, tuning = FreeSimulation((seen,), noise, noise), tuning_of(model, recording.command.channels)
+        measure, tuning = FreeSimulation((seen,), noise, noise), make_tuning(model, recording.command.channels)
         without = evaluate_fit(measure, tuning, np.zeros(len(tuning.names)), NO_EFFECTS)
         names = Names(tuple("xyz"[:axes]), recording.response.channels, "m/s^2")
         complete = simulate_response(
             model, recording.command.samples, recording.sample_rate_hz, (placed,), recording.hold
         ).response
-        return signature_of(gather_evidence(measure, tuning, without)[0], complete, placed, names, Hold.ZERO_ORDER)
+        return compute_signature(gather_evidence(measure, tuning, without)[0], complete, placed, names, Hold.ZERO_ORDER)
 
     return of
 

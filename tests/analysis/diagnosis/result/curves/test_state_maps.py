@@ -8,10 +8,10 @@ from analysis.diagnosis.balance.motion import compute_motions
 from analysis.diagnosis.balance.structures import search_structures
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect
-from analysis.diagnosis.result.candidates import add_balance_classes, collect_balance_errors
+from analysis.diagnosis.result.candidates import add_balances_with_fitted_model, collect_balance_errors
 from analysis.diagnosis.result.curves.state_maps import WITH_CANDIDATES, compute_state_maps
 from analysis.diagnosis.search.time_budget import unlimited_time
-from analysis.figures.diagnosis.state_maps import state_map_pictures
+from analysis.figures.diagnosis.state_maps import make_state_map_pictures
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
@@ -88,7 +88,7 @@ def test_what_nothing_completes_has_no_second_course():
     assert maps.completed == ""
     assert all(not len(view.mean_residual) for view in maps.views)
     assert not len(maps.loops[0].completed_force)
-    assert "Blue" not in state_map_pictures((maps,))[0].caption
+    assert "Blue" not in make_state_map_pictures((maps,))[0].caption
 
 
 def test_how_far_names_reach_is_measured_on_held_out_blocks(friction_maps):
@@ -100,12 +100,12 @@ def test_how_far_names_reach_is_measured_on_held_out_blocks(friction_maps):
 
 
 def test_states_and_loops_are_drawn_with_plain_units(friction_maps):
-    states, loops = state_map_pictures(friction_maps[1])
+    states, loops = make_state_map_pictures(friction_maps[1])
     labels = [axes.get_xlabel() for axes in states.figure.axes]
     assert labels == ["Position (mm)", "Velocity (mm/s)", "Command (N)", "Time (s)"]
     assert "Against velocity: mean missing force from −" in states.alternative.replace("-", "−")
     assert [axes.get_xlabel() for axes in loops.figure.axes] == ["Position (mm)", "Velocity (mm/s)"]
-    assert state_map_pictures(()) == ()
+    assert make_state_map_pictures(()) == ()
 
 
 def test_what_stands_in_a_class_is_no_candidate_beside_it(friction_maps):
@@ -119,12 +119,13 @@ def test_what_stands_in_a_class_is_no_candidate_beside_it(friction_maps):
         laws=(replace(weighed, equivalents=("stribeck_friction",)),),
         further_laws=(weighed, _make_rival(weighed)),
     )
-    found = add_balance_classes(named, (alike,), recording.command.channels)
+    found = add_balances_with_fitted_model(named, (alike,), recording.command.channels)
     assert found.effects[0].class_ == ()  # it only refines the named law, and is no candidate either
     assert found.candidates == ()
     apart = replace(balance, laws=(replace(weighed, equivalents=()),), further_laws=(_make_rival(weighed),))
     assert [
-        candidate.effect for candidate in add_balance_classes(named, (apart,), recording.command.channels).candidates
+        candidate.effect
+        for candidate in add_balances_with_fitted_model(named, (apart,), recording.command.channels).candidates
     ] == ["stribeck_friction"]
 
 
@@ -136,9 +137,13 @@ def test_a_law_that_leaves_a_remainder_explains_less_than_all(friction_maps):
     effect = NamedEffect(weighed.law.effect, "mechanism", "force", 0.9, 0.9, level)
     named = replace(NOTHING, verdict="partly_explained", effects=(effect,), remainder=(PLACE,))
     half = replace(balance, laws=(replace(weighed, share=1.0),), linear=0.2, error=0.1, ceiling=0.1)
-    assert add_balance_classes(named, (half,), recording.command.channels).effects[0].share == pytest.approx(0.75)
+    assert add_balances_with_fitted_model(named, (half,), recording.command.channels).effects[0].share == pytest.approx(
+        0.75
+    )
     whole = replace(half, ceiling=0.0)
-    assert add_balance_classes(named, (whole,), recording.command.channels).effects[0].share == pytest.approx(1.0)
+    assert add_balances_with_fitted_model(named, (whole,), recording.command.channels).effects[
+        0
+    ].share == pytest.approx(1.0)
 
 
 def _make_rival(weighed):

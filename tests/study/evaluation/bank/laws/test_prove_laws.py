@@ -7,7 +7,7 @@ import pytest
 from study.errors import StudyError
 from study.evaluation.bank.laws.prove_laws import prove_laws, reveal_laws
 from study.evaluation.bank.laws.seal_laws import fresh_motions_path, read_fresh_motions, seal_laws
-from study.evaluation.bank.laws.write_laws import format_law_lines, write_laws
+from study.evaluation.bank.laws.write_law_proof import format_law_lines, write_law_proof
 from study.evaluation.bank.proof_folder import SETTINGS, open_proof_folder
 from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.seal_cases import BankPlan
@@ -62,7 +62,7 @@ def test_a_folder_of_effects_is_no_folder_of_laws(sealed):
 @pytest.mark.slow
 def test_no_law_is_named_that_is_not_there(tmp_path):
     done = prove_laws(tmp_path / "bank", BankPlan(SEED, 20, brief=True), BankOptions(), lambda what, done, of: None)
-    write_laws(done)
+    write_law_proof(done)
     assert json.loads((done.folder.path / "proof.json").read_text())["of"] == "laws"
     assert next(format_law_lines(done)).endswith("misses in 20 cases")
     assert [each.number for each in done.outcomes if each.diagnosis is None] == []

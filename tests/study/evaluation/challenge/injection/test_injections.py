@@ -7,7 +7,7 @@ import pytest
 
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
-from study.evaluation.challenge.injection.axis_motion import axis_motion
+from study.evaluation.challenge.injection.axis_motion import compute_axis_motion
 from study.evaluation.challenge.injection.force_injections import FORCE_INJECTIONS
 from study.evaluation.challenge.injection.injections import INJECTIONS, applicable_injections, inject, measure_response
 
@@ -98,7 +98,7 @@ def test_an_added_mass_asks_for_its_force_and_a_weaker_drive_for_a_larger_comman
 
 
 def test_a_delayed_drive_was_commanded_earlier():
-    plain, moved = swinging(), axis_motion(swinging(), 0)
+    plain, moved = swinging(), compute_axis_motion(swinging(), 0)
     assert moved is not None
     late = inject(plain, "transport_delay", 0.9, np.random.default_rng(2))
     shift = late.values["delay"] * RATE_HZ
@@ -161,5 +161,5 @@ def test_what_a_sensor_remembers_ends_with_the_take(effect):
 
 
 def test_a_motion_is_differentiated_within_each_take():
-    whole = axis_motion(two_takes(), 0)
-    assert np.abs(whole.v).max() == pytest.approx(np.abs(axis_motion(recording(), 0).v).max())
+    whole = compute_axis_motion(two_takes(), 0)
+    assert np.abs(whole.v).max() == pytest.approx(np.abs(compute_axis_motion(recording(), 0).v).max())

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from study.evaluation.challenge.device import Device
-from study.evaluation.challenge.law_kernel import law_force
+from study.evaluation.challenge.law_kernel import compute_law_force
 from study.evaluation.challenge.laws.build_law import build_law
-from study.evaluation.challenge.laws.concealed_laws import LAW_KINDS, Sizes
+from study.evaluation.challenge.laws.concealed_laws import LAW_KINDS, PeakValues
 from study.evaluation.challenge.laws.draw_law import COUNTS, TURN, draw_law, generate_law_case
 from study.evaluation.challenge.mechanism_kernel import Motion
 
 SEED = 7
-SIZES = Sizes(0.01, 0.2, 20.0)
+PEAKS = PeakValues(0.01, 0.2, 20.0)
 
 
 @pytest.fixture(scope="module")
@@ -56,14 +56,14 @@ def test_the_law_shows_and_fresh_motion_carries_its_force(found):
 def test_a_force_hangs_on_the_variables_that_are_said(kind):
     """And on no others: each is moved alone."""
     random = np.random.default_rng(3)
-    first, second = kind.draw(random, SIZES)
+    first, second = kind.draw(random, PEAKS)
     row = np.array([kind.code, 0, 1, 1.0, first, second, 1.0])
     state = {"x": 0.008, "y": 0.004, "vx": 0.15, "vy": 0.05, "fx": 1.0, "t": 0.37, "kept": 0.001}
     moves = {"x": -0.0011, "y": 0.001, "vx": -0.07, "vy": 0.02, "fx": 0.4, "t": 0.11}
 
     def force(at):
         q, v, u = (np.array([at[a], at.get(b, 0.0), 0.0]) for a, b in (("x", "y"), ("vx", "vy"), ("fx", "fy")))
-        return law_force(row, q, v, u, at["kept"], at["t"])
+        return compute_law_force(row, q, v, u, at["kept"], at["t"])
 
     needed = {name for name, by in moves.items() if force({**state, name: state[name] + by}) != force(state)}
     if kind.name == "drag beyond a place":  # a step: nothing between the two places
@@ -73,7 +73,7 @@ def test_a_force_hangs_on_the_variables_that_are_said(kind):
 
 @pytest.mark.parametrize("kind", [kind for kind in LAW_KINDS if kind.change is not None], ids=lambda kind: kind.name)
 def test_what_changes_commands_and_readings_leaves_none_alone_at_zero(kind):
-    first, second = kind.draw(np.random.default_rng(4), SIZES)
+    first, second = kind.draw(np.random.default_rng(4), PEAKS)
     zero, some = np.zeros(5), np.linspace(-3.0, 3.0, 5)
     assert np.array_equal(kind.change(zero, some, first, second), zero)
     assert np.abs(kind.change(some, some, first, second)).max() > 0

@@ -11,7 +11,7 @@ from study.evaluation.challenge.concealed_effect import EffectContext
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.device import simulate_motion as simulate_bench_motion
 from study.evaluation.challenge.draw_case import EFFECTS
-from study.evaluation.challenge.drive_plan import multisine
+from study.evaluation.challenge.drive_plan import draw_multisine
 from study.evaluation.challenge.second_engine import second_engine
 from study.evaluation.challenge.sensor import NOISE_MPS2
 
@@ -26,15 +26,15 @@ ALONG_X = {
 
 @pytest.fixture(scope="module")
 def bench():
-    from study.evaluation.challenge.second_engine.mujoco_bench import baseline_bench
+    from study.evaluation.challenge.second_engine.mujoco_bench import make_baseline_bench
 
-    return baseline_bench(draw_bench(np.random.default_rng(50_021)))
+    return make_baseline_bench(draw_bench(np.random.default_rng(50_021)))
 
 
 @pytest.fixture(scope="module")
 def command():
     wave = np.zeros((1500, 3))
-    wave[:1000, 0] = multisine(np.random.default_rng(50_022), 3.0, 1000)
+    wave[:1000, 0] = draw_multisine(np.random.default_rng(50_022), 3.0, 1000)
     return wave
 
 
@@ -44,13 +44,13 @@ def apart(one, other):
 
 @pytest.mark.parametrize("name", ALONG_X)
 def test_both_engines_know_the_same_physics(name, bench, command):
-    from study.evaluation.challenge.second_engine.mujoco_bench import linear_bench, simulate_motion
+    from study.evaluation.challenge.second_engine.mujoco_bench import linearise_bench, simulate_motion
     from study.evaluation.challenge.second_engine.mujoco_case import BUILDERS
 
-    free, first = simulate_motion(bench, command), Device(linear_bench(bench))
+    free, first = simulate_motion(bench, command), Device(linearise_bench(bench))
     travel, peak = np.abs(free[1]).max(axis=0), np.abs(free[0]).max(axis=0)
     values = EFFECTS[name].draw(
-        EffectContext(np.random.default_rng(5), 0.8, linear_bench(bench), 0, travel, peak, (0,))
+        EffectContext(np.random.default_rng(5), 0.8, linearise_bench(bench), 0, travel, peak, (0,))
     )
     with_it = BUILDERS[name](bench, 0, values)
     if name == "transport_delay":

@@ -20,7 +20,7 @@ def test_the_time_limit_ends_the_question_unless_it_was_answered(on_stage):
         await stage.reads("The time for this answer is over.")
         screen.arm(replace(QUESTION, time_limit_s=3600.0))
         await stage.press("1")
-        screen._time_over()  # at the same moment as the answer
+        screen._end_at_time_limit()  # at the same moment as the answer
 
     replies = on_stage(screen, story)
     assert replies[0] == TIME_OVER

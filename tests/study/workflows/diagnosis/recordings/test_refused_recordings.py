@@ -34,10 +34,8 @@ def test_an_unstable_model_is_named(files, findings, tmp_path, made):
 
 
 def test_a_recording_that_is_too_short_or_all_noise_is_named(files, findings, tmp_path, recording):
-    cut = replace(
-        recording, command=recording.command.part(0, 90), response=recording.response.part(0, 90), position=None,
-        segments=(),
-    )  # fmt: skip
+    command, response = recording.command.select_samples(0, 90), recording.response.select_samples(0, 90)
+    cut = replace(recording, command=command, response=response, position=None, segments=())
     write_recording(tmp_path / "short.h5", cut)
     error = refused_with(files, findings, tmp_path, sources=(tmp_path / "short.h5",))
     assert error.title == "These recordings cannot be diagnosed"

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.errors.choose_measure import measure_of
+from analysis.diagnosis.errors.choose_measure import make_measure
 from study.errors import UserInterruptError, WrongUseError
 from study.store.formats.recording_file import write_recording
 from study.workflows.diagnosis.diagnose_at_screen import diagnose_at_screen, free_out
@@ -79,8 +79,8 @@ def test_forces_without_a_measured_motion_are_refused(files, recording, tmp_path
 
 def test_what_is_compared_is_what_was_asked_for(made, recording):
     model = made.device(1)
-    assert measure_of([recording], model).measure.name == "free simulation"
-    assert measure_of([recording], model, compared="force").measure.name == "predicted force"
+    assert make_measure([recording], model).measure.name == "free simulation"
+    assert make_measure([recording], model, compared="force").measure.name == "predicted force"
     imposed = replace(recording, meta={**recording.meta, "imposed": "position"})
-    assert measure_of([imposed], model).measure.name == "predicted force"
-    assert measure_of([imposed], model, compared="motion").measure.name != "predicted force"
+    assert make_measure([imposed], model).measure.name == "predicted force"
+    assert make_measure([imposed], model, compared="motion").measure.name != "predicted force"

@@ -9,7 +9,7 @@ from equalizer.plant.model_quality import NOT_STORED
 from study.store.formats.identified_model_file import write_identified_model
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.equalize_trajectory import equalize_trajectory
-from study.workflows.equalizer.equalized_summary import summary, summary_lines
+from study.workflows.equalizer.equalized_summary import format_equalization_lines, summarise_equalization
 from tests.study.workflows.equalizer.trajectory.plans import RATE_HZ, model_of, noise, played_error, refusal, table
 
 
@@ -20,19 +20,19 @@ def test_the_forces_of_a_table_make_the_device_do_it_row_by_row(plants, plan):
     assert forces.start_s == 0.5
     assert played_error(plants, plan, 0.1) < 0.01
     assert done.feedforward.error < 0.01
-    measured, predicted, *_ = summary_lines(done)
+    measured, predicted, *_ = format_equalization_lines(done)
     assert measured == NOT_STORED
     assert predicted.startswith("As the model itself predicts") and predicted.endswith("N of 3 N.")
-    assert "a spring that holds the handle is not counted" in summary_lines(done)[-1]
-    assert summary(done)["peak_n"] <= 3.0
+    assert "a spring that holds the handle is not counted" in format_equalization_lines(done)[-1]
+    assert summarise_equalization(done)["peak_n"] <= 3.0
 
 
 def test_what_is_left_out_is_reported(plants, plan, tmp_path):
     t = np.arange(2000)[:, None] / RATE_HZ
     write_trajectory(tmp_path / "whistle.csv", table(noise(plants) + np.sin(2 * np.pi * 84 * t)))
     done = equalize_trajectory(replace(plan, trajectory=tmp_path / "whistle.csv"))
-    assert 0.3 < summary(done)["left_out"] < 0.9
-    assert any("lies outside the band and is not played" in line for line in summary_lines(done))
+    assert 0.3 < summarise_equalization(done)["left_out"] < 0.9
+    assert any("lies outside the band and is not played" in line for line in format_equalization_lines(done))
 
 
 def test_too_strong_forces_are_refused_with_the_factor_or_solved_under_the_cap(plan):
@@ -42,14 +42,14 @@ def test_too_strong_forces_are_refused_with_the_factor_or_solved_under_the_cap(p
     assert "fits when scaled by 0." in refused.happened
     done = equalize_trajectory(replace(loud, constrain=True))
     assert np.linalg.norm(read_trajectory(loud.out).signal.samples, axis=1).max() <= 3.0
-    assert summary(done)["capped"]["error_capped"] > summary(done)["capped"]["error_free"]
-    assert any("held at the cap have corners" in line for line in summary_lines(done))
+    assert summarise_equalization(done)["capped"]["error_capped"] > summarise_equalization(done)["capped"]["error_free"]
+    assert any("held at the cap have corners" in line for line in format_equalization_lines(done))
 
 
 def test_what_the_cap_costs_is_reported_in_one_figure(plan):
     done = equalize_trajectory(replace(plan, trajectory=plan.trajectory.with_name("loud.csv"), constrain=True))
-    capped, lines = summary(done)["capped"], summary_lines(done)
-    assert summary(done)["predicted_error"] == capped["error_capped"]
+    capped, lines = summarise_equalization(done)["capped"], format_equalization_lines(done)
+    assert summarise_equalization(done)["predicted_error"] == capped["error_capped"]
     assert sum(" error " in line for line in lines) == 1
     figures = [100 * capped[f"error_{kind}"] for kind in ("capped", "free", "clipped")]
     assert "error {:.2f} % of the wanted acceleration".format(*figures) in lines[1]

@@ -9,7 +9,7 @@ from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from study.store.formats.identified_model_file import write_identified_model
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.workflows.equalizer.equalize_trajectory import equalize_trajectory
-from study.workflows.equalizer.equalized_summary import summary, summary_lines
+from study.workflows.equalizer.equalized_summary import format_equalization_lines, summarise_equalization
 from tests.study.workflows.equalizer.trajectory.plans import model_of, refusal
 
 
@@ -28,9 +28,9 @@ def test_named_friction_is_compensated_and_what_is_linear_is_not(plan, tmp_path)
     done = equalize_trajectory(replace(plan, physics=tmp_path / "improved.toml"))
     added = done.forces.signal.samples - alone
     assert 0.01 < np.abs(added).max() < 0.2
-    assert summary(done)["compensated"] == ["coulomb_friction"]
-    assert "it is linear" in summary(done)["not_compensated"]["added_mass"]
-    assert "Compensated: coulomb_friction." in summary_lines(done)
+    assert summarise_equalization(done)["compensated"] == ["coulomb_friction"]
+    assert "it is linear" in summarise_equalization(done)["not_compensated"]["added_mass"]
+    assert "Compensated: coulomb_friction." in format_equalization_lines(done)
 
 
 def test_each_effect_that_a_diagnosis_names_is_compensated_or_reported(plan, tmp_path):
@@ -43,7 +43,7 @@ def test_each_effect_that_a_diagnosis_names_is_compensated_or_reported(plan, tmp
         for effect in EFFECT_NAMES
     )
     write_mechanical_model(tmp_path / "improved.toml", mechanism(*named))
-    told = summary(equalize_trajectory(replace(plan, physics=tmp_path / "improved.toml")))
+    told = summarise_equalization(equalize_trajectory(replace(plan, physics=tmp_path / "improved.toml")))
     assert {*told["compensated"], *told["not_compensated"]} == {effect.name for effect in EFFECT_NAMES}
     assert all(told["not_compensated"].values())
 
@@ -54,8 +54,8 @@ def test_the_cap_holds_for_the_sum_and_the_share_that_fits_is_reported(plan, tmp
     plan.out.unlink()
     done = equalize_trajectory(replace(plan, physics=tmp_path / "f.toml", cap_n=1.01 * peak_n))
     assert done.peaks.peak_n <= 1.01 * peak_n * (1 + 1e-9)
-    assert 0 <= summary(done)["compensated_share"] < 1
-    assert any("of it fits under the cap" in line for line in summary_lines(done))
+    assert 0 <= summarise_equalization(done)["compensated_share"] < 1
+    assert any("of it fits under the cap" in line for line in format_equalization_lines(done))
 
 
 def test_a_model_that_hides_its_amplitude_gets_no_friction_on_top(plants, plan, tmp_path):

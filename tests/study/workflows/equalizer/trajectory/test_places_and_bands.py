@@ -10,7 +10,7 @@ from equalizer.tracking.lqr.padding import band_error
 from study.errors import WrongUseError
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.equalize_trajectory import equalize_trajectory
-from study.workflows.equalizer.equalized_summary import summary, summary_lines
+from study.workflows.equalizer.equalized_summary import format_equalization_lines, summarise_equalization
 from tests.study.workflows.equalizer.trajectory.plans import RATE_HZ, noise, played_error, refusal, table, with_models
 
 
@@ -23,9 +23,9 @@ def test_models_of_several_places_need_a_place(plan):
 def test_two_places_are_blended(plants, plan):
     blended = with_models(plan, "left", "right", at_m=(0.0, 0.0, 0.0))
     done = equalize_trajectory(blended)
-    assert summary(done)["interpolation"] == "blended forces"
-    assert summary(done)["held_out"] == []
-    assert any(line.startswith("No place could be held out") for line in summary_lines(done))
+    assert summarise_equalization(done)["interpolation"] == "blended forces"
+    assert summarise_equalization(done)["held_out"] == []
+    assert any(line.startswith("No place could be held out") for line in format_equalization_lines(done))
     error = played_error(plants, blended, 0.1)
     blended.out.unlink()
     equalize_trajectory(with_models(plan, "left"))
@@ -35,12 +35,12 @@ def test_two_places_are_blended(plants, plan):
 def test_three_places_are_checked_with_the_middle_one_held_out(plants, plan):
     between = with_models(plan, "left", "centre", "right", at_m=(0.015, 0.0, 0.0))
     done = equalize_trajectory(between)
-    (check,) = summary(done)["held_out"]
+    (check,) = summarise_equalization(done)["held_out"]
     assert check["place_m"] == [0.0, 0.0, 0.0]
     blended, modal = check["blended_held_out_error"], check["modal_held_out_error"]
     better = modal is not None and modal < blended
-    assert summary(done)["interpolation"] == ("modal" if better else "blended forces")
-    measured, first, second, *_ = summary_lines(done)
+    assert summarise_equalization(done)["interpolation"] == ("modal" if better else "blended forces")
+    measured, first, second, *_ = format_equalization_lines(done)
     assert measured == f"Of the nearest model: {NOT_STORED}"
     assert first.startswith(f"Held out (0, 0, 0) mm: error {100 * blended:.1f} % (rms over lines) with blended forces")
     assert second.startswith("As the models themselves predict: error")
@@ -73,10 +73,10 @@ def test_a_narrow_and_a_wide_model_of_one_place_play_bands(plants, plan, tmp_pat
     write_trajectory(tmp_path / "wide.csv", table(noise(plants, 2.0, 200.0)))
     banded = with_models(plan, "wide", "centre", trajectory=tmp_path / "wide.csv")
     done = equalize_trajectory(banded)
-    assert summary(done)["bands"]["edges_hz"] == [4.0, 36.0]
+    assert summarise_equalization(done)["bands"]["edges_hz"] == [4.0, 36.0]
     assert played_error(plants, banded, 0.1) < 0.06
-    assert summary(done)["bands"]["high_level_error"] < 0.1
-    lines = summary_lines(done)
+    assert summarise_equalization(done)["bands"]["high_level_error"] < 0.1
+    lines = format_equalization_lines(done)
     assert any(line.startswith("Bands: a rigid model below 4 Hz") for line in lines)
     assert any("simply cut off" in line for line in lines)
     assert any(line.startswith("Loudness of the high band") for line in lines)

@@ -11,7 +11,7 @@ from study.store.disk.file_errors import CannotReadError, UnusableFileError
 from study.store.formats.identified_model_file import write_identified_model
 from study.store.formats.trajectory_file import write_trajectory
 from study.workflows.equalizer.equalize_trajectory import equalize_trajectory
-from study.workflows.equalizer.equalized_summary import summary, summary_lines
+from study.workflows.equalizer.equalized_summary import format_equalization_lines, summarise_equalization
 from tests.study.workflows.equalizer.trajectory.plans import model_of, noise, refusal, table, with_models
 
 
@@ -99,15 +99,15 @@ def test_what_was_measured_of_the_model_comes_before_what_it_predicts(plants, pl
     quality = ModelQuality(0.13, 0.12, 0.001, 0.13, 0.004, 10.0, ("A pole is at the bound of the decay.",))
     write_identified_model(tmp_path / "poor.h5", model_of(plants.omega_like(), quality=quality))
     done = equalize_trajectory(replace(plan, models=(tmp_path / "poor.h5",)))
-    first, cause, predicted, *_ = summary_lines(done)
+    first, cause, predicted, *_ = format_equalization_lines(done)
     assert first == (
         "Measured on 10 s held out for a test, the error of the model is 13.00 %, noise of the record 0.40 %; "
         "expected from misfit and scatter: 13.00 %."
     )
     assert cause == "A pole is at the bound of the decay."
     assert predicted.startswith("As the model itself predicts: error 0.")
-    assert list(summary(done))[1] == "quality"
-    assert summary(done)["quality"]["held_out_error"] == 0.13
+    assert list(summarise_equalization(done))[1] == "quality"
+    assert summarise_equalization(done)["quality"]["held_out_error"] == 0.13
 
 
 def test_of_several_models_the_nearest_and_the_worst_are_reported(plants, plan, tmp_path):
@@ -116,9 +116,9 @@ def test_of_several_models_the_nearest_and_the_worst_are_reported(plants, plan, 
     write_identified_model(tmp_path / "far.h5", model_of(plants.omega_like(0.05), (0.03, 0.0, 0.0), quality=far))
     models = (tmp_path / "near.h5", tmp_path / "far.h5")
     done = equalize_trajectory(replace(plan, models=models, at_m=(0.005, 0.0, 0.0)))
-    first, second, *_ = summary_lines(done)
+    first, second, *_ = format_equalization_lines(done)
     assert first.startswith("Of the nearest model: No recording was held out for a test")
     assert second.startswith(
         "Of the worst of the 2 models: Measured on 5 s held out for a test, the error of the model is 20.00 %"
     )
-    assert summary(done)["quality"]["expected_error"] == 0.2
+    assert summarise_equalization(done)["quality"]["expected_error"] == 0.2

@@ -22,7 +22,7 @@ from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.files.validate import validate_file
 from study.workflows.recording.import_recording import read_foreign
 from study.workflows.results.fold_session import fold_session
-from study.workflows.views.session_line import session_line
+from study.workflows.views.session_line import make_session_line
 from tests.study.workflows.files.mutated.mutations import COUNT, SEED, mutated
 
 MOST_MEMORY_BYTES = 2**30
@@ -53,7 +53,7 @@ def read_ours(path: Path, beside: Path) -> None:
             RequestInbox(path.parent).take()
         case "events.jsonl":
             read_valid_events(path)
-            session_line(SessionFolder(path.parent))
+            make_session_line(SessionFolder(path.parent))
             fold_session(SessionFolder(path.parent))
         case "model.h5":
             read_identified_model(path)

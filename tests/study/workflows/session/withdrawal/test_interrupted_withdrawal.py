@@ -17,8 +17,8 @@ from study.workflows.files.validate import validate_file
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.participant_number import participant_number
-from study.workflows.views.view_home import session_lines
-from study.workflows.views.view_session import session_view
+from study.workflows.views.view_home import list_session_lines
+from study.workflows.views.view_session import make_session_view
 from tests.study.workflows.session.withdrawal.data_folder import UTC, erase, files
 
 PART = ".anova.json.0123abcd.part"
@@ -76,13 +76,13 @@ def killer() -> _Killer:
 
 def check_half_erased(data: Path) -> None:
     """Nothing of P01 counts as data, and it is said how to go on."""
-    for line in session_lines(data):
+    for line in list_session_lines(data):
         if line.subject == "P01":
             assert line.standing == "withdrawn"
             assert "hapteq withdraw P01_" in line.remark
     assert [folder.name for folder in collect_sessions(data).sessions] == ["P02_001"]
     for name in ("P01_001", "P01_002"):
-        view = session_view(data / name)
+        view = make_session_view(data / name)
         assert (view.line.standing, view.thresholds, view.events) == ("withdrawn", (), ())
         with pytest.raises(StudyError, match="was withdrawn"):
             fold_session(SessionFolder(data / name))

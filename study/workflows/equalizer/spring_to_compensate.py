@@ -1,7 +1,8 @@
-"""Virtual spring whose force must be compensated during playback, because the model does not contain it.
+"""Virtual spring whose force must be compensated during playback, because the identified model does not contain it.
 
-A model from the excitation to the response (`input` of its provenance is "excitation") contains the spring under which
-it was recorded; a model from the total force does not.
+A model from the excitation to the response (its provenance has `input` = "excitation") contains the virtual spring that
+held the handle while it was recorded; a model from the total force (excitation plus spring) does not. Used wherever
+forces for playback are computed: `play_forces` and `equalize_stimuli`.
 """
 
 import math
@@ -14,15 +15,15 @@ SPRING_TOLERANCE = 0.01
 """Relative difference of stiffness and of damping up to which two springs count as equal."""
 
 
-def spring_outside_model(model: IdentifiedModel, spring: VirtualSpring) -> VirtualSpring:
-    """The spring to compensate: `spring`, which acts during playback, or `NO_SPRING` if the model contains it. Raises
-    StudyError if the model contains another spring."""
+def find_spring_to_compensate(model: IdentifiedModel, spring: VirtualSpring) -> VirtualSpring:
+    """Find the spring to compensate: `spring`, which acts during playback, or `NO_SPRING` if the model contains it.
+    Raises StudyError if the model contains a spring of another stiffness or damping."""
     if model.provenance.get("input") != "excitation":
         return spring
     feedback = model.provenance.get("feedback")
-    settings = feedback if isinstance(feedback, dict) else {}
+    model_feedback = feedback if isinstance(feedback, dict) else {}
     model_spring = VirtualSpring(
-        float(settings.get("stiffness_n_per_m", 0.0)), float(settings.get("damping_n_s_per_m", 0.0))
+        float(model_feedback.get("stiffness_n_per_m", 0.0)), float(model_feedback.get("damping_n_s_per_m", 0.0))
     )
     if not (
         math.isclose(model_spring.stiffness_n_per_m, spring.stiffness_n_per_m, rel_tol=SPRING_TOLERANCE)

@@ -1,9 +1,10 @@
-"""Writes the results of a blind test of laws (`prove_laws`), in which laws outside the catalogue of effects are
-concealed.
+"""Writes the result of a blind test of laws (`prove_laws`): devices with concealed laws outside the effect catalogue.
 
-`write_laws` writes into the folder of the test: `proof.json` (all figures) and `proof.csv` (one row per case).
+`write_law_proof` writes into the folder of the test: `proof.json` (all figures) and `proof.csv` (one row per case).
 `write_law_table` writes figures and misses as small CSV tables that can be kept under version control.
-`format_law_lines` and `format_law_summary` give the result as text for the terminal and as JSON."""
+`format_law_lines` and `format_law_summary` return the result as text for the terminal and as JSON. A miss is a case
+with a wrong answer (`LawOutcome.missed`). Called by `hapteq prove`.
+"""
 
 import json
 import sys
@@ -17,7 +18,7 @@ from analysis.evaluation.laws.law_outcome import LawOutcome
 from equalizer.laws.law import Law
 from study.evaluation.bank.laws.prove_laws import LawBlindTest
 from study.evaluation.bank.write_proof import FigureRow, read_current_commit
-from study.store.disk.csv_rows import rows_to_csv
+from study.store.disk.csv_rows import format_csv_table
 from study.store.disk.json_document import write_json
 from study.store.disk.provenance import anonymise_arguments, gather_provenance
 from study.store.disk.text_file import write_text
@@ -30,7 +31,7 @@ DOCUMENT, TABLE = "proof.json", "proof.csv"
 
 @dataclass(frozen=True, slots=True)
 class LawRow:
-    """A case of the bank of laws as a row of proof.csv and of the table of misses."""
+    """A case of the test as a row of proof.csv and of the table of misses; the fields are the columns, in order."""
 
     number: int
     seed: int
@@ -50,24 +51,24 @@ class LawRow:
     names: str
     """Effects of the catalogue that the diagnosis names."""
     candidates: str
-    """Laws that the diagnosis gives as candidates only."""
+    """Laws that the diagnosis lists as candidates without naming them."""
     structure: bool
-    """Whether place, axis, variables and memory of the found laws are right."""
+    """Whether place, axis, variables and memory of the laws in the answer (named, else candidates) are right."""
     error: float | None
-    """Relative error of the found law in the visited range; None where it is unknown or infinite, as below."""
+    """Relative error of the law in the answer, in the visited range; None (here and below): unknown or infinite."""
     louder: float | None
-    """Relative error of the found law at a higher level."""
+    """The same at a higher level than recorded."""
     retuned: float | None
     """Rms error of the re-tuned model over the noise's rms, in the worst channel."""
     after: float | None
-    """The same ratio for the model with the effects that were found."""
+    """The same ratio for the model with the named effects."""
     seconds: float | None
     """Processor time of the diagnosis (s)."""
     miss: bool
 
 
-def write_laws(result: LawBlindTest) -> None:
-    """Write document and table, replacing earlier ones. Raises StudyError."""
+def write_law_proof(result: LawBlindTest) -> None:
+    """Write `proof.json` and `proof.csv` into the folder of the test, replacing earlier ones. Raises StudyError."""
     document = {
         **_collect_facts(result),
         "commit": read_current_commit(),
@@ -75,11 +76,11 @@ def write_laws(result: LawBlindTest) -> None:
     }
     write_json(result.folder.path / DOCUMENT, FORMAT, VERSION, document, gather_provenance(), overwrite=True)
     rows = [_make_row(outcome) for outcome in result.outcomes]
-    write_text(result.folder.path / TABLE, rows_to_csv(rows, LawRow), overwrite=True)
+    write_text(result.folder.path / TABLE, format_csv_table(rows, LawRow), overwrite=True)
 
 
 def write_law_table(path: Path, result: LawBlindTest) -> None:
-    """Write the figures as a small table at `path`, and the misses in a second table with the suffix -misses. Raises
+    """Write the figures as a CSV table at `path`, and the misses as a second one, whose name ends in -misses. Raises
     StudyError."""
     figures = [
         FigureRow(figure.name, figure.value, figure.low, figure.high, figure.of) for figure in result.score.figures
@@ -90,13 +91,13 @@ def write_law_table(path: Path, result: LawBlindTest) -> None:
         f"# commit {read_current_commit()}, code of the diagnosis {' '.join(result.engines)}",
         f"# seal of the labels {result.seal}",
     ]
-    write_text(path, "\n".join(lines) + "\n" + rows_to_csv(figures, FigureRow), overwrite=True)
+    write_text(path, "\n".join(lines) + "\n" + format_csv_table(figures, FigureRow), overwrite=True)
     misses = [_make_row(miss) for miss in result.score.misses]
-    write_text(path.with_name(f"{path.stem}-misses{path.suffix}"), rows_to_csv(misses, LawRow), overwrite=True)
+    write_text(path.with_name(f"{path.stem}-misses{path.suffix}"), format_csv_table(misses, LawRow), overwrite=True)
 
 
 def format_law_lines(result: LawBlindTest) -> Iterator[str]:
-    """Format lines for the terminal: each miss, each figure, the seal of the labels."""
+    """Yield lines for the terminal: each miss, each figure, the seal of the labels."""
     yield f"{len(result.score.misses)} misses in {len(result.outcomes)} cases"
     for miss in result.score.misses:
         truth = miss.kind if miss.truth is None else miss.truth.formula
@@ -145,10 +146,12 @@ def _format_answer(outcome: LawOutcome) -> str:
 
 
 def _format_law(law: Law) -> str:
+    """The law as place, axis and formula."""
     return f"{law.acts_on} {law.axis} = {law.text}"
 
 
 def _make_row(outcome: LawOutcome) -> LawRow:
+    """The outcome of a case as a row; lists are joined to text."""
     numbers = {} if outcome.truth is None else outcome.truth.numbers
     error, louder_error = outcome.errors or (None, None)
     return LawRow(

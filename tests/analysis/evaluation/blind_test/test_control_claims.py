@@ -3,7 +3,7 @@
 import pytest
 
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect
-from analysis.evaluation.blind_test.controlled import CLAIMS, judge_control
+from analysis.evaluation.blind_test.control_claims import CLAIMS, judge_control
 
 CELL = Mismatch("ax", "fx", (1.0, 5.0), None, None, 0.5, 0.001)
 ERRORS = Errors(0.5, 0.3, 0.1, 0.1)

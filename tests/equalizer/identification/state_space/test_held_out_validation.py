@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.identification.state_space.held_out import validate_on_test
+from equalizer.identification.state_space.held_out_validation import validate_on_test
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal

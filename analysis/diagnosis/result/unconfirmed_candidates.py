@@ -1,0 +1,80 @@
+"""Entries of the diagnosis document that need held-out gains: candidates that were not confirmed, and named effects.
+
+The held-out gain is the share of the error power on held-out samples that an effect explains (`held_out_gain`). Called
+by `diagnose` (candidates) and `assemble_findings` (named effects).
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from analysis.diagnosis.confirm.held_out_gain import estimate_held_out_gain
+from analysis.diagnosis.document import Candidate, Estimate, NamedEffect
+from analysis.diagnosis.errors.error_measure import ErrorMeasure
+from analysis.diagnosis.result.findings import BlackBox
+from analysis.diagnosis.result.named_effects import extract_law, find_axis_letter, make_labels, report_parameters
+from analysis.diagnosis.search.search_context import FittedCandidate
+from analysis.diagnosis.search.verdict import Unconfirmed
+from equalizer.effects.placing import place_of_effect
+from equalizer.plant.mechanical_model import MechanicalModel
+from equalizer.signals.recording import Recording
+
+
+def list_unconfirmed_candidates(
+    unconfirmed: Sequence[Unconfirmed], black_box: BlackBox | None, recording: Recording, model: MechanicalModel
+) -> tuple[Candidate, ...]:
+    """The unconfirmed effects as candidates of the document: of each hypothesis, the claim with index
+    `Unconfirmed.claim`.
+
+    black_box: the fitted model without physics, for comparison; None where there is none. `share_of_black_box` of a
+    candidate is its gain relative to that of the black box or, where candidates gain more, to their largest gain.
+    """
+    if not unconfirmed:
+        return ()
+    labels, largest_gain = (
+        make_labels(recording, model),
+        max(max(unconfirmed_effect.gain for unconfirmed_effect in unconfirmed), _compute_gain(black_box), 1e-300),
+    )
+    candidates = []
+    for unconfirmed_effect in unconfirmed:
+        claim_index = unconfirmed_effect.claim % len(unconfirmed_effect.hypothesis.claims)
+        claim = unconfirmed_effect.hypothesis.claims[claim_index]
+        candidates.append(
+            Candidate(
+                effect=claim.effect.name,
+                place=place_of_effect(claim.effect),
+                axis=find_axis_letter(claim, labels),
+                parameters=report_parameters(
+                    unconfirmed_effect.hypothesis, claim_index, unconfirmed_effect.hypothesis.point
+                ),
+                held_out_gain=min(unconfirmed_effect.gain, 1.0),
+                share_of_black_box=min(unconfirmed_effect.gain / largest_gain, 1.0),
+                why_not=unconfirmed_effect.why_not,
+                law=extract_law(unconfirmed_effect.hypothesis, claim_index, find_axis_letter(claim, labels)),
+            )
+        )
+    return tuple(candidates)
+
+
+def _compute_gain(black_box: BlackBox | None) -> float:
+    """Held-out gain of the black box over the model with the named effects: 1 - (black box error / model error)², with
+    the model error `BlackBox.physics_error`; 0 without a black box."""
+    return (
+        0.0
+        if black_box is None or not black_box.physics_error > 0
+        else 1 - (black_box.test_error / black_box.physics_error) ** 2
+    )
+
+
+def add_held_out_gains(
+    effects: Sequence[NamedEffect], measure: ErrorMeasure, fits: Sequence[FittedCandidate]
+) -> tuple[NamedEffect, ...]:
+    """The effects with their held-out gains and 95 % intervals. effects: in the order in which the search added them.
+    fits: the fit without effects, then the fit after each added effect."""
+    with_gain = []
+    for index, effect in enumerate(effects):
+        gain = estimate_held_out_gain(measure, fits[index], fits[index + 1])
+        estimate = (
+            None if gain is None else Estimate(gain.gain, "1", (min(gain.low, gain.gain), max(gain.high, gain.gain)))
+        )
+        with_gain.append(replace(effect, held_out_gain=estimate))
+    return tuple(with_gain)

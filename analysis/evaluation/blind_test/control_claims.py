@@ -1,0 +1,114 @@
+"""Controls of the blind test: claims about the answers of a diagnosis to inputs that were changed in a known way.
+
+A recording that is shuffled or silent must give no named effect (negative control); a recording that is mirrored, or
+whose axes are exchanged, must give the corresponding answer. A claim is a predicate on the answers to a control's
+inputs (`CLAIMS`); None among the answers = the diagnosis refused or failed. `study.evaluation.challenge.controls`
+makes the inputs, `study.evaluation.bank.run_controls` runs the controls.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from analysis.diagnosis.document import Diagnosis
+
+NAMED_PROBABILITY = 0.5
+"""Smallest probability of an effect that counts as named."""
+MAGNITUDE_TOLERANCE = 0.02
+"""Largest difference between the magnitudes of a parameter in the answers to a recording and to its mirror image,
+relative to the former."""
+
+
+@dataclass(frozen=True, slots=True)
+class ControlOutcome:
+    """A control's claim, whether the claim is true of the answers, and the answers."""
+
+    name: str
+    claim: str
+    held: bool
+    said: tuple[str, ...]
+    """Each answer in words."""
+
+
+def judge_control(name: str, claim: str, answers: Sequence[Diagnosis | None]) -> ControlOutcome:
+    """Judge a claim. answers: in the order of the control's inputs. Raises KeyError for a claim that is not in
+    `CLAIMS`."""
+    return ControlOutcome(name, claim, CLAIMS[claim](answers), tuple(map(_format_answer, answers)))
+
+
+def _is_no_effect_named(answers: Sequence[Diagnosis | None]) -> bool:
+    """Whether no effect has a probability of `NAMED_PROBABILITY` or more; None counts as no effect."""
+    return not any(
+        effect.probability >= NAMED_PROBABILITY for answer in answers if answer is not None for effect in answer.effects
+    )
+
+
+def _is_none_explained(answers: Sequence[Diagnosis | None]) -> bool:
+    """Whether no answer has the verdict "explained"; None counts as not explained."""
+    return all(answer is None or answer.verdict != "explained" for answer in answers)
+
+
+def _has_no_mismatch(answers: Sequence[Diagnosis | None]) -> bool:
+    """Whether every answer finds no mismatch, or only parameters that differ; False if an answer is None."""
+    return all(answer is not None and answer.verdict in ("no_mismatch", "parameters") for answer in answers)
+
+
+def _are_answers_equal(answers: Sequence[Diagnosis | None]) -> bool:
+    """Whether all answers have the same verdict, effects and axes, and at least one effect; False if one is None."""
+    distinct_answers = {_list_verdict_and_effects(answer, with_axes=True) for answer in answers if answer is not None}
+    return len(distinct_answers) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
+
+
+def _are_answers_equal_but_axes(answers: Sequence[Diagnosis | None]) -> bool:
+    """Whether all answers have the same verdict and effects, and at least one effect; axes may differ. False if an
+    answer is None."""
+    distinct_answers = {_list_verdict_and_effects(answer, with_axes=False) for answer in answers if answer is not None}
+    return len(distinct_answers) == 1 and None not in answers and bool(answers[0] and answers[0].effects)
+
+
+def _are_axes_exchanged(answers: Sequence[Diagnosis | None]) -> bool:
+    """Whether two answers have the same verdict and effects, and each effect is on another axis in the second."""
+    if not _are_answers_equal_but_axes(answers):
+        return False
+    first_axes, second_axes = ([effect.axis for effect in answer.effects] for answer in answers if answer is not None)
+    return all(
+        None not in axis_pair and axis_pair[0] != axis_pair[1]
+        for axis_pair in zip(first_axes, second_axes, strict=True)
+    )
+
+
+def _have_opposite_signs(answers: Sequence[Diagnosis | None]) -> bool:
+    """Whether two answers have the same verdict, effects and axes, and the first parameter of their first effect has
+    the same magnitude (`MAGNITUDE_TOLERANCE`) and the opposite sign."""
+    main_parameters = [
+        next(iter(answer.effects[0].parameters.values())).value for answer in answers if answer and answer.effects
+    ]
+    if len(main_parameters) != len(answers) or not _are_answers_equal(answers):
+        return False
+    return abs(main_parameters[0] + main_parameters[1]) <= MAGNITUDE_TOLERANCE * abs(main_parameters[0])
+
+
+def _list_verdict_and_effects(diagnosis: Diagnosis, with_axes: bool) -> tuple[object, ...]:
+    """The verdict, then each effect with its axis, or with None if `with_axes` is False; answers are compared by it."""
+    return diagnosis.verdict, *((effect.effect, effect.axis if with_axes else None) for effect in diagnosis.effects)
+
+
+def _format_answer(diagnosis: Diagnosis | None) -> str:
+    """Verdict and effects in words, as "explained: coulomb_friction of x"."""
+    if diagnosis is None:
+        return "no answer"
+    effects_text = ", ".join(
+        f"{effect.effect}{f' of {effect.axis}' if effect.axis else ''}" for effect in diagnosis.effects
+    )
+    return diagnosis.verdict.replace("_", " ") + (f": {effects_text}" if effects_text else "")
+
+
+CLAIMS: Mapping[str, Callable[[Sequence[Diagnosis | None]], bool]] = {
+    "no name": _is_no_effect_named,
+    "not explained": _is_none_explained,
+    "nothing": _has_no_mismatch,
+    "same": _are_answers_equal,
+    "same but axes": _are_answers_equal_but_axes,
+    "axis exchanged": _are_axes_exchanged,
+    "opposite": _have_opposite_signs,
+}
+"""Predicate on the answers, by the name of the claim."""
