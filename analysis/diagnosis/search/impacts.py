@@ -148,6 +148,7 @@ def _needs_gap(comparison: BandPowerComparison, problem: BandPowerProblem, best_
         make_claim_hypothesis(replace(claim, effect=gapless_effect), [{**placed_effect.values, "gap": smallest_gap}]),
         remove_claim(best_fit.hypothesis, 0),
     )
+    # Without a time limit: a comparison with an unfinished fit of the alternative would favour play.
     gapless_start = evaluate_hypothesis(problem, best_fit.deviations, hypothesis)
     gapless_fit = refine_band_power(
         weight_by_chance_variation(problem, gapless_start), gapless_start, time_left=unlimited_time
