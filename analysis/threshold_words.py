@@ -1,8 +1,8 @@
 """Wording of figures, tables and warnings for the two kinds of thresholds of a run.
 
 A staircase's threshold is the mean of its last reversal levels; that of the Bayesian Psi method is the mean of the
-posterior distribution. `threshold_words` selects the wording by the protocol's rule, so that no other module has to
-distinguish the two. The thresholds are computed in `analysis.psychophysics.thresholds`.
+posterior distribution. `select_threshold_words` selects the wording by the protocol's rule, so that no other module
+has to distinguish the two. The thresholds are computed in `analysis.psychophysics.thresholds`.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ class ThresholdWords:
     means: str
     """Name of the thresholds, in the plural; begins with a lower-case letter."""
     cut: str
-    """Relative clause: effect of the cap (largest level) on a threshold that is marked as cut."""
+    """Relative clause: effect of the cap (largest level) on a threshold that is marked as cut (limited by the cap)."""
     cut_note: str
     """Note below a table in which thresholds are marked as cut."""
     too_low: str
@@ -32,14 +32,14 @@ class ThresholdWords:
     """Sentence: what the observed d' says when it is compared with the d' of a cue."""
 
 
-CUT_END = (
+CENSORING_NOTE = (
     "On a stronger device the value would be higher; it is not a bound, because the true threshold may lie to either "
     "side."
 )
-REVERSALS = ThresholdWords(
+REVERSAL_WORDS = ThresholdWords(
     means="reversal means",
     cut="which cut off peaks of the staircase",
-    cut_note=f"cut: the cap cut off peaks of the staircase. {CUT_END}",
+    cut_note=f"cut: the cap cut off peaks of the staircase. {CENSORING_NOTE}",
     too_low="reversal means near the cap are too low before they are cut, and a cut mean is not a bound of the "
     "threshold",
     measured_in="the trials of the averaged reversals",
@@ -51,9 +51,9 @@ REVERSALS = ThresholdWords(
 )
 
 
-def _psi(rule: StaircaseRule) -> ThresholdWords:
-    """The words for the Psi method. Physical units are measured in the last `averaged_reversals` trials."""
-    last = rule.averaged_reversals
+def _make_psi_words(rule: StaircaseRule) -> ThresholdWords:
+    """Make the words for the Psi method. Physical units are measured in the last `averaged_reversals` trials."""
+    trials = rule.averaged_reversals
     return ThresholdWords(
         means="Psi's posterior means",
         cut="above which they lie by Psi's posterior with a probability over 10 %",
@@ -61,7 +61,7 @@ def _psi(rule: StaircaseRule) -> ThresholdWords:
         "the posterior's mean, at most the cap.",
         too_low="a posterior mean is biased towards the cap before it is cut, and a cut one is not a bound of the "
             "threshold",
-        measured_in=f"the last {last} trials of each run, taken in proportion to the threshold" if last > 1
+        measured_in=f"the last {trials} trials of each run, taken in proportion to the threshold" if trials > 1
         else "the last trial of each run, taken in proportion to the threshold",
         levels="Levels followed the answers, so the lowest points deviate somewhat from the curve even of a correct "
         "model.",
@@ -71,6 +71,6 @@ def _psi(rule: StaircaseRule) -> ThresholdWords:
     )  # fmt: skip
 
 
-def threshold_words(rule: StaircaseRule) -> ThresholdWords:
-    """The words for a rule: those of the Psi method where the rule is Bayesian, else those of reversal means."""
-    return _psi(rule) if rule.is_bayesian else REVERSALS
+def select_threshold_words(rule: StaircaseRule) -> ThresholdWords:
+    """Select the words for a rule: those of the Psi method where the rule is Bayesian, else those of reversal means."""
+    return _make_psi_words(rule) if rule.is_bayesian else REVERSAL_WORDS

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from equalizer.signals.recording import Recording as Recording
     from equalizer.signals.recording import Segment as Segment
     from equalizer.signals.signal import Signal as Signal
-    from equalizer.tracking.feedforward.feedforward import feedforward as equalize
-    from equalizer.tracking.lqr.lqr import stored_gains as stored_gains
+    from equalizer.tracking.feedforward.feedforward import compute_feedforward_forces as equalize
+    from equalizer.tracking.lqr.lqr import compute_stored_gains as stored_gains
     from equalizer.tracking.lqr.lqr import track as track
     from equalizer.tracking.lqr.tracking_problem import TrackingProblem as TrackingProblem
 
@@ -34,10 +34,10 @@ _HOME = {
     "Segment": "equalizer.signals.recording:Segment",
     "Signal": "equalizer.signals.signal:Signal",
     "TrackingProblem": "equalizer.tracking.lqr.tracking_problem:TrackingProblem",
-    "equalize": "equalizer.tracking.feedforward.feedforward:feedforward",
+    "equalize": "equalizer.tracking.feedforward.feedforward:compute_feedforward_forces",
     "fit_mechanical_model": "equalizer.identification.mechanical.mechanical_fit:fit_mechanical_model",
     "identify": "equalizer.identification.state_space.identify_recordings:identify_recordings",
-    "stored_gains": "equalizer.tracking.lqr.lqr:stored_gains",
+    "stored_gains": "equalizer.tracking.lqr.lqr:compute_stored_gains",
     "track": "equalizer.tracking.lqr.lqr:track",
 }
 """Module and name of each export. `__getattr__` imports it on access, because importing a module may take seconds."""

@@ -1,11 +1,11 @@
-"""Local time of this computer, for texts that people read. Logs and data keep UTC."""
+"""Local time of this computer, for texts that people read: app, commands and reports. Logs and data keep UTC."""
 
 from datetime import UTC, datetime
 
 from study.session.views.local_time import format_time_in_zone
 
 
-def machine_zone(time: datetime) -> datetime:
+def convert_to_machine_zone(time: datetime) -> datetime:
     """Convert a moment to the local time of this computer, summer time included; a
     `study.session.views.local_time.Zone`.
 
@@ -14,6 +14,6 @@ def machine_zone(time: datetime) -> datetime:
     return time.astimezone()
 
 
-def local_now() -> str:
-    """Local time now, such as "2026-11-22 14:05 +01:00"."""
-    return format_time_in_zone(datetime.now(UTC).isoformat(), machine_zone)
+def format_local_now() -> str:
+    """Format the present local time, such as "2026-11-22 14:05 +01:00"."""
+    return format_time_in_zone(datetime.now(UTC).isoformat(), convert_to_machine_zone)

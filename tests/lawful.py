@@ -8,7 +8,7 @@ from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.search.explain import Explanation, retune_alone
 from analysis.diagnosis.search.search_context import SearchContext
-from equalizer.effects.discovered_law import Channels, law_effect, law_values
+from equalizer.effects.discovered_law import Channels, get_law_values, make_law_effect
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.laws.law import ActsOn, Law
@@ -36,7 +36,9 @@ def recorded(laws: tuple[Law, ...], seed: int, noise: float = 1.0, plan=PLAN) ->
         segments.append(Segment(at, at + len(wave), kind, level, period, role))
         at += len(wave) + 300
     command = np.vstack(blocks)
-    effects = [PlacedEffect(law_effect(each, Channels(("fx",), ("ax",))), (0,), law_values(each)) for each in laws]
+    effects = [
+        PlacedEffect(make_law_effect(each, Channels(("fx",), ("ax",))), (0,), get_law_values(each)) for each in laws
+    ]
     model = device(1)
     played = simulate_mechanism(model, command, RATE_HZ, effects)
 

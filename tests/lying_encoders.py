@@ -12,7 +12,7 @@ from equalizer.signals.signal import FloatArray
 from study.devices.device import DeviceSettings, Fault
 from study.devices.drive.runner import _TICK
 from study.devices.governor import cells
-from study.devices.governor.govern import ROWS, VECTOR
+from study.devices.governor.govern import MATRIX_TYPE, VECTOR_TYPE
 from study.devices.governor.governor import Governor
 from study.devices.rig import READING_SIZE
 from study.session.stimulus.held_stimulus import HeldStimulus
@@ -109,7 +109,20 @@ def _play(tick, state, settings, loop, buffer, force, hold, matrix, offsets, lat
     return n
 
 
-_ARRAYS = (VECTOR, VECTOR, ROWS, ROWS, VECTOR, VECTOR, ROWS, ROWS, VECTOR, ROWS, VECTOR, ROWS)
+_ARRAYS = (
+    VECTOR_TYPE,
+    VECTOR_TYPE,
+    MATRIX_TYPE,
+    MATRIX_TYPE,
+    VECTOR_TYPE,
+    VECTOR_TYPE,
+    MATRIX_TYPE,
+    MATRIX_TYPE,
+    VECTOR_TYPE,
+    MATRIX_TYPE,
+    VECTOR_TYPE,
+    MATRIX_TYPE,
+)
 _compiled = njit(types.int64(types.FunctionType(_TICK.signature), *_ARRAYS), error_model="numpy")(_play)
 
 

@@ -7,7 +7,7 @@ import threading
 from multiprocessing import Pipe
 
 from study.devices.device import Device, DeviceSettings
-from study.devices.loop_process.line import LINES, Line
+from study.devices.loop_process.line import LINE_NAMES, Line
 from study.devices.loop_process.remote_device import RemoteDevice
 from study.devices.loop_process.serve import DeviceServer
 
@@ -16,9 +16,9 @@ class ServedHere:
     """In the place of the loop's process."""
 
     def __init__(self, device: Device) -> None:
-        pairs = [Pipe() for _ in LINES]
+        pairs = [Pipe() for _ in LINE_NAMES]
         self.theirs = tuple(theirs for _, theirs in pairs)
-        self.lines = [Line(ours, name) for (ours, _), name in zip(pairs, LINES, strict=True)]
+        self.lines = [Line(ours, name) for (ours, _), name in zip(pairs, LINE_NAMES, strict=True)]
         self.work, self.signs, self.look, self.stop, self.close = self.lines
         self.server = DeviceServer(device, self.theirs)
         self._thread = threading.Thread(target=self._serve, daemon=True)

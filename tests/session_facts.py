@@ -10,7 +10,7 @@ from study.session.facts.events import (
     TrialPresented,
 )
 from study.session.state.fold import apply_event
-from study.session.state.machine import PresentTrial, TakeRest, next_action
+from study.session.state.machine import PresentTrial, TakeRest, find_next_action
 
 UTC = "2026-01-01T00:00:00.000+00:00"
 
@@ -62,10 +62,10 @@ def measured(action: PresentTrial) -> TrialMeasured:
 
 def one_trial(state, correct: bool):
     """Present, answer, measure; rests on the way."""
-    action = next_action(state)
+    action = find_next_action(state)
     if isinstance(action, TakeRest):
         state = apply_event(state, RestTaken(UTC, state.run, state.trial, rested_s=action.seconds))
-        action = next_action(state)
+        action = find_next_action(state)
     for event in (presented(action), answered(action, correct), measured(action)):
         state = apply_event(state, event)
     return state

@@ -139,7 +139,7 @@ class TrueSensor:
         self.closed = False
         stub.sense_into(self.samples)
 
-    def latest(self) -> tuple[FloatArray, bool]:
+    def read_latest(self) -> tuple[FloatArray, bool]:
         return self._newest.read_zeroed(time.monotonic())
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> None:

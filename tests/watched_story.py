@@ -13,7 +13,7 @@ from study.session.facts.events import (
     TrialSpoiled,
 )
 from study.session.state.due_trial import PresentTrial
-from study.session.state.machine import Finish, TakeRest, next_action
+from study.session.state.machine import Finish, TakeRest, find_next_action
 from study.session.watching.followed_session import FollowedSession, apply_followed_event, begin_watching
 from study.session.watching.live import Live
 from study.session.watching.make_watch_view import LiveInfo, make_watch_view
@@ -47,11 +47,11 @@ class Story:
         return self
 
     def open_trial(self) -> PresentTrial:
-        action = next_action(self.watched.state)
+        action = find_next_action(self.watched.state)
         if isinstance(action, TakeRest):
             state = self.watched.state
             self.tell(RestTaken(at(self.seconds), state.run, state.trial, rested_s=action.seconds))
-            action = next_action(self.watched.state)
+            action = find_next_action(self.watched.state)
         self.seconds += 10.0
         self.tell(presented(action, at(self.seconds)))
         return action
@@ -74,7 +74,7 @@ class Story:
 
     def finish(self) -> "Story":
         answers = iter([True, True, True, False] * 100)
-        while not isinstance(next_action(self.watched.state), Finish):
+        while not isinstance(find_next_action(self.watched.state), Finish):
             self.answer(next(answers))
         return self.tell(SessionClosed(at(self.seconds + 4), "completed"))
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.data.measured_motion import fill_gaps
-from equalizer.identification.frequency_response.experiments import instrument_signal
+from equalizer.identification.frequency_response.experiments import select_instrument_signal
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError, estimate_transfer
 from equalizer.signals.recording import Recording, Segment
@@ -113,7 +113,7 @@ def _is_stroke(recording: Recording, segment: Segment) -> bool:
 
 def _find_driven_axis(recording: Recording, segment: Segment) -> int:
     """Index of the command with the largest peak-to-peak excitation in a segment."""
-    return int(np.argmax(np.ptp(instrument_signal(recording)[segment.start : segment.stop], axis=0)))
+    return int(np.argmax(np.ptp(select_instrument_signal(recording)[segment.start : segment.stop], axis=0)))
 
 
 def _measure_loss_per_path(recording: Recording, start: int, stop: int, axis: int) -> float:
@@ -130,7 +130,7 @@ def _measure_loss_per_path(recording: Recording, start: int, stop: int, axis: in
 
 def _select_settled_rests(recording: Recording) -> list[FloatArray]:
     """Responses (k, outputs) in the second half of each long rest; transients decay in the first half."""
-    rests = find_runs(np.asarray(~instrument_signal(recording).any(axis=1)))
+    rests = find_runs(np.asarray(~select_instrument_signal(recording).any(axis=1)))
     longest = max((stop - start for start, stop in rests), default=0)
     return [
         recording.response.samples[(start + stop) // 2 : stop] for start, stop in rests if stop - start > longest / 2

@@ -1,7 +1,7 @@
 """Drift of a device during a session: probes are compared line by line with the first ones, in physical parameters.
 
-A line drives one axis j with the force F; all axes answer with accelerations A. With A0, F0 of the first probes at the
-same level, and a mechanism that is reciprocal, its other properties cancel in
+A spectral line drives one axis j with the force F; all axes respond with accelerations A. With A0, F0 of the first
+probes at the same level, and a reciprocal mechanism, its other properties cancel in
 
     (F A0_j - F0 A_j) / (A0_j A_j) = sum over k of (dM_k + dC_k / iw - dK_k / w^2) A0_k A_k / (A0_j A_j)
                                      - g_j F / A_j + iw T F / A_j + friction
@@ -28,30 +28,30 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 IntArray = npt.NDArray[np.int64]
 
 AXES = "xyz"
-BASE_CYCLES = 2
-"""Number of probes at each level before anything is compared: their differences give the noise."""
+FIRST_PROBES = 2
+"""Number of reference probes at each level, before anything is compared: their differences give the noise."""
 PENALTY_PER_PARAMETER = 8.0
-"""Penalty per parameter, in units of the squared misfit over noise: more than twice Akaike's, against false alarms."""
-MOST_CAUSES = 2
+"""Penalty per parameter, in units of the squared misfit over noise: four times Akaike's, against false alarms."""
+MAX_CAUSES = 2
 """Largest number of causes at a time: more of them would also fit the deviations of real friction from its law."""
 RIVAL_RATIO = 2.0
 """Ratio of squared misfits below which two causes cannot be distinguished. On the simulated omega.3, whose friction
 deviates from the law, the ratio of grip to gain is 1.2 to 1.7 when the hand's impedance grows by half."""
-DELAY_STEPS = 3
+DELAY_ITERATIONS = 3
 """Gauss-Newton steps for the delay, of which the response is a nonlinear function."""
-DEVIATIONS = 4.0
+Z_LIMIT = 4.0
 """Standard errors beyond which a change is significant."""
 
 CAUSES = {"friction": ("friction",), "grip": ("mass", "damping", "stiffness"), "gain": ("gain",), "delay": ("delay",)}
-NUMBERS = ("friction", "mass", "damping", "stiffness", "gain", "delay")
-UNITS = {"friction": "N", "mass": "kg", "damping": "N s/m", "stiffness": "N/m", "gain": "", "delay": "s"}
-SMALLEST_CHANGE = {"friction": 0.03, "mass": 0.01, "damping": 0.5, "stiffness": 15.0, "gain": 0.03, "delay": 3e-4}
-"""Least reported changes: 3 % of a stimulus of 1 N, or a tenth of a light grip."""
+PARAMETERS = ("friction", "mass", "damping", "stiffness", "gain", "delay")
+PARAMETER_UNITS = {"friction": "N", "mass": "kg", "damping": "N s/m", "stiffness": "N/m", "gain": "", "delay": "s"}
+LEAST_CHANGE = {"friction": 0.03, "mass": 0.01, "damping": 0.5, "stiffness": 15.0, "gain": 0.03, "delay": 3e-4}
+"""Least reported changes, in the unit of each parameter: 3 % of a stimulus of 1 N, a tenth of a light grip, 0.3 ms."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimedProbe:
-    """One probe with a hand on the handle."""
+    """One probe of a session, with or without a hand on the handle."""
 
     time_s: float
     """Time since the session began."""
@@ -61,69 +61,66 @@ class TimedProbe:
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """One number that changed, at the time of the newest probe that was compared."""
+    """A parameter that changed, at the time of the newest probe that was compared."""
 
     cause: str
     """friction, grip, gain or delay"""
-    number: str
+    parameter: str
     """friction, mass, damping, stiffness, gain or delay"""
-    axis: str
+    axis: str  # x, y or z; empty for a delay
     time_s: float
     change: float
     error: float
-    """Standard error."""
+    """Standard error of the change."""
     initial_value: float | None
-    """Initial value of the friction; None where only the change is known."""
+    """Initial value of the friction (N); None for other parameters, of which only the change is known."""
     rivals: tuple[str, ...] = ()
     """Causes that the probes cannot tell from this one."""
 
     @property
     def unit(self) -> str:
-        """Unit of `change`, `error` and `before`; empty for a gain, whose change is relative."""
-        return UNITS[self.number]
+        """Unit of `change`, `error` and `initial_value`; empty for a gain, whose change is relative."""
+        return PARAMETER_UNITS[self.parameter]
 
 
 def find_drifts(probes: Sequence[TimedProbe], period: int, causes: Sequence[str] = tuple(CAUSES)) -> tuple[Drift, ...]:
-    """Differences of the newest probe of each level from the first ones. Empty with too few probes. period: samples.
-    Probes are ordered by time. causes: possible changes; without a hand no grip."""
+    """Find the significant changes from the first probes of each level to its newest one. Empty where a level has no
+    probe after its `FIRST_PROBES`. probes: by rising time. period: samples. causes: of `CAUSES`; without a hand no
+    grip."""
     levels = sorted({probe.level_n for probe in probes})
-    by_level = {level: [probe for probe in probes if probe.level_n == level] for level in levels}
-    if not probes or min(len(level_probes) for level_probes in by_level.values()) < BASE_CYCLES + 1:
+    probes_by_level = {level: [probe for probe in probes if probe.level_n == level] for level in levels}
+    if not probes or min(len(level_probes) for level_probes in probes_by_level.values()) < FIRST_PROBES + 1:
         return ()
-    first_probes = [probe for level_probes in by_level.values() for probe in level_probes[:BASE_CYCLES]]
-    newest = [level_probes[-1] for level_probes in by_level.values()]
-    compared_probes = [*first_probes, *newest]
+    first_probes = [probe for level_probes in probes_by_level.values() for probe in level_probes[:FIRST_PROBES]]
+    newest_probes = [level_probes[-1] for level_probes in probes_by_level.values()]
+    compared_probes = [*first_probes, *newest_probes]
     shapes = compute_friction_spectra(tuple(probe.lines for probe in compared_probes), period)
-    probe_levels, newest_s = (
+    probe_levels_n, newest_s = (
         np.array([probe.level_n for probe in compared_probes]),
-        max(probe.time_s for probe in newest),
+        max(probe.time_s for probe in newest_probes),
     )
     delay_s = 0.0
-    for _ in range(DELAY_STEPS):  # a delay turns phases; its column is that for a small one
-        compared = _compare_probes(compared_probes, shapes, probe_levels, delay_s)
-        changes = tuple(_select_causes(compared, newest_s, tuple(causes)))
-        delay_s += sum(drift.change for drift in changes if drift.number == "delay")
-    delay = replace(_estimate_delay(compared, newest_s), change=delay_s)
-    other_drifts = tuple(drift for drift in changes if drift.number != "delay")
-    return (
-        (*other_drifts, delay)
-        if abs(delay_s) > max(SMALLEST_CHANGE["delay"], DEVIATIONS * delay.error)
-        else other_drifts
-    )
+    for _ in range(DELAY_ITERATIONS):  # a delay turns phases; its column is that for a small one
+        comparison = _compare_probes(compared_probes, shapes, probe_levels_n, delay_s)
+        drifts = tuple(_select_causes(comparison, newest_s, tuple(causes)))
+        delay_s += sum(drift.change for drift in drifts if drift.parameter == "delay")
+    delay = replace(_estimate_delay(comparison, newest_s), change=delay_s)
+    other_drifts = tuple(drift for drift in drifts if drift.parameter != "delay")
+    return (*other_drifts, delay) if abs(delay_s) > max(LEAST_CHANGE["delay"], Z_LIMIT * delay.error) else other_drifts
 
 
-def _estimate_delay(compared: _Comparison, time_s: float) -> Drift:
+def _estimate_delay(comparison: _Comparison, time_s: float) -> Drift:
     """A delay as the only cause, with its standard error; its `change` is 0."""
-    error = float(_fit(compared, ("delay",))[2][0])
-    return Drift("delay", "delay", "", time_s, 0.0, error, None)
+    standard_error_s = float(_fit_causes(comparison, ("delay",))[2][0])
+    return Drift("delay", "delay", "", time_s, 0.0, standard_error_s, None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Comparison:
-    """Regression of the difference on the causes, in units of the noise."""
+    """Regression of the difference on the causes; both sides are divided by the noise."""
 
     difference: ComplexArray
-    """(equations,): left side of the module's equation, one per line of each newest probe."""
+    """(equations,): left side of the module's equation less known friction; one per line of each newest probe."""
     columns: dict[tuple[str, int], ComplexArray]
     """(equations,) by parameter and axis: its change per unit of the parameter."""
     friction_n: FloatArray
@@ -131,37 +128,38 @@ class _Comparison:
 
 
 def _compare_probes(
-    probes: Sequence[TimedProbe], shapes: ComplexArray, levels: FloatArray, delay_s: float
+    probes: Sequence[TimedProbe], shapes: ComplexArray, levels_n: FloatArray, delay_s: float
 ) -> _Comparison:
-    lines, axes = np.nonzero(probes[0].lines.driven)
-    w = 2 * np.pi * probes[0].lines.frequency_hz[lines]
-    acceleration = np.array([probe.lines.acceleration_mps2[lines] for probe in probes])
-    force = np.array([probe.lines.force_n[lines, axes] for probe in probes])
+    """Regression of the newest probes on the first ones, which come before. shapes: see `compute_friction_spectra`."""
+    line_indices, axes = np.nonzero(probes[0].lines.driven)
+    w = 2 * np.pi * probes[0].lines.frequency_hz[line_indices]
+    acceleration = np.array([probe.lines.acceleration_mps2[line_indices] for probe in probes])
+    force = np.array([probe.lines.force_n[line_indices, axes] for probe in probes])
     driven_acceleration = np.take_along_axis(acceleration, axes[None, :, None], axis=2)[..., 0]
-    first_count = BASE_CYCLES * len(set(levels.tolist()))
+    first_count = FIRST_PROBES * len(set(levels_n.tolist()))
     force[first_count:] *= np.exp(-1j * w * delay_s)
     friction_n, shape = _estimate_first_friction(
-        force / driven_acceleration, shapes[:, :, lines], (driven_acceleration, axes), first_count
+        force / driven_acceleration, shapes[:, :, line_indices], (driven_acceleration, axes), first_count
     )
-    first_indices = {level: np.flatnonzero(levels[:first_count] == level) for level in set(levels.tolist())}
+    first_indices = {level: np.flatnonzero(levels_n[:first_count] == level) for level in set(levels_n.tolist())}
 
-    def mean_of_first(values: ComplexArray, requested_levels: FloatArray) -> ComplexArray:
+    def average_first(values: ComplexArray, requested_levels_n: FloatArray) -> ComplexArray:
         """Mean over the first probes of each requested level; linear in responses to the same force."""
-        return np.array([values[first_indices[level]].mean(axis=0) for level in requested_levels])
+        return np.array([values[first_indices[level]].mean(axis=0) for level in requested_levels_n])
 
     newest = slice(first_count, None)
     first_acceleration, first_driven, first_force, first_shape = (
-        mean_of_first(spectrum, levels[newest]) for spectrum in (acceleration, driven_acceleration, force, shape)
+        average_first(spectrum, levels_n[newest]) for spectrum in (acceleration, driven_acceleration, force, shape)
     )
     product = first_driven * driven_acceleration[newest]
-    scatter = driven_acceleration[:first_count] - mean_of_first(driven_acceleration, levels[:first_count])
-    noise = float(np.sqrt(np.mean(np.abs(scatter) ** 2) * BASE_CYCLES / (BASE_CYCLES - 1) * (1 + 1 / BASE_CYCLES)))
+    scatter = driven_acceleration[:first_count] - average_first(driven_acceleration, levels_n[:first_count])
+    noise = float(np.sqrt(np.mean(np.abs(scatter) ** 2) * FIRST_PROBES / (FIRST_PROBES - 1) * (1 + 1 / FIRST_PROBES)))
     scale = np.abs(first_force) / np.abs(product) * noise
     known_friction = ((first_acceleration * shape[newest] - acceleration[newest] * first_shape) * friction_n).sum(
         axis=2
     )
     difference = (force[newest] * first_driven - first_force * driven_acceleration[newest] - known_friction) / product
-    columns = _make_columns(
+    columns = _compute_columns(
         w,
         force[newest] / driven_acceleration[newest],
         axes,
@@ -172,7 +170,7 @@ def _compare_probes(
     )
 
 
-def _make_columns(
+def _compute_columns(
     w: FloatArray,
     apparent_mass: ComplexArray,
     axes: IntArray,
@@ -199,99 +197,104 @@ def _estimate_first_friction(
     fits best: the level-dependent part of the apparent mass is fitted, its mean over the levels is subtracted."""
     driven_acceleration, axes = driven
     apparent_mass = apparent_mass[:count]
-    best = (np.inf, np.zeros(3), shapes[0])
+    best_fit = (np.inf, np.zeros(3), shapes[0])
     for shape in shapes:
         driven_shape = (
             np.take_along_axis(shape, axes[None, :, None], axis=2)[..., 0][:count] / driven_acceleration[:count]
         )
-        misfit, levels_n = 0.0, np.zeros(3)
+        misfit, axis_friction_n = 0.0, np.zeros(3)
         for axis in range(3):
-            is_axis = axes == axis
-            weight = 1 / np.abs(apparent_mass[:, is_axis])
-            x = _stack_real_imaginary((driven_shape - driven_shape.mean(axis=0))[:, is_axis] * weight)
-            y = _stack_real_imaginary((apparent_mass - apparent_mass.mean(axis=0))[:, is_axis] * weight)
-            levels_n[axis] = max(0.0, float(x @ y / max(float(x @ x), 1e-300)))
-            misfit += float(np.sum((y - levels_n[axis] * x) ** 2))
-        if misfit < best[0]:
-            best = (misfit, levels_n, shape)
-    return best[1], best[2]
+            drives_axis = axes == axis
+            weight = 1 / np.abs(apparent_mass[:, drives_axis])
+            x = _stack_real_imaginary((driven_shape - driven_shape.mean(axis=0))[:, drives_axis] * weight)
+            y = _stack_real_imaginary((apparent_mass - apparent_mass.mean(axis=0))[:, drives_axis] * weight)
+            axis_friction_n[axis] = max(0.0, float(x @ y / max(float(x @ x), 1e-300)))
+            misfit += float(np.sum((y - axis_friction_n[axis] * x) ** 2))
+        if misfit < best_fit[0]:
+            best_fit = (misfit, axis_friction_n, shape)
+    return best_fit[1], best_fit[2]
 
 
-def _select_causes(compared: _Comparison, time_s: float, causes: tuple[str, ...]) -> Iterator[Drift]:
+def _select_causes(comparison: _Comparison, time_s: float, causes: tuple[str, ...]) -> Iterator[Drift]:
     """The significant changes of the parameters of the best set of causes."""
-    count = 2 * len(compared.difference)
+    equation_count = 2 * len(comparison.difference)
     # The misfit that all causes together leave beyond the noise raises every standard error.
-    inflation = max(1.0, _fit(compared, causes)[0] / max(1, count - len(_list_parameters(causes))))
+    inflation = max(1.0, _fit_causes(comparison, causes)[0] / max(1, equation_count - len(_list_parameters(causes))))
     misfit = {
-        cause_set: _fit(compared, cause_set)[0]
-        for size in range(MOST_CAUSES + 1)
-        for cause_set in combinations(causes, size)
+        cause_set: _fit_causes(comparison, cause_set)[0]
+        for cause_count in range(MAX_CAUSES + 1)
+        for cause_set in combinations(causes, cause_count)
     }
 
-    def cost(cause_set: tuple[str, ...]) -> float:
+    def compute_cost(cause_set: tuple[str, ...]) -> float:
         # Squared misfit while that is at the noise level, else its logarithm, as of a noise of unknown variance.
         scaled_misfit = misfit[cause_set] / inflation
         return PENALTY_PER_PARAMETER * len(_list_parameters(cause_set)) + (
-            count * float(np.log(scaled_misfit / count)) if scaled_misfit > count else scaled_misfit - count
+            equation_count * float(np.log(scaled_misfit / equation_count))
+            if scaled_misfit > equation_count
+            else scaled_misfit - equation_count
         )
 
-    best = min(misfit, key=cost)
-    _, values, errors = _fit(compared, best)
-    for (number, axis), value, error in zip(_list_parameters(best), values, errors, strict=True):
+    best_causes = min(misfit, key=compute_cost)
+    _, values, errors = _fit_causes(comparison, best_causes)
+    for (parameter, axis), value, error in zip(_list_parameters(best_causes), values, errors, strict=True):
         inflated_error = float(error * np.sqrt(inflation))
-        if abs(value) > max(SMALLEST_CHANGE[number], DEVIATIONS * inflated_error):
-            cause = next(cause for cause, numbers in CAUSES.items() if number in numbers)
-            initial_n = float(compared.friction_n[axis]) if number == "friction" else None
+        if abs(value) > max(LEAST_CHANGE[parameter], Z_LIMIT * inflated_error):
+            cause = next(cause for cause, cause_parameters in CAUSES.items() if parameter in cause_parameters)
+            initial_n = float(comparison.friction_n[axis]) if parameter == "friction" else None
             axis_name = "" if cause == "delay" else AXES[axis]
             yield Drift(
                 cause,
-                number,
+                parameter,
                 axis_name,
                 time_s,
                 float(value),
                 inflated_error,
                 initial_n,
-                _find_rivals(cause, best, misfit),
+                _find_rivals(cause, best_causes, misfit),
             )
 
 
-def _find_rivals(cause: str, best: tuple[str, ...], misfit: dict[tuple[str, ...], float]) -> tuple[str, ...]:
+def _find_rivals(cause: str, best_causes: tuple[str, ...], misfit: dict[tuple[str, ...], float]) -> tuple[str, ...]:
     """Causes that, in place of this one, leave less than `RIVAL_RATIO` times its squared misfit."""
     alternatives = {
         candidate: tuple(
             kept_cause
             for kept_cause in CAUSES
-            if (kept_cause in best and kept_cause != cause) or kept_cause == candidate
+            if (kept_cause in best_causes and kept_cause != cause) or kept_cause == candidate
         )
         for candidate in CAUSES
-        if candidate not in best
+        if candidate not in best_causes
     }
     return tuple(
         candidate
         for candidate, cause_set in alternatives.items()
-        if misfit.get(cause_set, np.inf) < RIVAL_RATIO * misfit[best]
+        if misfit.get(cause_set, np.inf) < RIVAL_RATIO * misfit[best_causes]
     )
 
 
-def _fit(compared: _Comparison, causes: tuple[str, ...]) -> tuple[float, FloatArray, FloatArray]:
+def _fit_causes(comparison: _Comparison, causes: tuple[str, ...]) -> tuple[float, FloatArray, FloatArray]:
     """Squared misfit over noise, the fitted parameters, and their standard errors."""
-    y = _stack_real_imaginary(compared.difference) * np.sqrt(2)  # each part has half of the noise's power
-    names = _list_parameters(causes)
-    if not names:
+    y = _stack_real_imaginary(comparison.difference) * np.sqrt(2)  # each part has half of the noise's power
+    parameters = _list_parameters(causes)
+    if not parameters:
         return float(y @ y), np.empty(0), np.empty(0)
-    x = np.stack([_stack_real_imaginary(compared.columns[name]) for name in names], axis=1) * np.sqrt(2)
-    size = np.linalg.norm(x, axis=0)
-    inverse = np.linalg.pinv((x / size).T @ (x / size)) / np.outer(size, size)
+    x = np.stack([_stack_real_imaginary(comparison.columns[parameter]) for parameter in parameters], axis=1) * np.sqrt(
+        2
+    )
+    column_norms = np.linalg.norm(x, axis=0)
+    inverse = np.linalg.pinv((x / column_norms).T @ (x / column_norms)) / np.outer(column_norms, column_norms)
     values = inverse @ x.T @ y
     return float(np.sum((y - x @ values) ** 2)), values, np.sqrt(np.diag(inverse))
 
 
 def _list_parameters(causes: tuple[str, ...]) -> tuple[tuple[str, int], ...]:
     """Parameters of these causes with their axes; a delay is common to all axes."""
-    numbers = [number for cause in causes for number in CAUSES[cause]]
-    return tuple((number, axis) for number in numbers for axis in range(1 if number == "delay" else 3))
+    parameters = [parameter for cause in causes for parameter in CAUSES[cause]]
+    return tuple((parameter, axis) for parameter in parameters for axis in range(1 if parameter == "delay" else 3))
 
 
 def _stack_real_imaginary(values: ComplexArray) -> FloatArray:
+    """(2 n,): real parts of n values of any shape, then their imaginary parts."""
     flat = values.ravel()
     return np.concatenate([flat.real, flat.imag])

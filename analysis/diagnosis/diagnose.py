@@ -72,7 +72,7 @@ def diagnose(
         computed_balances = settings.balances
         balances = computed_balances if computed_balances is not None else _compute_balances(recordings, settings, map_)
         if is_too_short_to_name(recordings):
-            balances = tuple(balance.without_names(TOO_SHORT_TO_NAME) for balance in balances)
+            balances = tuple(balance.withdraw_names(TOO_SHORT_TO_NAME) for balance in balances)
         findings = _diagnose_by_balance(recordings, model, settings, map_, progress, balances)
         if findings is not None:
             return findings

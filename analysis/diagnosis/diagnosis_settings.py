@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from analysis.diagnosis.errors.choose_measure import Compared
 from analysis.diagnosis.search.guard import Guard
-from analysis.diagnosis.search.time_budget import unlimited_time
+from analysis.diagnosis.search.time_budget import grant_time
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.law_entry import LawEntry
 from equalizer.signals.recording import Recording
@@ -40,7 +40,7 @@ class DiagnosisSettings:
     """Whether laws are discovered where no effect of the catalogue is named."""
     kept: tuple[LawEntry, ...] = ()
     """Laws discovered in other recordings, tried in addition to the catalogue."""
-    time_left: TimeBudget = unlimited_time
+    time_left: TimeBudget = grant_time
     """Whether there is time left; called before each step of the search. Once it returns False, the search ends with
     the result so far."""
     guard: Guard = field(default_factory=Guard)

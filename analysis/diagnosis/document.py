@@ -3,6 +3,7 @@
 The data classes define the fields and check that they agree (a verdict with its effects, an effect with the
 vocabulary). Shares and probabilities are from 0 to 1; errors are root mean square over the channels, normalised to the
 signal. The docstrings of the data classes are published as descriptions in the JSON Schema.
+`study.store.formats.diagnosis_file` reads and writes the file.
 """
 
 import json
@@ -235,11 +236,11 @@ def diagnosis_to_json(diagnosis: Diagnosis) -> dict[str, Any]:
     """The diagnosis as JSON values, without format and version. Empty optional entries are left out."""
     document: dict[str, Any] = _ADAPTER.dump_python(diagnosis, mode="json", by_alias=True)
     effects, candidates = document["effects"], document["candidates"]
-    optional_entries = [(effect, optional) for effect in effects for optional in ("class", "held_out_gain")]
+    optional_entries = [(effect, optional_key) for effect in effects for optional_key in ("class", "held_out_gain")]
     optional_entries += [(entry, "law") for entry in (*effects, *candidates)]
-    for entry, optional in ((document, "candidates"), *optional_entries):
-        if not entry[optional]:
-            del entry[optional]
+    for entry, optional_key in ((document, "candidates"), *optional_entries):
+        if not entry[optional_key]:
+            del entry[optional_key]
     return document
 
 
@@ -272,11 +273,11 @@ _PYDANTIC_MESSAGES = {"unexpected_keyword_argument": "this key is unknown", "mis
 """Messages that replace those of pydantic, by pydantic's type of error."""
 
 
-def _format_problem(place: tuple[str | int, ...], message: str) -> str:
+def _format_problem(entry_path: tuple[str | int, ...], message: str) -> str:
     """The message after the path of the entry; without a path for the whole document."""
-    path = ".".join(str(part) for part in place)
+    joined_path = ".".join(str(key) for key in entry_path)
     text = message.removeprefix("Value error, ")
-    return f"{path}: {text}" if path else text
+    return f"{joined_path}: {text}" if joined_path else text
 
 
 _ADAPTER: TypeAdapter[Diagnosis] = TypeAdapter(Diagnosis)
@@ -288,7 +289,8 @@ def make_found_law(law: Law) -> FoundLaw:
 
 
 def format_law(law: FoundLaw) -> str:
-    """ "F = -4.1*abs(vy)**1.5*sign(vy) N": the force that a law adds, or the command or reading that it replaces."""
+    """Format a law: as "F = -4.1*abs(vy)**1.5*sign(vy) N" the force that it adds, else what replaces a command or
+    reading."""
     if law.acts_on == "force":
         return f"F = {law.expression} N"
     replaced_signal = "command" if law.acts_on == "command" else "reading"

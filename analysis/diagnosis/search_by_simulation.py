@@ -22,8 +22,8 @@ from analysis.diagnosis.search.verdict import SearchResult, judge
 from analysis.diagnosis.types import Mapper, Progress
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import Effect
-from equalizer.effects.law_entry import library_effects
-from equalizer.effects.placing import place_of_effect
+from equalizer.effects.law_entry import make_library_effects
+from equalizer.effects.placing import find_place
 from equalizer.plant.mechanical_model import MechanicalModel, adopt_recording_units
 from equalizer.signals.recording import Recording
 
@@ -82,7 +82,7 @@ def search_by_simulation(
         catalogue = (
             []
             if has_named_law
-            else [e for e in catalogue if _is_unobservable(e.name, place_of_effect(e), is_complete_command)]
+            else [e for e in catalogue if _is_unobservable(e.name, find_place(e), is_complete_command)]
         )
         nameable_effects = []
     impacts = _ImpactSearch(fitting, nameable_effects, settings, progress)
@@ -212,7 +212,7 @@ def _select_catalogue(settings: DiagnosisSettings, recording: Recording, exclude
     """Select the effects to try: the catalogue and the kept laws without the excluded effects; excluded effects that
     others refine are included as rivals that cannot be named."""
     omitted = {*settings.without, *(GAIN_EFFECTS if settings.fitted and not settings.clean else ())}
-    all_effects = (*CATALOGUE, *library_effects(settings.kept, recording))
+    all_effects = (*CATALOGUE, *make_library_effects(settings.kept, recording))
     catalogue = [effect for effect in all_effects if effect.name not in omitted]
     refined = {name for effect in catalogue for name in effect.simpler}
     return catalogue + [effect for effect in CATALOGUE if effect.name in refined & excluded]

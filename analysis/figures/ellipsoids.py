@@ -1,6 +1,7 @@
 """Figure of acceleration ellipses by frequency, as in the published figure 3, by second moments and by phasors.
 
-`analysis.psychophysics.ellipsoid` defines both ellipses and the frame: the first axis is the test direction.
+`analysis.psychophysics.ellipsoid` defines both ellipses and the frame: the first axis is the test direction. Called by
+`study_pictures`.
 """
 
 from collections.abc import Sequence
@@ -15,7 +16,7 @@ from analysis.figures.style import BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILLION
 from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.wording import format_number
 
-_COLUMNS = 6
+_MAX_COLUMNS = 6
 """Largest number of frequencies in a row of panels."""
 _COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE)
 _STYLES: tuple[LineStyleType, ...] = ("-", "--", "-.", ":", (0, (5, 1)))
@@ -32,10 +33,10 @@ def draw_ellipsoids(results: Sequence[EllipsoidResult]) -> Figure:
         return draw_no_data_note(create_figure(8.6, 2.0), "There is no ellipsoid to draw.")
     frequencies = sorted({result.frequency_hz for result in results})
     directions = list(dict.fromkeys(result.along for result in results))
-    height = 1.1 * max(0.4, *(_half_height(result) for result in results))
-    columns = min(_COLUMNS, len(frequencies))
+    half_height = 1.1 * max(0.4, *(_compute_half_height(result) for result in results))
+    columns = min(_MAX_COLUMNS, len(frequencies))
     block_count = -(-len(frequencies) // columns)
-    figure = create_figure(8.6, (1.6 + 2 * min(2.0, 8.0 / columns) * height / 1.15) * block_count + 0.4)
+    figure = create_figure(8.6, (1.6 + 2 * min(2.0, 8.0 / columns) * half_height / 1.15) * block_count + 0.4)
     grid = figure.subplots(2 * block_count, columns, squeeze=False, sharex=True, sharey=True)
     for grid_row in grid:
         for axes in grid_row:
@@ -43,7 +44,7 @@ def draw_ellipsoids(results: Sequence[EllipsoidResult]) -> Figure:
     for index, frequency in enumerate(frequencies):
         block, column = divmod(index, columns)
         frequency_results = [result for result in results if result.frequency_hz == frequency]
-        _draw_panels(grid[2 * block][column], grid[2 * block + 1][column], frequency_results, directions, height)
+        _draw_panels(grid[2 * block][column], grid[2 * block + 1][column], frequency_results, directions, half_height)
     handles = [
         Line2D([], [], color=_COLOURS[i % 5], linestyle=_STYLES[i % 5], label=direction.replace("_", " "))
         for i, direction in enumerate(directions)
@@ -54,54 +55,67 @@ def draw_ellipsoids(results: Sequence[EllipsoidResult]) -> Figure:
 
 
 def _draw_panels(
-    above: Axes, below: Axes, frequency_results: list[EllipsoidResult], directions: list[str], height: float
+    moment_axes: Axes,
+    phasor_axes: Axes,
+    frequency_results: list[EllipsoidResult],
+    directions: list[str],
+    half_height: float,
 ) -> None:
-    """Both panels of one frequency. frequency_results: results at this frequency. height: half height of a panel,
-    semi-axis = 1."""
-    for axes in (above, below):
+    """Draw both panels of one frequency. frequency_results: at least one. half_height: of a panel, in units of the
+    largest semi-axis. Ratio and tilt are written in the titles where there is a single result."""
+    for axes in (moment_axes, phasor_axes):
         axes.set_aspect("equal")
         axes.set_xlim(-1.15, 1.15)
-        axes.set_ylim(-height, height)
+        axes.set_ylim(-half_height, half_height)
         axes.plot([-1.12, 1.12], [0, 0], color=GREY, linewidth=0.9)
         axes.plot([0, 0], [-0.06, 0.06], color=GREY, linewidth=0.9)
-    first, is_single = frequency_results[0], len(frequency_results) == 1
-    above.set_title(
-        f"{first.frequency_hz:g} Hz\nmean squares"
-        + (_ellipse_label(first.moments.normalised_axes[1], first.moments.tilt_deg) if is_single else ""),
+    first_result, is_single = frequency_results[0], len(frequency_results) == 1
+    moment_axes.set_title(
+        f"{first_result.frequency_hz:g} Hz\nmean squares"
+        + (
+            _format_ellipse_label(first_result.moments.normalised_axes[1], first_result.moments.tilt_deg)
+            if is_single
+            else ""
+        ),
         fontsize=9,
     )
-    below.set_title(
-        "phasors" + (_ellipse_label(first.phasor.ellipticity, first.phasor.tilt_deg) if is_single else ""), fontsize=9
+    phasor_axes.set_title(
+        "phasors"
+        + (_format_ellipse_label(first_result.phasor.ellipticity, first_result.phasor.tilt_deg) if is_single else ""),
+        fontsize=9,
     )
     for result in frequency_results:
         index = directions.index(result.along)
         colour, style = _COLOURS[index % 5], _STYLES[index % 5]
-        _draw_ellipse(above, result.moments.normalised_axes[1], result.moments.turn_deg, colour, style)
-        _draw_ellipse(below, result.phasor.ellipticity, result.phasor.turn_deg, colour, style)
+        _draw_ellipse(moment_axes, result.moments.normalised_axes[1], result.moments.turn_deg, colour, style)
+        _draw_ellipse(phasor_axes, result.phasor.ellipticity, result.phasor.turn_deg, colour, style)
 
 
-def _ellipse_label(ratio: float, tilt_deg: float) -> str:
-    """Ratio of the semi-axes and tilt (degrees) of an ellipse, as a line of a title."""
+def _format_ellipse_label(ratio: float, tilt_deg: float) -> str:
+    """Format the ratio of the semi-axes and the tilt of an ellipse as a line of a title."""
     return f"\n1 : {ratio:.2f}, tilt {format_number(tilt_deg, 0)}°"
 
 
-def _half_height(result: EllipsoidResult) -> float:
+def _compute_half_height(result: EllipsoidResult) -> float:
     """Extent of the taller of both ellipses perpendicular to the test direction, largest semi-axis = 1:
     hypot(sin(turn), ratio cos(turn))."""
     shapes = (
         (result.moments.normalised_axes[1], result.moments.turn_deg),
         (result.phasor.ellipticity, result.phasor.turn_deg),
     )
-    return max(float(np.hypot(np.sin(np.radians(turn)), ratio * np.cos(np.radians(turn)))) for ratio, turn in shapes)
+    return max(
+        float(np.hypot(np.sin(np.radians(turn_deg)), ratio * np.cos(np.radians(turn_deg))))
+        for ratio, turn_deg in shapes
+    )
 
 
 def _draw_ellipse(axes: Axes, ratio: float, turn_deg: float, colour: str, style: LineStyleType) -> None:
-    """An ellipse with semi-axes 1 and `ratio`, turned by turn_deg counter-clockwise."""
-    angle, turn = np.linspace(0, 2 * np.pi, 181), np.radians(turn_deg)
+    """Draw an ellipse with semi-axes 1 and `ratio`, turned by turn_deg counter-clockwise."""
+    angle, turn_rad = np.linspace(0, 2 * np.pi, 181), np.radians(turn_deg)
     x, y = np.cos(angle), ratio * np.sin(angle)
     axes.plot(
-        x * np.cos(turn) - y * np.sin(turn),
-        x * np.sin(turn) + y * np.cos(turn),
+        x * np.cos(turn_rad) - y * np.sin(turn_rad),
+        x * np.sin(turn_rad) + y * np.cos(turn_rad),
         color=colour,
         linestyle=style,
         linewidth=1.6,

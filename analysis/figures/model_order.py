@@ -11,7 +11,7 @@ from matplotlib.ticker import LogLocator
 
 from analysis.figures.picture import Picture
 from analysis.figures.style import BLUE, GREY, ORANGE, VERMILLION, create_figure, style_axes
-from equalizer.identification.state_space.order_report import VISIBLE, OrderReport
+from equalizer.identification.state_space.order_report import VISIBLE_RATIO, OrderReport
 
 
 def model_order_picture(report: OrderReport, chosen: int) -> Picture:
@@ -19,8 +19,8 @@ def model_order_picture(report: OrderReport, chosen: int) -> Picture:
     return Picture(
         name="model-order",
         title="Error and cost of the model by its order",
-        caption=f"Left: singular values of the data, in units of the noise; states above {VISIBLE:g} times the noise "
-        "(dashed) are seen. Right: error on held-out lines, with its lower bound, the noise (dashed), and the "
+        caption=f"Left: singular values of the data, in units of the noise; states above {VISIBLE_RATIO:g} times the "
+        "noise (dashed) are seen. Right: error on held-out lines, with its lower bound, the noise (dashed), and the "
         f"multiplications per tick. This model has order {chosen}; of those tried, the lowest that is as good as the "
         f"best is {report.suggested_order}.",
         figure=draw_model_order(report, chosen),
@@ -38,7 +38,7 @@ def draw_model_order(report: OrderReport, chosen: int) -> Figure:
 
 
 def _draw_singular_values(axes: Axes, report: OrderReport) -> None:
-    """Singular values in units of the noise; those above `VISIBLE` are filled."""
+    """Singular values in units of the noise; those above `VISIBLE_RATIO` are filled."""
     style_axes(axes)
     values = report.singular_values
     number = np.arange(1, len(values) + 1)
@@ -47,7 +47,7 @@ def _draw_singular_values(axes: Axes, report: OrderReport) -> None:
     axes.semilogy(
         number[~is_visible], values[~is_visible], "o", color=GREY, markersize=4, markerfacecolor="none", label="noise"
     )
-    axes.axhline(VISIBLE, color=GREY, linestyle="--", linewidth=1)
+    axes.axhline(VISIBLE_RATIO, color=GREY, linestyle="--", linewidth=1)
     axes.yaxis.set_major_formatter("{x:g}")
     axes.set_xlabel("State")
     axes.set_ylabel("Singular value (noise = 1)")

@@ -1,8 +1,8 @@
-"""Magnitude of the response from wanted to delivered acceleration, with and without equalizer (published figure 5).
+"""Magnitude of the response from target to delivered acceleration, with and without equalizer (published figure 5).
 
 Each row of panels is one condition (centre or edge of the workspace, equalizer, friction), each column the axis of the
-wanted acceleration. A perfect equalizer gives 0 dB along that axis and nothing across it. `played_response` measures
-the responses.
+target acceleration. A perfect equalizer gives 0 dB along that axis and nothing across it. `played_response` defines
+the response; `reproduction_pictures` calls this module.
 """
 
 from collections.abc import Sequence
@@ -26,8 +26,8 @@ _TICKS_HZ = (5, 10, 20, 35)
 """Ticks of the frequency axis, as in the published figure."""
 
 
-def played_responses_picture(rows: Sequence[PlayedResponse]) -> Picture:
-    """Picture of delivered over wanted acceleration, with its caption for the rows of the equalizer."""
+def make_played_responses_picture(playbacks: Sequence[PlayedResponse]) -> Picture:
+    """Make the picture of delivered over target acceleration without and with equalizer. playbacks: one per row."""
     return Picture(
         name="equalized-response",
         title="What is played, with and without the equalizer",
@@ -35,12 +35,12 @@ def played_responses_picture(rows: Sequence[PlayedResponse]) -> Picture:
         "it, which should be 0 dB; thin: the response across it. True acceleration of the simulated handle, line by "
         "line. The first row is a force, scaled by its mean gain; the last row is ours: models of other places, "
         "their forces blended.",
-        figure=draw_played_responses(rows),
+        figure=draw_played_responses(playbacks),
     )
 
 
-def friction_picture(rows: Sequence[PlayedResponse]) -> Picture:
-    """Picture of delivered over wanted acceleration, with its caption for the rows with and without friction."""
+def make_friction_picture(playbacks: Sequence[PlayedResponse]) -> Picture:
+    """Make the picture of delivered over target acceleration with and without friction. playbacks: one per row."""
     return Picture(
         name="equalized-friction",
         title="What friction costs",
@@ -48,20 +48,21 @@ def friction_picture(rows: Sequence[PlayedResponse]) -> Picture:
         "that each has less: friction, which no linear model contains, makes the lines scatter. Last, the same on a "
         "copy of the simulated device without friction, with a model identified on that; the remaining coupling is "
         "the accelerometer's mounting error.",
-        figure=draw_played_responses(rows),
+        figure=draw_played_responses(playbacks),
     )
 
 
-def draw_played_responses(rows: Sequence[PlayedResponse]) -> Figure:
-    """Figure with a row of panels per response and three columns, one per axis of the wanted acceleration."""
-    if not rows:
+def draw_played_responses(playbacks: Sequence[PlayedResponse]) -> Figure:
+    """Figure with a row of panels per response and three columns, one per axis of the target acceleration; a note
+    where nothing was played."""
+    if not playbacks:
         return draw_no_data_note(create_figure(8.6, 2.0), "Nothing was played.")
-    figure = create_figure(8.6, 0.8 + 1.75 * len(rows))
-    grid = figure.subplots(len(rows), 3, sharex=True, sharey=True, squeeze=False)
-    for panels, row in zip(grid, rows, strict=True):
+    figure = create_figure(8.6, 0.8 + 1.75 * len(playbacks))
+    grid = figure.subplots(len(playbacks), 3, sharex=True, sharey=True, squeeze=False)
+    for panels, playback in zip(grid, playbacks, strict=True):
         for target_axis, axes in enumerate(panels):
-            _draw_panel(axes, row, target_axis)
-        panels[0].set_ylabel(f"{fill(row.name, 18)}\n(dB)", fontsize=9)
+            _draw_panel(axes, playback, target_axis)
+        panels[0].set_ylabel(f"{fill(playback.name, 18)}\n(dB)", fontsize=9)
     for target_axis, name in enumerate(_AXES):
         grid[0][target_axis].set_title(f"wanted along {name}", fontsize=10)
         grid[-1][target_axis].set_xlabel("Frequency (Hz)")
@@ -72,20 +73,24 @@ def draw_played_responses(rows: Sequence[PlayedResponse]) -> Figure:
     return figure
 
 
-def _draw_panel(axes: Axes, row: PlayedResponse, target_axis: int) -> None:
-    """Draw |T| in dB over frequency for the three delivered axes. target_axis: index of the wanted axis, drawn
-    thicker."""
+def _draw_panel(axes: Axes, playback: PlayedResponse, target_axis: int) -> None:
+    """Draw |T| in dB over frequency for the three delivered axes. target_axis: index of the axis of the
+    target, drawn thicker."""
     style_axes(axes)
     axes.axhline(0, color=GREY, linewidth=0.8)
     for delivered_axis, colour in enumerate(_COLOURS):
         # -180 dB at the least, far below the axis: the logarithm of 0 is never taken.
-        level_db = 20 * np.log10(np.maximum(np.abs(row.response[:, delivered_axis, target_axis]), 1e-9))
+        level_db = 20 * np.log10(np.maximum(np.abs(playback.response[:, delivered_axis, target_axis]), 1e-9))
         is_target = delivered_axis == target_axis
         axes.plot(
-            row.frequency_hz, level_db, color=colour, linewidth=1.8 if is_target else 0.8, zorder=3 if is_target else 2
+            playback.frequency_hz,
+            level_db,
+            color=colour,
+            linewidth=1.8 if is_target else 0.8,
+            zorder=3 if is_target else 2,
         )
     axes.set_xscale("log")
-    axes.set_xlim(float(row.frequency_hz[0]), float(row.frequency_hz[-1]))
+    axes.set_xlim(float(playback.frequency_hz[0]), float(playback.frequency_hz[-1]))
     axes.set_ylim(_LOWEST_DB, _HIGHEST_DB)
     axes.set_xticks(_TICKS_HZ)
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

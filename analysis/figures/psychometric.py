@@ -2,6 +2,7 @@
 
 Shares come in bins of levels with Wilson's 95 % interval (`hierarchy.observed_shares`); the curves are those of the
 hierarchical model (`hierarchy.curve`). One panel per frequency; one figure for all people together, one per person.
+Called by `study_pictures`.
 """
 
 import math
@@ -35,7 +36,7 @@ from analysis.psychophysics.hierarchy.observed_shares import (
 )
 from protocols.procedure.staircase import to_db
 
-_ROW_IN = 2.2
+_ROW_HEIGHT_IN = 2.2
 """Height of a row of panels, inches."""
 _SMALLEST_MARKER, _LARGEST_MARKER = 2.5, 7.5
 """Marker sizes in points: the lower limit, for very few trials, and that of `_LARGEST_MARKER_TRIALS` trials or more."""
@@ -44,85 +45,104 @@ _LARGEST_MARKER_TRIALS = 100
 
 
 def draw_people_curves(answers: Answers, fit: FittedCurves) -> Figure:
-    """Figure of all people together, one panel per frequency, over the level in dB re each person's threshold."""
-    k = len(fit.frequencies_hz)
-    figure, panels = create_panel_grid(k, _ROW_IN, sharex=True)
-    shares_by_frequency = [compute_group_shares(answers, fit, index) for index in range(k)]
+    """Draw all people together, one panel per frequency, over the level in dB re each person's threshold. answers: at
+    least one."""
+    frequency_count = len(fit.frequencies_hz)
+    figure, panels = create_panel_grid(frequency_count, _ROW_HEIGHT_IN, sharex=True)
+    shares_by_frequency = [compute_group_shares(answers, fit, index) for index in range(frequency_count)]
     levels = [share.level_db for shares in shares_by_frequency for share in shares]
-    above_db = np.linspace(min(levels) - 1.0, max(levels) + 1.0, 200)
+    level_re_threshold_db = np.linspace(min(levels) - 1.0, max(levels) + 1.0, 200)
     for index, (axes, shares) in enumerate(zip(panels, shares_by_frequency, strict=False)):
         _draw_shares(axes, [share.level_db for share in shares], shares)
         axes.plot(
-            above_db, 100 * average_person_curves(above_db, answers, fit, index), color=BLACK, linewidth=1.4, zorder=2
+            level_re_threshold_db,
+            100 * average_person_curves(level_re_threshold_db, answers, fit, index),
+            color=BLACK,
+            linewidth=1.4,
+            zorder=2,
         )
         axes.axvline(0.0, color=GREY, linestyle=":", linewidth=1.0)
         axes.set_title(f"{fit.frequencies_hz[index]:g} Hz", fontsize=10, loc="left")
-    label_panel_axes(panels, k, "Level re threshold (dB)", "Right (%)")
+    label_panel_axes(panels, frequency_count, "Level re threshold (dB)", "Right (%)")
     panels[-1].legend(
-        handles=_legend_handles("curve of the model,\nmean of the people"), loc="center", fontsize=8.5, frameon=False
+        handles=_make_legend_handles("curve of the model,\nmean of the people"),
+        loc="center",
+        fontsize=8.5,
+        frameon=False,
     )
     return figure
 
 
 def draw_person_curves(answers: Answers, fit: FittedCurves, person: int, cap_n: float) -> Figure:
-    """Figure of one person, one panel per frequency with answers, over the level in newtons. person: index of the
-    person; cap_n: cap of the level, drawn as a dashed line."""
-    estimate, k = fit.persons[person], len(fit.frequencies_hz)
-    answered = [(index, shares) for index in range(k) if (shares := compute_person_shares(answers, person, index))]
+    """Draw one person, one panel per frequency with answers, over the level in newtons; a note without answers. person:
+    index in `answers`. cap_n: cap of the level, a dashed line."""
+    estimate, frequency_count = fit.persons[person], len(fit.frequencies_hz)
+    answered = [
+        (index, shares) for index in range(frequency_count) if (shares := compute_person_shares(answers, person, index))
+    ]
     if not answered:
         return draw_no_data_note(create_figure(4.0, 2.0), "There is no answer to draw.")
-    figure, panels = create_panel_grid(len(answered), _ROW_IN)
+    figure, panels = create_panel_grid(len(answered), _ROW_HEIGHT_IN)
     for axes, (index, shares) in zip(panels, answered, strict=False):
-        levels = [10.0 ** (share.level_db / 20.0) for share in shares]
-        low_n, high_n = 0.8 * min(levels), 1.15 * max(*levels, cap_n)
+        levels_n = [10.0 ** (share.level_db / 20.0) for share in shares]
+        low_n, high_n = 0.8 * min(levels_n), 1.15 * max(*levels_n, cap_n)
         level_n = np.geomspace(low_n, high_n, 200)
-        above_db = 20.0 * np.log10(level_n) - to_db(estimate.thresholds_n[index])
-        _draw_shares(axes, levels, shares)
-        axes.plot(level_n, 100 * evaluate_person_curve(above_db, estimate, fit), color=BLACK, linewidth=1.4, zorder=2)
+        level_re_threshold_db = 20.0 * np.log10(level_n) - to_db(estimate.thresholds_n[index])
+        _draw_shares(axes, levels_n, shares)
+        axes.plot(
+            level_n,
+            100 * evaluate_person_curve(level_re_threshold_db, estimate, fit),
+            color=BLACK,
+            linewidth=1.4,
+            zorder=2,
+        )
         axes.axvline(cap_n, color=GREY, linestyle="--", linewidth=1.0)
         if not estimate.above_cap[index]:
             axes.axvline(estimate.thresholds_n[index], color=GREY, linestyle=":", linewidth=1.0)
         axes.set_xscale("log")
         set_newton_ticks(axes.xaxis, low_n, high_n)
         axes.set_xlim(low_n, high_n)
-        size = "above the cap" if estimate.above_cap[index] else f"{estimate.thresholds_n[index]:.2f} N"
-        axes.set_title(f"{fit.frequencies_hz[index]:g} Hz: {size}", fontsize=10, loc="left")
+        threshold_text = "above the cap" if estimate.above_cap[index] else f"{estimate.thresholds_n[index]:.2f} N"
+        axes.set_title(f"{fit.frequencies_hz[index]:g} Hz: {threshold_text}", fontsize=10, loc="left")
     label_panel_axes(panels, len(answered), "Level (N)", "Right (%)")
-    cap = Line2D([], [], color=GREY, linestyle="--", linewidth=1, label=f"cap {cap_n:g} N")
-    panels[-1].legend(handles=[*_legend_handles("curve of the model"), cap], loc="center", fontsize=8.5, frameon=False)
+    cap_handle = Line2D([], [], color=GREY, linestyle="--", linewidth=1, label=f"cap {cap_n:g} N")
+    panels[-1].legend(
+        handles=[*_make_legend_handles("curve of the model"), cap_handle], loc="center", fontsize=8.5, frameon=False
+    )
     return figure
 
 
-def _draw_shares(axes: Axes, x: Sequence[float], shares: Sequence[ObservedShare]) -> None:
-    """Draw shares in percent at the places `x`, with their intervals and a dotted line at the threshold's share."""
+def _draw_shares(axes: Axes, levels: Sequence[float], shares: Sequence[ObservedShare]) -> None:
+    """Draw shares in percent at these levels (N or dB), with their intervals and a dotted line at the threshold's
+    share."""
     style_axes(axes)
     axes.axhline(100 * TARGET_PROPORTION, color=GREY, linestyle=":", linewidth=1.0)
-    for level, share in zip(x, shares, strict=True):
+    for level, share in zip(levels, shares, strict=True):
         axes.plot([level, level], [100 * share.lower, 100 * share.upper], color=BLUE, linewidth=0.8, zorder=1)
-        axes.plot(level, 100 * share.share, "o", color=BLUE, markersize=_marker_size(share.trials), zorder=3,
+        axes.plot(level, 100 * share.share, "o", color=BLUE, markersize=_compute_marker_size(share.trials), zorder=3,
                   markeredgecolor="white", markeredgewidth=0.4)  # fmt: skip
     axes.set_ylim(0, 104)
     axes.set_yticks([0, 25, 50, 75, 100])
 
 
-def _marker_size(trials: int) -> float:
-    """Marker size in points: it rises with the square root of the trials up to `_LARGEST_MARKER_TRIALS`."""
+def _compute_marker_size(trials: int) -> float:
+    """Compute the marker size in points: it rises with the square root of the trials up to `_LARGEST_MARKER_TRIALS`."""
     return _SMALLEST_MARKER + (_LARGEST_MARKER - _SMALLEST_MARKER) * math.sqrt(
         min(1.0, trials / _LARGEST_MARKER_TRIALS)
     )
 
 
-def _legend_handles(curve: str) -> list[Line2D]:
-    """Handles of the legend. curve: label of the fitted curve."""
+def _make_legend_handles(curve_label: str) -> list[Line2D]:
+    """Make the handles of the legend. curve_label: text for the fitted curve."""
     return [
         *(
-            Line2D([], [], marker="o", color=BLUE, linewidth=0.8, markersize=_marker_size(trials), label=label)
+            Line2D([], [], marker="o", color=BLUE, linewidth=0.8, markersize=_compute_marker_size(trials), label=label)
             for trials, label in (
                 (5, "5 trials, 95 % interval"),
                 (_LARGEST_MARKER_TRIALS, f"{_LARGEST_MARKER_TRIALS} trials or more"),
             )
         ),
-        Line2D([], [], color=BLACK, linewidth=1.4, label=curve),
+        Line2D([], [], color=BLACK, linewidth=1.4, label=curve_label),
         Line2D(
             [], [], color=GREY, linestyle=":", linewidth=1.0, label=f"threshold, {100 * TARGET_PROPORTION:.1f} % right"
         ),

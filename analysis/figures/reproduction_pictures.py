@@ -10,7 +10,7 @@ from analysis.evaluation.reproduction.equalized_findings import EqualizedRows
 from analysis.evaluation.reproduction.measured_device import MeasuredDevice
 from analysis.figures.frequency_bands import frequency_bands_picture
 from analysis.figures.picture import Picture
-from analysis.figures.played_responses import friction_picture, played_responses_picture
+from analysis.figures.played_responses import make_friction_picture, make_played_responses_picture
 from analysis.figures.study_pictures import make_ellipsoid_picture, study_pictures
 from analysis.figures.transfer_functions import make_transfer_functions_picture
 from analysis.psychophysics.ellipsoid import EllipsoidResult
@@ -33,5 +33,5 @@ def reproduction_pictures(
         2: tuple(picture for picture in study_pictures(study) if picture.name == "thresholds"),
         3: (make_ellipsoid_picture(shapes),),
         4: (make_transfer_functions_picture(device.response),),
-        5: (played_responses_picture(rows.figure_rows), friction_picture(rows.friction_rows)),
+        5: (make_played_responses_picture(rows.figure_rows), make_friction_picture(rows.friction_rows)),
     }

@@ -22,7 +22,7 @@ from analysis.psychophysics.hierarchy.observed_shares import BIN_DB
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, tabulate_thresholds
-from analysis.threshold_words import threshold_words
+from analysis.threshold_words import select_threshold_words
 
 
 def study_pictures(analysis: StudyAnalysis, ellipsoids: Sequence[EllipsoidResult] = ()) -> tuple[Picture, ...]:
@@ -82,7 +82,7 @@ def _make_units_pictures(analysis: StudyAnalysis) -> list[Picture]:
             title="Thresholds in every unit that was measured",
             caption="The same runs in each panel, people joined by lines; bar: median of what is shown. Hollow markers "
             "with an arrow are cut by the cap: medians over them are too low. Acceleration and displacement are what "
-            f"was measured along the direction in {threshold_words(analysis.protocol.staircase).measured_in}."
+            f"was measured along the direction in {select_threshold_words(analysis.protocol.staircase).measured_in}."
             + (
                 " Above detection: over the level from which the same participant felt the vibration at all."
                 if tables[-1].quantity == "above_detection_db"
@@ -119,7 +119,7 @@ def _make_curve_pictures(analysis: StudyAnalysis) -> list[Picture]:
         name="psychometric",
         title="Psychometric functions, all people together",
         caption=f"{points_text}Levels are relative to each person's threshold by the model of all answers, whose curve "
-        f"is drawn. {threshold_words(analysis.protocol.staircase).levels}",
+        f"is drawn. {select_threshold_words(analysis.protocol.staircase).levels}",
         figure=draw_people_curves(answer_counts, primary),
     )
     return [
@@ -182,7 +182,7 @@ def _make_staircase_pictures(analysis: StudyAnalysis) -> list[Picture]:
         Picture(
             name=f"staircases-{index}-{_sanitize_subject_code(subject)}",
             title=f"{'Levels' if analysis.protocol.staircase.is_bayesian else 'Staircases'} of {subject}",
-            caption=threshold_words(analysis.protocol.staircase).track,
+            caption=select_threshold_words(analysis.protocol.staircase).track,
             figure=draw_staircases(
                 [run for run in analysis.runs if run.subject == subject], analysis.protocol.staircase
             ),

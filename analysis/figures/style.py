@@ -17,9 +17,9 @@ COLOURS = (BLUE, ORANGE, GREEN, VERMILLION, PURPLE, SKY, BLACK, WINE, OLIVE, TEA
 """Ten, for the ten participants of the published study; the last three after P. Tol's muted scheme."""
 MARKERS = ("o", "s", "D", "P", "X", "p", "h", "d", "*", "8")
 CENSORED_MARKER = "$\\uparrow$"
-"""An arrow above the participant's own marker: the cap cut into this threshold."""
+"""An arrow above the participant's own marker: the cap (largest level) limited this threshold."""
 _TICK_MULTIPLES = ((1.5, (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)), (3.0, (1.0, 2.0, 5.0)), (4.0, (1.0, 3.0)), (np.inf, (1.0,)))
-"""Largest number of decades of an axis, and the multiples of powers of ten that are its ticks. By hand."""
+"""Largest number of decades of an axis, and the multiples of powers of ten that are its ticks. Set by hand."""
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -75,8 +75,8 @@ def label_panel_axes(panel_axes: list[Axes], panel_count: int, x_label: str, y_l
 
 
 def set_newton_ticks(axis: Axis, lowest_n: float, highest_n: float) -> None:
-    """Set ticks at 1, 2 and 5 times powers of ten, from 0.01 to 3 N, on a logarithmic axis, as decimals. Call after the
-    scale is set."""
+    """Set ticks at 1, 2 and 5 times powers of ten from 0.01 to 2 N, and at 3 N, on a logarithmic axis, as decimals;
+    those from lowest_n to highest_n only. Call after the scale is set."""
     tick_levels_n = [
         level_n for level_n in (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 3.0) if lowest_n <= level_n <= highest_n
     ]

@@ -2,6 +2,7 @@
 
 A recording groups its channels by signal (command, response, position and so on); here each channel is one item with
 its role, name, quantity and unit. A stretch is a range of samples within which time is continuous.
+The checks of `analysis.look` use it.
 """
 
 from dataclasses import dataclass
@@ -40,12 +41,12 @@ class Channel:
         return self.samples[np.isfinite(self.samples)]
 
     def format(self, value: float) -> str:
-        """A value of this channel, as text with its unit."""
+        """Format a value of this channel as text with its unit."""
         return format_value(value, self.unit)
 
 
-def channels_of(recording: Recording) -> tuple[Channel, ...]:
-    """All channels of all signals of a recording."""
+def list_channels(recording: Recording) -> tuple[Channel, ...]:
+    """List all channels of all signals of a recording."""
     return tuple(
         Channel(role, name, quantity, unit, np.ascontiguousarray(samples))
         for role, signal in collect_signals(recording).items()
@@ -56,10 +57,10 @@ def channels_of(recording: Recording) -> tuple[Channel, ...]:
 
 
 def format_value(value: float, unit: str, digits: int = 3) -> str:
-    """A value as text, with its unit and `digits` significant digits; the unit "1" is not written."""
+    """Format a value as text, with its unit and `digits` significant digits; the unit "1" is not written."""
     return f"{typeset(f'{value:.{digits}g}')}{'' if unit == '1' else f' {unit}'}"
 
 
-def rms(samples: FloatArray) -> float:
-    """Root mean square about the mean; 0 for no samples."""
+def compute_rms(samples: FloatArray) -> float:
+    """Compute the root mean square about the mean; 0 without samples. samples: finite."""
     return float(np.std(samples)) if samples.size else 0.0

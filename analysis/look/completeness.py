@@ -9,7 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
-from analysis.look.channels import Channel, rms
+from analysis.look.channels import Channel, compute_rms
 from analysis.look.check import Check, add_fine_if_none
 from equalizer.signals.signal import FloatArray, find_runs
 
@@ -111,8 +111,8 @@ def _fit_scale(values: FloatArray, copy: FloatArray) -> float | None:
         values[is_finite] - values[is_finite].mean(),
         copy[is_finite] - copy[is_finite].mean(),
     )
-    copy_rms, energy = rms(centred_copy), float(centred_values @ centred_values)
+    copy_rms, energy = compute_rms(centred_copy), float(centred_values @ centred_values)
     if energy == 0 or copy_rms == 0:
         return None
     scale = float(centred_values @ centred_copy) / energy
-    return scale if rms(centred_copy - scale * centred_values) < _COPY_TOLERANCE * copy_rms else None
+    return scale if compute_rms(centred_copy - scale * centred_values) < _COPY_TOLERANCE * copy_rms else None

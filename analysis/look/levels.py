@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.look.channels import Channel, rms
+from analysis.look.channels import Channel, compute_rms
 from analysis.look.check import Check
 from analysis.wording import typeset
 from equalizer.signals.recording import Recording, Segment
@@ -51,7 +51,7 @@ def compute_segment_levels(recording: Recording, channels: Sequence[Channel]) ->
             segment.start / rate_hz,
             (segment.stop - segment.start) / rate_hz,
             segment.period,
-            tuple(rms(_select_finite_samples(channel, segment)) for channel in channels),
+            tuple(compute_rms(_select_finite_samples(channel, segment)) for channel in channels),
         )
         for number, segment in enumerate(recording.segments or full_record, start=1)
     )

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.data.observed_parts import find_parts
-from analysis.diagnosis.noise.rounding import rounding_step
-from analysis.look.channels import Channel, Stretch, channels_of, rms
+from analysis.diagnosis.noise.rounding import find_rounding_step
+from analysis.look.channels import Channel, Stretch, compute_rms, list_channels
 from analysis.look.check import Check
 from analysis.look.clipping import check_clipping
 from analysis.look.clock import CLOCK, check_clock
@@ -55,8 +55,8 @@ def check_resolution(channels: Sequence[Channel]) -> tuple[Check, ...]:
 def _check_channel_resolution(channel: Channel) -> Check | None:
     """Check the quantization of one channel; None where it has no quantization step, or one below a thousandth of its
     rms."""
-    quantization_step = rounding_step(channel.samples)
-    rms_in_steps = rms(channel.finite_samples) / quantization_step if quantization_step else FINE_STEPS
+    quantization_step = find_rounding_step(channel.samples)
+    rms_in_steps = compute_rms(channel.finite_samples) / quantization_step if quantization_step else FINE_STEPS
     if rms_in_steps >= FINE_STEPS:
         return None
     text = (
@@ -102,18 +102,22 @@ class Overview(SummaryDisplay):
     stretches: tuple[Stretch, ...]
     summaries: tuple[ChannelSummary, ...]
     levels: tuple[SegmentLevel, ...]
+    """Rms of each channel in each segment."""
     spectra: CrossSpectra | None
     """Cross spectra of all channels; None where no stretch without gaps is long enough."""
     bands: tuple[DrivenBand, ...]
+    """Bands that the commands drive; empty without spectra."""
     coherences: tuple[ResponseCoherence, ...]
+    """Coherence of responses with commands in these bands; empty without spectra."""
     pairs: tuple[KinematicPair, ...]
+    """Pairs of channels of which the second should be a time derivative of the first."""
     repeats: Repeats
     checks: tuple[Check, ...]
     """All checks, sorted by level: "wrong", then "notice", then "fine"."""
 
     def summary(self) -> Summary:
         """Range and rms of each channel, and all checks that are not fine."""
-        noticed = [check for check in self.checks if check.level != "fine"]
+        notable_checks = [check for check in self.checks if check.level != "fine"]
         return Summary(
             f"{self.name}: {len(self.channels)} channels",
             (
@@ -124,7 +128,7 @@ class Overview(SummaryDisplay):
                     )
                     for row in self.summaries
                 ),
-                *((check.level, check.seen) for check in noticed),
+                *((check.level, check.seen) for check in notable_checks),
             ),
         )
 
@@ -132,7 +136,7 @@ class Overview(SummaryDisplay):
 def make_overview(name: str, recording: Recording) -> Overview:
     """Make the overview of a recording: channels, spectra, levels and checks. name: name of the file, for tables and
     figures."""
-    channels, stretches, rate_hz = channels_of(recording), find_parts(recording), recording.sample_rate_hz
+    channels, stretches, rate_hz = list_channels(recording), find_parts(recording), recording.sample_rate_hz
     spectra = estimate_cross_spectra(channels, stretches, rate_hz)
     bands = find_driven_bands(spectra, channels) if spectra else ()
     coherences = estimate_coherences(spectra, channels, bands) if spectra else ()
@@ -196,6 +200,6 @@ def _summarise_channel(channel: Channel) -> ChannelSummary:
         float(finite_samples.min()),
         float(finite_samples.max()),
         float(finite_samples.mean()),
-        rms(channel.finite_samples),
+        compute_rms(channel.finite_samples),
         len(channel.samples) - channel.finite_samples.size,
     )

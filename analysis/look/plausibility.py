@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analysis.look.channels import Channel, rms
+from analysis.look.channels import Channel, compute_rms
 from analysis.look.check import Check, add_fine_if_none
 from equalizer.signals.units import UNSTATED
 
@@ -50,7 +50,7 @@ def _check_channel_unit(channel: Channel) -> Check | None:
             "State the unit in the map; otherwise masses, damping and stiffnesses are relative to this channel's "
             "scale.",
         )
-    peak, rms_value = float(np.max(np.abs(finite_samples))), rms(finite_samples)
+    peak, rms_value = float(np.max(np.abs(finite_samples))), compute_rms(finite_samples)
     if peak > _LARGEST_PEAKS.get(channel.unit, np.inf):
         return _report_wrong_unit(channel, f"{channel.label} reaches {channel.format(peak)}.")
     if 0 < rms_value < _SMALLEST_RMS.get(channel.unit, 0.0):
@@ -91,7 +91,7 @@ def _check_channel_offset(channel: Channel) -> Check | None:
     """Check the offset of one channel; None where it is below `LEAST_OFFSET_RATIO` times the rms, or the channel is
     constant or has no finite sample."""
     finite_samples = channel.finite_samples
-    rms_value = rms(finite_samples)
+    rms_value = compute_rms(finite_samples)
     if not finite_samples.size or rms_value == 0 or abs(float(finite_samples.mean())) < LEAST_OFFSET_RATIO * rms_value:
         return None
     mean = float(finite_samples.mean())

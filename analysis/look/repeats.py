@@ -9,7 +9,7 @@ import numpy as np
 
 from analysis.diagnosis.data.find_segments import find_designed_command, find_period
 from analysis.diagnosis.noise.periods import find_settled_periods, stack_periods
-from analysis.look.channels import Stretch, rms
+from analysis.look.channels import Stretch, compute_rms
 from analysis.look.check import Check
 from analysis.wording import conjoin, typeset
 from equalizer.signals.recording import Recording, Segment
@@ -77,7 +77,7 @@ def _compute_repeat_noise(recording: Recording, *, declared: bool) -> tuple[Repe
         rms_between_repeats = np.sqrt(
             np.sum((by_period - mean) ** 2, axis=(0, 1)) / ((periods.count - 1) * periods.length)
         )
-        mean_rms = np.array([rms(column) for column in mean.T])
+        mean_rms = np.array([compute_rms(column) for column in mean.T])
         share = tuple((rms_between_repeats / np.where(mean_rms > 0, mean_rms, np.inf)).tolist())
         segment_number = periods.index + 1 if declared else 0
         noises.append(RepeatNoise(segment_number, periods.length, periods.count, periods.settled, share))
@@ -133,7 +133,7 @@ def _check_periods(recording: Recording) -> list[Check | None]:
 
 
 def _check_period(command: FloatArray, segment: Segment, number: int) -> Check | None:
-    command_rms = rms(command[np.isfinite(command).all(axis=1)])
+    command_rms = compute_rms(command[np.isfinite(command).all(axis=1)])
     difference = command[segment.period :] - command[: -segment.period]
     relative_difference = float(np.sqrt(np.nanmean(difference**2) / 2)) / command_rms if command_rms > 0 else 0.0
     if relative_difference <= RIGHT_PERIOD:

@@ -2,6 +2,7 @@
 
 A wrong answer is no proof of inattention: at high frequencies a person may not perceive a direction even at full level.
 The rate per participant and frequency is wrong over answered trials, with Wilson's 95 % interval.
+Called by `study_analysis`; other analyses use `compute_wilson_interval` alone.
 """
 
 from collections.abc import Iterable
@@ -32,27 +33,29 @@ class CatchTally:
     """Limits of Wilson's 95 % interval of the lapse rate."""
 
 
-def catch_tallies(trials: Iterable[Trial]) -> tuple[CatchTally, ...]:
-    """A tally per participant and frequency, over all sessions: participants in the order of their first trial,
-    frequencies ascending."""
-    answers: dict[str, dict[float, list[bool]]] = {}
+def tally_catch_trials(trials: Iterable[Trial]) -> tuple[CatchTally, ...]:
+    """Tally the valid catch trials per participant and frequency, over all sessions: participants in the order of their
+    first trial, frequencies ascending."""
+    wrong_by_subject: dict[str, dict[float, list[bool]]] = {}
     for trial in trials:
         if trial.phase is Phase.CATCH and trial.is_valid:
-            answers.setdefault(trial.subject, {}).setdefault(trial.frequency_hz, []).append(not trial.correct)
+            wrong_by_subject.setdefault(trial.subject, {}).setdefault(trial.frequency_hz, []).append(not trial.correct)
     return tuple(
-        _tally(subject, frequency_hz, sum(wrong), len(wrong))
-        for subject, by_frequency in answers.items()
-        for frequency_hz, wrong in sorted(by_frequency.items())
+        _make_tally(subject, frequency_hz, sum(is_wrong), len(is_wrong))
+        for subject, by_frequency in wrong_by_subject.items()
+        for frequency_hz, is_wrong in sorted(by_frequency.items())
     )
 
 
-def wilson_interval(count: int, total: int) -> tuple[float, float]:
-    """Wilson score interval of the rate count / total; total >= 1. Source: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927),
-    209-212."""
+def compute_wilson_interval(count: int, total: int) -> tuple[float, float]:
+    """Compute Wilson's score interval (95 %) of the rate count / total; total >= 1. Source: E. B. Wilson, J. Am. Stat.
+    Assoc. 22 (1927), 209-212."""
     interval = binomtest(count, total).proportion_ci(CONFIDENCE, method="wilson")
     return float(interval.low), float(interval.high)
 
 
-def _tally(subject: str, frequency_hz: float, wrong: int, answered: int) -> CatchTally:
+def _make_tally(subject: str, frequency_hz: float, wrong: int, answered: int) -> CatchTally:
     """Tally from the numbers of wrong and of all answers."""
-    return CatchTally(subject, frequency_hz, answered, wrong, wrong / answered, *wilson_interval(wrong, answered))
+    return CatchTally(
+        subject, frequency_hz, answered, wrong, wrong / answered, *compute_wilson_interval(wrong, answered)
+    )

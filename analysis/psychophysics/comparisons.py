@@ -7,7 +7,7 @@ Two groups differ significantly when their comparison intervals are disjoint: ex
 approximately for unequal ones. The intervals are NOT confidence intervals of the means.
 
 Source: Y. Hochberg, A. C. Tamhane, Multiple Comparison Procedures (1987), equation 3.32; C. Y. Kramer,
-Biometrics 12 (1956), 307-310.
+Biometrics 12 (1956), 307-310. Called by `study_analysis`.
 """
 
 import itertools
@@ -59,26 +59,26 @@ class Comparisons:
     """Reason, in words, where nothing can be compared."""
 
 
-def compare_all(anova: OneWayAnova, confidence: float = 0.95) -> Comparisons:
-    """All pairs of the groups of an ANOVA, and a comparison interval for each group that has a value. Without a spread
-    within groups the result is empty and its notes say so."""
+def compare_group_means(anova: OneWayAnova, confidence: float = 0.95) -> Comparisons:
+    """Compare all pairs of the groups of an ANOVA that have a value, with a comparison interval for each. Without a
+    spread within groups the result is empty and its notes give the reason. confidence: 0 to 1."""
     if anova.mean_square_within is None or anova.df_within is None:
         return Comparisons(confidence, None, (), (), ("Without a spread within groups no pairs can be compared.",))
     groups = [group for group in anova.groups if group.n > 0]
-    return tukey_kramer(groups, anova.mean_square_within, anova.df_within, confidence)
+    return compute_tukey_kramer(groups, anova.mean_square_within, anova.df_within, confidence)
 
 
-def tukey_kramer(
+def compute_tukey_kramer(
     groups: Sequence[GroupSummary], mean_square_within: float, df_within: int, confidence: float = 0.95
 ) -> Comparisons:
-    """Tukey-Kramer intervals and p-values of all pairs. mean_square_within, df_within: of the error term of the ANOVA.
-    Raises ValueError unless there are at least two groups, all with a mean."""
+    """Compute Tukey-Kramer intervals and p-values of all pairs. mean_square_within, df_within: of the error term of the
+    ANOVA. Raises ValueError unless there are at least two groups, all with a mean."""
     means = [group.mean for group in groups if group.mean is not None]
     if len(means) != len(groups) or len(groups) < 2:
         raise ValueError(f"a comparison needs two or more groups that all have a mean; got {len(means)}")
     sizes = [group.n for group in groups]
     critical_range = float(studentized_range.ppf(confidence, len(groups), df_within))
-    half_widths = comparison_half_widths(sizes, mean_square_within, critical_range)
+    half_widths = compute_comparison_half_widths(sizes, mean_square_within, critical_range)
     pairs = []
     for i, j in itertools.combinations(range(len(groups)), 2):
         difference = means[j] - means[i]
@@ -104,8 +104,10 @@ def tukey_kramer(
     return Comparisons(confidence, critical_range, tuple(pairs), intervals, ())
 
 
-def comparison_half_widths(sizes: Sequence[int], mean_square_within: float, critical_range: float) -> tuple[float, ...]:
-    """Half-width (q / sqrt(2)) w_i of the comparison interval of each of k >= 2 groups with the sizes n_i.
+def compute_comparison_half_widths(
+    sizes: Sequence[int], mean_square_within: float, critical_range: float
+) -> tuple[float, ...]:
+    """Compute the half-width (q / sqrt(2)) w_i of the comparison interval of each of k >= 2 groups with the sizes n_i.
 
     The w_i are least-squares solutions of w_i + w_j = d_ij, the standard deviations of the differences of means:
     w_i = ((k - 1) sum_j d_ij - sum of d over all pairs) / ((k - 1) (k - 2)), and d_12 / 2 for k = 2. For equal sizes n

@@ -12,7 +12,7 @@ from typing import Literal
 from analysis.psychophysics.comparisons import Comparisons
 from analysis.psychophysics.hierarchy.primary import FAR_ABOVE_NOTE, PrimaryAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, format_frequency
-from analysis.threshold_words import threshold_words
+from analysis.threshold_words import select_threshold_words
 from analysis.wording import capitalise, conjoin
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.staircase_rule import StaircaseRule
@@ -88,7 +88,7 @@ def compute_declared_result(
                 comparisons,
                 table,
                 declared.primary == "published",
-                TUKEY_NOTE.format(means=capitalise(threshold_words(rule).means)),
+                TUKEY_NOTE.format(means=capitalise(select_threshold_words(rule).means)),
             ),
         ]
         results.sort(key=lambda result: not result.declared)

@@ -1,7 +1,8 @@
 """Separation of trials by who answered: people, simulated participants, or people at a device that did not move.
 
 An analysis never mixes these populations: answers of simulated participants, or of people who felt nothing, say nothing
-about human thresholds. The column `felt` of a trial decides: empty, true or false.
+about human thresholds. The column `felt` of a trial decides: empty (simulated participant), true (a person) or false (a
+person at a device that did not move). Called by `study_analysis` and `collect_sessions`.
 """
 
 from collections.abc import Iterable
@@ -20,36 +21,43 @@ class Population(Enum):
 
 
 def split_by_population(trials: Iterable[Trial]) -> dict[Population, tuple[Trial, ...]]:
-    """The trials of each population that occurs, in the order given.
+    """Split the trials by population: those of each population that occurs, session by session in order of first
+    trials.
 
     Raises ValueError, with the name of the session, where the answers of one session belong to different populations.
     """
     sessions: dict[tuple[str, str], list[Trial]] = {}
     for trial in trials:
         sessions.setdefault((trial.subject, trial.session), []).append(trial)
-    parts: dict[Population, list[Trial]] = {}
-    for (subject, session), rows in sessions.items():
-        parts.setdefault(_population_of(subject, session, rows), []).extend(rows)
-    return {kind: tuple(parts[kind]) for kind in Population if kind in parts}
-
-
-def _population_of(subject: str, session: str, rows: list[Trial]) -> Population:
-    """Population of one session, whose trials are `rows`; raises ValueError where they disagree."""
-    # Only answered trials count, if there are any: `felt` may not be known yet for a trial without an answer.
-    kinds = {_trial_population(trial) for trial in rows if trial.is_valid} or {
-        _trial_population(trial) for trial in rows
+    trials_by_population: dict[Population, list[Trial]] = {}
+    for (subject, session), session_trials in sessions.items():
+        trials_by_population.setdefault(_find_session_population(subject, session, session_trials), []).extend(
+            session_trials
+        )
+    return {
+        population: tuple(trials_by_population[population])
+        for population in Population
+        if population in trials_by_population
     }
-    if len(kinds) > 1:
-        kind_names = " and ".join(kind.value for kind in Population if kind in kinds)
+
+
+def _find_session_population(subject: str, session: str, session_trials: list[Trial]) -> Population:
+    """Find the population of one session from its trials (at least one); raises ValueError where they disagree."""
+    # Only answered trials count, if there are any: `felt` may not be known yet for a trial without an answer.
+    populations = {_find_trial_population(trial) for trial in session_trials if trial.is_valid} or {
+        _find_trial_population(trial) for trial in session_trials
+    }
+    if len(populations) > 1:
+        names = " and ".join(population.value for population in Population if population in populations)
         raise ValueError(
-            f"session {session} of {subject} mixes trials of {kind_names} (column felt): a session contains trials of "
+            f"session {session} of {subject} mixes trials of {names} (column felt): a session contains trials of "
             "one kind only; find the cause, remove the wrong rows, and analyse it again"
         )
-    return kinds.pop()
+    return populations.pop()
 
 
-def _trial_population(trial: Trial) -> Population:
-    """Population of a trial, by its column `felt`."""
+def _find_trial_population(trial: Trial) -> Population:
+    """Find the population of a trial by its column `felt`."""
     if trial.felt is None:
         return Population.SIMULATED
     return Population.PEOPLE if trial.felt else Population.NOT_FELT

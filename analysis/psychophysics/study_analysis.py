@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from analysis.psychophysics.anova import OneWayAnova, compute_one_way_anova
-from analysis.psychophysics.catch_trials import CatchTally, catch_tallies
-from analysis.psychophysics.comparisons import Comparisons, compare_all
+from analysis.psychophysics.catch_trials import CatchTally, tally_catch_trials
+from analysis.psychophysics.comparisons import Comparisons, compare_group_means
 from analysis.psychophysics.cues.cue_findings import CueFinding, compute_cue_findings, make_cue_warnings
 from analysis.psychophysics.cues.delivered_cues import CueGap, find_cue_gaps
 from analysis.psychophysics.declared_result import DeclaredResult, compute_declared_result
@@ -163,12 +163,12 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol, left_out: Se
     rows = tuple(compute_run_threshold(run, rule) for run in runs)
     tested = tuple(trial for trial in trials if trial.phase is Phase.TEST)
     table = tabulate_thresholds(rows, protocol.stimulus.frequencies_hz)
-    detection, catches = compute_detection_thresholds(trials, protocol), catch_tallies(trials)
+    detection, catches = compute_detection_thresholds(trials, protocol), tally_catch_trials(trials)
     detection_table = tabulate_thresholds(detection, protocol.detection.frequencies_hz)
     anova, within = (
         compute_one_way_anova(table.group_by_frequency()), analyse_repeated_measures(table.subjects, table.values),
     )  # fmt: skip
-    comparisons, (primary, single) = compare_all(anova, CONFIDENCE), _fit_models(tested, protocol)
+    comparisons, (primary, single) = compare_group_means(anova, CONFIDENCE), _fit_models(tested, protocol)
     (means, tobit), cues, gaps = (
         _compute_mean_contrasts(rows, primary, protocol), compute_cue_findings(tested), find_cue_gaps(tested),
     )  # fmt: skip

@@ -11,12 +11,12 @@ from collections.abc import Iterable, Sequence
 from scipy.stats import binom
 
 from analysis.psychophysics.bias import compute_criterion_variance
-from analysis.psychophysics.catch_trials import CatchTally, wilson_interval
+from analysis.psychophysics.catch_trials import CatchTally, compute_wilson_interval
 from analysis.psychophysics.criterion_drift import estimate_criterion_drifts
 from analysis.psychophysics.detection import find_directions_below_detection
 from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.psychophysics.thresholds import RunEnd, Threshold
-from analysis.threshold_words import threshold_words
+from analysis.threshold_words import select_threshold_words
 from analysis.wording import conjoin, format_signed
 from protocols.definition.staircase_rule import StaircaseRule
 from protocols.definition.study_protocol import StudyProtocol
@@ -138,7 +138,7 @@ def _warn_of_censored(table: ThresholdTable, rule: StaircaseRule) -> str:
     if not cells:
         return ""
     return (
-        f"{_format_count(cells, 'threshold')} cut by the cap of {rule.cap_n:g} N, {threshold_words(rule).cut}: "
+        f"{_format_count(cells, 'threshold')} cut by the cap of {rule.cap_n:g} N, {select_threshold_words(rule).cut}: "
         f"{conjoin(cells)}. As in the published analysis they enter means and tests as plain numbers, so means near "
         "the cap are too low, differences towards it too small, and intervals and effect sizes without coverage."
     )
@@ -263,7 +263,7 @@ def _warn_of_lapses(catches: Sequence[CatchTally]) -> str:
         wrong = sum(tally.wrong for tally in felt_tallies if tally.subject == subject)
         answered = sum(tally.given for tally in felt_tallies if tally.subject == subject)
         if wrong > MANY_LAPSES * answered:
-            lower, upper = wilson_interval(wrong, answered)
+            lower, upper = compute_wilson_interval(wrong, answered)
             lapses.append(f"{subject} ({wrong} of {answered}; 95 % interval {100 * lower:.0f} to {100 * upper:.0f} %)")
     if not lapses:
         return ""

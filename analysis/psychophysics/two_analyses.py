@@ -9,12 +9,12 @@ Called by `analysis.psychophysics.study_analysis` and the tables of `analysis.re
 from collections.abc import Sequence
 
 from analysis.psychophysics.comparisons import Comparisons
-from analysis.psychophysics.coverage.coverage_words import coverage_sentence
+from analysis.psychophysics.coverage.coverage_words import describe_coverage
 from analysis.psychophysics.coverage.measured_coverage import MEASURED
 from analysis.psychophysics.group_contrasts import Contrast
 from analysis.psychophysics.hierarchy.primary import PrimaryAnalysis
 from analysis.psychophysics.threshold_table import ThresholdTable, format_frequency
-from analysis.threshold_words import threshold_words
+from analysis.threshold_words import select_threshold_words
 from analysis.wording import capitalise, conjoin, format_p_text, format_signed
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
@@ -125,17 +125,17 @@ def describe_comparison(
 
 
 def describe_measured_coverage(analyses: Sequence[str], table: ThresholdTable, rule: StaircaseRule) -> tuple[str, ...]:
-    """Describe the measured coverage of the intervals of these analyses (names of `coverage_words.NAMES`). Empty
+    """Describe the measured coverage of the intervals of these analyses (names of `coverage_words.TITLES`). Empty
     where neither the cap nor the trial limit affected a threshold, and for a rule other than `SIMULATED_RULE`."""
     if not table.coverage or rule != SIMULATED_RULE:
         return ()
-    return tuple(filter(None, (coverage_sentence(MEASURED, analysis) for analysis in analyses)))
+    return tuple(filter(None, (describe_coverage(MEASURED, analysis) for analysis in analyses)))
 
 
 def _describe_differences(primary: PrimaryAnalysis, means: Sequence[Contrast], rule: StaircaseRule) -> str:
     """Describe the differences in dB by the model and by the thresholds of runs: equal within `NOTABLE_DIFFERENCE_DB`,
     or where not."""
-    means_noun = threshold_words(rule).means
+    means_noun = select_threshold_words(rule).means
     means_by_frequency = {contrast.frequency_hz: contrast for contrast in means}
     reference = f"{primary.frequencies_hz[0]:g} Hz"
     pairs = [(contrast, means_by_frequency.get(contrast.frequency_hz)) for contrast in primary.contrasts]

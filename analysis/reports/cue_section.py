@@ -14,7 +14,7 @@ from analysis.psychophysics.cues.cue_findings import CueFinding, describe_cue_ga
 from analysis.psychophysics.cues.cue_sensitivity import INTERNAL_NOISE_DB, TYPICAL_NOISE_DB
 from analysis.psychophysics.cues.delivered_cues import CueGap
 from analysis.reports.page import Section, Table
-from analysis.threshold_words import threshold_words
+from analysis.threshold_words import select_threshold_words
 from analysis.wording import MISSING, conjoin, format_number, format_p, format_signed
 from protocols.definition.staircase_rule import StaircaseRule
 
@@ -35,7 +35,10 @@ def make_cue_sections(findings: Sequence[CueFinding], gaps: Sequence[CueGap], ru
         *(make_cue_warnings(findings) or (_describe_no_cue(findings),)),
         *filter(None, [describe_cue_gaps(gaps)]),
     )
-    tables = (_tabulate_sensitivity(findings, threshold_words(rule).sensitivity), _tabulate_regressions(findings))
+    tables = (
+        _tabulate_sensitivity(findings, select_threshold_words(rule).sensitivity),
+        _tabulate_regressions(findings),
+    )
     return [Section("Was direction the cue?", paragraphs=(_INTRODUCTION, *sentences), tables=tables)]
 
 

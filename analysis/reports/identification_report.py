@@ -1,7 +1,8 @@
 """HTML report of an identified device: measured transfer functions, resonances, fitted state-space model and its order.
 
-The response maps commanded forces (N) to accelerations of the handle (m/s²). The report has the published figures 1
-(frequency bands) and 4 (transfer functions), and the held-out error of each candidate model order.
+The responses map commanded forces (N) to accelerations of the handle (m/s²). The figures are laid out as the published
+figures 1 (frequency bands) and 4 (transfer functions); a third shows the held-out error of each model order. Called by
+`study.workflows.equalizer.report_identification`, which computes the findings.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,38 +23,41 @@ from equalizer.identification.state_space.order_report import OrderReport
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
 
-CURVE_LINES = 400
-"""Number of frequencies at which the model's response is drawn."""
+CURVE_POINT_COUNT = 400
+"""Number of frequencies, logarithmically spaced over the model's band, at which the model's response is drawn."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IdentificationFindings:
-    """The content of an identification report: the measured response, the model, and results derived from them."""
+    """Content of an identification report: the measured response, the fitted model, and results derived from them."""
 
     estimate: FrequencyResponse
-    """Measured response."""
+    """Frequency response estimated from the recordings, m/s² per N."""
     model: IdentifiedModel
+    """State-space model fitted to the estimate."""
     resonances: tuple[Resonance, ...]
+    """Resonances of the estimate; empty where none was found."""
     onset: CouplingOnset
-    """Frequency from which the axes are coupled."""
+    """Frequency from which the axes are coupled, or that none was found."""
     bands: tuple[FrequencyBand, ...]
+    """Frequency bands of figure 1 in ascending order; without bands, the figure is left out."""
     direction_limit_hz: float
-    """Highest frequency at which directions are perceived, drawn with the bands."""
+    """Highest frequency (Hz) at which people perceive the direction of a vibration; drawn with the bands."""
     order: OrderReport | None
-    """Comparison of model orders; None where there are too few lines to hold some out."""
+    """Held-out error by model order; None where the estimate has too few lines to hold some out."""
     results: tuple[str, ...]
-    """Sentences on the model."""
+    """Paragraphs on the model, shown first."""
     remarks: tuple[str, ...]
-    """Further sentences, shown as a list."""
+    """Remarks of the identification, shown as a list below the results."""
 
 
-def identification_pictures(findings: IdentificationFindings) -> tuple[Picture, ...]:
-    """Pictures of the transfer functions (published figure 4), the bands (figure 1) and the choice of order; those
-    without data are left out."""
-    low, high = findings.model.band_hz
-    curve_hz = np.geomspace(low, high, CURVE_LINES)
-    curve = ResponseCurve("model", curve_hz, model_response(findings.model, curve_hz))
-    pictures = [make_transfer_functions_picture(findings.estimate, curve, findings.model.band_hz)]
+def make_identification_pictures(findings: IdentificationFindings) -> tuple[Picture, ...]:
+    """Draw the transfer functions (published figure 4), the frequency bands (figure 1; only with bands) and the
+    held-out error by model order (only with a comparison of orders)."""
+    low_hz, high_hz = findings.model.band_hz
+    curve_hz = np.geomspace(low_hz, high_hz, CURVE_POINT_COUNT)
+    model_curve = ResponseCurve("model", curve_hz, model_response(findings.model, curve_hz))
+    pictures = [make_transfer_functions_picture(findings.estimate, model_curve, findings.model.band_hz)]
     if findings.bands:
         pictures.append(
             frequency_bands_picture(findings.estimate, findings.onset, findings.bands, findings.direction_limit_hz)
@@ -66,29 +70,29 @@ def identification_pictures(findings: IdentificationFindings) -> tuple[Picture, 
 def render_identification_report(
     findings: IdentificationFindings, pictures: Sequence[Picture], provenance: Mapping[str, str], generated: str
 ) -> str:
-    """The report as an HTML page. pictures: those of `identification_pictures`, recognised by name; missing pictures
-    are left out. generated: local time of the report; provenance: versions and hashes by name."""
-    by_name = {picture.name: picture for picture in pictures}
-    low, high = findings.model.band_hz
+    """Render the report as an HTML page. pictures: those of `make_identification_pictures`, recognised by name; a
+    missing picture is left out. provenance: origin of the model by name. generated: local time of the report."""
+    pictures_by_name = {picture.name: picture for picture in pictures}
+    low_hz, high_hz = findings.model.band_hz
 
     def find_picture(name: str) -> tuple[Picture, ...]:
-        """The picture of this name; empty where it is missing."""
-        return (by_name[name],) if name in by_name else ()
+        """Return the picture of this name; empty where it is missing."""
+        return (pictures_by_name[name],) if name in pictures_by_name else ()
 
     sections = (
         Section("The model", paragraphs=findings.results, points=findings.remarks),
         Section(
             "Transfer functions",
             pictures=find_picture("transfer-functions"),
-            tables=(_resonance_table(findings.resonances),),
+            tables=(_make_resonance_table(findings.resonances),),
         ),
-        Section("Bands", paragraphs=(_onset_sentence(findings.onset),), pictures=find_picture("frequency-bands")),
-        Section("Order", pictures=find_picture("model-order"), tables=_order_tables(findings.order)),
+        Section("Bands", paragraphs=(_describe_onset(findings.onset),), pictures=find_picture("frequency-bands")),
+        Section("Order", pictures=find_picture("model-order"), tables=_make_order_tables(findings.order)),
     )
     return render_page(
         Page(
             title="Identified device",
-            summary=f"A model of order {findings.model.order} for {low:g} to {high:g} Hz, "
+            summary=f"A model of order {findings.model.order} for {low_hz:g} to {high_hz:g} Hz, "
             f"{len(findings.model.input_channels)} forces to {len(findings.model.output_channels)} accelerations.",
             banner="",
             sections=sections,
@@ -98,8 +102,9 @@ def render_identification_report(
     )
 
 
-def _resonance_table(resonances: Sequence[Resonance]) -> Table:
-    """Table of resonance frequencies and damping ratios with 95 % intervals."""
+def _make_resonance_table(resonances: Sequence[Resonance]) -> Table:
+    """Make the table of resonance frequencies and damping ratios with their 95 % intervals, and the curves (gain,
+    coupling) in which each resonance has a peak."""
     rows = tuple(
         (
             f"{resonance.frequency_hz:.2f} Hz",
@@ -113,8 +118,9 @@ def _resonance_table(resonances: Sequence[Resonance]) -> Table:
     return Table("Resonances", ("Frequency", "95 % interval", "Damping ratio", "95 % interval", "Seen in"), rows)
 
 
-def _onset_sentence(onset: CouplingOnset) -> str:
-    """Sentence on the frequency at which coupling begins, and the rule by which it was found."""
+def _describe_onset(onset: CouplingOnset) -> str:
+    """Describe in a sentence the frequency at which coupling begins, with its interval if known, and the rule by which
+    it was found."""
     if onset.frequency_hz is None:
         return f"No onset of coupling was found. Rule: {onset.rule}."
     interval_text = ""
@@ -123,8 +129,9 @@ def _onset_sentence(onset: CouplingOnset) -> str:
     return f"Coupling begins at {onset.frequency_hz:.2f} Hz{interval_text}. Rule: {onset.rule}."
 
 
-def _order_tables(order: OrderReport | None) -> tuple[Table, ...]:
-    """Table of held-out error and multiplications per tick by model order; empty without a comparison."""
+def _make_order_tables(order: OrderReport | None) -> tuple[Table, ...]:
+    """Make the table of held-out error (%) and multiplications per tick by model order; empty without a comparison of
+    orders."""
     if order is None:
         return ()
     rows = tuple(
@@ -136,6 +143,6 @@ def _order_tables(order: OrderReport | None) -> tuple[Table, ...]:
         )
         for row in order.rows
     )
-    noise = f"The noise alone gives {100 * order.held_out_noise:.2f} %."
+    noise_note = f"The noise alone gives {100 * order.held_out_noise:.2f} %."
     header = ("Order", "Error on held-out lines", "Multiplications per tick", "With a full matrix")
-    return (Table("Error and cost by order", header, rows, notes=(noise,)),)
+    return (Table("Error and cost by order", header, rows, notes=(noise_note,)),)

@@ -2,7 +2,7 @@
 
 A known fault of mechanism, actuator or sensor is added to one of two stretches of a real recording; the diagnosis gets
 both stretches and the model. The section has the rates of right answers with 95 % intervals, tallies by kind of fault
-and by recording, and every miss. `analysis.evaluation.blind_test.injected` judges the answers.
+and by recording, and every miss. `analysis.evaluation.blind_test.injected` judges the answers. Called by `real_report`.
 """
 
 from collections.abc import Sequence
@@ -20,17 +20,18 @@ from analysis.reports.page import Section, Table
 
 
 def make_injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
-    """Section with rates of right answers, tallies by kind and by recording, and all misses; without empty tables."""
+    """Make the section with rates of right answers, tallies by kind and by recording, and all misses; without empty
+    tables."""
     rates = Table(
         "How often it was right",
         ("what", "rate, 95 % interval"),
-        tuple((injected_figure.name, figure_text(injected_figure)) for injected_figure in score_injections(outcomes)),
+        tuple((rate.name, format_rate(rate)) for rate in score_injections(outcomes)),
     )
-    by_kind = _tally_table("Detectable faults by kind", "injected", make_tallies(outcomes, kind_of))
-    by_recording = _tally_table(
+    by_kind = _make_tally_table("Detectable faults by kind", "injected", make_tallies(outcomes, classify_injection))
+    by_recording = _make_tally_table(
         "Detectable faults by recording", "recording", make_tallies(outcomes, lambda outcome: outcome.recording)
     )
-    missed = [
+    missed_outcomes = [
         outcome for outcome in outcomes if not outcome.right and (outcome.detectable or outcome.answer_class == "wrong")
     ]
     miss_table = Table(
@@ -38,13 +39,13 @@ def make_injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
         ("recording", "injected", "error changes by", "judged", "named"),
         tuple(
             (
-                miss.recording,
-                miss.injected or "nothing",
-                _change_text(miss.change),
-                miss.answer_class,
-                ", ".join(miss.named) or "-",
+                missed_outcome.recording,
+                missed_outcome.injected or "nothing",
+                _format_change(missed_outcome.change),
+                missed_outcome.answer_class,
+                ", ".join(missed_outcome.named) or "-",
             )
-            for miss in missed
+            for missed_outcome in missed_outcomes
         ),
     )
     return Section(
@@ -60,13 +61,13 @@ def make_injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
     )
 
 
-def kind_of(injected_outcome: InjectedOutcome) -> str:
-    """Kind of a case: name of the injected fault, "two at once" for two faults, or empty without a fault."""
+def classify_injection(injected_outcome: InjectedOutcome) -> str:
+    """Classify a case: name of the injected fault, "two at once" for two faults, or empty without a fault."""
     return "two at once" if len(injected_outcome.effects) > 1 else injected_outcome.injected
 
 
-def _tally_table(title: str, heading: str, rows: Sequence[Tally]) -> Table:
-    """Table of tallies, one row each. heading: heading of the first column."""
+def _make_tally_table(title: str, heading: str, tallies: Sequence[Tally]) -> Table:
+    """Make a table of tallies, one row each. heading: of the first column."""
     header = (
         heading,
         "drawn",
@@ -80,25 +81,26 @@ def _tally_table(title: str, heading: str, rows: Sequence[Tally]) -> Table:
         header,
         tuple(
             (
-                row.name,
-                str(row.fault_count),
-                str(row.right.of),
-                *map(str, row.counts),
-                figure_text(row.right),
-                figure_text(row.faultless),
+                tally.name,
+                str(tally.fault_count),
+                str(tally.right.of),
+                *map(str, tally.counts),
+                format_rate(tally.right),
+                format_rate(tally.faultless),
             )
-            for row in rows
+            for tally in tallies
         ),
     )
 
 
-def _change_text(change: float | None) -> str:
-    """Ratio of the held-out errors with and without the fault."""
+def _format_change(change: float | None) -> str:
+    """Format the ratio of the held-out errors with and without the fault; "unknown" for None."""
     return "unknown" if change is None else f"{change:.2f}"
 
 
-def figure_text(figure: Figure) -> str:
-    """A share with its 95 % interval and number of cases: 88 % [69, 96] of 24; "none was drawn" without cases."""
-    if figure.value is None or figure.low is None or figure.high is None:
+def format_rate(rate: Figure) -> str:
+    """Format a share with its 95 % interval and number of cases: 88 % [69, 96] of 24; "none was drawn" without
+    cases."""
+    if rate.value is None or rate.low is None or rate.high is None:
         return "none was drawn"
-    return f"{100 * figure.value:.0f} % [{100 * figure.low:.0f}, {100 * figure.high:.0f}] of {figure.of}"
+    return f"{100 * rate.value:.0f} % [{100 * rate.low:.0f}, {100 * rate.high:.0f}] of {rate.of}"

@@ -1,7 +1,8 @@
-"""Report of recordings before any model: what is wrong, then per recording its checks, channels and figures.
+"""HTML report of recordings before any model is fitted: per recording its checks, channels, segments and figures.
 
-`summarise_overview` is the summary of a recording in a sentence. Checks and channels are values of
-`analysis.look.overview`; here they become tables.
+A banner counts the checks with the level "wrong" and quotes the first. `analysis.look.overview` computes the checks and
+summaries; here they become tables. Called by `study.workflows.recording.look_at_recordings` (the page) and
+`study.cli.look` (`summarise_overview`, for the terminal).
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,24 +17,29 @@ from analysis.wording import replace_time_units, typeset
 
 def render_look_report(
     overviews: Sequence[Overview],
-    pictures: Sequence[tuple[Picture, ...]],
+    pictures_by_recording: Sequence[tuple[Picture, ...]],
     provenance: Mapping[str, str],
     generated: str,
 ) -> str:
-    """The page about recordings. pictures: of each recording, as `pictures_of` gives them."""
-    wrong = [(overview.name, check) for overview in overviews for check in overview.checks if check.level == "wrong"]
+    """Render the page about recordings as HTML. pictures_by_recording: the pictures of each recording in the order of
+    the overviews, from `make_recording_pictures`. provenance: versions and inputs by name. generated: local time of the
+    report. The summary quotes at most three recordings."""
+    wrong_checks = [
+        (overview.name, check) for overview in overviews for check in overview.checks if check.level == "wrong"
+    ]
     sections = [
         section
-        for overview, overview_pictures in zip(overviews, pictures, strict=True)
-        for section in _recording_sections(overview, overview_pictures, overviews)
+        for overview, overview_pictures in zip(overviews, pictures_by_recording, strict=True)
+        for section in _make_recording_sections(overview, overview_pictures, overviews)
     ]
     return render_page(
         Page(
             title="A look at " + ", ".join(dict.fromkeys(overview.recording.device for overview in overviews)),
             summary=f"{len(overviews)} recording{'s' if len(overviews) > 1 else ''}, before any model. "
             + " ".join(summarise_overview(overview) for overview in overviews[:3]),
-            banner=f"{len(wrong)} thing{'s' if len(wrong) > 1 else ''} would mislead an analysis: {wrong[0][1].seen}"
-            if wrong
+            banner=f"{len(wrong_checks)} thing{'s' if len(wrong_checks) > 1 else ''} would mislead an analysis: "
+            f"{wrong_checks[0][1].seen}"
+            if wrong_checks
             else "",
             sections=tuple(sections),
             generated=generated,
@@ -42,40 +48,48 @@ def render_look_report(
     )
 
 
-def pictures_of(overviews: Sequence[Overview]) -> tuple[tuple[Picture, ...], ...]:
-    """Pictures of each recording; recordings are numbered from 1."""
+def make_recording_pictures(overviews: Sequence[Overview]) -> tuple[tuple[Picture, ...], ...]:
+    """Draw the pictures of each recording, in the order of the overviews; their names contain the number of the
+    recording, from 1."""
     return tuple(make_look_pictures(overview, number) for number, overview in enumerate(overviews, start=1))
 
 
 def summarise_overview(overview: Overview) -> str:
-    """One sentence: what was recorded, for how long, and the result of the checks."""
+    """Summarise a recording in a sentence: duration, sample rate, number of channels and segments, and the checks
+    counted by level. Times are in samples where the recording has no time axis."""
     recording = overview.recording
-    counts = {level: sum(check.level == level for check in overview.checks) for level in ("wrong", "notice", "fine")}
-    text = (
+    count_by_level = {
+        level: sum(check.level == level for check in overview.checks) for level in ("wrong", "notice", "fine")
+    }
+    sentence = (
         f"{overview.name}: {recording.response.duration_s:.4g} s at {recording.sample_rate_hz:.6g} Hz, "
-        f"{len(overview.channels)} channels, {len(recording.segments)} segments; checks: {counts['wrong']} wrong, "
-        f"{counts['notice']} to notice, {counts['fine']} fine."
+        f"{len(overview.channels)} channels, {len(recording.segments)} segments; checks: "
+        f"{count_by_level['wrong']} wrong, {count_by_level['notice']} to notice, {count_by_level['fine']} fine."
     )
-    return text if recording.is_timed else replace_time_units(text)
+    return sentence if recording.is_timed else replace_time_units(sentence)
 
 
-def _recording_sections(
-    overview: Overview, pictures: Sequence[Picture], overviews: Sequence[Overview]
+def _make_recording_sections(
+    overview: Overview, pictures: Sequence[Picture], all_overviews: Sequence[Overview]
 ) -> tuple[Section, ...]:
-    suffix = f" of {overview.name}" if len(overviews) > 1 else ""
+    """Make the sections of one recording: checks, channels, and pictures with the table of segments. Headings name the
+    recording where the page shows several."""
+    title_suffix = f" of {overview.name}" if len(all_overviews) > 1 else ""
     return (
-        Section(f"Checks{suffix}", tables=(_check_table(overview.checks),)),
-        Section(f"Channels{suffix}", tables=(_channel_table(overview),)),
-        Section(f"Pictures{suffix}", pictures=tuple(pictures), tables=(_segment_table(overview),)),
+        Section(f"Checks{title_suffix}", tables=(_make_check_table(overview.checks),)),
+        Section(f"Channels{title_suffix}", tables=(_make_channel_table(overview),)),
+        Section(f"Pictures{title_suffix}", pictures=tuple(pictures), tables=(_make_segment_table(overview),)),
     )
 
 
-def _check_table(checks: Sequence[Check]) -> Table:
+def _make_check_table(checks: Sequence[Check]) -> Table:
+    """Make the table of the checks with their level, result and advice."""
     rows = tuple((check.name, check.level, check.seen, check.do) for check in checks)
     return Table("What was checked", ("Check", "Result", "Seen", "What to do"), rows)
 
 
-def _channel_table(overview: Overview) -> Table:
+def _make_channel_table(overview: Overview) -> Table:
+    """Make the table of range, mean, rms about the mean and number of missing samples of each channel, in its unit."""
     header = ("Channel", "Quantity", "Unit", "Lowest", "Highest", "Mean", "Rms about it", "Missing")
     rows = tuple(
         (
@@ -90,13 +104,15 @@ def _channel_table(overview: Overview) -> Table:
     return Table("Channels", header, rows)
 
 
-def _segment_table(overview: Overview) -> Table:
+def _make_segment_table(overview: Overview) -> Table:
+    """Make the table of the segments with start and length (s, or samples where the recording has no time axis), period
+    (samples; empty where not periodic) and the rms of each channel; folded with more than 12 rows."""
     header = (
         "Segment",
         "Role",
         *(("Start (s)", "Length (s)") if overview.recording.is_timed else ("Start (samples)", "Length (samples)")),
         "Period",
-        *(f"Rms of {c.role} {c.name}" for c in overview.channels),
+        *(f"Rms of {channel.role} {channel.name}" for channel in overview.channels),
     )
     rows = tuple(
         (

@@ -9,6 +9,8 @@ from analysis.wording import conjoin, typeset
 from protocols.definition.preparation import DemoSettings, PracticeSettings
 from protocols.definition.staircase_rule import StaircaseRule, StepChange
 from protocols.definition.study_protocol import StudyProtocol
+from protocols.procedure.psi import LAPSE_RATE
+from protocols.procedure.schedule import BLOCK
 
 _ORDERS = {
     "random": "in random order",
@@ -17,7 +19,7 @@ _ORDERS = {
 }
 _DRAWS = {
     "independent": "drawn independently for every trial",
-    "balanced": "drawn so that both occurred equally often within every eight trials",
+    "balanced": f"drawn so that both occurred equally often within every {BLOCK} trials",
 }
 _LEVELS = {
     "commanded_force": "The level of a trial is the amplitude of the commanded force.",
@@ -131,8 +133,8 @@ def _describe_level_rule(rule: StaircaseRule) -> str:
         return (
             f"The level began at {rule.start_n:g} N; each later level was the one that was expected to give the most "
             "information on threshold and slope, given all previous answers of the run (Psi: Kontsevich and Tyler "
-            f"1999; Weibull curve, 2 % lapses, flat prior). It never passed {rule.cap_n:g} N. A run ended after "
-            f"{rule.bayesian.trials} trials{spread_text if rule.bayesian.spread_db else ''}."
+            f"1999; Weibull curve, {100 * LAPSE_RATE:g} % lapses, flat prior). It never passed {rule.cap_n:g} N. A run "
+            f"ended after {rule.bayesian.trials} trials{spread_text if rule.bayesian.spread_db else ''}."
         )
     phases = conjoin([f"{phase.step_db:g} dB for {phase.reversals} reversals" for phase in rule.steps])
     up_rule = "every wrong answer" if rule.up_after_wrong == 1 else f"{rule.up_after_wrong} wrong answers in a row"

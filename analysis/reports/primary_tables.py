@@ -2,7 +2,8 @@
 
 Tables: median thresholds by frequency, contrasts between frequencies, likelihood thresholds of single runs, estimates
 per person, and goodness of fit. Forces are in N, level differences in dB. `psychophysics.hierarchy.primary` computes
-the values; this module only words them.
+the values, this module formats them. Called by `study_report`; `study.workflows.results.analyze_data` uses two of its
+formatters for the terminal.
 """
 
 import math
@@ -17,12 +18,12 @@ from analysis.psychophysics.hierarchy.run_likelihood import RunLikelihood, conve
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.two_analyses import describe_measured_coverage
 from analysis.reports.page import Section, Table
-from analysis.threshold_words import threshold_words
+from analysis.threshold_words import select_threshold_words
 from analysis.wording import MISSING, conjoin, format_number, format_p, format_p_text, format_signed
 
-AT_BOUND = 0.01
-"""Distance of the logarithm of a spread from its upper bound below which the search counts as ended at the bound."""
-MEANING = (
+BOUND_TOLERANCE_LOG = 0.01
+"""Distance of ln(standard deviation) from its upper bound below which the search counts as ended at the bound."""
+INTRODUCTION = (
     "One psychometric model of all answers: thresholds differ by frequency, by person, and by person at each "
     "frequency; slopes and response biases differ by person. An answer at the cap is an answer like any other, "
     "so nothing is censored and no participant is left out; levels that follow the answers do not bias the "
@@ -31,142 +32,147 @@ MEANING = (
 )
 """Introduction of the section on the model of all answers."""
 
-RUN_MEANING = (
+RUN_NOTE = (
     "From the answers at this frequency alone, with the person's slope and criterion and the lapse rate of the model. "
     "Above the cap, or below the levels played (right answers only): no size, a one-sided bound."
 )
-"""Note on the thresholds of single runs."""
-SINGLE_MEANING = (
+"""Note below the thresholds of single runs, where the model of all answers was fitted."""
+SINGLE_RUN_NOTE = (
     "From the answers at this frequency alone. What a run does not determine is averaged over typical participants: "
     "slopes within a factor of 1.5, response biases within 0.3 d', few lapses. Above the cap, or below the levels "
     "played (right answers only): no size, a one-sided bound."
 )
-"""Note on thresholds by likelihood where there is no model of all answers."""
-TOBIT_MEANING = (
+"""Note below the thresholds of single runs, where the model of all answers could not be fitted."""
+TOBIT_NOTE = (
     "A mean that the cap cut counts as at least this. A sensitivity analysis: {too_low}. Wald's intervals, t with "
     "n − 1 degrees of freedom."
 )
-"""Note on the contrasts by Tobit's model (values censored at the cap)."""
+"""Note below the contrasts by Tobit's model (values censored at the cap)."""
 
 
-def primary_section(analysis: StudyAnalysis) -> Section:
-    """Section on the model of all answers: medians, contrasts, runs, persons and goodness of fit. Without that model, a
-    section on thresholds by likelihood of single persons, or on the reason why there are none."""
+def make_primary_section(analysis: StudyAnalysis) -> Section:
+    """Make the section on the model of all answers: medians, contrasts, runs, persons and goodness of fit. Without that
+    model, the section holds the thresholds by likelihood of single persons, or the reason why there are none."""
     primary, means = analysis.primary, analysis.mean_contrasts
     if primary is None:
-        return _single_section(analysis)
-    words = threshold_words(analysis.protocol.staircase)
-    by_means = [_contrast_table(f"Differences by {words.means} (dB)", means, (), _coverage_notes(analysis, "means"))]
+        return _make_single_section(analysis)
+    phrases = select_threshold_words(analysis.protocol.staircase)
+    mean_tables = [
+        _make_contrast_table(f"Differences by {phrases.means} (dB)", means, (), _describe_coverage(analysis, "means"))
+    ]
     if analysis.tobit:
-        notes = (TOBIT_MEANING.format(too_low=words.too_low), *_coverage_notes(analysis, "tobit"))
-        by_means.append(_contrast_table("Sensitivity: differences by Tobit's model (dB)", analysis.tobit, (), notes))
-    model = _coverage_notes(analysis, "model")
+        tobit_notes = (TOBIT_NOTE.format(too_low=phrases.too_low), *_describe_coverage(analysis, "tobit"))
+        mean_tables.append(
+            _make_contrast_table("Sensitivity: differences by Tobit's model (dB)", analysis.tobit, (), tobit_notes)
+        )
+    coverage_notes = _describe_coverage(analysis, "model")
     return Section(
         "All answers in one model",
-        paragraphs=(MEANING, analysis.compared, _overall_paragraph(primary), limit_words(primary)),
+        paragraphs=(INTRODUCTION, analysis.compared, _describe_estimates(primary), describe_direction_limit(primary)),
         tables=(
-            _median_table(primary),
-            _contrast_table("Differences by the model (dB)", primary.contrasts, primary.medians, model),
-            *(by_means if means else []),
-            _run_table(primary.runs, primary.confidence, (RUN_MEANING, *_coverage_notes(analysis, "run"))),
-            _person_table(primary),
-            _goodness_table(primary),
+            _make_median_table(primary),
+            _make_contrast_table("Differences by the model (dB)", primary.contrasts, primary.medians, coverage_notes),
+            *(mean_tables if means else []),
+            _make_run_table(primary.runs, primary.confidence, (RUN_NOTE, *_describe_coverage(analysis, "run"))),
+            _make_person_table(primary),
+            _make_goodness_table(primary),
         ),
     )
 
 
-def _single_section(analysis: StudyAnalysis) -> Section:
-    """Section without a model of all answers: thresholds of single persons, or the reason why there are none."""
-    single = analysis.single
-    if single is None:
+def _make_single_section(analysis: StudyAnalysis) -> Section:
+    """Make the section without a model of all answers: thresholds of single persons, or why there are none."""
+    single_persons = analysis.single
+    if single_persons is None:
         return Section("All answers in one model", paragraphs=(analysis.compared,))
-    notes = (SINGLE_MEANING, *_coverage_notes(analysis, "single"))
-    table = _run_table(single.runs, single.confidence, notes)
+    run_notes = (SINGLE_RUN_NOTE, *_describe_coverage(analysis, "single"))
+    table = _make_run_table(single_persons.runs, single_persons.confidence, run_notes)
     return Section("Thresholds by likelihood", paragraphs=(analysis.compared,), tables=(replace(table, folded=False),))
 
 
-def _coverage_notes(analysis: StudyAnalysis, name: str) -> tuple[str, ...]:
-    """Notes on the measured coverage of an analysis's intervals where the cap cut the data
-    (`describe_measured_coverage`)."""
-    return describe_measured_coverage((name,), analysis.table, analysis.protocol.staircase)
+def _describe_coverage(analysis: StudyAnalysis, analysis_name: str) -> tuple[str, ...]:
+    """Describe the measured coverage of an analysis (`coverage_words.TITLES`) where the data are cut or stopped; else
+    empty."""
+    return describe_measured_coverage((analysis_name,), analysis.table, analysis.protocol.staircase)
 
 
-def _overall_paragraph(primary: PrimaryAnalysis) -> str:
-    """Paragraph on the test over all frequencies, the spread between people, and the common parameters."""
+def _describe_estimates(primary: PrimaryAnalysis) -> str:
+    """Describe the test over all frequencies, the standard deviations between persons and the common parameters, with
+    warnings where the fit did not converge or does not determine them."""
     overall = primary.overall
-    people = f" ({overall.participants} people with enough answers at each)" if overall.left_out else ""
-    test = (
-        f"Frequencies differ{people}: F = {format_number(overall.f)}, Huynh-Feldt epsilon "
+    participant_note = f" ({overall.participants} people with enough answers at each)" if overall.left_out else ""
+    test_text = (
+        f"Frequencies differ{participant_note}: F = {format_number(overall.f)}, Huynh-Feldt epsilon "
         f"{format_number(overall.epsilon_huynh_feldt)}, {format_p_text(overall.p_huynh_feldt)}. "
         if overall.f is not None
         else ""
     )
     return (
-        f"{test}People differ by {format_number(primary.person_sd_db, 1)} dB (standard deviation) at all frequencies, "
-        f"and by {format_number(primary.frequency_sd_db, 1)} dB more from frequency to frequency. Median slope "
-        f"{format_number(primary.slope)} ({primary.family.value}), lapse rate "
+        f"{test_text}People differ by {format_number(primary.person_sd_db, 1)} dB (standard deviation) at all "
+        f"frequencies, and by {format_number(primary.frequency_sd_db, 1)} dB more from frequency to frequency. "
+        f"Median slope {format_number(primary.slope)} ({primary.family.value}), lapse rate "
         f"{format_number(100 * primary.lapse, 1)} %, response bias "
         f"{format_number(primary.criterion_sd)} (standard deviation, in units of d')."
         + ("" if primary.converged else " The fit did not converge: do not use these numbers.")
         + describe_undetermined(primary)
-        + far_above_words(primary)
+        + describe_far_above(primary)
     )
 
 
-def far_above_words(primary: PrimaryAnalysis) -> str:
-    """Sentence, with a leading space, on frequencies whose medians lie so far above the cap that they cannot be
-    compared with each other; empty with fewer than two such frequencies."""
+def describe_far_above(primary: PrimaryAnalysis) -> str:
+    """Describe the frequencies whose medians lie so far above the cap that they cannot be compared with each other: a
+    sentence with a leading space; empty with fewer than two such frequencies."""
     if len(primary.far_above_hz) < 2:
         return ""
-    names = conjoin([f"{frequency_hz:g} Hz" for frequency_hz in primary.far_above_hz])
-    return f" At {names} the medians lie at more than twice the cap: the differences between these are not known."
+    far_hz = conjoin([f"{frequency_hz:g} Hz" for frequency_hz in primary.far_above_hz])
+    return f" At {far_hz} the medians lie at more than twice the cap: the differences between these are not known."
 
 
 def describe_undetermined(primary: PrimaryAnalysis) -> str:
-    """Sentences, with a leading space, where a spread between people ended at the upper bound of its search; else
-    empty. This happens with few people, whose answers make slopes of 2 and of 20 almost equally likely."""
+    """Describe the standard deviations between persons whose search ended at its upper bound: sentences with a leading
+    space; else empty. With few persons, slopes of 2 and of 20 are almost equally likely."""
     spreads = (primary.person_sd_db, primary.frequency_sd_db, primary.slope_log_sd, primary.criterion_sd)
-    names = ("thresholds", "thresholds from frequency to frequency", "slopes", "response biases")
-    at_bound = [
+    quantity_names = ("thresholds", "thresholds from frequency to frequency", "slopes", "response biases")
+    undetermined = [
         name
-        for name, spread, (_, highest) in zip(names, spreads, LOG_SD_BOUNDS, strict=True)
-        if math.log(spread) > highest - AT_BOUND
+        for name, spread, (_, upper_bound) in zip(quantity_names, spreads, LOG_SD_BOUNDS, strict=True)
+        if math.log(spread) > upper_bound - BOUND_TOLERANCE_LOG
     ]
-    if not at_bound:
+    if not undetermined:
         return ""
     return (
-        f" The answers do not determine how much people differ in their {conjoin(at_bound)}: the search ended at its "
-        "bound. Do not use the median slope, nor single curves."
+        f" The answers do not determine how much people differ in their {conjoin(undetermined)}: the search ended at "
+        "its bound. Do not use the median slope, nor single curves."
     )
 
 
-def limit_words(primary: PrimaryAnalysis) -> str:
-    """Sentence on the direction limit: the frequency (Hz) at which the median participant's threshold reaches the cap,
-    with its interval."""
+def describe_direction_limit(primary: PrimaryAnalysis) -> str:
+    """Describe the direction limit in a sentence: the frequency (Hz) at which the median participant's threshold
+    reaches the cap, with its interval; or that there is none within the tested frequencies."""
     limit = primary.limit
-    low, high = primary.frequencies_hz[0], primary.frequencies_hz[-1]
-    lower = f"{limit.lower_hz:.1f} Hz" if limit.lower_hz is not None else f"below {low:g} Hz"
-    upper = f"{limit.upper_hz:.1f} Hz" if limit.upper_hz is not None else f"above {high:g} Hz"
+    lowest_hz, highest_hz = primary.frequencies_hz[0], primary.frequencies_hz[-1]
+    lower_text = f"{limit.lower_hz:.1f} Hz" if limit.lower_hz is not None else f"below {lowest_hz:g} Hz"
+    upper_text = f"{limit.upper_hz:.1f} Hz" if limit.upper_hz is not None else f"above {highest_hz:g} Hz"
     if limit.frequency_hz is None:
-        return f"Direction limit: none within {low:g} to {high:g} Hz. {limit.words}"
-    percent = f"{100 * primary.confidence:g} %"
+        return f"Direction limit: none within {lowest_hz:g} to {highest_hz:g} Hz. {limit.words}"
+    confidence_text = f"{100 * primary.confidence:g} %"
     return (
         f"Direction limit: the median participant's threshold reaches the cap at {limit.frequency_hz:.1f} Hz "
-        f"({percent} interval: {lower} to {upper}). {limit.words}"
+        f"({confidence_text} interval: {lower_text} to {upper_text}). {limit.words}"
     )
 
 
-def _median_table(primary: PrimaryAnalysis) -> Table:
-    """Table of the median thresholds with intervals, in N and in dB re 1 N."""
+def _make_median_table(primary: PrimaryAnalysis) -> Table:
+    """Make the table of the median thresholds with intervals, in N and in dB re 1 N."""
     rows = []
     for median in primary.medians:
-        interval_n = interval_words(median.lower_n, median.upper_n, median.above_cap)
-        interval_db = interval_words(median.lower_db, median.upper_db, median.above_cap, 1)
-        size = "above the cap" if median.above_cap else format_number(median.newton)
+        interval_n = format_median_interval(median.lower_n, median.upper_n, median.above_cap)
+        interval_db = format_median_interval(median.lower_db, median.upper_db, median.above_cap, 1)
+        threshold_text = "above the cap" if median.above_cap else format_number(median.newton)
         rows.append(
             (
                 f"{median.frequency_hz:g} Hz",
-                size,
+                threshold_text,
                 interval_n,
                 MISSING if median.above_cap else format_number(median.db, 1),
                 interval_db,
@@ -181,9 +187,9 @@ def _median_table(primary: PrimaryAnalysis) -> Table:
     )
 
 
-def interval_words(lower: float | None, upper: float | None, above_cap: bool, digits: int = 2) -> str:
-    """Interval of a median as text. upper: None above the cap. lower: None where there are too few people, or where no
-    lower bound was found above the cap."""
+def format_median_interval(lower: float | None, upper: float | None, above_cap: bool, digits: int = 2) -> str:
+    """Format the interval of a median threshold. upper: None above the cap. lower: None where there are too few people,
+    or, above the cap, where no lower bound was found."""
     if lower is None:
         return "no lower bound" if above_cap else "no interval: too few people"
     return (
@@ -193,74 +199,75 @@ def interval_words(lower: float | None, upper: float | None, above_cap: bool, di
     )
 
 
-def _contrast_table(
-    caption: str, rows: Sequence[Contrast], medians: Sequence[MedianThreshold], notes: Sequence[str]
+def _make_contrast_table(
+    caption: str, contrasts: Sequence[Contrast], medians: Sequence[MedianThreshold], notes: Sequence[str]
 ) -> Table:
-    """Table of differences between two frequencies in dB; frequencies whose medians are above the cap are marked."""
-    above = {median.frequency_hz for median in medians if median.above_cap}
+    """Make the table of differences between two frequencies (dB); those whose median is above the cap are marked."""
+    above_cap_hz = {median.frequency_hz for median in medians if median.above_cap}
     return Table(
         caption=caption,
         header=("Contrast", "n", "Difference", "95 % interval", "p", "p (Holm)", "d_z", "p equivalent", "p spread"),
         rows=tuple(
             (
-                f"{c.frequency_hz:g} − {c.against_hz:g} Hz{' *' * (c.frequency_hz in above)}",
-                str(c.participants),
-                format_signed(c.difference_db, 1),
-                f"{format_signed(c.lower_db, 1)} to {format_signed(c.upper_db, 1)}",
-                format_p(c.p),
-                format_p(c.p_holm),
-                format_number(c.effect_size),
-                format_p(c.p_equivalence),
-                format_p(c.p_spread),
+                f"{contrast.frequency_hz:g} − {contrast.against_hz:g} Hz"
+                f"{' *' * (contrast.frequency_hz in above_cap_hz)}",
+                str(contrast.participants),
+                format_signed(contrast.difference_db, 1),
+                f"{format_signed(contrast.lower_db, 1)} to {format_signed(contrast.upper_db, 1)}",
+                format_p(contrast.p),
+                format_p(contrast.p_holm),
+                format_number(contrast.effect_size),
+                format_p(contrast.p_equivalence),
+                format_p(contrast.p_spread),
             )
-            for c in rows
+            for contrast in contrasts
         ),
         notes=(
             "Within participants, t with n − 1 degrees of freedom; n have enough answers at both. Equivalent: two "
             f"one-sided tests within ±{EQUIVALENCE_DB:g} dB. Spread: Pitman and Morgan, whether people differ equally "
             "much at both.",
-            *(("* The median is above the cap: only the lower end of the interval is known.",) if above else ()),
+            *(("* The median is above the cap: only the lower end of the interval is known.",) if above_cap_hz else ()),
             *notes,
         ),
     )
 
 
-def _run_table(runs: Sequence[RunLikelihood], confidence: float, notes: tuple[str, ...]) -> Table:
-    """Table of the maximum-likelihood thresholds of single runs, in N."""
+def _make_run_table(runs: Sequence[RunLikelihood], confidence: float, notes: tuple[str, ...]) -> Table:
+    """Make the folded table of the maximum-likelihood thresholds (N) of single runs. confidence: 0 to 1."""
     return Table(
         caption="Single thresholds by maximum likelihood (N)",
         header=("Participant", "Frequency", "Trials", "Threshold", f"{100 * confidence:g} % likelihood interval"),
-        rows=tuple((run.subject, f"{run.frequency_hz:g} Hz", str(run.trials), *run_words(run)) for run in runs),
+        rows=tuple((run.subject, f"{run.frequency_hz:g} Hz", str(run.trials), *format_run(run)) for run in runs),
         notes=notes,
         folded=True,
     )
 
 
-def run_words(run: RunLikelihood) -> tuple[str, str]:
-    """Threshold and likelihood interval in N; a dash for an interval that excludes no threshold."""
-    lower, upper = convert_to_newton(run.lower_db), convert_to_newton(run.upper_db)
+def format_run(run: RunLikelihood) -> tuple[str, str]:
+    """Format threshold and likelihood interval of a run (N), one-sided where an end is unknown; a dash without ends."""
+    lower_n, upper_n = convert_to_newton(run.lower_db), convert_to_newton(run.upper_db)
     if run.below:
-        size = "below the levels played"
+        threshold_text = "below the levels played"
     else:
-        size = "above the cap" if run.db is None else format_number(convert_to_newton(run.db))
-    if lower is not None and upper is not None:
-        return size, f"{format_number(lower)} to {format_number(upper)}"
-    if upper is not None:
-        return size, f"below {format_number(upper)}"
-    return size, MISSING if lower is None else f"above {format_number(lower)}"
+        threshold_text = "above the cap" if run.db is None else format_number(convert_to_newton(run.db))
+    if lower_n is not None and upper_n is not None:
+        return threshold_text, f"{format_number(lower_n)} to {format_number(upper_n)}"
+    if upper_n is not None:
+        return threshold_text, f"below {format_number(upper_n)}"
+    return threshold_text, MISSING if lower_n is None else f"above {format_number(lower_n)}"
 
 
-def _person_table(primary: PrimaryAnalysis) -> Table:
-    """Table of the model's estimates per person: thresholds in N, slope, criterion (shrunk towards the population)."""
+def _make_person_table(primary: PrimaryAnalysis) -> Table:
+    """Make the folded table of the model's estimates per person: thresholds (N), slope, criterion (units of d')."""
     return Table(
         caption="Thresholds of the participants by the model (N)",
-        header=("Participant", *(f"{f:g} Hz" for f in primary.frequencies_hz), "Slope", "Criterion"),
+        header=("Participant", *(f"{hz:g} Hz" for hz in primary.frequencies_hz), "Slope", "Criterion"),
         rows=tuple(
             (
                 person.subject,
                 *(
-                    "above the cap" if above else format_number(value)
-                    for value, above in zip(person.thresholds_n, person.above_cap, strict=True)
+                    "above the cap" if is_above_cap else format_number(threshold_n)
+                    for threshold_n, is_above_cap in zip(person.thresholds_n, person.above_cap, strict=True)
                 ),
                 format_number(person.slope),
                 format_signed(person.criterion),
@@ -275,14 +282,14 @@ def _person_table(primary: PrimaryAnalysis) -> Table:
     )
 
 
-def _goodness_table(primary: PrimaryAnalysis) -> Table:
-    """Table of predicted and observed shares of right answers, by bins of trials."""
+def _make_goodness_table(primary: PrimaryAnalysis) -> Table:
+    """Make the folded table of predicted and observed shares of correct answers, by bins of trials."""
     return Table(
         caption="Predicted and observed shares of right answers",
         header=("Trials", "Predicted", "Observed", "z"),
         rows=tuple(
-            (str(b.trials), f"{100 * b.predicted:.1f} %", f"{100 * b.observed:.1f} %", format_signed(b.z, 1))
-            for b in primary.goodness.bins
+            (str(row.trials), f"{100 * row.predicted:.1f} %", f"{100 * row.observed:.1f} %", format_signed(row.z, 1))
+            for row in primary.goodness.bins
         ),
         notes=(
             "Levels follow answers and persons were fitted to theirs, so single shares deviate by up to three "

@@ -1,4 +1,9 @@
-"""Report of a folder of real recordings: named effects, residuals, and an expert's objections."""
+"""HTML report of a folder of real recordings: the diagnosis of each recording, what could not be used, and tests with
+an injected effect.
+
+Per recording: verdict, named effects, fitted parameters, errors on held-out data, and the objections an expert may
+raise. Called by `study.evaluation.real.write_real`.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,42 +25,50 @@ VERDICT_WORDS = {
     "unexplained": "unexplained",
     "refused": "refused",
 }
+"""Words for the verdict of a diagnosis (`RealAnswer.verdict`)."""
 
 
 @dataclass(frozen=True, slots=True)
-class Trouble:
-    """A folder or file that could not be used."""
+class UnusableInput:
+    """A folder of recordings that could not be used; made by `study.evaluation.real.real_folder`."""
 
     location: str
+    """Name of the sub-folder, or of the folder itself where it has no sub-folders."""
     reason: str
+    """The reason, as a sentence."""
 
 
 def render_real_report(
     answers: Sequence[RealAnswer],
-    troubles: Sequence[Trouble],
-    injected: Sequence[InjectedOutcome],
+    unusable_inputs: Sequence[UnusableInput],
+    injected_outcomes: Sequence[InjectedOutcome],
     pictures: Mapping[tuple[str, str], Picture],
     provenance: Mapping[str, str],
     generated: str,
 ) -> str:
-    """HTML. pictures: by folder and recording."""
-    sections = [Section("All recordings", tables=(overview_table(answers),))]
-    if troubles:
+    """Render the report as an HTML page. injected_outcomes: diagnoses of recordings with an injected effect; empty: the
+    section is left out. pictures: by folder and recording; a missing picture is left out. provenance: versions and
+    inputs by name. generated: local time of the report."""
+    sections = [Section("All recordings", tables=(make_overview_table(answers),))]
+    if unusable_inputs:
         sections.append(
             Section(
-                "What could not be used", points=tuple(f"{trouble.location}: {trouble.reason}" for trouble in troubles)
+                "What could not be used",
+                points=tuple(
+                    f"{unusable_input.location}: {unusable_input.reason}" for unusable_input in unusable_inputs
+                ),
             )
         )
-    sections += [_recording_section(answer, pictures.get((answer.folder, answer.recording))) for answer in answers]
-    if injected:
-        sections.append(make_injected_section(injected))
+    sections += [_make_recording_section(answer, pictures.get((answer.folder, answer.recording))) for answer in answers]
+    if injected_outcomes:
+        sections.append(make_injected_section(injected_outcomes))
     named_count = sum(bool(answer.effects) for answer in answers)
     return render_page(
         Page(
             title="Diagnosis of real recordings",
             summary=f"{len(answers)} recordings of real devices were compared with simple models; in {named_count} of "
             "them physics was named. The remaining error and the objections to each answer are given with it.",
-            banner=_banner(troubles),
+            banner=_describe_unusable_inputs(unusable_inputs),
             sections=tuple(sections),
             generated=generated,
             provenance=provenance,
@@ -63,9 +76,9 @@ def render_real_report(
     )
 
 
-def overview_table(answers: Sequence[RealAnswer]) -> Table:
-    """Table of all recordings: verdict, named effects, held-out errors of each model as shares of the signal, and
-    seconds."""
+def make_overview_table(answers: Sequence[RealAnswer]) -> Table:
+    """Make the table of all recordings: verdict, named effects, held-out errors of each model as shares of the signal,
+    and duration of the diagnosis in s."""
     header = (
         "recording",
         "verdict",
@@ -78,26 +91,31 @@ def overview_table(answers: Sequence[RealAnswer]) -> Table:
         "s",
     )
     return Table(
-        "Errors on held-out data, shares of the signal", header, tuple(_overview_row(answer) for answer in answers)
+        "Errors on held-out data, shares of the signal",
+        header,
+        tuple(_format_overview_row(answer) for answer in answers),
     )
 
 
-def _overview_row(real_answer: RealAnswer) -> tuple[str, ...]:
+def _format_overview_row(real_answer: RealAnswer) -> tuple[str, ...]:
+    """Format the row of a recording. A dash stands for the error with effects where no effect is named, and for that of
+    the black box where it was not computed; the other errors are empty where nothing was held out."""
     errors = real_answer.held_out
     error_texts = (
         ("", "", "", "") if errors is None else tuple(map(format_error, (errors.before, errors.retuned, errors.noise)))
     )
     before_text, retuned_text, noise_text = error_texts[:3]
     after_text = format_error(errors.after) if errors is not None and real_answer.effects else "-"
-    effect_names = ", ".join(real_answer.effects) or _first_candidate(real_answer) or "-"
+    effect_names = ", ".join(real_answer.effects) or _describe_first_candidate(real_answer) or "-"
     black_box_text = "-" if real_answer.black_box is None else format_error(real_answer.black_box)
     return (
-        _recording_title(real_answer), VERDICT_WORDS[real_answer.verdict], effect_names,
+        _format_recording_title(real_answer), VERDICT_WORDS[real_answer.verdict], effect_names,
         before_text, retuned_text, after_text, black_box_text, noise_text, f"{real_answer.seconds:.0f}",
     )  # fmt: skip
 
 
-def _first_candidate(real_answer: RealAnswer) -> str:
+def _describe_first_candidate(real_answer: RealAnswer) -> str:
+    """Describe the best candidate that was not confirmed, where the verdict is "unexplained"; else empty."""
     return (
         f"not confirmed: {real_answer.candidates[0].effect}"
         if real_answer.candidates and real_answer.verdict == "unexplained"
@@ -105,20 +123,24 @@ def _first_candidate(real_answer: RealAnswer) -> str:
     )
 
 
-def _banner(troubles: Sequence[Trouble]) -> str:
-    if not troubles:
+def _describe_unusable_inputs(unusable_inputs: Sequence[UnusableInput]) -> str:
+    """Describe in a sentence how many inputs could not be used, for the banner; empty where there are none."""
+    if not unusable_inputs:
         return ""
-    return f"{len(troubles)} folders or files could not be used; they are named below."
+    return f"{len(unusable_inputs)} folders or files could not be used; they are named below."
 
 
-def _recording_section(real_answer: RealAnswer, picture: Picture | None) -> Section:
+def _make_recording_section(real_answer: RealAnswer, picture: Picture | None) -> Section:
+    """Make the section of one recording: verdict and model as paragraphs; location of the mismatch, named effects,
+    parameters, further tests, remarks and objections as a list; errors by stretch as a table. The picture is shown only
+    where it has rows of errors."""
     points = (
         *real_answer.where,
         *real_answer.named,
-        *(parameter_sentence(number) for number in real_answer.numbers),
-        *_pair_points(real_answer.pair),
+        *(describe_parameter(parameter) for parameter in real_answer.numbers),
+        *_describe_pair(real_answer.pair),
     )
-    further_sentences = tuple(_further_sentence(*test) for test in _further_tests(real_answer))
+    further_sentences = tuple(_describe_further_test(*test) for test in _list_further_tests(real_answer))
     objections = tuple(f"An expert would object: {objection}" for objection in real_answer.objections)
     paragraphs = (
         *((real_answer.title,) if real_answer.title else ()),
@@ -128,15 +150,17 @@ def _recording_section(real_answer: RealAnswer, picture: Picture | None) -> Sect
         *((real_answer.left,) if real_answer.left else ()),
     )
     return Section(
-        _recording_title(real_answer),
+        _format_recording_title(real_answer),
         paragraphs=paragraphs,
         points=(*points, *real_answer.not_confirmed, *further_sentences, *real_answer.remarks, *objections),
         pictures=(picture,) if picture is not None and list_error_rows(real_answer) else (),
-        tables=_stretch_tables(real_answer),
+        tables=_make_stretch_tables(real_answer),
     )
 
 
-def _stretch_tables(real_answer: RealAnswer) -> tuple[Table, ...]:
+def _make_stretch_tables(real_answer: RealAnswer) -> tuple[Table, ...]:
+    """Make the table of root-mean-square errors by held-out stretch and channel, those of further tests included; empty
+    without stretches. The ratio is a dash where the re-tuned model has no error."""
     stretches = (*real_answer.stretches, *(stretch for test in real_answer.further for stretch in test.stretches))
     if not stretches:
         return ()
@@ -154,23 +178,30 @@ def _stretch_tables(real_answer: RealAnswer) -> tuple[Table, ...]:
     return (Table("Root-mean-square errors, stretch by stretch", header, rows),)
 
 
-def parameter_sentence(parameter: OwnParameter) -> str:
-    """Sentence that compares a fitted parameter of the model with its value known by other means, where there is such a
-    value."""
+def describe_parameter(parameter: OwnParameter) -> str:
+    """Describe a fitted parameter of the model in a sentence with its 95 % interval and, where its value is known by
+    other means, with its deviation from it in % (none from 0)."""
     interval = None if parameter.low is None or parameter.high is None else (parameter.low, parameter.high)
-    text = f"The model's {parameter.name} is {format_value(parameter.value, parameter.unit, interval)} after everything"
+    value_text = (
+        f"The model's {parameter.name} is {format_value(parameter.value, parameter.unit, interval)} after everything"
+    )
     if parameter.nominal is None:
-        return f"{text}."
-    deviation_percent = 100 * (parameter.value / parameter.nominal - 1)
-    interval_words = {True: ", and the interval holds it", False: ", and the interval does not hold it", None: ""}
+        return f"{value_text}."
+    deviation_text = ""
+    if parameter.nominal:
+        deviation_percent = 100 * (parameter.value / parameter.nominal - 1)
+        deviation_text = f", {typeset(f'{deviation_percent:+.2g}')} % off"
+    interval_clauses = {True: ", and the interval holds it", False: ", and the interval does not hold it", None: ""}
     nominal_text = format_value(parameter.nominal, parameter.unit)
     return (
-        f"{text}; known by other means is {nominal_text}, {typeset(f'{deviation_percent:+.2g}')} % off"
-        f"{interval_words[parameter.holds_nominal]}."
+        f"{value_text}; known by other means is {nominal_text}{deviation_text}"
+        f"{interval_clauses[parameter.holds_nominal]}."
     )
 
 
-def _pair_points(pair: PairOutcome | None) -> tuple[str, ...]:
+def _describe_pair(pair: PairOutcome | None) -> tuple[str, ...]:
+    """Describe the comparison of the device before and after a change that was really made, as sentences; empty without
+    one."""
     if pair is None:
         return ()
     effect_names = ", ".join(pair.named) if pair.named else "no effect of the catalogue"
@@ -183,11 +214,15 @@ def _pair_points(pair: PairOutcome | None) -> tuple[str, ...]:
     )
 
 
-def _further_tests(real_answer: RealAnswer) -> list[tuple[str, str, float | None, float | None, str]]:
+def _list_further_tests(real_answer: RealAnswer) -> list[tuple[str, str, float | None, float | None, str]]:
+    """List the arguments of `_describe_further_test` for each further test: recording, error measure, errors of the
+    re-tuned model and of the model with the named effects, and problem."""
     return [(test.recording, test.error, test.retuned, test.after, test.problem) for test in real_answer.further]
 
 
-def _further_sentence(recording: str, error: str, retuned: float | None, after: float | None, problem: str) -> str:
+def _describe_further_test(recording: str, error: str, retuned: float | None, after: float | None, problem: str) -> str:
+    """Describe a further test in a sentence: its errors as shares of the signal (retuned: of the re-tuned model; after:
+    with the named effects), or the problem for which it could not be made. error: name of the error measure."""
     if problem:
         return f"A further test, {recording}, could not be made: {problem}"
     return (
@@ -196,8 +231,8 @@ def _further_sentence(recording: str, error: str, retuned: float | None, after: 
     )
 
 
-def _recording_title(real_answer: RealAnswer) -> str:
-    """A folder's only recording is often called like it."""
+def _format_recording_title(real_answer: RealAnswer) -> str:
+    """Format the title of a recording: folder and name, or the name alone where both are the same."""
     return (
         real_answer.recording
         if real_answer.recording == real_answer.folder

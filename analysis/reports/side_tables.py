@@ -1,7 +1,7 @@
-"""Tables of a study report on detection, delivered acceleration, catch trials and practice.
+"""Tables of a study report on detection, delivered acceleration, catch trials and practice; called by `study_report`.
 
-They supplement the direction thresholds: detection thresholds tell whether a vibration is felt at all, the ratio of
-delivered to wanted acceleration whether the stimulus was as intended, catch trials how attentive a participant was.
+They supplement the direction thresholds. Detection thresholds: from which level a vibration is felt at all. Delivered
+over wanted acceleration: whether the stimulus was as intended. Catch trials: how attentive a participant was.
 """
 
 from collections.abc import Iterator
@@ -11,34 +11,43 @@ from analysis.psychophysics.equalized_delivery import compute_deliveries
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.reports.methods_text import describe_levels
 from analysis.reports.page import Table
-from analysis.threshold_words import threshold_words
+from analysis.threshold_words import select_threshold_words
 from analysis.wording import MISSING, format_number, format_signed, mark_cut
 from protocols.procedure.staircase import to_db
 
 
-def detection_table(analysis: StudyAnalysis) -> Table:
-    """Table of detection and direction thresholds (N) per participant and frequency, with their ratio in dB."""
-    table = analysis.detection_table
+def make_detection_table(analysis: StudyAnalysis) -> Table:
+    """Make the table of detection and direction thresholds (N) per participant and frequency, with their ratio in
+    dB."""
+    thresholds = analysis.detection_table
     rows = [
-        (subject, f"{frequency:g} Hz", *_detection_cells(analysis, subject, frequency, value, bound))
-        for subject, values, bounds in zip(table.subjects, table.values, table.censored, strict=True)
-        for frequency, value, bound in zip(table.frequencies_hz, values, bounds, strict=True)
+        (
+            subject,
+            f"{frequency_hz:g} Hz",
+            *_format_detection_cells(analysis, subject, frequency_hz, detection_n, detection_is_cut),
+        )
+        for subject, subject_thresholds_n, subject_is_cut in zip(
+            thresholds.subjects, thresholds.values, thresholds.censored, strict=True
+        )
+        for frequency_hz, detection_n, detection_is_cut in zip(
+            thresholds.frequencies_hz, subject_thresholds_n, subject_is_cut, strict=True
+        )
     ]
     return Table(
         caption="Thresholds of detection (N)",
         header=("Participant", "Frequency", "Felt from", "Direction felt from", "Direction above detection (dB)"),
         rows=tuple(rows),
         notes=(
-            f"{threshold_words(analysis.protocol.staircase).cut_note} –: no completed run. The last column is given "
-            "where both are thresholds. Near 0 dB the vibration has a direction as soon as it is felt; far above, it "
-            "is felt long before its direction is.",
+            f"{select_threshold_words(analysis.protocol.staircase).cut_note} –: no completed run. The last column is "
+            "given where both are thresholds. Near 0 dB the vibration has a direction as soon as it is felt; far "
+            "above, it is felt long before its direction is.",
         ),
     )
 
 
-def detection_run_table(analysis: StudyAnalysis) -> Table:
-    """Folded table of all detection runs: thresholds in newtons, trials, share of right answers, d' of two intervals,
-    and criterion."""
+def make_detection_run_table(analysis: StudyAnalysis) -> Table:
+    """Make the folded table of all detection runs: thresholds (N), reversals (for staircases only), trials, share of
+    correct answers in %, d' of two intervals, and criterion."""
     reversal_header = () if analysis.protocol.staircase.is_bayesian else ("Reversals",)
     return Table(
         caption="All detection runs",
@@ -57,14 +66,14 @@ def detection_run_table(analysis: StudyAnalysis) -> Table:
     )  # fmt: skip
 
 
-def delivery_tables(analysis: StudyAnalysis) -> tuple[Table, ...]:
-    """Table of delivered over wanted acceleration by frequency; empty where levels are commanded forces."""
+def make_delivery_tables(analysis: StudyAnalysis) -> tuple[Table, ...]:
+    """Make the table of delivered over wanted acceleration by frequency; empty where levels are commanded forces."""
     rows = tuple(
         (
             f"{delivery.frequency_hz:g} Hz",
             str(delivery.trials),
-            *map(_percent_text, delivery.along),
-            _percent_text(delivery.off_axis),
+            *map(_format_percent, delivery.along),
+            _format_percent(delivery.off_axis),
         )
         for delivery in compute_deliveries(analysis.trials)
     )
@@ -75,12 +84,13 @@ def delivery_tables(analysis: StudyAnalysis) -> tuple[Table, ...]:
     return (Table("What arrived of what was wanted", header, rows, notes=(note,)),)
 
 
-def _percent_text(share: float | None) -> str:
+def _format_percent(share: float | None) -> str:
+    """Format a ratio in percent without decimals; a dash for None."""
     return MISSING if share is None else f"{100 * share:.0f} %"
 
 
-def catch_table(analysis: StudyAnalysis) -> Table:
-    """Table of catch trials by participant and frequency, with the lapse rate and its 95 % interval."""
+def make_catch_table(analysis: StudyAnalysis) -> Table:
+    """Make the table of catch trials by participant and frequency, with the lapse rate and Wilson's 95 % interval."""
     return Table(
         caption="Catch trials",
         header=("Participant", "Frequency", "Given", "Wrong", "Lapse rate", "95 % interval"),
@@ -102,8 +112,9 @@ def catch_table(analysis: StudyAnalysis) -> Table:
     )
 
 
-def practice_table(analysis: StudyAnalysis) -> Table:
-    """Folded table of practice runs, with right answers and whether each was passed, not passed or broken off."""
+def make_practice_table(analysis: StudyAnalysis) -> Table:
+    """Make the folded table of practice runs, with correct answers and whether each was passed, not passed or broken
+    off."""
     settings = analysis.protocol.practice
     return Table(
         caption="Practice runs",
@@ -133,12 +144,12 @@ def practice_table(analysis: StudyAnalysis) -> Table:
     )
 
 
-def _detection_cells(
+def _format_detection_cells(
     analysis: StudyAnalysis, subject: str, frequency_hz: float, detection_n: float | None, detection_is_cut: bool
 ) -> Iterator[str]:
-    """Cells with the detection threshold, the direction threshold, and their ratio in dB where neither is cut.
-    detection_n: detection threshold (N); detection_is_cut: whether the cap cut it."""
-    direction_n, direction_is_cut = _direction_cell(analysis, subject, frequency_hz)
+    """Format the cells of detection threshold, direction threshold and their ratio in dB; the ratio is a dash where
+    either is missing or cut. detection_n: detection threshold (N); detection_is_cut: whether the cap cut it."""
+    direction_n, direction_is_cut = _find_direction_threshold(analysis, subject, frequency_hz)
     yield mark_cut(detection_n, detection_is_cut)
     yield mark_cut(direction_n, direction_is_cut)
     if detection_n is None or direction_n is None or detection_is_cut or direction_is_cut:
@@ -147,10 +158,11 @@ def _detection_cells(
         yield format_signed(to_db(direction_n) - to_db(detection_n), 1)
 
 
-def _direction_cell(analysis: StudyAnalysis, subject: str, frequency_hz: float) -> tuple[float | None, bool]:
-    """Direction threshold (N; None where missing), and whether the cap cut it."""
-    table = analysis.table
-    if subject not in table.subjects or frequency_hz not in table.frequencies_hz:
+def _find_direction_threshold(analysis: StudyAnalysis, subject: str, frequency_hz: float) -> tuple[float | None, bool]:
+    """Find the direction threshold (N) of a participant at a frequency, and whether the cap cut it; None where
+    missing."""
+    thresholds = analysis.table
+    if subject not in thresholds.subjects or frequency_hz not in thresholds.frequencies_hz:
         return None, False
-    row, column = table.subjects.index(subject), table.frequencies_hz.index(frequency_hz)
-    return table.values[row][column], table.censored[row][column]
+    row, column = thresholds.subjects.index(subject), thresholds.frequencies_hz.index(frequency_hz)
+    return thresholds.values[row][column], thresholds.censored[row][column]

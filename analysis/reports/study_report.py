@@ -2,8 +2,9 @@
 
 This module decides which sections the page has and in which order: declared contrast, quality of the device model,
 warnings, thresholds and their comparison, detection, catch and practice trials, delivered stimuli, cues, acceleration
-ellipses, single runs, methods. The tables come from `study_tables` and its neighbours, the statistics from
-`analysis.psychophysics.study_analysis`; no statistic is computed here.
+ellipses, single runs, methods. The tables come from `study_tables`, `primary_tables` and `side_tables`, the statistics
+from `analysis.psychophysics.study_analysis`; no statistic is computed here. Called by
+`study.workflows.results.analyze_data`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,22 +18,22 @@ from analysis.reports.cue_section import make_cue_sections
 from analysis.reports.declared_section import make_declared_section
 from analysis.reports.methods_text import compose_methods_text
 from analysis.reports.page import Page, Section, render_page
-from analysis.reports.primary_tables import primary_section
+from analysis.reports.primary_tables import make_primary_section
 from analysis.reports.side_tables import (
-    catch_table,
-    delivery_tables,
-    detection_run_table,
-    detection_table,
-    practice_table,
+    make_catch_table,
+    make_delivery_tables,
+    make_detection_run_table,
+    make_detection_table,
+    make_practice_table,
 )
 from analysis.reports.study_tables import (
-    ellipsoid_table,
-    group_table,
-    one_way_table,
-    pair_table,
-    run_table,
-    threshold_table_text,
-    within_table,
+    make_ellipsoid_table,
+    make_group_table,
+    make_one_way_table,
+    make_pair_table,
+    make_run_table,
+    make_threshold_table,
+    make_within_table,
 )
 
 _BANNERS = {
@@ -53,29 +54,30 @@ def render_study_report(
     ellipsoids: Sequence[EllipsoidResult] = (),
     qualities: Sequence[tuple[str, str]] = (),
 ) -> str:
-    """The page as HTML text.
+    """Render the report as an HTML page.
 
-    pictures: those of `analysis.figures.study_pictures` for the same analysis and ellipsoids. provenance: versions,
-    hashes and inputs by name. generated: local time of the report with its UTC offset. qualities: pairs (sessions,
-    sentence) on the device models that converted accelerations to forces.
+    pictures: those of `analysis.figures.study_pictures` for the same analysis and ellipsoids, recognised by name.
+    provenance: versions, hashes and inputs by name. generated: local time of the report with its UTC offset.
+    ellipsoids: of the recordings of the device; may be empty. qualities: pairs (sessions, sentence) on the device
+    models that converted accelerations to forces; empty without models.
     """
-    by_name = {picture.name: picture for picture in pictures}
+    pictures_by_name = {picture.name: picture for picture in pictures}
     sections = [
-        *_declared_sections(analysis),
-        *_model_sections(qualities),
-        _warning_section(analysis),
-        *_result_sections(analysis, by_name),
-        *_side_sections(analysis),
-        *_delivery_sections(analysis, by_name),
+        *_make_declared_sections(analysis),
+        *_make_model_sections(qualities),
+        _make_warning_section(analysis),
+        *_make_result_sections(analysis, pictures_by_name),
+        *_make_side_sections(analysis),
+        *_make_delivery_sections(analysis, pictures_by_name),
         *make_cue_sections(analysis.cues, analysis.cue_gaps, analysis.protocol.staircase),
-        *_ellipsoid_sections(ellipsoids, by_name),
-        *_run_sections(analysis, pictures),
+        *_make_ellipsoid_sections(ellipsoids, pictures_by_name),
+        *_make_run_sections(analysis, pictures),
         Section("Methods", paragraphs=compose_methods_text(analysis.protocol)),
     ]
     return render_page(
         Page(
             title=analysis.protocol.title,
-            summary=_summary_line(analysis),
+            summary=_summarise_runs(analysis),
             banner=_BANNERS[analysis.population] if analysis.population else "",
             sections=tuple(sections),
             generated=generated,
@@ -84,110 +86,123 @@ def render_study_report(
     )
 
 
-def _summary_line(analysis: StudyAnalysis) -> str:
-    """Line under the title: numbers of participants, runs, complete runs and counted trials."""
+def _summarise_runs(analysis: StudyAnalysis) -> str:
+    """Summarise the study in a line under the title: numbers of participants, runs, complete runs and counted trials;
+    without test runs, the number of detection runs."""
     if not analysis.thresholds:
-        return _detection_summary(analysis)
-    complete = sum(row.complete for row in analysis.thresholds)
+        return _summarise_detection_runs(analysis)
+    complete_count = sum(row.complete for row in analysis.thresholds)
     people, runs = len(analysis.table.subjects), len(analysis.thresholds)
     simulated = "simulated " if analysis.population is Population.SIMULATED else ""
     return (
         f"{people} {simulated}participant{'s' if people != 1 else ''}, {runs} run{'s' if runs != 1 else ''}, "
-        f"{complete} of them complete, {sum(row.trials for row in analysis.thresholds)} counted trials."
+        f"{complete_count} of them complete, {sum(row.trials for row in analysis.thresholds)} counted trials."
     )
 
 
-def _detection_summary(analysis: StudyAnalysis) -> str:
+def _summarise_detection_runs(analysis: StudyAnalysis) -> str:
+    """Summarise a study without test runs: the number of its detection runs, or that there is no run."""
     if not analysis.detection:
         return "There is no run to analyse."
-    runs = len(analysis.detection)
-    return f"No test run; {runs} detection run{'s' if runs != 1 else ''}."
+    run_count = len(analysis.detection)
+    return f"No test run; {run_count} detection run{'s' if run_count != 1 else ''}."
 
 
-def _declared_sections(analysis: StudyAnalysis) -> list[Section]:
-    """Section on the declared (preregistered) contrast, the first of the report; empty without frequencies."""
+def _make_declared_sections(analysis: StudyAnalysis) -> list[Section]:
+    """Make the section on the declared (preregistered) contrast, the first of the report; empty where the protocol has
+    no test frequencies."""
     if not analysis.protocol.stimulus.frequencies_hz:
         return []
     return [make_declared_section(analysis.declared, analysis.declared_result)]
 
 
-def _model_sections(qualities: Sequence[tuple[str, str]]) -> list[Section]:
-    """Section on the quality of the models that converted accelerations to forces, placed before all values that depend
-    on them; empty without models."""
+def _make_model_sections(qualities: Sequence[tuple[str, str]]) -> list[Section]:
+    """Make the section on the quality of the models that converted accelerations to forces, placed before all values
+    that depend on them; empty without models."""
     if not qualities:
         return []
     points = tuple(f"{sessions}: {sentence}" for sessions, sentence in qualities)
     return [Section("How good the model of the device is", points=points)]
 
 
-def _warning_section(analysis: StudyAnalysis) -> Section:
+def _make_warning_section(analysis: StudyAnalysis) -> Section:
+    """Make the section of warnings, or of a sentence that there are none."""
     no_warning_note = ("No irregularities: all runs are complete, and no threshold touched the cap.",)
     return Section(
         "Before you read the numbers", paragraphs=() if analysis.warnings else no_warning_note, points=analysis.warnings
     )
 
 
-def _result_sections(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Section]:
-    """Thresholds, the primary analysis, and the published comparison, in this order; empty without a test run."""
+def _make_result_sections(analysis: StudyAnalysis, pictures_by_name: Mapping[str, Picture]) -> list[Section]:
+    """Make the sections on thresholds, the primary analysis, and the published comparison, in this order; empty without
+    a test run. The table of pairs is left out where no pair can be compared."""
     if not analysis.thresholds:
         return []
-    pairs = (pair_table(analysis),) if analysis.comparisons.pairs else ()
-    thresholds = Section(
+    pair_tables = (make_pair_table(analysis),) if analysis.comparisons.pairs else ()
+    threshold_section = Section(
         "Thresholds",
-        pictures=tuple(by_name[name] for name in ("thresholds", "units") if name in by_name),
-        tables=(threshold_table_text(analysis), group_table(analysis)),
+        pictures=tuple(pictures_by_name[name] for name in ("thresholds", "units") if name in pictures_by_name),
+        tables=(make_threshold_table(analysis), make_group_table(analysis)),
     )
-    comparison = Section(
+    comparison_section = Section(
         "Comparison of the frequencies, as published",
         paragraphs=(analysis.difference,),
-        tables=(one_way_table(analysis), *pairs, within_table(analysis)),
+        tables=(make_one_way_table(analysis), *pair_tables, make_within_table(analysis)),
     )
-    model = replace(
-        primary_section(analysis),
-        pictures=tuple(picture for name, picture in by_name.items() if name.startswith(("medians", "psychometric"))),
+    model_section = replace(
+        make_primary_section(analysis),
+        pictures=tuple(
+            picture for name, picture in pictures_by_name.items() if name.startswith(("medians", "psychometric"))
+        ),
     )
-    return [thresholds, model, comparison]
+    return [threshold_section, model_section, comparison_section]
 
 
-def _side_sections(analysis: StudyAnalysis) -> list[Section]:
-    """Detection runs, catch trials and practice runs, each only where the study has them."""
+def _make_side_sections(analysis: StudyAnalysis) -> list[Section]:
+    """Make the sections on detection, catch trials and practice runs, each only where the study has them."""
     sections = []
     if analysis.detection:
         detection_note = (
             "Which of two intervals held a vibration, in any direction: the level from which it is felt at all."
         )
-        tables = (detection_table(analysis), detection_run_table(analysis))
+        tables = (make_detection_table(analysis), make_detection_run_table(analysis))
         sections.append(Section("Is the vibration felt at all?", paragraphs=(detection_note,), tables=tables))
     if analysis.catches:
         catch_note = (
             "Trials at full level, mixed into the test runs. They changed no level of a run and enter no threshold."
         )
-        sections.append(Section("Catch trials", paragraphs=(catch_note,), tables=(catch_table(analysis),)))
+        sections.append(Section("Catch trials", paragraphs=(catch_note,), tables=(make_catch_table(analysis),)))
     if analysis.practice:
         practice_note = (
             "Short runs at a fixed level, before the test runs. They enter no result and excluded no participant."
         )
-        sections.append(Section("Practice", paragraphs=(practice_note,), tables=(practice_table(analysis),)))
+        sections.append(Section("Practice", paragraphs=(practice_note,), tables=(make_practice_table(analysis),)))
     return sections
 
 
-def _delivery_sections(analysis: StudyAnalysis, by_name: Mapping[str, Picture]) -> list[Section]:
-    """Section on the accelerations that the device delivered; empty where the figure `delivered` does not exist."""
-    if "delivered" not in by_name:
+def _make_delivery_sections(analysis: StudyAnalysis, pictures_by_name: Mapping[str, Picture]) -> list[Section]:
+    """Make the section on the accelerations that the device delivered; empty where the figure `delivered` does not
+    exist."""
+    if "delivered" not in pictures_by_name:
         return []
-    tables = delivery_tables(analysis)
-    return [Section("What the device delivered", pictures=(by_name["delivered"],), tables=tables)]
+    tables = make_delivery_tables(analysis)
+    return [Section("What the device delivered", pictures=(pictures_by_name["delivered"],), tables=tables)]
 
 
-def _ellipsoid_sections(results: Sequence[EllipsoidResult], by_name: Mapping[str, Picture]) -> list[Section]:
+def _make_ellipsoid_sections(
+    results: Sequence[EllipsoidResult], pictures_by_name: Mapping[str, Picture]
+) -> list[Section]:
+    """Make the section on the acceleration ellipses; empty without results. Its picture is left out where it does not
+    exist."""
     if not results:
         return []
-    pictures = (by_name["ellipsoids"],) if "ellipsoids" in by_name else ()
-    return [Section("Acceleration ellipses", pictures=pictures, tables=(ellipsoid_table(results),))]
+    pictures = (pictures_by_name["ellipsoids"],) if "ellipsoids" in pictures_by_name else ()
+    return [Section("Acceleration ellipses", pictures=pictures, tables=(make_ellipsoid_table(results),))]
 
 
-def _run_sections(analysis: StudyAnalysis, pictures: Sequence[Picture]) -> list[Section]:
+def _make_run_sections(analysis: StudyAnalysis, pictures: Sequence[Picture]) -> list[Section]:
+    """Make the section with the staircase figures and the table of all test runs; empty without runs."""
     if not analysis.runs:
         return []
-    tracks = tuple(picture for picture in pictures if picture.name.startswith("staircases-"))
-    return [Section("Runs", pictures=tracks, tables=(run_table(analysis),))]
+    staircase_pictures = tuple(picture for picture in pictures if picture.name.startswith("staircases-"))
+    return [Section("Runs", pictures=staircase_pictures, tables=(make_run_table(analysis),))]

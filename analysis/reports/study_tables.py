@@ -1,7 +1,7 @@
 """Tables of a study report: thresholds, one-way ANOVA, Tukey-Kramer pairs, repeated-measures tests, runs, ellipses.
 
-This module only formats values of `analysis.psychophysics.study_analysis` as text; tests and effect sizes are computed
-there. Each function takes the whole analysis and returns one `Table`. Forces are in N, levels in dB re 1 N.
+This module only formats values as text; tests and effect sizes are computed in `analysis.psychophysics.study_analysis`,
+ellipses in `analysis.psychophysics.ellipsoid`. Forces are in N, levels in dB re 1 N. Called by `study_report`.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,44 +13,62 @@ from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.thresholds import RunEnd, Threshold
 from analysis.psychophysics.two_analyses import describe_measured_coverage
 from analysis.reports.page import Table
-from analysis.threshold_words import threshold_words
+from analysis.threshold_words import select_threshold_words
 from analysis.wording import MISSING, format_count, format_number, format_p, format_signed, mark_cut
 
 
-def threshold_table_text(analysis: StudyAnalysis) -> Table:
-    """Table of thresholds in newtons, a row per participant and a column per frequency; thresholds that are limited by
-    the largest permitted level (cap) are marked as cut."""
-    table = analysis.table
+def make_threshold_table(analysis: StudyAnalysis) -> Table:
+    """Make the table of thresholds (N), a row per participant and a column per frequency. Thresholds that are limited
+    by the largest permitted level (cap) are marked as cut; "stopped" stands where the trial limit ended the run."""
+    thresholds = analysis.table
     rows = [
-        (subject, *("stopped" if stop else mark_cut(value, cut) for value, cut, stop in zip(*cells, strict=True)))
-        for subject, *cells in zip(table.subjects, table.values, table.censored, table.stopped, strict=True)
+        (
+            subject,
+            *(
+                "stopped" if is_stopped else mark_cut(threshold_n, is_cut)
+                for threshold_n, is_cut, is_stopped in zip(*cells, strict=True)
+            ),
+        )
+        for subject, *cells in zip(
+            thresholds.subjects, thresholds.values, thresholds.censored, thresholds.stopped, strict=True
+        )
     ]
     return Table(
         caption="Individual thresholds (N)",
-        header=("Participant", *(f"{frequency:g} Hz" for frequency in table.frequencies_hz)),
+        header=("Participant", *(f"{frequency:g} Hz" for frequency in thresholds.frequencies_hz)),
         rows=tuple(rows),
         notes=(
-            f"{threshold_words(analysis.protocol.staircase).cut_note} stopped: by the trial limit, without a "
+            f"{select_threshold_words(analysis.protocol.staircase).cut_note} stopped: by the trial limit, without a "
             "threshold. –: no completed run.",
         ),
     )
 
 
-def group_table(analysis: StudyAnalysis) -> Table:
-    """Table of the frequencies: number, mean and standard deviation of thresholds, comparison interval, and how many
-    were cut by the cap or stopped by the trial limit."""
+def make_group_table(analysis: StudyAnalysis) -> Table:
+    """Make the table of the frequencies: number, mean and standard deviation of thresholds, comparison interval, and
+    how many were cut by the cap or stopped by the trial limit."""
     intervals = {interval.name: interval for interval in analysis.comparisons.intervals}
-    cuts, stops = (
+    cut_counts, stop_counts = (
         [sum(column) for column in zip(*cells, strict=True)]
         for cells in (analysis.table.censored, analysis.table.stopped)
     )
     rows = []
-    for group, cut, stop_count in zip(analysis.anova.groups, cuts, stops, strict=True):
+    for group, cut_count, stop_count in zip(analysis.anova.groups, cut_counts, stop_counts, strict=True):
         interval = intervals.get(group.name)
         interval_text = f"{format_number(interval.lower)} to {format_number(interval.upper)}" if interval else MISSING
-        mean = mark_cut(group.mean, bool(cut or stop_count))
-        rows.append((group.name, str(group.n), mean, format_number(group.sd), interval_text, str(cut), str(stop_count)))
-    percent = f"{100 * analysis.comparisons.confidence:g} %"
+        mean_text = mark_cut(group.mean, bool(cut_count or stop_count))
+        rows.append(
+            (
+                group.name,
+                str(group.n),
+                mean_text,
+                format_number(group.sd),
+                interval_text,
+                str(cut_count),
+                str(stop_count),
+            )
+        )
+    confidence_text = f"{100 * analysis.comparisons.confidence:g} %"
     return Table(
         caption="Groups (N)",
         header=(
@@ -58,35 +76,36 @@ def group_table(analysis: StudyAnalysis) -> Table:
             "n",
             "Mean",
             "SD",
-            f"{percent} comparison interval{_coverage_suffix(analysis)}",
+            f"{confidence_text} comparison interval{_format_coverage_suffix(analysis)}",
             "Cut",
             "Stopped",
         ),
         rows=tuple(rows),
         notes=(
             "Comparison intervals are for comparing means with each other; they are not confidence intervals.",
-            *_coverage_notes(analysis),
+            *_list_coverage_notes(analysis),
         ),
     )
 
 
-def _coverage_suffix(analysis: StudyAnalysis) -> str:
-    """Suffix for the name of an interval or effect size that includes cut or stopped runs: its confidence does not
-    hold; empty where there is none."""
+def _format_coverage_suffix(analysis: StudyAnalysis) -> str:
+    """Format the suffix for the name of an interval or effect size that includes cut or stopped runs: its confidence
+    does not hold; empty where no run was cut or stopped."""
     return ", without coverage" if analysis.table.coverage else ""
 
 
-def _coverage_notes(analysis: StudyAnalysis) -> tuple[str, ...]:
-    """Note on why confidence levels do not hold (`ThresholdTable.coverage`); empty without cut or stopped runs."""
+def _list_coverage_notes(analysis: StudyAnalysis) -> tuple[str, ...]:
+    """List the note on why confidence levels do not hold (`ThresholdTable.coverage`); empty without cut or stopped
+    runs."""
     return (analysis.table.coverage,) if analysis.table.coverage else ()
 
 
-def one_way_table(analysis: StudyAnalysis) -> Table:
-    """Table of the one-way ANOVA between frequencies; without rows, but with the reason in the notes, where F
+def make_one_way_table(analysis: StudyAnalysis) -> Table:
+    """Make the table of the one-way ANOVA between frequencies; without rows, but with the reason in the notes, where F
     cannot be computed."""
     anova = analysis.anova
     rows: tuple[tuple[str, ...], ...] = ()
-    effect: tuple[str, ...] = ()
+    effect_notes: tuple[str, ...] = ()
     if anova.f is not None and anova.ss_between is not None and anova.df_between:
         between_cells = (
             format_number(anova.ss_between, 3),
@@ -102,27 +121,27 @@ def one_way_table(analysis: StudyAnalysis) -> Table:
             ("Frequency", *between_cells, format_number(anova.f), format_p(anova.p)),
             ("Within", *within_cells, "", ""),
         )
-        effect = (
-            f"Effect size{_coverage_suffix(analysis)}: η² = {format_number(anova.eta_squared)}, "
+        effect_notes = (
+            f"Effect size{_format_coverage_suffix(analysis)}: η² = {format_number(anova.eta_squared)}, "
             f"ω² = {format_number(anova.omega_squared)}.",
         )
     return Table(
         caption="One-way analysis of variance, as published",
         header=("Source", "Sum of squares", "df", "Mean square", "F", "p"),
         rows=rows,
-        notes=effect
+        notes=effect_notes
         + anova.notes
         + describe_measured_coverage(("one-way",), analysis.table, analysis.protocol.staircase),
     )
 
 
-def pair_table(analysis: StudyAnalysis) -> Table:
-    """Table of all pairs of frequencies: difference of the means, simultaneous interval and p-value."""
+def make_pair_table(analysis: StudyAnalysis) -> Table:
+    """Make the table of all pairs of frequencies: difference of the means, simultaneous interval and p-value."""
     comparisons = analysis.comparisons
-    percent = f"{100 * comparisons.confidence:g} %"
+    confidence_text = f"{100 * comparisons.confidence:g} %"
     return Table(
         caption="Pairs of frequencies (Tukey-Kramer)",
-        header=("Pair", "Difference (N)", f"{percent} interval{_coverage_suffix(analysis)}", "p"),
+        header=("Pair", "Difference (N)", f"{confidence_text} interval{_format_coverage_suffix(analysis)}", "p"),
         rows=tuple(
             (
                 f"{pair.second} − {pair.first}",
@@ -134,46 +153,54 @@ def pair_table(analysis: StudyAnalysis) -> Table:
         ),
         notes=(
             *comparisons.notes,
-            *_coverage_notes(analysis),
+            *_list_coverage_notes(analysis),
             *describe_measured_coverage(("tukey",), analysis.table, analysis.protocol.staircase),
         ),
     )
 
 
-def within_table(analysis: StudyAnalysis) -> Table:
-    """Table of the repeated-measures tests that can be computed: ANOVA with Greenhouse-Geisser's and with Huynh-Feldt's
-    correction and without one, and Friedman's test. The notes say why a test is missing."""
-    within, ranks = analysis.within, analysis.ranks
+def make_within_table(analysis: StudyAnalysis) -> Table:
+    """Make the table of the repeated-measures tests that can be computed: ANOVA with Greenhouse-Geisser's and with
+    Huynh-Feldt's correction and without one, and Friedman's test. The notes give effect sizes and Mauchly's test, and
+    say why a test is missing."""
+    anova, friedman = analysis.within, analysis.ranks
     rows: list[tuple[str, ...]] = []
-    effects = []
-    if within.epsilon is not None and within.df_conditions is not None and within.df_error is not None:
-        f = f"F = {format_number(within.f)}"
-        corrected = f"{within.epsilon * within.df_conditions:.2f}, {within.epsilon * within.df_error:.2f}"
-        rows.append((f"Greenhouse-Geisser, ε = {format_number(within.epsilon)}", corrected, f, format_p(within.p)))
-        huynh = within.epsilon_huynh_feldt or 1.0
-        corrected = f"{huynh * within.df_conditions:.2f}, {huynh * within.df_error:.2f}"
-        rows.append((f"Huynh-Feldt, ε = {format_number(huynh)}", corrected, f, format_p(within.p_huynh_feldt)))
+    notes = []
+    if anova.epsilon is not None and anova.df_conditions is not None and anova.df_error is not None:
+        f_text = f"F = {format_number(anova.f)}"
+        corrected_df = f"{anova.epsilon * anova.df_conditions:.2f}, {anova.epsilon * anova.df_error:.2f}"
         rows.append(
-            ("Without correction", f"{within.df_conditions}, {within.df_error}", f, format_p(within.p_uncorrected))
+            (f"Greenhouse-Geisser, ε = {format_number(anova.epsilon)}", corrected_df, f_text, format_p(anova.p))
         )
-        effects.append(
-            f"Effect size{_coverage_suffix(analysis)}: partial η² = {format_number(within.partial_eta_squared)}, "
-            f"generalized η² = {format_number(within.generalized_eta_squared)}."
-        )
-    if within.mauchly_w is not None:
-        effects.append(
-            f"Sphericity (Mauchly): W = {format_number(within.mauchly_w)}, p = {format_p(within.mauchly_p)}."
-        )
-    if ranks.p is not None:
+        huynh_epsilon = anova.epsilon_huynh_feldt or 1.0
+        corrected_df = f"{huynh_epsilon * anova.df_conditions:.2f}, {huynh_epsilon * anova.df_error:.2f}"
         rows.append(
-            ("Friedman (ranks)", format_count(ranks.df), f"χ² = {format_number(ranks.chi_squared)}", format_p(ranks.p))
+            (f"Huynh-Feldt, ε = {format_number(huynh_epsilon)}", corrected_df, f_text, format_p(anova.p_huynh_feldt))
         )
-        effects.append(f"Agreement of the rankings: Kendall's W = {format_number(ranks.kendall_w)}.")
+        rows.append(
+            ("Without correction", f"{anova.df_conditions}, {anova.df_error}", f_text, format_p(anova.p_uncorrected))
+        )
+        notes.append(
+            f"Effect size{_format_coverage_suffix(analysis)}: partial η² = {format_number(anova.partial_eta_squared)}, "
+            f"generalized η² = {format_number(anova.generalized_eta_squared)}."
+        )
+    if anova.mauchly_w is not None:
+        notes.append(f"Sphericity (Mauchly): W = {format_number(anova.mauchly_w)}, p = {format_p(anova.mauchly_p)}.")
+    if friedman.p is not None:
+        rows.append(
+            (
+                "Friedman (ranks)",
+                format_count(friedman.df),
+                f"χ² = {format_number(friedman.chi_squared)}",
+                format_p(friedman.p),
+            )
+        )
+        notes.append(f"Agreement of the rankings: Kendall's W = {format_number(friedman.kendall_w)}.")
     return Table(
-        caption=f"Within participants ({within.participants} without a gap)",
+        caption=f"Within participants ({anova.participants} without a gap)",
         header=("Test", "df", "Statistic", "p"),
         rows=tuple(rows),
-        notes=(*effects, *within.notes, *ranks.notes),
+        notes=(*notes, *anova.notes, *friedman.notes),
     )
 
 
@@ -181,8 +208,9 @@ REVERSALS_NOTE = "Reversals at the cap: of the averaged ones. Pushes: how often 
 """Note below the table of runs, for staircases."""
 
 
-def run_table(analysis: StudyAnalysis) -> Table:
-    """Table of all runs with their trials, thresholds, d' and criterion; reversals only for staircases."""
+def make_run_table(analysis: StudyAnalysis) -> Table:
+    """Make the folded table of all test runs with their trials, thresholds, d' and criterion; reversals and pushes only
+    for staircases."""
     by_reversals = not analysis.protocol.staircase.is_bayesian
     reversal_columns: tuple[tuple[str, Callable[[Threshold], str]], ...] = (
         ("Reversals", lambda row: str(row.reversals)),
@@ -194,7 +222,7 @@ def run_table(analysis: StudyAnalysis) -> Table:
         ("Session", lambda row: row.session),
         ("Run", lambda row: str(row.run)),
         ("Hz", lambda row: f"{row.frequency_hz:g}"),
-        ("N", _threshold_text),
+        ("N", _format_threshold),
         ("dB re 1 N", lambda row: format_number(row.threshold_db)),
         ("m/s²", lambda row: format_number(row.threshold_mps2)),
         ("mm", lambda row: format_number(row.threshold_mm, 3)),
@@ -203,7 +231,7 @@ def run_table(analysis: StudyAnalysis) -> Table:
         ("at cap", lambda row: str(row.trials_at_cap)),
         *(pushes if by_reversals else ()),
         ("Spoiled", lambda row: str(row.spoiled_trials)),
-        ("At will", _repeats_text),
+        ("At will", _format_repeats),
         ("% right", lambda row: format_number(row.percent_correct, 0)),
         ("d'", lambda row: format_number(row.d_prime)),
         ("Criterion", lambda row: format_number(row.criterion)),
@@ -211,10 +239,10 @@ def run_table(analysis: StudyAnalysis) -> Table:
     return Table(
         caption="All runs",
         header=tuple(name for name, _ in columns),
-        rows=tuple(tuple(text(row) for _, text in columns) for row in analysis.thresholds),
+        rows=tuple(tuple(format_cell(row) for _, format_cell in columns) for row in analysis.thresholds),
         notes=(
             *([REVERSALS_NOTE] if by_reversals else []),
-            f"m/s² and mm: as measured in {threshold_words(analysis.protocol.staircase).measured_in}.",
+            f"m/s² and mm: as measured in {select_threshold_words(analysis.protocol.staircase).measured_in}.",
             f"At will: presentations that the participant made void (asked for again, paused, left, answered outside "
             f"the time), with their share; ! {OFTEN_WORDS}.",
             f"Criterion: {CRITERION_DEFINITION}.",
@@ -223,21 +251,22 @@ def run_table(analysis: StudyAnalysis) -> Table:
     )
 
 
-def _threshold_text(row: Threshold) -> str:
-    """Threshold in N, or "stopped" where the trial limit ended the run."""
+def _format_threshold(row: Threshold) -> str:
+    """Format the threshold of a run in N, or "stopped" where the trial limit ended it."""
     return "stopped" if row.ended is RunEnd.TRIAL_LIMIT else mark_cut(row.threshold_n, row.censored)
 
 
-def _repeats_text(row: Threshold) -> str:
-    """Number and share of presentations that the participant made void; "!" marks frequent ones."""
+def _format_repeats(row: Threshold) -> str:
+    """Format number and share of the presentations that the participant made void; "!" marks frequent ones
+    (`OFTEN_WORDS`)."""
     if not row.repeats_at_will:
         return "0"
     return f"{row.repeats_at_will} ({100 * row.repeat_rate:.1f} %){' !' * row.asked_often}"
 
 
-def ellipsoid_table(results: Sequence[EllipsoidResult]) -> Table:
-    """Table of acceleration ellipses: ratio of the axes and tilt (degrees), from second moments and from phasors at the
-    driven frequency; ratio of off-axis to on-axis acceleration; share of harmonics."""
+def make_ellipsoid_table(results: Sequence[EllipsoidResult]) -> Table:
+    """Make the table of acceleration ellipses: ratio of the axes and tilt (degrees), from second moments and from
+    phasors at the driven frequency; ratio of off-axis to on-axis acceleration; share of harmonics in %."""
     return Table(
         caption="Acceleration ellipses",
         header=(

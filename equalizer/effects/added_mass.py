@@ -11,7 +11,7 @@ import numpy as np
 
 from equalizer.effects.effect import ALL_SITES, Effect, Parameter, Structure, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, quadratic_form
+from equalizer.effects.starts.starting_values import PartialRegression, compute_quadratic_form, select_axis_motion
 from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
@@ -24,18 +24,18 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalMode
     return replace(model, mass=model.mass + values["mass"] * np.outer(direction, direction))
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Mass by linear regression of the missing force on -dv/dt, with position, velocity and a constant as nuisances
     (the median over all axes for ALL_SITES); then a share of the model's mass. Only positive values."""
     sites = range(evidence.model.inputs) if axis == ALL_SITES else (axis,)
     estimates = []
     for site in sites:
-        motion = axis_motion(evidence, site)
+        motion = select_axis_motion(evidence, site)
         nuisances = np.column_stack([motion.position, motion.velocity, np.ones_like(motion.force)])
         regression = PartialRegression(motion.force, nuisances)
         estimates.append(float(regression.fit(-motion.acceleration).strengths[0]))
     model_mass = min(
-        quadratic_form(evidence.model.mass, compute_driven_axes(evidence.model)[:, site]) for site in sites
+        compute_quadratic_form(evidence.model.mass, compute_driven_axes(evidence.model)[:, site]) for site in sites
     )
     candidates = (float(np.median(estimates)), _INITIAL_MASS_SHARE * model_mass)
     return tuple({"mass": mass} for mass in candidates if mass > 0)
@@ -49,6 +49,6 @@ EFFECT = Effect(
     "lines",
     parameters=(Parameter("mass", 1e-9, 1e6, none=0.0),),
     action=Structure(_change),
-    starts=_starts,
+    starts=_find_starting_values,
     sites=("all", "one"),
 )

@@ -1,35 +1,47 @@
-"""Amplifier lag: a closed current loop that follows its command as a first-order low pass.
+"""Amplifier lag: a closed current loop that follows its command as a first-order low pass; an entry of the catalogue.
 
-    T dF/dt + F = u        T in s, command u and actuator force F in N
+    T dF/dt + F = u        T in s, command u and actuator force F in N (a rotation: N m)
 
-The solution for a command that is held over a step is exact: `simulation.command_path.lag_mean` and `lag_at_end`.
+The solution for a command that is held over a step is exact (`simulation.command_path`).
 """
 
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnCommand, Parameter, Values
-from equalizer.effects.simulation.command_path import lag_at_end, lag_mean
-from equalizer.effects.starts.command_starts import likeliest_value
+from equalizer.effects.simulation.command_path import compute_lagged_end, compute_lagged_mean
+from equalizer.effects.starts.command_starts import find_command_parameter
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.response_starts import starts_for_lateness
+from equalizer.effects.starts.response_starts import list_lag_starts
 from equalizer.signals.signal import FloatArray
 
-SHORTEST_S, LONGEST_S = 2e-5, 0.05
+SHORTEST_TIME_CONSTANT_S, LONGEST_TIME_CONSTANT_S = 2e-5, 0.05
 """Range of time constants (s) that are searched for a starting value."""
 
 
-def _lag_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    return lag_mean(commands, step_s, values["time_constant"])
+def _compute_mean_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
+    """Compute the mean force (n,) over each step: `OnCommand.change` of this effect."""
+    return compute_lagged_mean(commands, step_s, values["time_constant"])
 
 
-def _lag_force_at_end(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    return lag_at_end(commands, step_s, values["time_constant"])
+def _compute_end_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
+    """Compute the force (n,) at the end of each step: `OnCommand.at_end` of this effect."""
+    return compute_lagged_end(commands, step_s, values["time_constant"])
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Time constants from the delay of the response and from a grid search on the missing force."""
-    fitting = likeliest_value(evidence, axis, lag_mean, list(np.geomspace(SHORTEST_S, LONGEST_S, 16)), False)
-    return tuple({"time_constant": late} for late in starts_for_lateness(evidence, axis, fitting, LONGEST_S))
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Find time constants to start a fit from, the largest first: the time shift of the response, and the value that
+    fits the missing force best (grid search, refined). Empty where the response is early."""
+    likeliest_s = find_command_parameter(
+        evidence,
+        axis,
+        compute_lagged_mean,
+        list(np.geomspace(SHORTEST_TIME_CONSTANT_S, LONGEST_TIME_CONSTANT_S, 16)),
+        False,
+    )
+    return tuple(
+        {"time_constant": time_constant_s}
+        for time_constant_s in list_lag_starts(evidence, axis, likeliest_s, LONGEST_TIME_CONSTANT_S)
+    )
 
 
 EFFECT = Effect(
@@ -39,7 +51,7 @@ EFFECT = Effect(
     signature="the missing force follows the command's rate of change at every level alike, and position and response "
     "are late by the same",
     parameters=(Parameter("time_constant", 1e-6, 1.0, none=0.0),),
-    action=OnCommand(_lag_force, fine=True, at_end=_lag_force_at_end),
-    starts=_starts,
+    action=OnCommand(_compute_mean_force, fine=True, at_end=_compute_end_force),
+    starts=_find_starting_values,
     sites=("all", "one"),
 )

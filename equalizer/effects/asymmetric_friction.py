@@ -1,12 +1,14 @@
 """Asymmetric Coulomb friction: dry friction that is stronger in one direction of motion than in the other.
 
+    F = -level_positive where v > 0, +level_negative where v < 0        levels in N (a rotation: N m)
+
 The force jumps at v = 0; the simulation replaces the jump by a bristle of nanometre travel (`dry_friction_kernel`).
 """
 
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
-from equalizer.effects.simulation.dry_friction_kernel import friction_force
+from equalizer.effects.simulation.dry_friction_kernel import compute_friction_force
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import regress_out_linear_terms, select_sliding_motion
@@ -17,35 +19,39 @@ _INITIAL_LEVEL_RATIO = 1.3
 
 
 @compile_law
-def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Mean friction force (N) over the step. memory: deflection of the bristle (m); at: motion in the step, as laid out
-    in `simulation.instant`."""
-    return float(friction_force(parameters[0], parameters[1], memory[0], memory, at))
+def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
+    """Mean friction force (N) over a step. parameters: level for v > 0, level for v < 0 (N); memory: deflection of the
+    bristle over its largest; step_motion: motion in the step, as laid out in `simulation.instant`."""
+    return float(compute_friction_force(parameters[0], parameters[1], memory[0], memory, step_motion))
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Starting values: the levels by regression of the missing force on either direction of sliding, then two pairs of
-    levels with the same mean and the ratio `_INITIAL_LEVEL_RATIO`. Empty where the mean level is not positive."""
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Starting values: the levels by regression of the missing force on either direction of sliding, each at least 5 %
+    of their mean, then two pairs of levels with the ratio `_INITIAL_LEVEL_RATIO` and the same mean. Empty where the
+    mean level is not positive."""
     motion = select_sliding_motion(evidence, axis)
     is_forward = np.asarray(motion.velocity > 0, dtype=np.float64)
     # No constant force among the regressors: it would absorb the asymmetry.
-    positive, negative = (
+    positive_level, negative_level = (
         regress_out_linear_terms(motion, constant=False).fit(-is_forward, 1 - is_forward).strengths.tolist()
     )
-    mean = (positive + negative) / 2
-    if mean <= 0:
+    mean_level = (positive_level + negative_level) / 2
+    if mean_level <= 0:
         return ()
-    measured = {"level_positive": max(positive, 0.05 * mean), "level_negative": max(negative, 0.05 * mean)}
+    measured = {
+        "level_positive": max(positive_level, 0.05 * mean_level),
+        "level_negative": max(negative_level, 0.05 * mean_level),
+    }
     high_level, low_level = (
-        2 * mean * _INITIAL_LEVEL_RATIO / (1 + _INITIAL_LEVEL_RATIO),
-        2 * mean / (1 + _INITIAL_LEVEL_RATIO),
+        2 * mean_level * _INITIAL_LEVEL_RATIO / (1 + _INITIAL_LEVEL_RATIO),
+        2 * mean_level / (1 + _INITIAL_LEVEL_RATIO),
     )
     candidates = ((high_level, low_level), (low_level, high_level))
     return (
         measured,
         *(
-            {"level_positive": positive_level, "level_negative": negative_level}
-            for positive_level, negative_level in candidates
+            {"level_positive": trial_positive, "level_negative": trial_negative}
+            for trial_positive, trial_negative in candidates
         ),
     )
 
@@ -57,7 +63,7 @@ EFFECT = Effect(
     signature="the missing force flips its sign with the velocity, by unequal amounts: there is a mean force while "
     "the axis moves; its odd harmonics, and weaker even ones, fall as the level rises",
     parameters=(Parameter("level_positive", 1e-9, 1e6, none=0.0), Parameter("level_negative", 1e-9, 1e6, none=0.0)),
-    action=AxisForce(_law, pack_values("level_positive", "level_negative"), memory=1),
-    starts=_starts,
+    action=AxisForce(_compute_mean_force, pack_values("level_positive", "level_negative"), memory=1),
+    starts=_find_starting_values,
     simpler=("coulomb_friction",),
 )

@@ -1,7 +1,8 @@
 """Backlash in a drive: within the gap the motor moves alone, at either end of it contact drives the handle.
 
 The moving mass along the driven axis is split: the motor becomes a body of its own, which the command drives, and acts
-on the handle through a spring and a damper that only push.
+on the handle through a spring and a damper that only push. The gap and the displacement r of motor minus handle are in
+m (a rotation: rad). An entry of the catalogue.
 """
 
 from dataclasses import replace
@@ -14,92 +15,109 @@ from equalizer.effects.simulation.command_path import ActuatorForce
 from equalizer.effects.simulation.instant import F_END, STEP_S, X_FREE, X_PER_N, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import quadratic_form
+from equalizer.effects.starts.starting_values import compute_quadratic_form
 from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import estimate_spectral_density
 
-STEPS = 20
+STEPS_PER_SAMPLE = 20
 """Integration steps per sample: a contact lasts only about a millisecond."""
-MOTOR_SHARE, CONTACT_HZ, CONTACT_RATIO = 0.3, 300.0, 0.03
+MOTOR_SHARE, CONTACT_HZ, CONTACT_DAMPING_RATIO = 0.3, 300.0, 0.03
 """Defaults of parameters that a file leaves out: the motor's share of the moving mass; natural frequency (Hz) of the
 motor mass on the contact's spring; damping ratio of that oscillator."""
 RELATIVE_GAPS, EXCERPT_S, SPECTRUM_WINDOW_S = np.geomspace(0.02, 3.0, 14), 2.0, 0.128
-"""Starting values: gaps that are tried, relative to the travel of the free motor (see `_starts`); length (s) of each
-simulated excerpt; length (s) of a spectrum's window."""
+"""For starting values: gaps that are tried, relative to the rms travel of the free motor (see `_find_starting_values`);
+length (s) of each simulated excerpt; length (s) of a spectrum's window."""
 
 
 @compile_law
-def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Mean force (N) of the contact's spring and damper over the step, solved for implicitly; the contact never pulls.
-    parameters: gap, stiffness, damping; `at` describes the motion of motor minus handle."""
-    half, stiffness, rate = 0.5 * parameters[0], parameters[1], parameters[2] / at[STEP_S]
+def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
+    """Compute the mean force (N) of the contact's spring and damper over the step, solved for implicitly; the contact
+    never pulls. parameters: gap (m), stiffness (N/m), damping (N s/m). step_motion: motion of motor minus handle
+    (`instant`); the force at the step's end is written to it."""
+    half_gap, stiffness, damping_over_step = 0.5 * parameters[0], parameters[1], parameters[2] / step_motion[STEP_S]
     for side in (1.0, -1.0):
-        start, end = max(side * at[X] - half, 0.0), side * at[X_FREE] - half
-        if start <= 0 and end <= 0:
+        start_penetration, end_penetration = (
+            max(side * step_motion[X] - half_gap, 0.0),
+            side * step_motion[X_FREE] - half_gap,
+        )
+        if start_penetration <= 0 and end_penetration <= 0:
             continue
         # For a contact that is stiff relative to the step, the force at the end gets more weight: the plain mean of
         # start and end would overshoot.
-        slack = stiffness * at[X_PER_N]
-        end_weight = (0.5 + slack) / (1 + slack)
-        contact_force = stiffness * ((1 - end_weight) * start + end_weight * end) + rate * (end - start)
-        contact_force /= 1 + at[X_PER_N] * (end_weight * stiffness + rate)
-        if end - at[X_PER_N] * contact_force < 0:
-            contact_force = stiffness * (1 - end_weight) * start
+        stiffness_ratio = stiffness * step_motion[X_PER_N]
+        end_weight = (0.5 + stiffness_ratio) / (1 + stiffness_ratio)
+        contact_force = stiffness * (
+            (1 - end_weight) * start_penetration + end_weight * end_penetration
+        ) + damping_over_step * (end_penetration - start_penetration)
+        contact_force /= 1 + step_motion[X_PER_N] * (end_weight * stiffness + damping_over_step)
+        if end_penetration - step_motion[X_PER_N] * contact_force < 0:
+            contact_force = stiffness * (1 - end_weight) * start_penetration
         contact_force = max(contact_force, 0.0)
-        end -= at[X_PER_N] * contact_force
-        at[F_END] = -side * max(stiffness * end + rate * (end - start), 0.0) if end > 0 else 0.0
+        end_penetration -= step_motion[X_PER_N] * contact_force
+        step_motion[F_END] = (
+            -side * max(stiffness * end_penetration + damping_over_step * (end_penetration - start_penetration), 0.0)
+            if end_penetration > 0
+            else 0.0
+        )
         return float(-side * contact_force)
     return 0.0
 
 
-def _motor_and_contact(model: MechanicalModel, axis: int, values: Values) -> tuple[float, float, float]:
-    """Mass of the motor (at most 0.9 of the mass along the axis), and stiffness and damping of the contact."""
-    axis_mass = quadratic_form(model.mass, compute_driven_axes(model)[:, axis])
-    mass = min(values.get("motor_mass", MOTOR_SHARE * axis_mass), 0.9 * axis_mass)
-    stiffness = values.get("contact_stiffness", mass * (2 * np.pi * CONTACT_HZ) ** 2)
-    return mass, stiffness, values.get("contact_damping", 2 * CONTACT_RATIO * float(np.sqrt(stiffness * mass)))
+def _derive_motor_and_contact(model: MechanicalModel, axis: int, values: Values) -> tuple[float, float, float]:
+    """Derive mass of the motor (kg, at most 0.9 of the mass along the axis), and stiffness (N/m) and damping (N s/m) of
+    the contact, with defaults for values that are left out."""
+    axis_mass = compute_quadratic_form(model.mass, compute_driven_axes(model)[:, axis])
+    motor_mass = min(values.get("motor_mass", MOTOR_SHARE * axis_mass), 0.9 * axis_mass)
+    stiffness = values.get("contact_stiffness", motor_mass * (2 * np.pi * CONTACT_HZ) ** 2)
+    return (
+        motor_mass,
+        stiffness,
+        values.get("contact_damping", 2 * CONTACT_DAMPING_RATIO * float(np.sqrt(stiffness * motor_mass))),
+    )
 
 
-def _change(model: MechanicalModel, axis: int, values: Values) -> tuple[MechanicalModel, FloatArray]:
-    """The model with the motor as a further coordinate, and the direction of motor minus handle, along which the
+def _split_off_motor(model: MechanicalModel, axis: int, values: Values) -> tuple[MechanicalModel, FloatArray]:
+    """Return the model with the motor as a further coordinate, and the direction of motor minus handle, along which the
     contact acts. Without a gap: the unchanged model and a direction of zeros."""
     direction = compute_driven_axes(model)[:, axis]
     if values["gap"] <= 0:
         return model, np.zeros_like(direction)
-    motor_mass = _motor_and_contact(model, axis, values)[0]
+    motor_mass = _derive_motor_and_contact(model, axis, values)[0]
     mass = np.pad(model.mass - motor_mass * np.outer(direction, direction), ((0, 1), (0, 1)))
     mass[-1, -1] = motor_mass
-    force = np.pad(model.input, ((0, 1), (0, 0)))
-    force[-1, axis] = np.linalg.norm(model.input[:, axis])
-    force[:-1, axis] = 0
-    split = replace(
+    input_matrix = np.pad(model.input, ((0, 1), (0, 0)))
+    input_matrix[-1, axis] = np.linalg.norm(model.input[:, axis])
+    input_matrix[:-1, axis] = 0
+    split_model = replace(
         model,
         mass=mass,
         damping=np.pad(model.damping, ((0, 1), (0, 1))),
         stiffness=np.pad(model.stiffness, ((0, 1), (0, 1))),
-        input=force,
+        input=input_matrix,
         output=np.pad(model.output, ((0, 0), (0, 1))),
     )
-    return split, np.append(-direction, 1.0)
+    return split_model, np.append(-direction, 1.0)
 
 
-def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    """(3,): gap, contact stiffness, contact damping."""
-    return np.array([values["gap"], *_motor_and_contact(model, axis, values)[1:]])
+def _pack_parameters(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    """Pack the parameters of `_compute_mean_force`, (3,): gap, contact stiffness, contact damping."""
+    return np.array([values["gap"], *_derive_motor_and_contact(model, axis, values)[1:]])
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """The two gaps whose simulated impacts match the residual's spectrum best (mean squared log ratio). Spectra are
-    compared because the waveform of impacts cannot be predicted. The tried gaps scale with the rms travel that the
-    command would give the free motor at 10 Hz."""
-    motor_mass, stiffness, damping = _motor_and_contact(evidence.model, axis, {})
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Find the two gaps whose simulated impacts match the residual's spectrum best (mean squared log ratio); empty
+    without a command. Spectra are compared because the waveform of impacts cannot be predicted. The tried gaps scale
+    with the rms travel that the command would give the free motor if all its power were at 10 Hz."""
+    motor_mass, stiffness, damping = _derive_motor_and_contact(evidence.model, axis, {})
     contact_values = {"motor_mass": motor_mass, "contact_stiffness": stiffness, "contact_damping": damping}
-    excerpts = _weakest_and_strongest_excerpt(evidence, axis)
+    excerpts = _find_weakest_and_strongest_excerpt(evidence, axis)
     free_motor_travel = float(np.std(evidence.command[excerpts[-1], axis])) / motor_mass / (2 * np.pi * 10.0) ** 2
-    floor = evidence.noise**2 / (0.5 * evidence.sample_rate_hz)
-    residual_spectra = [_spectrum(evidence, (evidence.response - evidence.predicted)[excerpt]) for excerpt in excerpts]
+    noise_density = evidence.noise**2 / (0.5 * evidence.sample_rate_hz)
+    residual_spectra = [
+        _estimate_spectrum(evidence, (evidence.response - evidence.predicted)[excerpt]) for excerpt in excerpts
+    ]
     linear_responses = [_simulate_excerpt(evidence, axis, None, excerpt) for excerpt in excerpts]
     candidates = []
     for gap in (RELATIVE_GAPS * free_motor_travel).tolist():
@@ -107,47 +125,51 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
         for excerpt, residual_spectrum, linear_response in zip(
             excerpts, residual_spectra, linear_responses, strict=True
         ):
-            impact_spectrum = _spectrum(
+            impact_spectrum = _estimate_spectrum(
                 evidence, _simulate_excerpt(evidence, axis, {"gap": gap, **contact_values}, excerpt) - linear_response
             )
-            spectral_error += float(np.mean(np.log((impact_spectrum + floor) / (residual_spectrum + 0.1 * floor)) ** 2))
+            # The residual contains noise already: a tenth more only keeps the logarithm finite.
+            spectral_error += float(
+                np.mean(np.log((impact_spectrum + noise_density) / (residual_spectrum + 0.1 * noise_density)) ** 2)
+            )
         candidates.append((spectral_error, gap))
     return tuple({"gap": gap, **contact_values} for _, gap in sorted(candidates)[:2] if gap > 0)
 
 
-def _weakest_and_strongest_excerpt(evidence: Evidence, axis: int) -> list[slice]:
-    """Two excerpts of `EXCERPT_S`: with the least command power above a thousandth of the largest, and with the
-    largest."""
+def _find_weakest_and_strongest_excerpt(evidence: Evidence, axis: int) -> list[slice]:
+    """Find two excerpts of `EXCERPT_S`: that with the least command power above a thousandth of the largest, and that
+    with the largest. Samples that do not count add no power."""
     length = min(int(EXCERPT_S * evidence.sample_rate_hz), len(evidence.command))
-    power = np.cumsum(np.append(0.0, evidence.command[:, axis] ** 2 * evidence.used))
-    starts = np.arange(0, len(evidence.command) - length + 1, max(length // 4, 1))
-    excerpt_power = power[starts + length] - power[starts]
+    cumulative_power = np.cumsum(np.append(0.0, evidence.command[:, axis] ** 2 * evidence.used))
+    first_samples = np.arange(0, len(evidence.command) - length + 1, max(length // 4, 1))
+    excerpt_power = cumulative_power[first_samples + length] - cumulative_power[first_samples]
     significant_power = np.where(excerpt_power > 1e-3 * excerpt_power.max(), excerpt_power, np.inf)
     return [
-        slice(int(first), int(first) + length)
-        for first in (starts[np.argmin(significant_power)], starts[np.argmax(excerpt_power)])
+        slice(int(first_sample), int(first_sample) + length)
+        for first_sample in (first_samples[np.argmin(significant_power)], first_samples[np.argmax(excerpt_power)])
     ]
 
 
 def _simulate_excerpt(evidence: Evidence, axis: int, values: Values | None, excerpt: slice) -> FloatArray:
-    """(samples, p): simulated response to an excerpt of the commands; values: of the backlash, None = without it."""
+    """Simulate the response (samples, p) to an excerpt of the commands, from rest. values: of the backlash; None:
+    without it."""
     placed_effects = () if values is None else (PlacedEffect(EFFECT, (axis,), values),)
     bodies = build_bodies(evidence.model, placed_effects)
     commands = evidence.command[excerpt]
     outputs, _ = simulate_bodies(
         bodies,
         ActuatorForce(commands, commands),
-        (excerpt.stop - excerpt.start, STEPS),
-        1 / evidence.sample_rate_hz / STEPS,
+        (excerpt.stop - excerpt.start, STEPS_PER_SAMPLE),
+        1 / evidence.sample_rate_hz / STEPS_PER_SAMPLE,
     )
-    ports, p = bodies.ports.shape[1], evidence.model.outputs
-    return outputs[:, 3 * ports : 3 * ports + p]
+    port_count, response_count = bodies.ports.shape[1], evidence.model.outputs
+    return outputs[:, 3 * port_count : 3 * port_count + response_count]
 
 
-def _spectrum(evidence: Evidence, signal: FloatArray) -> FloatArray:
-    """(lines, p): power spectral density without the line at frequency zero."""
-    window = max(int(SPECTRUM_WINDOW_S * evidence.sample_rate_hz), 16)
-    return estimate_spectral_density(signal, evidence.sample_rate_hz, window)[1][1:]
+def _estimate_spectrum(evidence: Evidence, signal: FloatArray) -> FloatArray:
+    """Estimate the power spectral density (lines, p) of a signal (samples, p), without the line at frequency zero."""
+    window_samples = max(int(SPECTRUM_WINDOW_S * evidence.sample_rate_hz), 16)
+    return estimate_spectral_density(signal, evidence.sample_rate_hz, window_samples)[1][1:]
 
 
 EFFECT = Effect(
@@ -162,6 +184,6 @@ EFFECT = Effect(
         Parameter("contact_stiffness", 1e-3, 1e12, none=None, step=0.05),
         Parameter("contact_damping", 1e-9, 1e6, none=None, step=0.1),
     ),
-    action=JointForce(_change, _law, _pack, steps=STEPS),
-    starts=_starts,
+    action=JointForce(_split_off_motor, _compute_mean_force, _pack_parameters, steps=STEPS_PER_SAMPLE),
+    starts=_find_starting_values,
 )

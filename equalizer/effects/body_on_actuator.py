@@ -7,7 +7,11 @@ F = -(c (v - q') + k (x - q)), m q'' = -F. It adds a coordinate to the model. `e
 import numpy as np
 
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
-from equalizer.effects.starts.attached_oscillator import likely_oscillators, missing_force_spectra, with_oscillator
+from equalizer.effects.starts.attached_oscillator import (
+    estimate_missing_force_spectra,
+    find_likely_oscillators,
+    with_oscillator,
+)
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -22,12 +26,12 @@ def _add_body(model: MechanicalModel, axis: int, values: Values) -> MechanicalMo
     return with_oscillator(model, direction, values["mass"], values["damping"], values["stiffness"])
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """The two oscillators that explain most of the missing force: k = m w², c = 2 ratio m w, w = 2 pi natural_hz."""
-    missing = missing_force_spectra(evidence, axis)
+    missing = estimate_missing_force_spectra(evidence, axis)
     natural_hz = np.geomspace(2.0, 0.4 * evidence.sample_rate_hz, 50).tolist()
     starts = []
-    for oscillator in likely_oscillators(missing, axis, natural_hz, DAMPING_RATIOS)[:2]:
+    for oscillator in find_likely_oscillators(missing, axis, natural_hz, DAMPING_RATIOS)[:2]:
         natural_rad_s = 2 * np.pi * oscillator.natural_hz
         damping, stiffness = (
             2 * oscillator.damping_ratio * oscillator.mass * natural_rad_s,
@@ -49,7 +53,7 @@ EFFECT = Effect(
         Parameter("stiffness", 1e-6, 1e12, none=None, step=0.03),
     ),
     action=Structure(_add_body),
-    starts=_starts,
+    starts=_find_starting_values,
     # An extra mode is the special case of one axis and light damping.
     simpler=("extra_mode",),
 )

@@ -5,7 +5,7 @@
 The sample with time stamp t was taken at t (1 + ppm 1e-6): later than t for ppm > 0, by a clock that runs slow. A file
 may have been resampled from one clock to the other: `interpolated` is the share (0 to 1) of linear interpolation in the
 resampling; the rest is band-limited and does not change the spectrum. `with_position` is 1 where the position has the
-clock of the response and 0 where it has that of the commands.
+clock of the response and 0 where it has that of the commands. An entry of the catalogue.
 """
 
 import numpy as np
@@ -13,91 +13,107 @@ import numpy as np
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.simulation.interpolated_response import resample_response
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.response_starts import lateness
+from equalizer.effects.starts.response_starts import estimate_lag
 from equalizer.signals.signal import FloatArray
 
 WINDOW_S, LEAST_WINDOWS = 2.0, 4
 """Length (s) of the windows in which the time shift is measured, and fewest windows for a slope."""
-LONGEST_S = 0.1
-"""Largest time shift (s) of a window that is searched for."""
+LARGEST_SHIFT_S = 0.1
+"""Largest time shift (s) of a window, either way, that is searched for."""
 LARGEST_PPM = 2e4
 """Largest drift (1e-6): a larger one is taken for a wrong sample rate."""
-LEAST_SIGMA = 5.0
-"""Least drift, in standard errors, from which the effect is tried."""
+LEAST_DRIFT_SIGMA = 5.0
+"""Least drift, in standard errors, for the effect to be tried."""
 
 
-def _read_drifting(
-    response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values
-) -> FloatArray:
+def _apply_drift(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
+    """Resample the response (n, p) as a drifting clock samples it: `OnResponse.change`. The channels are ignored: all
+    have the same clock."""
     return resample_response(response, 1 + 1e-6 * values["ppm"], 0.0, values.get("interpolated", 0.0))
 
 
-def _read_position(position: FloatArray, sample_rate_hz: float, values: Values) -> FloatArray:
-    return _read_drifting(position, sample_rate_hz, (), values) if values.get("with_position", 1.0) > 0.5 else position
+def _apply_position_drift(position: FloatArray, sample_rate_hz: float, values: Values) -> FloatArray:
+    """Resample the position likewise where `with_position` is 1, its default: `OnResponse.on_position`."""
+    return _apply_drift(position, sample_rate_hz, (), values) if values.get("with_position", 1.0) > 0.5 else position
 
 
-def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """ppm from the slope of the response's time shift over time; the better fit of linear and band-limited
-    interpolation first, because only linear interpolation lowers peaks. Empty where the slope is not significant."""
-    slope = _lateness_per_second(evidence) if channel <= 0 else None
-    if slope is None:
+def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    """Find ppm from the slope of the response's time shift over time. Two sets of values, with band-limited and with
+    linear interpolation, the better fit first: only linear interpolation lowers peaks. Empty where the slope is not
+    significant or too large, and for a channel other than the first (the clock is common to all)."""
+    shift_rate = _estimate_significant_shift_rate(evidence) if channel <= 0 else None
+    if shift_rate is None:
         return ()
-    with_position = _position_drift_flag(evidence, slope)
+    with_position = _detect_position_drift(evidence, shift_rate)
     starts = [
-        {"ppm": -1e6 * slope, "interpolated": linear_share, "with_position": with_position}
+        {"ppm": -1e6 * shift_rate, "interpolated": linear_share, "with_position": with_position}
         for linear_share in (0.0, 1.0)
     ]
-    return tuple(sorted(starts, key=lambda values: _misfit(evidence, values)))
+    return tuple(sorted(starts, key=lambda values: _compute_misfit(evidence, values)))
 
 
-def _misfit(evidence: Evidence, values: Values) -> float:
-    """Sum of squares of the response's residual over the noise."""
-    read = _read_drifting(evidence.predicted, evidence.sample_rate_hz, (), values)
-    return float(np.sum((((evidence.response - read) / evidence.noise) ** 2)[evidence.used > 0]))
+def _compute_misfit(evidence: Evidence, values: Values) -> float:
+    """Compute the sum of squares of the response's residual over the noise, over the samples that count."""
+    drifted_prediction = _apply_drift(evidence.predicted, evidence.sample_rate_hz, (), values)
+    return float(np.sum((((evidence.response - drifted_prediction) / evidence.noise) ** 2)[evidence.used > 0]))
 
 
-def _position_drift_flag(evidence: Evidence, slope: float) -> float:
-    """1 where the measured position has the same clock error as the response, 0 where it is read by the commands'
-    clock."""
+def _detect_position_drift(evidence: Evidence, response_shift_rate: float) -> float:
+    """Return 1 where the measured position has the same clock error as the response, and where it cannot be told; 0
+    where its time shift is nearer to none: it has the clock of the commands. response_shift_rate: s per s."""
     if evidence.position is None or evidence.predicted_position is None or evidence.position_noise is None:
         return 1.0
-    noise = evidence.position_noise
-    position_slope = _lateness_slope(evidence, evidence.position / noise, evidence.predicted_position / noise)
-    return 1.0 if position_slope is None or abs(position_slope[0] - slope) < abs(position_slope[0]) else 0.0
+    position_noise = evidence.position_noise
+    position_shift = _estimate_shift_rate(
+        evidence, evidence.position / position_noise, evidence.predicted_position / position_noise
+    )
+    return (
+        1.0 if position_shift is None or abs(position_shift[0] - response_shift_rate) < abs(position_shift[0]) else 0.0
+    )
 
 
-def _lateness_per_second(evidence: Evidence) -> float | None:
-    """Slope of the response's time shift (s per s, equal to -1e-6 ppm); None where it is not significant or too
-    large."""
-    slope_and_error = _lateness_slope(evidence, evidence.response / evidence.noise, evidence.predicted / evidence.noise)
-    if slope_and_error is None:
+def _estimate_significant_shift_rate(evidence: Evidence) -> float | None:
+    """Estimate the slope of the response's time shift (s per s, equal to -1e-6 ppm); None where it is not significant
+    or larger than `LARGEST_PPM`."""
+    rate_and_error = _estimate_shift_rate(
+        evidence, evidence.response / evidence.noise, evidence.predicted / evidence.noise
+    )
+    if rate_and_error is None:
         return None
-    slope, standard_error = slope_and_error
-    return slope if abs(slope) > LEAST_SIGMA * standard_error and abs(slope) < 1e-6 * LARGEST_PPM else None
+    shift_rate, standard_error = rate_and_error
+    return (
+        shift_rate
+        if abs(shift_rate) > LEAST_DRIFT_SIGMA * standard_error and abs(shift_rate) < 1e-6 * LARGEST_PPM
+        else None
+    )
 
 
-def _lateness_slope(evidence: Evidence, measured: FloatArray, predicted: FloatArray) -> tuple[float, float] | None:
-    """Slope of the time shift over time (Theil-Sen estimator), and its standard error from the scaled median absolute
-    deviation of the residuals; None with too few windows. measured, predicted: (n, channels), over the noise."""
-    rate = evidence.sample_rate_hz
-    length = int(WINDOW_S * rate)
-    if LONGEST_S * rate < 1:
+def _estimate_shift_rate(evidence: Evidence, measured: FloatArray, predicted: FloatArray) -> tuple[float, float] | None:
+    """Estimate the slope of the time shift over time (s per s; Theil-Sen estimator), and its standard error from the
+    scaled median absolute deviation of the residuals. None with too few windows in which most samples count and the
+    prediction moves, or a sample period above `LARGEST_SHIFT_S`. measured, predicted: (n, channels), over the noise."""
+    sample_rate_hz = evidence.sample_rate_hz
+    window_samples = int(WINDOW_S * sample_rate_hz)
+    if LARGEST_SHIFT_S * sample_rate_hz < 1:
         return None
     window_times_s, shifts_s = [], []
-    for start in range(0, len(measured) - length + 1, length):
-        window = slice(start, start + length)
+    for start in range(0, len(measured) - window_samples + 1, window_samples):
+        window = slice(start, start + window_samples)
         if evidence.used[window].mean() > 0.5 and np.any(predicted[window]):
-            window_times_s.append((start + 0.5 * length) / rate)
-            shifts_s.append(lateness(measured[window], predicted[window], int(LONGEST_S * rate)) / rate)
+            window_times_s.append((start + 0.5 * window_samples) / sample_rate_hz)
+            shifts_s.append(
+                estimate_lag(measured[window], predicted[window], int(LARGEST_SHIFT_S * sample_rate_hz))
+                / sample_rate_hz
+            )
     if len(window_times_s) < LEAST_WINDOWS:
         return None
     # Windows with almost no motion give arbitrary shifts; the median of pairwise slopes is robust against them.
     times_s, time_shifts_s = np.array(window_times_s), np.array(shifts_s)
-    first, second = np.triu_indices(len(times_s), 1)
-    slope = float(np.median((time_shifts_s[second] - time_shifts_s[first]) / (times_s[second] - times_s[first])))
-    residual = time_shifts_s - slope * times_s
-    spread = 1.5 * float(np.median(np.abs(residual - np.median(residual))))
-    return slope, spread / (np.sqrt(len(times_s)) * float(times_s.std()))
+    earlier, later = np.triu_indices(len(times_s), 1)
+    shift_rate = float(np.median((time_shifts_s[later] - time_shifts_s[earlier]) / (times_s[later] - times_s[earlier])))
+    residual = time_shifts_s - shift_rate * times_s
+    residual_sd = 1.5 * float(np.median(np.abs(residual - np.median(residual))))
+    return shift_rate, residual_sd / (np.sqrt(len(times_s)) * float(times_s.std()))
 
 
 EFFECT = Effect(
@@ -111,8 +127,8 @@ EFFECT = Effect(
         Parameter("interpolated", 0.0, 1.0, none=None, scale="linear", step=0.05),
         Parameter("with_position", 0.0, 1.0, none=None, scale="linear", step=1.0, fixed=True),
     ),
-    action=OnResponse(_read_drifting, stage=4, on_position=_read_position),
-    starts=_starts,
+    action=OnResponse(_apply_drift, stage=4, on_position=_apply_position_drift),
+    starts=_find_starting_values,
     of_time=True,
     sites=("all",),
 )

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from equalizer.effects.discovered_law import COMMAND, DERIVATIVES, axis_names
-from equalizer.effects.placing import axis_letter, find_sites
+from equalizer.effects.discovered_law import COMMAND_PREFIX, DERIVATIVE_PREFIXES, derive_axis_letters
+from equalizer.effects.placing import find_sites, shorten_axis_name
 from equalizer.laws.law import Law
 from equalizer.laws.tree import Apply, Node, Variable, format_formula
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
@@ -59,7 +59,7 @@ def _reverse_effects(
     sites = find_sites(effect, inputs, outputs)
     if effect.law is not None:
         return (replace(effect, law=_reverse_law(effect.law, sites[0], axis_signs, channels)),)
-    letters = [effect.axis] if effect.axis is not None else [axis_letter(inputs[site], inputs) for site in sites]
+    letters = [effect.axis] if effect.axis is not None else [shorten_axis_name(inputs[site], inputs) for site in sites]
     return tuple(
         replace(effect, axis=letter, parameters=_reverse_parameters(effect, site, axis_signs))
         for site, letter in zip(sites, letters, strict=True)
@@ -87,9 +87,9 @@ def _reverse_law(law: Law, site: int, axis_signs: FloatArray, channels: tuple[tu
     """The law with the signals of reversed axes negated in its formula, and its result negated where its own axis
     (site) is reversed."""
     inputs, outputs = channels
-    letters, reversed_names = axis_names(inputs), set[str]()
+    letters, reversed_names = derive_axis_letters(inputs), set[str]()
     for axis in np.flatnonzero(axis_signs < 0):
-        reversed_names |= {inputs[axis], *(prefix + letters[axis] for prefix in (*DERIVATIVES, COMMAND))}
+        reversed_names |= {inputs[axis], *(prefix + letters[axis] for prefix in (*DERIVATIVE_PREFIXES, COMMAND_PREFIX))}
         reversed_names |= {outputs[axis]} if len(outputs) == len(inputs) else set()
     tree = _negate_variables(law.tree, reversed_names)
     return replace(law, expression=format_formula(Apply("neg", (tree,)) if axis_signs[site] < 0 else tree, None, None))

@@ -10,20 +10,22 @@ import numpy as np
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, linear_part
+from equalizer.effects.starts.starting_values import PartialRegression, select_axis_motion, stack_linear_regressors
 from equalizer.signals.signal import FloatArray
 
 
 @compile_law
-def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
+    """The force (N), the same at every instant. parameters: force."""
     return float(parameters[0])
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Mean of the missing force, and the constant of its regression with position, velocity and acceleration."""
-    motion = axis_motion(evidence, axis)
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Two starting values: the mean of the missing force, and the constant of its regression on position, velocity and
+    acceleration; a value of zero is left out."""
+    motion = select_axis_motion(evidence, axis)
     # Re-tuning of a linear model can change its stiffness but not its equilibrium: a constant is no nuisance here.
-    regression = PartialRegression(motion.force, linear_part(motion, constant=False))
+    regression = PartialRegression(motion.force, stack_linear_regressors(motion, constant=False))
     regressed_force = float(regression.fit(np.ones_like(motion.force)).strengths[0])
     mean_force = float(np.mean(motion.force))
     return tuple({"force": force} for force in (mean_force, regressed_force) if force != 0)
@@ -35,6 +37,6 @@ EFFECT = Effect(
     source="weight, or the pull of a cable",
     signature="the missing force is the same everywhere and at every level; the place of rest is another",
     parameters=(Parameter("force", -1e6, 1e6, none=0.0, scale="signed"),),
-    action=AxisForce(_law, pack_values("force")),
-    starts=_starts,
+    action=AxisForce(_compute_mean_force, pack_values("force")),
+    starts=_find_starting_values,
 )

@@ -9,7 +9,7 @@ The simulation replaces the jump at v = 0 by the bristle of the LuGre model, whi
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
-from equalizer.effects.simulation.dry_friction_kernel import friction_force
+from equalizer.effects.simulation.dry_friction_kernel import compute_friction_force
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import regress_out_linear_terms, select_sliding_motion
@@ -17,11 +17,12 @@ from equalizer.signals.signal import FloatArray
 
 
 @compile_law
-def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    return float(friction_force(parameters[0], parameters[0], memory[0], memory, at))
+def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
+    """Mean friction force (N) over a step. parameters: level; memory: deflection of the bristle over its largest."""
+    return float(compute_friction_force(parameters[0], parameters[0], memory[0], memory, step_motion))
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Level by linear regression of the missing force on -sgn(v) where the axis slides; empty unless positive."""
     motion = select_sliding_motion(evidence, axis)
     level = float(regress_out_linear_terms(motion).fit(-np.sign(motion.velocity)).strengths[0])
@@ -35,6 +36,6 @@ EFFECT = Effect(
     signature="the missing force flips its sign with the velocity and does not grow with it; its odd harmonics fall "
     "as the level rises",
     parameters=(Parameter("level", 1e-9, 1e6, none=0.0),),
-    action=AxisForce(_law, pack_values("level"), memory=1),
-    starts=_starts,
+    action=AxisForce(_compute_mean_force, pack_values("level"), memory=1),
+    starts=_find_starting_values,
 )

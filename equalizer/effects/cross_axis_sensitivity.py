@@ -8,7 +8,7 @@ import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.response_starts import regression_coefficients
+from equalizer.effects.starts.response_starts import fit_coefficients
 from equalizer.signals.signal import FloatArray
 
 SHARE_NAMES = ("from_next", "from_after_next")
@@ -19,28 +19,34 @@ LEAST_SHARE = 1e-4
 """Least share that is tried: a hundredth of the cross-axis sensitivity that accelerometer data sheets allow (1 %)."""
 
 
-def _next_channels(channel: int, channels: int) -> list[int]:
+def _list_following_channels(channel: int, channels: int) -> list[int]:
     """Indices of the one or two channels that follow this one, cyclically."""
     return [(channel + offset) % channels for offset in range(1, min(channels, 3))]
 
 
 def _mix_channels(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
-    read = response.copy()
+    """The response (n, p) with the shares of the following channels added to each of `channels`; shares of channels
+    that the response does not have are ignored."""
+    sensed_response = response.copy()
     for channel in channels:
-        for name, source_channel in zip(SHARE_NAMES, _next_channels(channel, response.shape[1]), strict=False):
-            read[:, channel] += values[name] * response[:, source_channel]
-    return read
+        for name, source_channel in zip(
+            SHARE_NAMES, _list_following_channels(channel, response.shape[1]), strict=False
+        ):
+            sensed_response[:, channel] += values[name] * response[:, source_channel]
+    return sensed_response
 
 
-def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """Shares by linear regression of the channel's residual on the other predicted channels and its own (its gain)."""
-    source_channels = _next_channels(channel, evidence.response.shape[1])
+def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    """Shares by linear regression of the channel's residual on the next one or two predicted channels and its own
+    prediction (an error of its gain). Empty for a single channel, and where the largest share is not between
+    `LEAST_SHARE` and `LARGEST_SHARE`; a missing channel gets the share 0."""
+    source_channels = _list_following_channels(channel, evidence.response.shape[1])
     residual = evidence.response - evidence.predicted
     if not source_channels:
         return ()
-    shares = regression_coefficients(
-        residual[:, channel], evidence.predicted[:, [*source_channels, channel]], evidence.used
-    )[: len(source_channels)]
+    shares = fit_coefficients(residual[:, channel], evidence.predicted[:, [*source_channels, channel]], evidence.used)[
+        : len(source_channels)
+    ]
     if not LEAST_SHARE < float(np.abs(shares).max()) < LARGEST_SHARE:
         return ()
     return ({**dict.fromkeys(SHARE_NAMES, 0.0), **dict(zip(SHARE_NAMES, shares.tolist(), strict=False))},)
@@ -56,7 +62,7 @@ EFFECT = Effect(
         Parameter(name, -LARGEST_SHARE, LARGEST_SHARE, none=0.0, scale="linear", step=1e-3) for name in SHARE_NAMES
     ),
     action=OnResponse(_mix_channels, stage=-1),
-    starts=_starts,
+    starts=_find_starting_values,
     sites=("one", "each"),
     simpler=("sensor_misalignment",),
 )

@@ -61,8 +61,8 @@ class AxisForce:
     """A force along a driven axis that depends on the motion."""
 
     law: Any
-    """Compiled function law(parameters, memory, at) -> force in N; `equalizer.effects.simulation.instant` documents
-    `at`."""
+    """Compiled function law(parameters, memory, step_motion) -> mean force in N over a step;
+    `equalizer.effects.simulation.instant` documents `step_motion`."""
     pack: Callable[[MechanicalModel, int, Values], FloatArray]
     """Arguments: model, index of the driven axis, values. Returns the law's `parameters`, a flat array."""
     memory: int = 0

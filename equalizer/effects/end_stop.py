@@ -3,7 +3,7 @@
     F = -k (x - x_s) where x lies beyond the stop x_s, else 0        k in N/m (a rotation: N m/rad)
 
 A second stop at -x_s has the stiffness `opposite` times k (0 = none). Beyond means away from zero, unless `side` states
-the direction (1: upwards, -1: downwards); there is no second stop then.
+the direction (1: upwards, -1: downwards); there is no second stop then. An entry of the catalogue.
 """
 
 import numpy as np
@@ -15,87 +15,104 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import (
     AxisMotion,
     PartialRegression,
-    axis_motion,
     regress_out_linear_terms,
+    select_axis_motion,
 )
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
-COARSE_SHARES, FINE_OFFSETS = np.linspace(0.3, 0.98, 18), np.linspace(-0.04, 0.04, 9)
+COARSE_POSITION_SHARES, FINE_POSITION_OFFSETS = np.linspace(0.3, 0.98, 18), np.linspace(-0.04, 0.04, 9)
 """Stop positions that are tried, relative to the largest deflection: a coarse grid, then offsets around its best
 point."""
 
 
 @compile_law
-def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Weighted mean of the force at the step's start and end. A stop only pushes, and its penetration at the end
-    depends on its force (implicit step). parameters: stop and stiffness, signs of both sides, relative stiffness of the
-    second."""
-    force = last = 0.0
+def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
+    """Compute the weighted mean of the force (N) at the step's start and end. A stop only pushes, and its penetration
+    at the end depends on its force (implicit step). parameters: as `_pack_parameters` returns them. step_motion: see
+    `instant`; the force at the end is written to it."""
+    force = force_at_end = 0.0
     for side in range(2):
         side_sign = parameters[2 + side]
         stiffness = parameters[1] if side == 0 else parameters[1] * parameters[4]
-        start = max(side_sign * at[X] - parameters[0], 0.0)
-        end = side_sign * (at[X_FREE] + at[X_PER_N] * force) - parameters[0]
+        start_penetration = max(side_sign * step_motion[X] - parameters[0], 0.0)
+        end_penetration = side_sign * (step_motion[X_FREE] + step_motion[X_PER_N] * force) - parameters[0]
         # Weight of the end: 1/2 (trapezoidal rule) for a soft stop, towards 1 (backward Euler) for a stop that is too
         # stiff for the step, where the trapezoidal rule would oscillate.
-        slack = stiffness * at[X_PER_N]
-        end_weight = (0.5 + slack) / (1 + slack)
-        contact_force = stiffness * ((1 - end_weight) * start + end_weight * end) / (1 + end_weight * slack)
-        if end - at[X_PER_N] * contact_force < 0:
-            contact_force = stiffness * (1 - end_weight) * start
+        stiffness_ratio = stiffness * step_motion[X_PER_N]
+        end_weight = (0.5 + stiffness_ratio) / (1 + stiffness_ratio)
+        contact_force = (
+            stiffness
+            * ((1 - end_weight) * start_penetration + end_weight * end_penetration)
+            / (1 + end_weight * stiffness_ratio)
+        )
+        if end_penetration - step_motion[X_PER_N] * contact_force < 0:
+            contact_force = stiffness * (1 - end_weight) * start_penetration
         force -= side_sign * max(contact_force, 0.0)
-        last -= side_sign * stiffness * max(end - at[X_PER_N] * contact_force, 0.0)
-    at[F_END] = last
+        force_at_end -= side_sign * stiffness * max(end_penetration - step_motion[X_PER_N] * contact_force, 0.0)
+    step_motion[F_END] = force_at_end
     return float(force)
 
 
-def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    """Parameters of `_law`; the sign of the position states the side where `side` is 0 or missing."""
+def _pack_parameters(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    """Pack the parameters of `_compute_mean_force`, (5,): distance (m) and stiffness (N/m) of the stop, signs of both
+    sides, relative stiffness of the second. The sign of the position states the side where `side` is 0 or missing."""
     side = values.get("side", 0.0)
-    direction = float(np.sign(side)) or (-1.0 if values["position"] < 0 else 1.0)
+    stop_sign = float(np.sign(side)) or (-1.0 if values["position"] < 0 else 1.0)
     # With `side`, a stop may lie on the other side of zero, where a stop at -position would overlap with it.
-    opposite = 0.0 if side else values.get("opposite", 0.0)
-    return np.array([direction * values["position"], values["stiffness"], direction, -direction, opposite])
+    relative_stiffness = 0.0 if side else values.get("opposite", 0.0)
+    return np.array([stop_sign * values["position"], values["stiffness"], stop_sign, -stop_sign, relative_stiffness])
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """The best stop on either side by grid search and linear regression, the better first."""
-    motion = axis_motion(evidence, axis)
-    regression, farthest = regress_out_linear_terms(motion), float(np.abs(motion.position).max())
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Find the best stop on either side by grid search and linear regression, the better first; a side without a stop
+    is left out."""
+    motion = select_axis_motion(evidence, axis)
+    regression, largest_deflection = regress_out_linear_terms(motion), float(np.abs(motion.position).max())
     candidates = []
-    for direction in (1.0, -1.0):
-        coarse = _best_stop(motion, regression, direction, COARSE_SHARES * farthest)
-        if coarse is not None:
-            fine = _best_stop(motion, regression, direction, abs(coarse[1]["position"]) + FINE_OFFSETS * farthest)
-            candidates.append(coarse if fine is None else fine)
+    for stop_sign in (1.0, -1.0):
+        coarse_fit = _find_best_stop(motion, regression, stop_sign, COARSE_POSITION_SHARES * largest_deflection)
+        if coarse_fit is not None:
+            refined_fit = _find_best_stop(
+                motion,
+                regression,
+                stop_sign,
+                abs(coarse_fit[1]["position"]) + FINE_POSITION_OFFSETS * largest_deflection,
+            )
+            candidates.append(coarse_fit if refined_fit is None else refined_fit)
     return tuple(values for _, values in sorted(candidates, key=lambda item: -item[0]))
 
 
-def _best_stop(
-    motion: AxisMotion, regression: PartialRegression, direction: float, stops: FloatArray
+def _find_best_stop(
+    motion: AxisMotion, regression: PartialRegression, stop_sign: float, stop_distances: FloatArray
 ) -> tuple[float, Values] | None:
-    """Explained share of the missing force, and values, of the best stop on the side `direction` (1 or -1) with a
-    second stop that is at most 10 % stiffer; None where no stop has a positive stiffness. stops: distances (m) to
-    try."""
+    """Find the best stop on the side `stop_sign` (1 or -1), with a second stop that is at most 10 % stiffer. Returns
+    the share of the missing force that both explain, and the values; None where no stop has a positive stiffness.
+    stop_distances: distances (m) to try."""
     candidates: list[tuple[float, Values]] = []
-    for stop in stops.tolist():
+    for stop_distance in stop_distances.tolist():
         penetration, opposite_penetration = (
-            np.maximum(side * motion.position - stop, 0.0) for side in (direction, -direction)
+            np.maximum(side * motion.position - stop_distance, 0.0) for side in (stop_sign, -stop_sign)
         )
         if not (penetration > 0).any():
             continue
-        laws = (
-            (-direction * penetration, direction * opposite_penetration)
+        regressors = (
+            (-stop_sign * penetration, stop_sign * opposite_penetration)
             if (opposite_penetration > 0).any()
-            else (-direction * penetration,)
+            else (-stop_sign * penetration,)
         )
-        fit = regression.fit(*laws)
-        stiffness, opposite_stiffness = float(fit.strengths[0]), float(fit.strengths[-1]) if len(laws) > 1 else 0.0
+        fit = regression.fit(*regressors)
+        stiffness, opposite_stiffness = (
+            float(fit.strengths[0]),
+            float(fit.strengths[-1]) if len(regressors) > 1 else 0.0,
+        )
         if stiffness > 0 and opposite_stiffness <= 1.1 * stiffness:
-            share = min(max(opposite_stiffness / stiffness, 0.0), 1.0)
+            relative_stiffness = min(max(opposite_stiffness / stiffness, 0.0), 1.0)
             candidates.append(
-                (fit.explained_share, {"position": direction * stop, "stiffness": stiffness, "opposite": share})
+                (
+                    fit.explained_share,
+                    {"position": stop_sign * stop_distance, "stiffness": stiffness, "opposite": relative_stiffness},
+                )
             )
     return max(candidates, key=lambda item: item[0], default=None)
 
@@ -113,6 +130,6 @@ EFFECT = Effect(
         Parameter("stiffness", 1e-6, 1e12, none=0.0),
         Parameter("opposite", 0.0, 1.5, none=None, scale="linear", step=0.05),
     ),
-    action=AxisForce(_law, _pack),
-    starts=_starts,
+    action=AxisForce(_compute_mean_force, _pack_parameters),
+    starts=_find_starting_values,
 )

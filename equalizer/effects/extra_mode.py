@@ -11,8 +11,8 @@ import numpy as np
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
 from equalizer.effects.starts.attached_oscillator import (
     AttachedOscillator,
-    likely_oscillators,
-    missing_force_spectra,
+    estimate_missing_force_spectra,
+    find_likely_oscillators,
     subtract_oscillator,
     with_oscillator,
 )
@@ -20,22 +20,23 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
-LOWEST_HZ, STARTS = 2.0, 2
+LOWEST_NATURAL_HZ, MAX_MODES = 2.0, 2
 """Lowest natural frequency (Hz) that is tried, and largest number of modes for which starting values are returned."""
-RATIOS = (0.01, 0.04, 0.12)
+DAMPING_RATIOS = (0.01, 0.04, 0.12)
 """Damping ratios of the coarse search."""
-FINE_FREQUENCIES, FINE_DAMPING = np.linspace(0.96, 1.04, 9), np.geomspace(0.4, 2.5, 5)
+FREQUENCY_FACTORS, DAMPING_FACTORS = np.linspace(0.96, 1.04, 9), np.geomspace(0.4, 2.5, 5)
 """Factors of the finer search: natural frequencies and damping ratios relative to the best of the coarse search."""
-TILTS = ("tilt_next", "tilt_after_next")
+TILT_NAMES = ("tilt_next", "tilt_after_next")
 """Parameter names: components of the oscillator's direction along the next two axes, relative to its own axis."""
 
 
-def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
-    """The model with the oscillator attached along the tilted direction, a unit vector in the coordinates."""
+def _attach_oscillator(model: MechanicalModel, axis: int, values: Values) -> MechanicalModel:
+    """The model with the oscillator attached along the direction of the axis, tilted towards the other axes; the
+    direction is scaled to a unit vector in the coordinates. A missing tilt is 0."""
     axes, m = compute_driven_axes(model), model.inputs
     direction = axes[:, axis].copy()
-    for offset, tilt in enumerate(TILTS[: m - 1], start=1):
-        direction += values.get(tilt, 0.0) * axes[:, (axis + offset) % m]
+    for offset, tilt_name in enumerate(TILT_NAMES[: m - 1], start=1):
+        direction += values.get(tilt_name, 0.0) * axes[:, (axis + offset) % m]
     direction /= np.linalg.norm(direction)
     mass, natural_rad_s = values["mass"], 2 * np.pi * values["frequency"]
     return with_oscillator(
@@ -43,32 +44,34 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalMode
     )
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Oscillators that explain most of the missing force, by a coarse and a fine grid search each."""
-    missing, starts = missing_force_spectra(evidence, axis), []
-    natural_hz = np.geomspace(LOWEST_HZ, 0.4 * evidence.sample_rate_hz, 90).tolist()
-    for _ in range(STARTS):
-        coarse = likely_oscillators(missing, axis, natural_hz, RATIOS)[:1]
-        for oscillator in coarse:
-            refined = likely_oscillators(
-                missing,
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Up to `MAX_MODES` oscillators that explain most of the missing force, each by a coarse and a fine grid search
+    over natural frequency (up to 0.4 of the sample rate) and damping ratio."""
+    missing_force, starting_values = estimate_missing_force_spectra(evidence, axis), []
+    natural_hz = np.geomspace(LOWEST_NATURAL_HZ, 0.4 * evidence.sample_rate_hz, 90).tolist()
+    for _ in range(MAX_MODES):
+        coarse_fits = find_likely_oscillators(missing_force, axis, natural_hz, DAMPING_RATIOS)[:1]
+        for oscillator in coarse_fits:
+            refined_fits = find_likely_oscillators(
+                missing_force,
                 axis,
-                (oscillator.natural_hz * FINE_FREQUENCIES).tolist(),
-                (oscillator.damping_ratio * FINE_DAMPING).tolist(),
+                (oscillator.natural_hz * FREQUENCY_FACTORS).tolist(),
+                (oscillator.damping_ratio * DAMPING_FACTORS).tolist(),
             )
-            starts.append(_mode_values(refined[0], axis, evidence.model.inputs))
+            starting_values.append(_convert_to_parameters(refined_fits[0], axis, evidence.model.inputs))
             # The next mode is searched for in the missing force without this mode.
-            missing = subtract_oscillator(missing, refined[0])
-    return tuple(starts)
+            missing_force = subtract_oscillator(missing_force, refined_fits[0])
+    return tuple(starting_values)
 
 
-def _mode_values(oscillator: AttachedOscillator, axis: int, m: int) -> Values:
-    """Parameters of an oscillator that was fitted at an axis. m: number of driven axes."""
+def _convert_to_parameters(oscillator: AttachedOscillator, axis: int, m: int) -> Values:
+    """Parameters of the effect for an oscillator that was fitted at an axis. m: number of driven axes; tilts towards
+    axes beyond them are 0, the others limited to -1 to 1."""
     tilts = [float(np.clip(oscillator.by_axis[(axis + offset) % m], -1, 1)) if offset < m else 0.0 for offset in (1, 2)]
     # Along a direction (1, t1, t2) the own axis feels only mass / (1 + t1² + t2²), which is what was fitted.
     mass = oscillator.mass * (1 + tilts[0] ** 2 + tilts[1] ** 2)
     values = {"frequency": oscillator.natural_hz, "mass": mass, "damping_ratio": oscillator.damping_ratio}
-    return values | dict(zip(TILTS, tilts, strict=True))
+    return values | dict(zip(TILT_NAMES, tilts, strict=True))
 
 
 EFFECT = Effect(
@@ -84,6 +87,6 @@ EFFECT = Effect(
         Parameter("tilt_next", -1.0, 1.0, none=None, scale="linear", step=0.02),
         Parameter("tilt_after_next", -1.0, 1.0, none=None, scale="linear", step=0.02),
     ),
-    action=Structure(_change),
-    starts=_starts,
+    action=Structure(_attach_oscillator),
+    starts=_find_starting_values,
 )

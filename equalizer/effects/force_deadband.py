@@ -8,20 +8,23 @@ With jump = 1 the force equals the command beyond the band; with jump = 0 it gro
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnCommand, Parameter, Values
-from equalizer.effects.starts.command_starts import grid_of_peaks, likeliest_value
+from equalizer.effects.starts.command_starts import find_command_parameter, make_force_level_grid
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 
 def _apply_deadband(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
+    """Force (n,) for commands (n,), both in N; `step_s` is not used, because the dead band has no memory. A missing
+    jump is 0."""
     width = values["width"]
     jump = values.get("jump", 0.0) * width * np.sign(commands) * (np.abs(commands) > width)
     return np.asarray(commands - np.clip(commands, -width, width) + jump)
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Likeliest width without a jump (0) and with a full one (1), each by grid search."""
-    peaks = grid_of_peaks(evidence, axis)
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Likeliest width without a jump (0) and with a full one (1), each by search over a grid of widths from 0.1 % to
+    99.5 % of the strongest command; a jump for which no width explains enough of the missing force is left out."""
+    peaks = make_force_level_grid(evidence, axis)
     grid = [peaks[0] / 30, peaks[0] / 10, peaks[0] / 3, *peaks] if peaks else []
     starting_values = []
     for jump in (0.0, 1.0):
@@ -29,12 +32,12 @@ def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
         def change(commands: FloatArray, step_s: float, width: float, jump: float = jump) -> FloatArray:
             return _apply_deadband(commands, step_s, {"width": width, "jump": jump})
 
-        width = likeliest_value(evidence, axis, change, grid, True)
+        width = find_command_parameter(evidence, axis, change, grid, True)
         starting_values += [] if width is None else [{"width": width, "jump": jump}]
     return tuple(starting_values)
 
 
-def _without_jump(values: Values) -> tuple[Values, ...]:
+def _remove_jump(values: Values) -> tuple[Values, ...]:
     """The dead band without a jump that gives the same force beyond the band: the two differ only for commands between
     both widths, where a recording has few samples."""
     jump = values.get("jump", 0.0)
@@ -52,7 +55,7 @@ EFFECT = Effect(
         Parameter("jump", 0.0, 1.0, none=None, scale="linear", step=0.05),
     ),
     action=OnCommand(_apply_deadband),
-    starts=_starts,
+    starts=_find_starting_values,
     sites=("one", "all"),
-    near_equivalents=_without_jump,
+    near_equivalents=_remove_jump,
 )

@@ -15,7 +15,7 @@ def _scale_force(commands: FloatArray, step_s: float, values: Values) -> FloatAr
     return np.asarray(values["gain"] * commands)
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """gain = 1 + sum(u f) / sum(u²): least squares of the missing force f over the command u. Empty where the gain is
     not positive or as good as 1."""
     columns, used = slice(None) if axis == ALL_SITES else slice(axis, axis + 1), evidence.used > 0
@@ -39,6 +39,6 @@ EFFECT = Effect(
     "alike",
     parameters=(Parameter("gain", 0.05, 20.0, none=1.0),),
     action=OnCommand(_scale_force),
-    starts=_starts,
+    starts=_find_starting_values,
     sites=("one", "all"),
 )

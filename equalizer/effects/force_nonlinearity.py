@@ -24,7 +24,7 @@ def _bend_force(commands: FloatArray, step_s: float, values: Values) -> FloatArr
     return square_law_force(commands, values["square"], values["reference"])
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     square_law = fit_square_law(evidence, axis)
     return () if square_law is None else ({"square": square_law[0], "reference": square_law[1]},)
 
@@ -41,6 +41,6 @@ EFFECT = Effect(
         Parameter("reference", 1e-6, 1e6, none=None),
     ),
     action=OnCommand(_bend_force),
-    starts=_starts,
+    starts=_find_starting_values,
     sites=("one", "all"),
 )

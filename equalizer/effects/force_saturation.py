@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnCommand, Parameter, Values
-from equalizer.effects.starts.command_starts import grid_of_peaks, likeliest_value
+from equalizer.effects.starts.command_starts import find_command_parameter, make_force_level_grid
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
@@ -19,10 +19,10 @@ def _clip_force(commands: FloatArray, step_s: float, values: Values) -> FloatArr
     return np.clip(commands, -values["limit"], values["limit"])
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Likeliest limit by grid search, from 3 % to just below the strongest command."""
-    limit = likeliest_value(
-        evidence, axis, lambda u, step_s, value: np.clip(u, -value, value), grid_of_peaks(evidence, axis), True
+    limit = find_command_parameter(
+        evidence, axis, lambda u, step_s, value: np.clip(u, -value, value), make_force_level_grid(evidence, axis), True
     )
     return () if limit is None else ({"limit": limit},)
 
@@ -35,6 +35,6 @@ EFFECT = Effect(
     "at the top level alone",
     parameters=(Parameter("limit", 1e-4, 1e4, none=math.inf),),
     action=OnCommand(_clip_force),
-    starts=_starts,
+    starts=_find_starting_values,
     sites=("one", "all"),
 )

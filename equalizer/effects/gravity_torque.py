@@ -9,7 +9,7 @@ from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_
 from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import axis_motion, regress_out_linear_terms
+from equalizer.effects.starts.starting_values import regress_out_linear_terms, select_axis_motion
 from equalizer.signals.signal import FloatArray
 
 LEAST_TRAVEL_RAD = 0.5
@@ -18,26 +18,31 @@ distinguished."""
 
 
 @compile_law
-def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Mean of the torques at start and end of the step (trapezoidal rule). The angle at the end depends on that mean:
-    it is found by fixed-point iteration. parameters: torque, angle; at: see `instant`."""
-    start, torque = np.sin(at[X] + parameters[1]), 0.0
+def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
+    """Mean of the torques (N m) at start and end of the step (trapezoidal rule). The angle at the end depends on that
+    mean, which is found by four fixed-point iterations. parameters: torque, angle; step_motion: see `instant`."""
+    start_sine, torque = np.sin(step_motion[X] + parameters[1]), 0.0
     for _ in range(4):
-        torque = -0.5 * parameters[0] * (start + np.sin(at[X_FREE] + at[X_PER_N] * torque + parameters[1]))
-    at[F_END] = -parameters[0] * np.sin(at[X_FREE] + at[X_PER_N] * torque + parameters[1])
+        torque = (
+            -0.5
+            * parameters[0]
+            * (start_sine + np.sin(step_motion[X_FREE] + step_motion[X_PER_N] * torque + parameters[1]))
+        )
+    step_motion[F_END] = -parameters[0] * np.sin(step_motion[X_FREE] + step_motion[X_PER_N] * torque + parameters[1])
     return float(torque)
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Starting values by linear regression of the missing torque on -sin(x) and -cos(x), whose factors are
-    torque cos(angle) and torque sin(angle). Empty for translational models and for small travel."""
-    motion = axis_motion(evidence, axis)
+    torque cos(angle) and torque sin(angle). Empty for translational models, for a travel of at most `LEAST_TRAVEL_RAD`
+    and for a torque of zero."""
+    motion = select_axis_motion(evidence, axis)
     if not evidence.model.rotational or not np.ptp(motion.position) > LEAST_TRAVEL_RAD:
         return ()
     fit = regress_out_linear_terms(motion).fit(-np.sin(motion.position), -np.cos(motion.position))
-    sine, cosine = fit.strengths.tolist()
-    torque = float(np.hypot(sine, cosine))
-    return ({"torque": torque, "angle": float(np.arctan2(cosine, sine))},) if torque > 0 else ()
+    sine_strength, cosine_strength = fit.strengths.tolist()
+    torque = float(np.hypot(sine_strength, cosine_strength))
+    return ({"torque": torque, "angle": float(np.arctan2(cosine_strength, sine_strength))},) if torque > 0 else ()
 
 
 EFFECT = Effect(
@@ -49,6 +54,6 @@ EFFECT = Effect(
         Parameter("torque", 1e-9, 1e6, none=0.0),
         Parameter("angle", -1e3, 1e3, none=None, scale="linear", step=0.02),
     ),
-    action=AxisForce(_law, pack_values("torque", "angle")),
-    starts=_starts,
+    action=AxisForce(_compute_mean_force, pack_values("torque", "angle")),
+    starts=_find_starting_values,
 )

@@ -11,7 +11,7 @@ import numpy as np
 
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, quadratic_form
+from equalizer.effects.starts.starting_values import PartialRegression, compute_quadratic_form, select_axis_motion
 from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
@@ -31,14 +31,15 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalMode
     )
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Values by linear regression of the missing force, then shares of the model's own values."""
-    motion = axis_motion(evidence, axis)
+    motion = select_axis_motion(evidence, axis)
     regression = PartialRegression(motion.force, np.ones((len(motion.force), 1)))
     estimates = regression.fit(-motion.acceleration, -motion.velocity, -motion.position).strengths.tolist()
     direction, model = compute_driven_axes(evidence.model)[:, axis], evidence.model
     model_shares = [
-        _INITIAL_SHARE * quadratic_form(matrix, direction) for matrix in (model.mass, model.damping, model.stiffness)
+        _INITIAL_SHARE * compute_quadratic_form(matrix, direction)
+        for matrix in (model.mass, model.damping, model.stiffness)
     ]
     values = [
         estimate if estimate > 0 else 0.1 * fallback for estimate, fallback in zip(estimates, model_shares, strict=True)
@@ -60,7 +61,7 @@ EFFECT = Effect(
         Parameter("stiffness", 0.0, 1e9, none=0.0, scale="signed"),
     ),
     action=Structure(_change),
-    starts=_starts,
+    starts=_find_starting_values,
     sites=("each",),
     simpler=("added_mass", "viscous_damping"),
 )

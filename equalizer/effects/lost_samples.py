@@ -104,7 +104,7 @@ def _is_clearly_repeated(position: FloatArray, measured: FloatArray) -> Flags:
     return np.asarray(nearer < -(DISTINGUISHABLE**2) / 2)
 
 
-def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """The fraction of lost samples; empty where they are too few or the negative control has as many."""
     columns = [channel]
     fraction = _estimate_fraction(evidence, columns, 1)
@@ -146,7 +146,7 @@ EFFECT = Effect(
     action=OnResponse(
         _lose_at_random, stage=5, conditioned=_lose_as_measured, conditioned_position=_lose_positions_as_measured
     ),
-    starts=_starts,
+    starts=_find_starting_values,
     of_time=True,
     sites=("all", "one"),
 )

@@ -1,14 +1,21 @@
 """Converts effects between the form of a model file (axis names, parameters) and that of a simulation (sites, values).
 
 A site is the index of a driven axis or, for sensor effects, of a response channel. `place_effects` converts from a
-file, `model_effects` back.
+file, `to_model_effects` back. Called by `analysis.diagnosis`, by `command_sign`, and by
+`study.workflows.files.validate_together` to check a model.
 """
 
 from collections.abc import Iterator
 from dataclasses import replace
 
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.discovered_law import Channels, law_channels, law_effect, law_values, law_with_values
+from equalizer.effects.discovered_law import (
+    Channels,
+    collect_channels,
+    get_law_values,
+    make_law_effect,
+    with_law_values,
+)
 from equalizer.effects.effect import Effect, PlacedEffect
 from equalizer.laws.law import Law
 from equalizer.laws.parse import LawError
@@ -25,51 +32,55 @@ class PlacingError(ValueError):
 
 
 def place_recorded_effects(model: MechanicalModel, recording: Recording) -> tuple[PlacedEffect, ...]:
-    """`place_effects` with the channels and conditions of a recording. Raises PlacingError."""
-    return place_effects(model, law_channels(recording))
+    """Place `model.effects` as `place_effects` does, with the channels and conditions of a recording. Raises
+    PlacingError."""
+    return place_effects(model, collect_channels(recording))
 
 
 def place_effects(model: MechanicalModel, channels: Channels) -> tuple[PlacedEffect, ...]:
-    """`model.effects` at the axes and channels that they name; an effect that names none acts on all.
+    """Place `model.effects` at the axes and channels that they name; an effect that names none acts on all.
 
     An axis is named by its channel ('fx', 'ax') or by its letter ('x'). A parameter that a file leaves out takes its
-    default. Raises PlacingError for an unknown effect or axis, or a value that must not be negative.
+    default. Raises PlacingError for an unknown effect or axis, a negative value of a positive parameter, or a law with
+    a signal that the channels lack.
     """
     model_channels = replace(channels, quantity=model.quantity)
     return tuple(_place_effect(effect, model_channels) for effect in model.effects)
 
 
-def model_effects(
+def to_model_effects(
     placed_effects: tuple[PlacedEffect, ...], input_channels: tuple[str, ...], output_channels: tuple[str, ...]
 ) -> tuple[ModelEffect, ...]:
-    """The inverse of `place_effects`: an entry per site, or a single entry without an axis where an effect acts on all
-    sites with the same values. Raises PlacingError for a site beyond the channels."""
+    """Convert placed effects to entries of a model file, the inverse of `place_effects`: an entry per site, or a single
+    entry without an axis where an effect acts on all sites with the same values. Raises PlacingError for a site beyond
+    the channels."""
     return tuple(
-        _model_effect(placed_effect, axis)
+        _to_model_effect(placed_effect, axis_name)
         for placed_effect in placed_effects
-        for axis in _axis_names(
-            placed_effect, output_channels if place_of_effect(placed_effect.effect) == "sensor" else input_channels
+        for axis_name in _iterate_axis_names(
+            placed_effect, output_channels if find_place(placed_effect.effect) == "sensor" else input_channels
         )
     )
 
 
-def place_of_effect(effect: Effect) -> Place:
-    """Place where an effect sits (mechanism, hand, actuator, sensor); for a discovered law, by the quantity it acts
-    on."""
+def find_place(effect: Effect) -> Place:
+    """Find the place where an effect sits (mechanism, hand, actuator, sensor); for a discovered law, by the quantity it
+    acts on."""
     return EFFECTS_BY_NAME[effect.name].place if effect.law is None else LAW_PLACES[effect.law.acts_on]
 
 
-def _model_effect(placed: PlacedEffect, axis: str | None) -> ModelEffect:
-    """Entry of a model file for a placed effect: reported parameters, or the law with its fitted parameters."""
-    law = placed.effect.law
+def _to_model_effect(placed_effect: PlacedEffect, axis: str | None) -> ModelEffect:
+    """Convert a placed effect to an entry of a model file: reported parameters, or the law with its fitted
+    parameters."""
+    law = placed_effect.effect.law
     if law is None or axis is None:
-        return ModelEffect(placed.effect.name, axis, dict(placed.effect.report(placed.values)))
-    return ModelEffect(DISCOVERED_LAW, axis, {}, replace(law_with_values(law, placed.values), axis=axis))
+        return ModelEffect(placed_effect.effect.name, axis, dict(placed_effect.effect.report(placed_effect.values)))
+    return ModelEffect(DISCOVERED_LAW, axis, {}, replace(with_law_values(law, placed_effect.values), axis=axis))
 
 
-def axis_letter(channel: str, channels: tuple[str, ...]) -> str:
-    """Last letter of a channel name ('x' of 'fx'), provided that all channels end in different letters and each name is
-    short or ends in x, y or z; otherwise the whole name."""
+def shorten_axis_name(channel: str, channels: tuple[str, ...]) -> str:
+    """Shorten a channel name to its last letter ('x' of 'fx'), provided that all channels end in different letters and
+    each name is short or ends in x, y or z; otherwise return the whole name."""
     last_letters = [name[-1:] for name in channels]
     has_axis_suffixes = all(len(name) <= SHORT_NAME_LENGTH or name[-1:] in "xyz" for name in channels)
     return (
@@ -81,47 +92,50 @@ def axis_letter(channel: str, channels: tuple[str, ...]) -> str:
     )
 
 
-def _axis_names(placed: PlacedEffect, channels: tuple[str, ...]) -> Iterator[str | None]:
-    """Axis name of each site, or a single None for all. Raises PlacingError for a site that is not there."""
-    shared = placed.effect.law is None and set(placed.sites) == set(range(len(channels)))
-    if shared and (len(channels) > 1 or "one" not in placed.effect.sites):
+def _iterate_axis_names(placed_effect: PlacedEffect, channels: tuple[str, ...]) -> Iterator[str | None]:
+    """Iterate over the axis names of the sites, or yield a single None for all sites. Raises PlacingError for a site
+    that is not there."""
+    is_at_all_sites = placed_effect.effect.law is None and set(placed_effect.sites) == set(range(len(channels)))
+    if is_at_all_sites and (len(channels) > 1 or "one" not in placed_effect.effect.sites):
         yield None
         return
-    for site in placed.sites:
+    for site in placed_effect.sites:
         if not 0 <= site < len(channels):
-            raise PlacingError(f"{placed.effect.name} is placed at number {site + 1}, but there are {len(channels)}")
-        yield axis_letter(channels[site], channels)
+            raise PlacingError(
+                f"{placed_effect.effect.name} is placed at number {site + 1}, but there are {len(channels)}"
+            )
+        yield shorten_axis_name(channels[site], channels)
 
 
 def _place_effect(effect: ModelEffect, channels: Channels) -> PlacedEffect:
-    """The effect at its sites. Raises PlacingError for an unknown effect or axis, or a negative value."""
+    """Place an effect at its sites. Raises PlacingError as `place_effects` does."""
     if effect.law is not None:
         return _place_law(effect, effect.law, channels)
-    entry = EFFECTS.get(effect.kind)
-    if entry is None:
+    catalogue_effect = EFFECTS.get(effect.kind)
+    if catalogue_effect is None:
         raise PlacingError(
             f"no simulation of '{effect.kind}' exists{suggest_word(effect.kind, tuple(EFFECTS))}; simulated are "
             f"{', '.join(EFFECTS)}"
         )
-    for parameter in entry.parameters:
+    for parameter in catalogue_effect.parameters:
         value = effect.parameters.get(parameter.name, 0.0)
         if parameter.scale == "log" and value < 0:
             raise PlacingError(f"{effect.kind}.{parameter.name} is {value:g}; it must not be negative")
-    return PlacedEffect(entry, find_sites(effect, channels.inputs, channels.outputs), effect.parameters)
+    return PlacedEffect(catalogue_effect, find_sites(effect, channels.inputs, channels.outputs), effect.parameters)
 
 
 def _place_law(effect: ModelEffect, law: Law, channels: Channels) -> PlacedEffect:
-    """The effect of a discovered law at its site. Raises PlacingError for a signal or axis that is not there."""
+    """Place the effect of a discovered law at its site. Raises PlacingError for a signal or axis that is not there."""
     try:
-        entry = law_effect(law, channels)
+        placed_law = make_law_effect(law, channels)
     except LawError as error:
         raise PlacingError(f"{effect.kind} on {effect.axis}: {error}") from error
-    return PlacedEffect(entry, find_sites(effect, channels.inputs, channels.outputs), law_values(law))
+    return PlacedEffect(placed_law, find_sites(effect, channels.inputs, channels.outputs), get_law_values(law))
 
 
 def find_sites(effect: ModelEffect, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> tuple[int, ...]:
-    """Indices of the axes or channels that an effect of a model names; all where it names none. Raises PlacingError
-    where the name matches no channel or several."""
+    """Find the indices of the axes or channels that an effect of a model names; all where it names none. Raises
+    PlacingError where the name matches no channel or several."""
     place = EFFECTS_BY_NAME[effect.kind].place if effect.law is None else LAW_PLACES[effect.law.acts_on]
     channels = outputs if place == "sensor" else inputs
     if effect.axis is None:

@@ -1,6 +1,7 @@
 """Pose-dependent inertia: a mass that changes with position, as that of a linkage.
 
-With the mass M (1 + per_m x), Lagrange's equation adds -per_m M (x dv/dt + v^2 / 2) to the force on the axis.
+With the mass M (1 + per_m x), per_m in 1/m (a rotation: 1/rad), Lagrange's equation adds -per_m M (x dv/dt + v^2 / 2)
+to the force on the axis.
 """
 
 import numpy as np
@@ -9,48 +10,63 @@ from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
 from equalizer.effects.simulation.instant import STEP_S, V_FREE, V_PER_N, X_FREE, V, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import axis_motion, quadratic_form, regress_out_linear_terms
+from equalizer.effects.starts.starting_values import (
+    compute_quadratic_form,
+    regress_out_linear_terms,
+    select_axis_motion,
+)
 from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
-LAGRANGE = 0.5
+LAGRANGE_SPEED_SHARE = 0.5
 """Factor of M per_m v^2 by Lagrange's equation; the default of `speed_share`."""
 
 
 @compile_law
-def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Force (N) at mid-step. The mean acceleration depends on the force itself: an implicit step, linear in the force.
-    parameters: per_m M, speed_share."""
-    middle, speed = 0.5 * (at[X] + at[X_FREE]), 0.5 * (at[V] + at[V_FREE])
-    added_mass = parameters[0] * middle
-    free_acceleration, per_newton = (at[V_FREE] - at[V]) / at[STEP_S], at[V_PER_N] / at[STEP_S]
+def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
+    """Force (N) at the mean position and velocity of the step without this force. The mean acceleration depends on the
+    force itself: an implicit step, linear in the force, whose divisor is kept at 0.1 or more. parameters: per_m M,
+    speed_share."""
+    mid_position, mid_velocity = (
+        0.5 * (step_motion[X] + step_motion[X_FREE]),
+        0.5 * (step_motion[V] + step_motion[V_FREE]),
+    )
+    added_mass = parameters[0] * mid_position
+    free_acceleration, per_newton = (
+        (step_motion[V_FREE] - step_motion[V]) / step_motion[STEP_S],
+        step_motion[V_PER_N] / step_motion[STEP_S],
+    )
     return float(
-        -(added_mass * free_acceleration + parameters[0] * parameters[1] * speed * speed)
+        -(added_mass * free_acceleration + parameters[0] * parameters[1] * mid_velocity * mid_velocity)
         / max(1 + added_mass * per_newton, 0.1)
     )
 
 
 def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    """(2,): per_m times the mass along the axis, and speed_share."""
-    mass = quadratic_form(model.mass, compute_driven_axes(model)[:, axis])
-    return np.array([values["per_m"] * mass, values.get("speed_share", LAGRANGE)])
+    """(2,): per_m times the mass along the axis, and speed_share (1/2 where it is missing)."""
+    mass = compute_quadratic_form(model.mass, compute_driven_axes(model)[:, axis])
+    return np.array([values["per_m"] * mass, values.get("speed_share", LAGRANGE_SPEED_SHARE)])
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """per_m by regression of the missing force: with both terms free where their ratio is plausible (below 1.5), and
-    with the ratio of Lagrange's equation."""
-    motion = axis_motion(evidence, axis)
-    mass = quadratic_form(evidence.model.mass, compute_driven_axes(evidence.model)[:, axis])
-    by_place, by_speed = -mass * motion.position * motion.acceleration, -mass * motion.velocity**2
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """per_m by regression of the missing force: first with a separate strength of either term, where their ratio is
+    plausible (magnitude below 1.5; a negative speed_share becomes 0), then with the ratio of Lagrange's equation.
+    Values without any dependence (per_m = 0) are left out."""
+    motion = select_axis_motion(evidence, axis)
+    mass = compute_quadratic_form(evidence.model.mass, compute_driven_axes(evidence.model)[:, axis])
+    position_term, speed_term = -mass * motion.position * motion.acceleration, -mass * motion.velocity**2
     regression = regress_out_linear_terms(motion)
-    free, bound = regression.fit(by_place, by_speed), regression.fit(by_place + LAGRANGE * by_speed)
-    per_m, momentum = free.strengths.tolist()
-    joint_fit = float(bound.strengths[0])
-    starts = [{"per_m": joint_fit, "speed_share": LAGRANGE}]
-    if abs(momentum) < 1.5 * abs(per_m):
-        starts.insert(0, {"per_m": per_m, "speed_share": max(momentum / per_m, 0.0)})
-    return tuple(values for values in starts if values["per_m"] != 0)
+    separate_fit, lagrange_fit = (
+        regression.fit(position_term, speed_term),
+        regression.fit(position_term + LAGRANGE_SPEED_SHARE * speed_term),
+    )
+    per_m, speed_strength = separate_fit.strengths.tolist()
+    lagrange_per_m = float(lagrange_fit.strengths[0])
+    starting_values = [{"per_m": lagrange_per_m, "speed_share": LAGRANGE_SPEED_SHARE}]
+    if abs(speed_strength) < 1.5 * abs(per_m):
+        starting_values.insert(0, {"per_m": per_m, "speed_share": max(speed_strength / per_m, 0.0)})
+    return tuple(values for values in starting_values if values["per_m"] != 0)
 
 
 EFFECT = Effect(
@@ -63,6 +79,6 @@ EFFECT = Effect(
         Parameter("per_m", -1e6, 1e6, none=0.0, scale="signed"),
         Parameter("speed_share", -0.5, 1.5, none=None, scale="linear", step=0.02),
     ),
-    action=AxisForce(_law, _pack),
-    starts=_starts,
+    action=AxisForce(_compute_mean_force, _pack),
+    starts=_find_starting_values,
 )

@@ -8,7 +8,7 @@ The bristle of `simulation.dry_friction_kernel` replaces the jump at v = 0.
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
-from equalizer.effects.simulation.dry_friction_kernel import friction_force
+from equalizer.effects.simulation.dry_friction_kernel import compute_friction_force
 from equalizer.effects.simulation.instant import X_FREE, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
@@ -17,21 +17,25 @@ from equalizer.signals.signal import FloatArray
 
 
 @compile_law
-def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Friction force (N). Its level is taken at the mean of the step's start and (force-free) end position.
-    parameters: level (N), slope (1/m), bend (1/m²); memory: the bristle's deflection; at: motion, see `instant`."""
-    mean_position = 0.5 * (at[X] + at[X_FREE])
+def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
+    """Mean friction force (N) over a step, its level at the mean of the step's start and (force-free) end position.
+    parameters: level (N), slope (1/m), bend (1/m²); memory: the bristle's deflection over its largest; step_motion:
+    see `instant`."""
+    mean_position = 0.5 * (step_motion[X] + step_motion[X_FREE])
     level = max(
         parameters[0] * (1 + parameters[1] * mean_position + parameters[2] * mean_position * mean_position), 0.0
     )
-    return float(friction_force(level, level, memory[0], memory, at))
+    return float(compute_friction_force(level, level, memory[0], memory, step_motion))
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Values by linear regression of the missing force on -sgn(v), -x sgn(v), -x² sgn(v) where the axis slides."""
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Values by linear regression of the missing force on -sgn(v), -x sgn(v), -x² sgn(v) where the axis slides; empty
+    unless the level is positive."""
     motion = select_sliding_motion(evidence, axis)
-    sign = -np.sign(motion.velocity)
-    fit = regress_out_linear_terms(motion).fit(sign, sign * motion.position, sign * motion.position**2)
+    friction_direction = -np.sign(motion.velocity)
+    fit = regress_out_linear_terms(motion).fit(
+        friction_direction, friction_direction * motion.position, friction_direction * motion.position**2
+    )
     level, slope, bend = fit.strengths.tolist()
     if level <= 0:
         return ()
@@ -48,7 +52,7 @@ EFFECT = Effect(
         Parameter("slope_per_m", -1e6, 1e6, none=None, scale="signed"),
         Parameter("bend_per_m2", -1e9, 1e9, none=None, scale="signed"),
     ),
-    action=AxisForce(_law, pack_values("level", "slope_per_m", "bend_per_m2"), memory=1),
-    starts=_starts,
+    action=AxisForce(_compute_mean_force, pack_values("level", "slope_per_m", "bend_per_m2"), memory=1),
+    starts=_find_starting_values,
     simpler=("coulomb_friction",),
 )

@@ -8,11 +8,11 @@ The bristle deflection z saturates at level / k, where F = -level sgn(v) as in C
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
-from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
+from equalizer.effects.simulation.dry_friction_kernel import compute_bristle_deflection
 from equalizer.effects.simulation.instant import F_END, X_FREE, X_PER_N, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import axis_motion, best_trial, regress_out_linear_terms
+from equalizer.effects.starts.starting_values import find_best_trial, regress_out_linear_terms, select_axis_motion
 from equalizer.signals.signal import FloatArray
 
 RELATIVE_DEFLECTIONS = np.geomspace(3e-4, 1.0, 15)
@@ -20,48 +20,53 @@ RELATIVE_DEFLECTIONS = np.geomspace(3e-4, 1.0, 15)
 
 
 @compile_law
-def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
     """Mean force (N) over a step, whose travel depends on the force (implicit step), by Newton's method.
 
     The force is a weighted mean of those at both ends of the step: weight 1/2 (trapezoidal rule) for a soft bristle,
-    towards the end (backward Euler, stable) for a stiff one. memory: deflection z.
+    towards the end (backward Euler, stable) for a stiff one. parameters: level, stiffness; memory: deflection z (m).
     """
     if parameters[0] <= 0:
         return 0.0
-    stiffness, longest, start = parameters[1], parameters[0] / parameters[1], memory[0]
-    slack = stiffness * at[X_PER_N]
-    end_weight = (0.5 + slack) / (1 + slack)
-    free_travel = at[X_FREE] - at[X]
-    travel = free_travel / (1 + slack)
-    deflection = start
+    stiffness, slip_deflection, start_deflection = parameters[1], parameters[0] / parameters[1], memory[0]
+    relative_compliance = stiffness * step_motion[X_PER_N]
+    end_weight = (0.5 + relative_compliance) / (1 + relative_compliance)
+    free_travel = step_motion[X_FREE] - step_motion[X]
+    travel = free_travel / (1 + relative_compliance)
+    deflection = start_deflection
     for _ in range(20):
-        full = longest * np.sign(travel)
-        deflection = full + (start - full) * np.exp(-abs(travel) / longest)
+        sliding_deflection = slip_deflection * np.sign(travel)
+        deflection = sliding_deflection + (start_deflection - sliding_deflection) * np.exp(
+            -abs(travel) / slip_deflection
+        )
         # Derivative of the deflection with respect to the travel.
-        rate = 1 - deflection * np.sign(travel) / longest
-        travel_error = travel - free_travel + slack * ((1 - end_weight) * start + end_weight * deflection)
-        step = travel_error / (1 + slack * end_weight * max(rate, 0.0))
-        travel -= step
-        if abs(step) < 1e-7 * longest:
+        deflection_rate = 1 - deflection * np.sign(travel) / slip_deflection
+        travel_error = (
+            travel - free_travel + relative_compliance * ((1 - end_weight) * start_deflection + end_weight * deflection)
+        )
+        correction = travel_error / (1 + relative_compliance * end_weight * max(deflection_rate, 0.0))
+        travel -= correction
+        if abs(correction) < 1e-7 * slip_deflection:
             break
-    full = longest * np.sign(travel)
-    deflection = full + (start - full) * np.exp(-abs(travel) / longest)
+    sliding_deflection = slip_deflection * np.sign(travel)
+    deflection = sliding_deflection + (start_deflection - sliding_deflection) * np.exp(-abs(travel) / slip_deflection)
     memory[0] = deflection
-    at[F_END] = -stiffness * deflection
-    return float(-stiffness * ((1 - end_weight) * start + end_weight * deflection))
+    step_motion[F_END] = -stiffness * deflection
+    return float(-stiffness * ((1 - end_weight) * start_deflection + end_weight * deflection))
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Level and stiffness for the deflection level / k that explains most of the missing force."""
-    motion = axis_motion(evidence, axis)
-    path, used = evidence.axis_position[:, axis], evidence.used > 0
-    rms = float(np.sqrt(np.mean(motion.position**2)))
-    if rms == 0:
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+    """Level and stiffness for the deflection level / k that explains most of the missing force, among
+    `RELATIVE_DEFLECTIONS`; empty where the axis does not move or the level is not positive."""
+    motion = select_axis_motion(evidence, axis)
+    position, is_used = evidence.axis_position[:, axis], evidence.used > 0
+    rms_position = float(np.sqrt(np.mean(motion.position**2)))
+    if rms_position == 0:
         return ()
-    deflection, fit = best_trial(
+    deflection, fit = find_best_trial(
         regress_out_linear_terms(motion),
-        (RELATIVE_DEFLECTIONS * rms).tolist(),
-        lambda slip: (-bristle_bend(path, slip)[used],),
+        (RELATIVE_DEFLECTIONS * rms_position).tolist(),
+        lambda trial_deflection: (-compute_bristle_deflection(position, trial_deflection)[is_used],),
     )
     level = float(fit.strengths[0])
     return ({"level": level, "stiffness": level / deflection},) if level > 0 else ()
@@ -75,7 +80,7 @@ EFFECT = Effect(
     signature="the missing force flips its sign with the velocity only after some travel: a loop over the position "
     "near each reversal",
     parameters=(Parameter("level", 1e-9, 1e6, none=0.0), Parameter("stiffness", 1e-3, 1e9, none=None, step=0.03)),
-    action=AxisForce(_law, pack_values("level", "stiffness"), memory=1),
-    starts=_starts,
+    action=AxisForce(_compute_mean_force, pack_values("level", "stiffness"), memory=1),
+    starts=_find_starting_values,
     simpler=("coulomb_friction",),
 )

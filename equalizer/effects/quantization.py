@@ -15,8 +15,8 @@ from scipy.special import ndtr, ndtri
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.lattice import lattice_offset, lattice_step, staircase_step
-from equalizer.effects.starts.response_starts import site_channels
+from equalizer.effects.starts.lattice import find_lattice_offset, find_lattice_step, find_step_under_noise
+from equalizer.effects.starts.response_starts import list_site_channels
 from equalizer.signals.signal import FloatArray
 
 LEAST_TAIL_PROBABILITY = 1e-12
@@ -40,7 +40,7 @@ def _condition_on_measurement(
     recorded on the lattice, else rounded. noise: (p,), rms before rounding."""
     conditioned, step = _round_response(response, 0.0, channels, values), values["step"]
     for channel in channels:
-        if lattice_offset(measured[:, channel], step) is not None:
+        if find_lattice_offset(measured[:, channel], step) is not None:
             conditioned[:, channel] = _compute_quantile_response(
                 response[:, channel], measured[:, channel], float(noise[channel]), step
             )
@@ -72,9 +72,9 @@ def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...
     """The step of the lattice of the measured values, or else the step detected under added noise; empty if neither is
     found."""
     is_used = evidence.used > 0
-    for column in site_channels(evidence, channel):
+    for column in list_site_channels(evidence, channel):
         measured, noise = evidence.response[is_used, column], float(evidence.noise[column])
-        step = lattice_step(measured) or staircase_step(measured, noise)
+        step = find_lattice_step(measured) or find_step_under_noise(measured, noise)
         if step is not None:
             return ({"step": step},)
     return ()

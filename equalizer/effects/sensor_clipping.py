@@ -11,7 +11,7 @@ import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.response_starts import likeliest_reading, site_channels
+from equalizer.effects.starts.response_starts import find_response_parameter, list_site_channels
 from equalizer.signals.signal import FloatArray
 
 
@@ -24,13 +24,13 @@ def _clip_response(
     return read
 
 
-def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """The limit, below the predicted peak, that brings the predicted response closest to the measured one; empty where
     no limit does better than none."""
-    peak = float(np.abs(evidence.predicted[:, list(site_channels(evidence, channel))]).max())
+    peak = float(np.abs(evidence.predicted[:, list(list_site_channels(evidence, channel))]).max())
     if peak == 0:
         return ()
-    limit = likeliest_reading(
+    limit = find_response_parameter(
         evidence,
         channel,
         lambda samples, value: np.clip(samples, -value, value),
@@ -47,6 +47,6 @@ EFFECT = Effect(
     "agrees",
     parameters=(Parameter("limit", 1e-9, 1e9, none=math.inf),),
     action=OnResponse(_clip_response, stage=1),
-    starts=_starts,
+    starts=_find_starting_values,
     sites=("one", "all"),
 )

@@ -5,57 +5,61 @@ The drift is a parabola over the recording's length, added to the response x:
     y = x + total (start + s + 4 bend s (1 - s)),    s from 0 at the first sample to 1 at the last.
 
 `total` is the change of the offset from beginning to end, in the response's unit; `bend` the deviation from a straight
-line in the middle, and `start` the offset at the beginning, both relative to `total`.
+line in the middle, and `start` the offset at the beginning, both relative to `total`. An entry of the catalogue.
 """
 
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.response_starts import regression_coefficients
+from equalizer.effects.starts.response_starts import fit_coefficients
 from equalizer.signals.signal import FloatArray
 
-LEAST_SIGMA = 5.0
+LEAST_DRIFT_SIGMA = 5.0
 """Least linear drift, in its standard errors, for the effect to be tried."""
-STEEPEST = 3.0
-"""Bounds of the magnitudes of `bend` and `start`, relative to the total drift."""
+LARGEST_RATIO = 3.0
+"""Largest magnitude of `bend` and `start`, which are relative to the total drift."""
 
 
-def _drift_shape(samples: int, bend: float, start: float = 0.0) -> FloatArray:
-    """(samples,): the drift relative to its total."""
-    share = np.linspace(0.0, 1.0, samples)
-    return np.asarray(start + share + 4 * bend * share * (1 - share))
+def _compute_drift_shape(sample_count: int, bend: float, start: float = 0.0) -> FloatArray:
+    """Compute the drift (sample_count,) relative to its total."""
+    time_share = np.linspace(0.0, 1.0, sample_count)
+    return np.asarray(start + time_share + 4 * bend * time_share * (1 - time_share))
 
 
 def _add_drift(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
-    """(n, p): the response with the drift added to these channels."""
-    read = response.copy()
-    shape = _drift_shape(len(response), values.get("bend", 0.0), values.get("start", 0.0))
-    read[:, channels] += (values["total"] * shape)[:, None]
-    return read
+    """Add the drift to these channels of the response (n, p): `OnResponse.change` of this effect."""
+    drifted_response = response.copy()
+    shape = _compute_drift_shape(len(response), values.get("bend", 0.0), values.get("start", 0.0))
+    drifted_response[:, channels] += (values["total"] * shape)[:, None]
+    return drifted_response
 
 
-def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """Starting values from the residual by linear least squares: with and without a quadratic term; none where the
-    linear drift is not significant."""
+def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+    """Find starting values from the residual by linear least squares: with a quadratic term, then without; none where
+    the linear drift is not significant."""
     residual, n = (evidence.response - evidence.predicted)[:, channel], len(evidence.response)
-    basis = np.column_stack([_drift_shape(n, 0.0), _drift_shape(n, 1.0) - _drift_shape(n, 0.0), np.ones(n)])
-    total, middle, first = regression_coefficients(residual, basis, evidence.used).tolist()
-    slope, zero = regression_coefficients(residual, basis[:, [0, 2]], evidence.used).tolist()
-    size = float(np.sqrt(np.mean((residual - slope * basis[:, 0] - zero)[evidence.used > 0] ** 2)))
+    basis = np.column_stack(
+        [_compute_drift_shape(n, 0.0), _compute_drift_shape(n, 1.0) - _compute_drift_shape(n, 0.0), np.ones(n)]
+    )
+    total, bend_coefficient, offset = fit_coefficients(residual, basis, evidence.used).tolist()
+    linear_total, linear_offset = fit_coefficients(residual, basis[:, [0, 2]], evidence.used).tolist()
+    residual_rms = float(
+        np.sqrt(np.mean((residual - linear_total * basis[:, 0] - linear_offset)[evidence.used > 0] ** 2))
+    )
     # With white residuals, the standard error of a slope that is fitted together with an offset, over s from 0 to 1, is
     # sqrt(12 / n) times the residual's rms: the variance of s is 1/12.
-    if abs(slope) * np.sqrt(evidence.used.sum() / 12) < LEAST_SIGMA * size:
+    if abs(linear_total) * np.sqrt(evidence.used.sum() / 12) < LEAST_DRIFT_SIGMA * residual_rms:
         return ()
     return (
-        {"total": total, "bend": _share(middle, total), "start": _share(first, total)},
-        {"total": slope, "bend": 0.0, "start": _share(zero, slope)},
+        {"total": total, "bend": _limit_ratio(bend_coefficient, total), "start": _limit_ratio(offset, total)},
+        {"total": linear_total, "bend": 0.0, "start": _limit_ratio(linear_offset, linear_total)},
     )
 
 
-def _share(part: float, total: float) -> float:
-    """A part relative to the total, within the bounds; 0 where the total is 0."""
-    return float(np.clip(part / total, -STEEPEST, STEEPEST)) if total else 0.0
+def _limit_ratio(coefficient: float, total: float) -> float:
+    """Compute a coefficient relative to the total, limited to `LARGEST_RATIO`; 0 where the total is 0."""
+    return float(np.clip(coefficient / total, -LARGEST_RATIO, LARGEST_RATIO)) if total else 0.0
 
 
 EFFECT = Effect(
@@ -66,11 +70,11 @@ EFFECT = Effect(
     "position agrees",
     parameters=(
         Parameter("total", -1e12, 1e12, none=0.0, scale="signed"),
-        Parameter("bend", -STEEPEST, STEEPEST, none=None, scale="linear", step=0.02),
-        Parameter("start", -STEEPEST, STEEPEST, none=None, scale="linear", step=0.02),
+        Parameter("bend", -LARGEST_RATIO, LARGEST_RATIO, none=None, scale="linear", step=0.02),
+        Parameter("start", -LARGEST_RATIO, LARGEST_RATIO, none=None, scale="linear", step=0.02),
     ),
     action=OnResponse(_add_drift, stage=2, needs_full_length=True),
-    starts=_starts,
+    starts=_find_starting_values,
     of_time=True,
     sites=("one", "each"),
 )

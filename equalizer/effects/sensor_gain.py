@@ -9,7 +9,7 @@ import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.response_starts import site_channels
+from equalizer.effects.starts.response_starts import list_site_channels
 from equalizer.signals.signal import FloatArray
 
 LEAST_DEVIATION = 1e-4
@@ -24,9 +24,9 @@ def _scale_response(
     return read
 
 
-def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """Gain by least squares of the measured on the predicted response; empty where it is 1 within `LEAST_DEVIATION`."""
-    channels, used = list(site_channels(evidence, channel)), evidence.used > 0
+    channels, used = list(list_site_channels(evidence, channel)), evidence.used > 0
     measured = (evidence.response[:, channels] / evidence.noise[channels])[used]
     predicted = (evidence.predicted[:, channels] / evidence.noise[channels])[used]
     size = float(np.sum(predicted**2))
@@ -41,6 +41,6 @@ EFFECT = Effect(
     signature="the response is wrong by one factor at every frequency and level, while the position agrees",
     parameters=(Parameter("gain", 0.01, 100.0, none=1.0),),
     action=OnResponse(_scale_response),
-    starts=_starts,
+    starts=_find_starting_values,
     sites=("one", "all"),
 )

@@ -12,11 +12,11 @@ import numpy as np
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.simulation.sensor_path import low_pass, undo_low_pass
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.response_starts import likeliest_reading
+from equalizer.effects.starts.response_starts import find_response_parameter
 from equalizer.signals.signal import FloatArray
 
-SLOWEST, FASTEST = 0.002, 1.5
-"""Range of bandwidths that are searched, as shares of the sample rate."""
+LOWEST_BANDWIDTH_SHARE, HIGHEST_BANDWIDTH_SHARE = 0.002, 1.5
+"""Lowest and highest bandwidth that is searched, as shares of the sample rate."""
 
 
 def _keep_response(
@@ -26,20 +26,23 @@ def _keep_response(
     return response
 
 
-def _bandwidth_hz(known_hz: float, values: Values) -> float:
-    """Bandwidth of the channel in Hz; that of the model where the value is infinite (no effect)."""
-    return known_hz if math.isinf(values["bandwidth"]) else values["bandwidth"]
+def _replace_bandwidth_hz(model_bandwidth_hz: float, values: Values) -> float:
+    """Bandwidth of the channel in Hz, which replaces that of the model; the model's where the value is infinite (no
+    effect)."""
+    return model_bandwidth_hz if math.isinf(values["bandwidth"]) else values["bandwidth"]
 
 
-def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """The bandwidth that fits the measured response best in place of the model's; empty where none improves the
     fit."""
-    rate, known_hz = evidence.sample_rate_hz, evidence.model.sensor.bandwidth_hz
-    bandwidth = likeliest_reading(
+    sample_rate_hz, model_bandwidth_hz = evidence.sample_rate_hz, evidence.model.sensor.bandwidth_hz
+    bandwidth = find_response_parameter(
         evidence,
         channel,
-        lambda samples, value: low_pass(undo_low_pass(samples, rate, known_hz), rate, value),
-        list(np.geomspace(SLOWEST * rate, FASTEST * rate, 10)),
+        lambda samples, bandwidth_hz: low_pass(
+            undo_low_pass(samples, sample_rate_hz, model_bandwidth_hz), sample_rate_hz, bandwidth_hz
+        ),
+        list(np.geomspace(LOWEST_BANDWIDTH_SHARE * sample_rate_hz, HIGHEST_BANDWIDTH_SHARE * sample_rate_hz, 10)),
     )
     return () if bandwidth is None else ({"bandwidth": bandwidth},)
 
@@ -50,7 +53,7 @@ EFFECT = Effect(
     source="Analog Devices ADXL335 data sheet: bandwidth set by an RC filter of 32 kOhm +-15 %",
     signature="the response falls short and late at high frequencies, at every level alike, while the position agrees",
     parameters=(Parameter("bandwidth", 1e-2, 1e5, none=math.inf),),
-    action=OnResponse(_keep_response, bandwidth_hz=_bandwidth_hz),
-    starts=_starts,
+    action=OnResponse(_keep_response, bandwidth_hz=_replace_bandwidth_hz),
+    starts=_find_starting_values,
     sites=("all", "one"),
 )

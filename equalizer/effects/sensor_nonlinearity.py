@@ -9,7 +9,7 @@ import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.response_starts import regression_coefficients, site_channels
+from equalizer.effects.starts.response_starts import fit_coefficients, list_site_channels
 from equalizer.signals.signal import FloatArray
 
 
@@ -19,15 +19,15 @@ def _add_cubic(response: FloatArray, sample_rate_hz: float, channels: tuple[int,
     return read
 
 
-def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """The cubic coefficient by linear regression of the residual, weighted by the noise."""
-    channels = list(site_channels(evidence, channel))
+    channels = list(list_site_channels(evidence, channel))
     weight = 1 / evidence.noise[channels]
     predicted = evidence.predicted[:, channels]
     residual = ((evidence.response[:, channels] - predicted) * weight).ravel()
     basis = np.column_stack([(predicted**3 * weight).ravel(), (predicted * weight).ravel()])
     # The response itself is a second regressor, because re-tuned parameters can absorb a change of gain.
-    cubic = float(regression_coefficients(residual, basis, np.repeat(evidence.used, len(channels)))[0])
+    cubic = float(fit_coefficients(residual, basis, np.repeat(evidence.used, len(channels)))[0])
     return ({"cubic": cubic},) if cubic != 0 and np.isfinite(cubic) else ()
 
 
@@ -39,6 +39,6 @@ EFFECT = Effect(
     "that rise with the level, while the position agrees",
     parameters=(Parameter("cubic", -1e12, 1e12, none=0.0, scale="signed"),),
     action=OnResponse(_add_cubic),
-    starts=_starts,
+    starts=_find_starting_values,
     sites=("one", "all"),
 )

@@ -21,7 +21,7 @@ def _add_offset(response: FloatArray, sample_rate_hz: float, channels: tuple[int
     return read
 
 
-def _starts(evidence: Evidence, channel: int) -> tuple[Values, ...]:
+def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
     """The mean residual of the channel; empty where it is not significant."""
     residual = (evidence.response - evidence.predicted)[evidence.used > 0, channel]
     offset = float(residual.mean())
@@ -36,6 +36,6 @@ EFFECT = Effect(
     signature="the response is off by the same amount all the time, at rest as in motion, while the position agrees",
     parameters=(Parameter("offset", -1e12, 1e12, none=0.0, scale="signed"),),
     action=OnResponse(_add_offset, stage=2),
-    starts=_starts,
+    starts=_find_starting_values,
     sites=("one", "each"),
 )

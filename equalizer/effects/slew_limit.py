@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit, types
 
 from equalizer.effects.effect import ALL_SITES, Effect, OnCommand, Parameter, Values
-from equalizer.effects.starts.command_starts import likeliest_value
+from equalizer.effects.starts.command_starts import find_command_parameter
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
@@ -69,14 +69,14 @@ def _compute_mean_and_end_force(commands: FloatArray, step_s: float, rate: float
     return forces
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Starting values: the likeliest rate on a grid from 1 to 100 % of the command's largest rate of change; where the
     residual of the response exceeds its noise, also `RATE_SHARES` of that rate."""
     commanded = evidence.command if axis == ALL_SITES else evidence.command[:, axis]
     largest_rate = float(np.abs(np.diff(commanded, axis=0)).max()) * evidence.sample_rate_hz
     if largest_rate == 0:
         return ()
-    rate = likeliest_value(
+    rate = find_command_parameter(
         evidence,
         axis,
         lambda u, step_s, value: _compute_mean_force(u, step_s, {"rate": value}),
@@ -105,6 +105,6 @@ EFFECT = Effect(
     signature="force is missing where the command changes fast, more at high frequencies and high levels",
     parameters=(Parameter("rate", 1e-2, 1e7, none=math.inf),),
     action=OnCommand(_compute_mean_force, fine=True, at_end=_compute_end_force),
-    starts=_starts,
+    starts=_find_starting_values,
     sites=("one", "all"),
 )

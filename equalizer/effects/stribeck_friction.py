@@ -1,37 +1,39 @@
 """Stribeck friction: dry friction that falls from its static to its Coulomb level as the velocity rises.
 
+    F = -(coulomb + (static - coulomb) exp(-(v / speed)²)) sgn(v)        levels in N, speed in m/s
+
 The force jumps at v = 0; the simulation replaces the jump by a bristle of nanometre travel (`dry_friction_kernel`).
 """
 
 import numpy as np
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values
-from equalizer.effects.simulation.dry_friction_kernel import friction_force
+from equalizer.effects.simulation.dry_friction_kernel import compute_friction_force
 from equalizer.effects.simulation.instant import V_FREE, V_PER_N, V
 from equalizer.effects.simulation.mechanism_kernel import compile_law
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import best_trial, regress_out_linear_terms, select_sliding_motion
+from equalizer.effects.starts.starting_values import find_best_trial, regress_out_linear_terms, select_sliding_motion
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
-SPEEDS = np.geomspace(0.03, 1.5, 12)
+RELATIVE_SPEEDS = np.geomspace(0.03, 1.5, 12)
 """Stribeck velocities that are tried as starting values, relative to the rms velocity."""
 _INITIAL_STATIC_RATIO = 1.2
 """Starting ratio of static to Coulomb friction where the data show no higher friction at low speed."""
 
 
 @compile_law
-def _law(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
+def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
     """Mean friction force (N) over the step, at its mean velocity. That depends on the force: at most three fixed-point
     iterations, each from the same bristle deflection. parameters: coulomb, static, speed."""
-    mean, force, start, last = at[V], 0.0, memory[0], -1.0
+    mean_velocity, force, start_deflection, previous_level = step_motion[V], 0.0, memory[0], -1.0
     for _ in range(3):
-        level = parameters[0] + (parameters[1] - parameters[0]) * np.exp(-((mean / parameters[2]) ** 2))
-        if abs(level - last) <= 1e-6 * level:
+        level = parameters[0] + (parameters[1] - parameters[0]) * np.exp(-((mean_velocity / parameters[2]) ** 2))
+        if abs(level - previous_level) <= 1e-6 * level:
             break
-        last = level
-        force = friction_force(level, level, start, memory, at)
-        mean = 0.5 * (at[V] + at[V_FREE] + at[V_PER_N] * force)
+        previous_level = level
+        force = compute_friction_force(level, level, start_deflection, memory, step_motion)
+        mean_velocity = 0.5 * (step_motion[V] + step_motion[V_FREE] + step_motion[V_PER_N] * force)
     return float(force)
 
 
@@ -40,15 +42,16 @@ def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
     return np.array([values["coulomb"], values["static"], max(values["speed"], 1e-12)])
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Levels by regression of the missing force, at the tried Stribeck velocity that explains most. Empty where neither
-    level is positive."""
+    level is positive; the Coulomb level is at least a twentieth of the static excess, and the static level
+    `_INITIAL_STATIC_RATIO` times it where the excess is below 2 %."""
     motion = select_sliding_motion(evidence, axis)
-    sign, rms = np.sign(motion.velocity), float(np.sqrt(np.mean(motion.velocity**2)))
-    speed, fit = best_trial(
+    direction, rms_velocity = np.sign(motion.velocity), float(np.sqrt(np.mean(motion.velocity**2)))
+    speed, fit = find_best_trial(
         regress_out_linear_terms(motion),
-        (SPEEDS * rms).tolist(),
-        lambda trial_speed: (-sign, -sign * np.exp(-((motion.velocity / trial_speed) ** 2))),
+        (RELATIVE_SPEEDS * rms_velocity).tolist(),
+        lambda trial_speed: (-direction, -direction * np.exp(-((motion.velocity / trial_speed) ** 2))),
     )
     coulomb, static_excess = fit.strengths.tolist()
     if coulomb <= 0 and coulomb + static_excess <= 0:
@@ -69,7 +72,7 @@ EFFECT = Effect(
         Parameter("static", 1e-9, 1e6, none=0.0),
         Parameter("speed", 1e-6, 1e3, none=None, step=0.03),
     ),
-    action=AxisForce(_law, _pack, memory=1),
-    starts=_starts,
+    action=AxisForce(_compute_mean_force, _pack, memory=1),
+    starts=_find_starting_values,
     simpler=("coulomb_friction",),
 )

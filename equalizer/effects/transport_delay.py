@@ -1,16 +1,16 @@
 """Transport delay of the command, as of a bus or a controller's tick: F(t) = u(t - delay).
 
 A command u that is held over a sample period and delayed by (k + r) periods, 0 <= r < 1, has over each period the mean
-(1 - r) u[n - k] + r u[n - k - 1] (`delay_mean`).
+(1 - r) u[n - k] + r u[n - k - 1] (`compute_delayed_mean`).
 """
 
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnCommand, Parameter, Values
-from equalizer.effects.simulation.command_path import delay_at_end, delay_mean
-from equalizer.effects.starts.command_starts import likeliest_value
+from equalizer.effects.simulation.command_path import compute_delayed_end, compute_delayed_mean
+from equalizer.effects.starts.command_starts import find_command_parameter
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.response_starts import starts_for_lateness
+from equalizer.effects.starts.response_starts import list_lag_starts
 from equalizer.signals.signal import FloatArray
 
 SHORTEST_S, LONGEST_S = 2e-5, 0.05
@@ -22,26 +22,31 @@ times, and a gradient search does not cross that jump."""
 
 
 def _delay_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    return delay_mean(commands, step_s, values["delay"])
+    """Mean force (n,) over each step, for commands (n,) in N."""
+    return compute_delayed_mean(commands, step_s, values["delay"])
 
 
 def _delay_force_at_end(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    return delay_at_end(commands, step_s, values["delay"])
+    """Force (n,) at the end of each step, for commands (n,) in N."""
+    return compute_delayed_end(commands, step_s, values["delay"])
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Delays (s) from the response's time shift and from the missing force, and the first of these across the jump of
-    the misfit (see `JUMP_MARGIN`)."""
-    force_delay = likeliest_value(evidence, axis, delay_mean, list(np.geomspace(SHORTEST_S, LONGEST_S, 24)), False)
-    starts = starts_for_lateness(evidence, axis, force_delay, LONGEST_S)
-    across_jump = tuple(_across_nearest_step(delay_s, 1 / evidence.sample_rate_hz) for delay_s in starts[:1])
-    return tuple({"delay": delay_s} for delay_s in (*starts, *across_jump))
+    the misfit (see `JUMP_MARGIN`). Empty where the measured response is early."""
+    force_delay_s = find_command_parameter(
+        evidence, axis, compute_delayed_mean, list(np.geomspace(SHORTEST_S, LONGEST_S, 24)), False
+    )
+    delays_s = list_lag_starts(evidence, axis, force_delay_s, LONGEST_S)
+    moved_delays_s = tuple(_move_across_jump(delay_s, 1 / evidence.sample_rate_hz) for delay_s in delays_s[:1])
+    return tuple({"delay": delay_s} for delay_s in (*delays_s, *moved_delays_s))
 
 
-def _across_nearest_step(delay_s: float, held_s: float) -> float:
-    """A delay (s) on the other side of the nearest whole number, at least 1, of hold times. held_s: sample period."""
-    hold_times = max(round(delay_s / held_s), 1)
-    return (hold_times + (JUMP_MARGIN if delay_s < hold_times * held_s else -JUMP_MARGIN)) * held_s
+def _move_across_jump(delay_s: float, hold_time_s: float) -> float:
+    """A delay (s) on the other side of the nearest whole number, at least 1, of hold times, `JUMP_MARGIN` from it.
+    hold_time_s: sample period."""
+    hold_times = max(round(delay_s / hold_time_s), 1)
+    return (hold_times + (JUMP_MARGIN if delay_s < hold_times * hold_time_s else -JUMP_MARGIN)) * hold_time_s
 
 
 EFFECT = Effect(
@@ -51,6 +56,6 @@ EFFECT = Effect(
     signature="the phase falls in proportion to frequency while the gain stays, in position and response alike",
     parameters=(Parameter("delay", 1e-6, 1.0, none=0.0),),
     action=OnCommand(_delay_force, fine=True, at_end=_delay_force_at_end),
-    starts=_starts,
+    starts=_find_starting_values,
     sites=("all", "one"),
 )

@@ -11,7 +11,7 @@ import numpy as np
 
 from equalizer.effects.effect import Effect, Parameter, Structure, Values
 from equalizer.effects.starts.evidence import Evidence
-from equalizer.effects.starts.starting_values import PartialRegression, axis_motion, quadratic_form
+from equalizer.effects.starts.starting_values import PartialRegression, compute_quadratic_form, select_axis_motion
 from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
 
@@ -26,14 +26,14 @@ def _change(model: MechanicalModel, axis: int, values: Values) -> MechanicalMode
     return replace(model, damping=model.damping + values["damping"] * np.outer(direction, direction))
 
 
-def _starts(evidence: Evidence, axis: int) -> tuple[Values, ...]:
+def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Positive ones of two values: regression of the missing force on -v, and `_INITIAL_DAMPING_SHARE` of the model's
     damping."""
-    motion = axis_motion(evidence, axis)
+    motion = select_axis_motion(evidence, axis)
     nuisances = np.column_stack([motion.position, motion.acceleration, np.ones_like(motion.position)])
     fit = PartialRegression(motion.force, nuisances).fit(-motion.velocity)
     regressed_damping = float(fit.strengths[0])
-    model_damping = quadratic_form(evidence.model.damping, compute_driven_axes(evidence.model)[:, axis])
+    model_damping = compute_quadratic_form(evidence.model.damping, compute_driven_axes(evidence.model)[:, axis])
     candidates = (regressed_damping, _INITIAL_DAMPING_SHARE * model_damping)
     return tuple({"damping": damping} for damping in candidates if damping > 0)
 
@@ -45,5 +45,5 @@ EFFECT = Effect(
     signature="the missing force is a straight line over the velocity, at every level; nothing appears at silent lines",
     parameters=(Parameter("damping", 1e-9, 1e6, none=0.0),),
     action=Structure(_change),
-    starts=_starts,
+    starts=_find_starting_values,
 )

@@ -39,6 +39,7 @@ class IdentifiedModel(SummaryDisplay):
     D: FloatArray
     """(p, m): not zero in a model of a limited band, where it approximates the modes outside the band."""
     sample_rate_hz: float
+    """Rate (Hz) at which commands are written and responses are sampled."""
     band_hz: tuple[float, float]
     """Frequency band of the fit (Hz), lower and upper limit; the model is not valid outside it."""
     input_unit: str | tuple[str, ...]
@@ -47,6 +48,7 @@ class IdentifiedModel(SummaryDisplay):
     """SI unit of all responses, or the units channel by channel."""
     input_channels: tuple[str, ...]
     output_channels: tuple[str, ...]
+    """Names of the m commands and of the p responses."""
     delay_samples: float = 0.0
     """Delay in samples from a command to the first response that it can change. For information only: A, B, C, D
     include it."""
@@ -62,6 +64,7 @@ class IdentifiedModel(SummaryDisplay):
     """Relative errors of the model: misfit, scatter and held-out error; None = not known."""
 
     def __post_init__(self) -> None:
+        """Copy the arrays as read-only double precision, and check all values."""
         for name in ("A", "B", "C", "D", "covariance", "samples"):
             if getattr(self, name) is not None:
                 matrix = np.array(getattr(self, name), dtype=np.float64, ndmin=1)
@@ -132,6 +135,7 @@ def _list_problems(model: IdentifiedModel) -> Iterator[str]:
 
 
 def _list_shape_problems(model: IdentifiedModel) -> Iterator[str]:
+    """Sentences on matrices of a wrong shape or with values that are not finite."""
     n, m, p = model.A.shape[0], model.B.shape[-1], model.C.shape[0]
     for name, shape in {"A": (n, n), "B": (n, m), "C": (p, n), "D": (p, m)}.items():
         matrix: FloatArray = getattr(model, name)
@@ -142,26 +146,30 @@ def _list_shape_problems(model: IdentifiedModel) -> Iterator[str]:
 
 
 def _list_channel_problems(
-    side: str, channels: tuple[str, ...], unit: str | tuple[str, ...], count: int
+    direction: str, channels: tuple[str, ...], unit: str | tuple[str, ...], count: int
 ) -> Iterator[str]:
+    """Sentences on a wrong number of channels or units, repeated channels and units outside SI. direction: "input" or
+    "output"; count: number that the matrices have."""
     if len(channels) != count:
-        yield f"{side}_channels names {len(channels)} channels, but the matrices have {count}"
+        yield f"{direction}_channels names {len(channels)} channels, but the matrices have {count}"
     if len(set(channels)) != len(channels):
-        yield f"{side}_channels names a channel twice: {', '.join(channels)}"
+        yield f"{direction}_channels names a channel twice: {', '.join(channels)}"
     units = (unit,) if isinstance(unit, str) else unit
     if len(units) not in (1, count):
-        yield f"{side}_unit holds {len(units)} units for {count} channels; one for all, or one per channel"
+        yield f"{direction}_unit holds {len(units)} units for {count} channels; one for all, or one per channel"
     for unit_text in units:
         try:
             parsed = parse_unit(unit_text)
         except UnknownUnitError as error:
-            yield f"{side}_unit: {error}"
+            yield f"{direction}_unit: {error}"
         else:
             if parsed.si != unit_text:
-                yield f"{side}_unit is '{unit_text}'; a model is in SI units, here {parsed.si}"
+                yield f"{direction}_unit is '{unit_text}'; a model is in SI units, here {parsed.si}"
 
 
 def _list_uncertainty_problems(model: IdentifiedModel) -> Iterator[str]:
+    """Sentences on a covariance or on samples that do not fit the parameters; positive semidefiniteness is not checked
+    beyond the diagonal."""
     k = model.parameters.size
     covariance, samples = model.covariance, model.samples
     if covariance is not None:

@@ -19,7 +19,7 @@ from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME
 from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.summary import Summary, SummaryDisplay
-from equalizer.signals.unit_system import LINEAR, ROTATIONAL, UnitSystem, system_of
+from equalizer.signals.unit_system import LINEAR, ROTATIONAL, UnitSystem, determine_unit_system
 
 DERIVATIVE_OF_QUANTITY = {
     "position": 0, "displacement": 0, "angle": 0, "velocity": 1, "speed": 1, "acceleration": 2,
@@ -154,7 +154,7 @@ def adopt_recording_units(
     recordings are SI, or if its input or output matrix converts units (has entries other than 0, 1 and -1). commands,
     responses: units of the recordings' channels."""
     is_unit_free = all(np.isin(np.abs(matrix), (0.0, 1.0)).all() for matrix in (model.input, model.output))
-    system = system_of(commands, responses, time)
+    system = determine_unit_system(commands, responses, time)
     if model.units is not None or not is_unit_free or system.rotational is not None:
         return model
     return replace(model, units=system)

@@ -1,4 +1,4 @@
-"""Measured quantities by the words in channel names, from headers and maps.
+"""Measured quantities by the words in channel names, for the import of files and the diagnosis.
 
 Words of other languages are further entries of the table; those in other scripts are in `study.importing`. French
 `tension` is left out: in English it is a force.
@@ -22,33 +22,35 @@ QUANTITY_WORDS = {
     "humidity": "humidity",
     "setting": "setting",
 }
-_QUANTITY = {word: quantity for quantity, words in QUANTITY_WORDS.items() for word in words.split()}
-_LARGE, _SMALL = "A-ZÀ-ÖØ-Þ", "a-zß-öø-ÿ"
-_WORD = re.compile(f"[{_LARGE}]?[{_SMALL}]+|[{_LARGE}]+(?![{_SMALL}])")
-_DERIVATIVE = "rate"
+_QUANTITY_BY_WORD = {word: quantity for quantity, words in QUANTITY_WORDS.items() for word in words.split()}
+_UPPER, _LOWER = "A-ZÀ-ÖØ-Þ", "a-zß-öø-ÿ"
+_WORD = re.compile(f"[{_UPPER}]?[{_LOWER}]+|[{_UPPER}]+(?![{_LOWER}])")
+_RATE_WORD = "rate"
 """Word behind an angle that makes it an angular velocity: `yaw rate`."""
-_AMBIGUOUS = frozenset(
+_AMBIGUOUS_WORDS = frozenset(
     ["dot", "ddot", "d", "delta", "diff", "rate", "error", "gyro", "pedal", "time", "ratio", "mode", "limit"]
 )
 """Words that make the quantity ambiguous: `theta_dot`, `gyro pitch`, `travel time`."""
-SEVERAL_MEANINGS = frozenset(["spannung", "tensión", "yaw", "pitch", "roll"])
+WORDS_NEEDING_UNIT = frozenset(["spannung", "tensión", "yaw", "pitch", "roll"])
 """Words that also name a stress, a distance or an angular velocity: a stated unit decides."""
 
 
-def words_in(name: str) -> list[str]:
-    """Words of a name in lower case: two each of `Yaw_Rate`, `motorSpeed` and `load angle`."""
+def split_into_words(name: str) -> list[str]:
+    """Words of a name in lower case, in Unicode normal form C; digits and signs are left out. Two words each in
+    `Yaw_Rate`, `motorSpeed` and `load angle`."""
     return [word.lower() for word in _WORD.findall(unicodedata.normalize("NFC", name))]
 
 
-def quantity_in(name: str) -> str:
-    """The quantity, by the last word that names one: a load angle is an angle. Empty where no word does, or another
-    word makes it ambiguous."""
-    words = words_in(name)
-    last = max((index for index, word in enumerate(words) if word in _QUANTITY), default=None)
-    if last is None:
+def detect_quantity(name: str) -> str:
+    """The quantity (a key of `QUANTITY_WORDS`), by the last word that names one: a load angle is an angle. An angle
+    with the word `rate` behind it is a velocity. Empty where no word names a quantity, or another word makes it
+    ambiguous."""
+    words = split_into_words(name)
+    last_index = max((index for index, word in enumerate(words) if word in _QUANTITY_BY_WORD), default=None)
+    if last_index is None:
         return ""
-    quantity = _QUANTITY[words[last]]
-    if quantity == "angle" and words[last + 1 : last + 2] == [_DERIVATIVE]:
+    quantity = _QUANTITY_BY_WORD[words[last_index]]
+    if quantity == "angle" and words[last_index + 1 : last_index + 2] == [_RATE_WORD]:
         quantity = "velocity"
-        del words[last + 1]
-    return "" if _AMBIGUOUS & set(words) else quantity
+        del words[last_index + 1]
+    return "" if _AMBIGUOUS_WORDS & set(words) else quantity

@@ -3,7 +3,7 @@
 In M a + B v + K x = force, the unit of mass is force time² / length, that of damping force time / length, and that of
 stiffness force / length. In SI: N s^2/m = kg, N s/m, N/m; for a rotation N m s^2/rad and so on. Where a command is a
 current (A) or a plain number, the force constant of the motor is unknown and contained in every parameter: a "mass"
-then has the unit A s^2/m, not kg.
+then has the unit A s^2/m, not kg. Used by `plant.mechanical_model` and wherever the diagnosis prints a parameter.
 """
 
 import re
@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 _FACTOR = re.compile(r"(kg|N|m|s)(?:\^(\d+))?$")
-_RATES = ("/s^2", "/s")
-FORCES = ("N", "N m")
+_RATE_SUFFIXES = ("/s^2", "/s")
+FORCE_UNITS = ("N", "N m")
 """SI units of a command that is a force or a torque."""
 
 
@@ -35,33 +35,35 @@ class UnitSystem:
             return unit if self.time == "s" else f"1/{self.time}"
         numerator, _, denominator = unit.partition("/")
         powers = {"N": 0, "m": 0, "s": 0}
-        for part, sign in ((numerator, 1), (denominator, -1)):
-            for factor in part.split():
-                match = _FACTOR.match(factor)
-                if match is None and factor != "1":
+        for side_text, sign in ((numerator, 1), (denominator, -1)):
+            for unit_text in side_text.split():
+                factor_match = _FACTOR.match(unit_text)
+                if factor_match is None and unit_text != "1":
                     return unit
-                for name, power in _base_powers(match[1]) if match else ():
-                    assert match is not None
-                    powers[name] += sign * power * int(match[2] or 1)
+                for name, power in _decompose_base_unit(factor_match[1]) if factor_match else ():
+                    assert factor_match is not None
+                    powers[name] += sign * power * int(factor_match[2] or 1)
         return self._format_unit(powers["N"], powers["m"], powers["s"])
 
-    def _format_unit(self, force: int, length: int, seconds: int) -> str:
+    def _format_unit(self, force_power: int, length_power: int, time_power: int) -> str:
         """The product of force, length and time to these powers, such as "A s^2/m"."""
-        bases = [(self.force, force), (self.length, length), (self.time, seconds)]
-        units = [(f"({name})" if "/" in name else name, power) for name, power in bases if name != "1"]
+        base_powers = [(self.force, force_power), (self.length, length_power), (self.time, time_power)]
+        factors = [(f"({name})" if "/" in name else name, power) for name, power in base_powers if name != "1"]
         numerator = [
             _format_power(name, power)
-            for name, power in sorted(units, key=lambda item: item[0] == self.length)
+            for name, power in sorted(factors, key=lambda item: item[0] == self.length)
             if power > 0
         ]
-        denominator = [_format_power(name, -power) for name, power in units if power < 0]
-        below = f"/({' '.join(denominator)})" if len(denominator) > 1 else f"/{denominator[0]}" if denominator else ""
-        return f"{' '.join(numerator) or '1'}{below}"
+        denominator = [_format_power(name, -power) for name, power in factors if power < 0]
+        denominator_text = (
+            f"/({' '.join(denominator)})" if len(denominator) > 1 else f"/{denominator[0]}" if denominator else ""
+        )
+        return f"{' '.join(numerator) or '1'}{denominator_text}"
 
     @property
-    def known(self) -> bool:
+    def has_force_unit(self) -> bool:
         """Whether commands are forces or torques; if not, every parameter contains an unknown force constant."""
-        return self.force in FORCES
+        return self.force in FORCE_UNITS
 
     @property
     def rotational(self) -> bool | None:
@@ -73,15 +75,18 @@ LINEAR, ROTATIONAL = UnitSystem(), UnitSystem("N m", "rad")
 """The SI systems of translational and rotational models."""
 
 
-def system_of(commands: Sequence[str], motions: Sequence[str], time: str = "s") -> UnitSystem:
-    """The unit system of a recording. commands, motions: units of its commands and of its responses (position, velocity
-    or acceleration); those of the first channel are used where channels differ. time: unit of time."""
-    motion = next((motions[0].removesuffix(rate) for rate in _RATES if motions[0].endswith(rate)), motions[0])
+def determine_unit_system(commands: Sequence[str], motions: Sequence[str], time: str = "s") -> UnitSystem:
+    """Determine the unit system of a recording. commands, motions: units of its commands and of its responses
+    (position, velocity or acceleration); those of the first channel are used where channels differ. time: unit of
+    time."""
+    motion = next(
+        (motions[0].removesuffix(suffix) for suffix in _RATE_SUFFIXES if motions[0].endswith(suffix)), motions[0]
+    )
     return UnitSystem(commands[0], motion, time)
 
 
-def _base_powers(name: str) -> tuple[tuple[str, int], ...]:
-    """A base unit (N, m, s or kg) as powers of N, m and s; kg = N s^2/m."""
+def _decompose_base_unit(name: str) -> tuple[tuple[str, int], ...]:
+    """Decompose a unit (N, m, s or kg) into powers of N, m and s; kg = N s^2/m."""
     return (("N", 1), ("s", 2), ("m", -1)) if name == "kg" else ((name, 1),)
 
 

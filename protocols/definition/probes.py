@@ -121,8 +121,8 @@ def find_probe_contradictions(protocol: StudyProtocol) -> list[Problem]:
     if protocol.measurement.keep_s < PERIOD_S:
         violation = f"is {protocol.measurement.keep_s:g} s, less than the period of a probe"
         problems.append(Problem("measurement.keep_s", violation, f"at least {PERIOD_S:g} s"))
-    # The slope of a multisine is below 2 pi f_max sqrt(2) peak (`study.session.stimulus.limits.BETWEEN_SAMPLES`); the
-    # slew limit permits at least that of the steepest stimulus, 2 pi f cap.
+    # The slope of a multisine is below 2 pi f_max sqrt(2) peak (`MULTISINE_PEAK_FACTOR` in
+    # `study.session.stimulus.limits`); the slew limit permits at least that of the steepest stimulus, 2 pi f cap.
     largest_force_n = max((*probes.levels_n, probes.reference_n if probes.reference_s else 0.0))
     highest_allowed_hz = cap_n * max(protocol.all_frequencies_hz, default=0.0) / (math.sqrt(2) * largest_force_n)
     if probes.to_hz > highest_allowed_hz:

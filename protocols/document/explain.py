@@ -12,7 +12,14 @@ from typing import Any
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.dumping import protocol_values
-from protocols.document.schema import Node, Place, describe_allowed, find_node, protocol_schema, resolve_reference
+from protocols.document.schema import (
+    Node,
+    ValuePath,
+    describe_allowed,
+    find_node,
+    make_protocol_schema,
+    resolve_reference,
+)
 from protocols.document.validation_messages import format_key_path
 
 TomlValue = str | int | float | bool | list[Any] | dict[str, str]
@@ -36,11 +43,11 @@ class ExplainedField:
 
 def explain_protocol(protocol: StudyProtocol | RecordingProtocol) -> tuple[ExplainedField, ...]:
     """Explain all fields of a protocol, in the order of its values, with nested tables flattened to dotted keys."""
-    schema = protocol_schema(protocol.kind)
+    schema = make_protocol_schema(protocol.kind)
     return tuple(_explain_fields(schema, protocol_values(protocol), ()))
 
 
-def _explain_fields(schema: Node, value: Any, path: Place) -> Iterator[ExplainedField]:
+def _explain_fields(schema: Node, value: Any, path: ValuePath) -> Iterator[ExplainedField]:
     """Explain the value at a path: a table key by key, a list of tables entry by entry, other values as one field.
     schema: JSON Schema of the whole protocol. path: keys and list indices from the top of the protocol."""
     field_schema = resolve_reference(schema, find_node(schema, path) or {})

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from protocols.definition.problem import Problem
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.study_protocol import StudyProtocol
-from protocols.document.schema import ADAPTERS, protocol_schema
+from protocols.document.schema import ADAPTERS, make_protocol_schema
 from protocols.document.validation_messages import collect_problems, describe_value
 
 Protocol = StudyProtocol | RecordingProtocol
@@ -65,7 +65,7 @@ def protocol_from_values(values: dict[str, Any], source: str) -> Protocol:
         # but still no text and no truth value for a number.
         protocol: Protocol = ADAPTERS[kind].validate_json(json.dumps(values), strict=True)
     except ValidationError as error:
-        raise ProtocolError(source, collect_problems(protocol_schema(kind), error.errors())) from error
+        raise ProtocolError(source, collect_problems(make_protocol_schema(kind), error.errors())) from error
     return protocol
 
 

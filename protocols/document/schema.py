@@ -1,7 +1,7 @@
 """JSON Schema of protocol files, and the values that it allows at each place of a file, in words.
 
 The schema is generated from the dataclasses of `protocols.definition`, the only place where key names, bounds, defaults
-and reasons are written. Documentation and error messages use these functions.
+and reasons are written. `explain`, `validation_messages` and the documentation of file formats use these functions.
 """
 
 from functools import cache
@@ -14,7 +14,7 @@ from protocols.definition.study_protocol import StudyProtocol
 
 Node = dict[str, Any]
 """A JSON Schema, or a part of one."""
-Place = tuple[str | int, ...]
+ValuePath = tuple[str | int, ...]
 """Path from the top of a protocol to a value: key names and list indices, from 0."""
 
 ADAPTERS: dict[str, TypeAdapter[Any]] = {
@@ -23,7 +23,7 @@ ADAPTERS: dict[str, TypeAdapter[Any]] = {
 }
 """Pydantic adapter of each `kind` of protocol, which validates, serialises and describes it."""
 
-UNITS = {
+UNIT_WORDS = {
     "n": "newtons",
     "db": "decibels",
     "s": "seconds",
@@ -38,26 +38,27 @@ UNITS = {
 
 
 @cache
-def protocol_schema(kind: str) -> Node:
-    """JSON Schema of a protocol of this kind, "study" or "recording". Raises KeyError for another kind."""
+def make_protocol_schema(kind: str) -> Node:
+    """Make the JSON Schema of a protocol of this kind, "study" or "recording". Raises KeyError for another kind."""
     return ADAPTERS[kind].json_schema()
 
 
-def find_node(root: Node, place: Place) -> Node | None:
-    """Schema of the value at this place; None where the schema has no such place."""
+def find_node(root: Node, path: ValuePath) -> Node | None:
+    """Find the schema of the value at this place; None where the schema has no such place."""
     node: Node | None = root
-    for part in place:
-        node = _child_node(root, node, part) if node is not None else None
+    for step in path:
+        node = _find_child_node(root, node, step) if node is not None else None
     return node
 
 
 def list_keys(root: Node, node: Node) -> tuple[str, ...]:
-    """The keys of a table in the order of the dataclass's fields; empty for another value than a table."""
+    """List the keys of a table in the order of the dataclass's fields; empty for another value than a table."""
     return tuple(resolve_reference(root, node).get("properties", {}))
 
 
 def resolve_reference(root: Node, node: Node) -> Node:
-    """The node with its "$ref" replaced by the definition."""
+    """The node with its "$ref" replaced by the definition, whose entries the node's own override; other nodes
+    unchanged."""
     if "$ref" not in node:
         return node
     target: Node = root["$defs"][node["$ref"].rsplit("/", 1)[-1]]
@@ -65,7 +66,7 @@ def resolve_reference(root: Node, node: Node) -> Node:
 
 
 def describe_allowed(root: Node, node: Node, key: str = "") -> str:
-    """Allowed values in words. key: name of the value, whose suffix determines the unit (`UNITS`)."""
+    """Describe the allowed values in words. key: name of the value, whose suffix determines the unit (`UNIT_WORDS`)."""
     node = resolve_reference(root, node)
     if "oneOf" in node:
         return (
@@ -90,44 +91,47 @@ def describe_allowed(root: Node, node: Node, key: str = "") -> str:
 
 
 def find_unit(key: str) -> str:
-    """Unit of a key in words, such as ", in newtons" for `start_n`; empty for a key without a unit."""
-    for suffix, unit in sorted(UNITS.items(), key=lambda item: -len(item[0])):
+    """Find the unit of a key in words, such as ", in newtons" for `start_n`; empty for a key without a unit."""
+    for suffix, unit in sorted(UNIT_WORDS.items(), key=lambda item: -len(item[0])):
         if key.endswith(f"_{suffix}"):
             return f", in {unit}"
     return ""
 
 
-def _child_node(root: Node, node: Node, part: str | int) -> Node | None:
-    """Schema of an entry of a list (`part`: its index), of a key of a table, or of the member of a union that the
-    discriminator's value `part` selects; None where there is no such schema."""
+def _find_child_node(root: Node, node: Node, step: str | int) -> Node | None:
+    """Find the schema of an entry of a list (`step`: its index), of a key of a table, or of the member of a union that
+    the discriminator's value `step` selects; None where there is no such schema."""
     node = resolve_reference(root, node)
-    if isinstance(part, int):
+    if isinstance(step, int):
         return node.get("items")
     if "oneOf" in node:
-        reference = node["discriminator"]["mapping"].get(part)
+        reference = node["discriminator"]["mapping"].get(step)
         return {"$ref": reference} if reference else None
-    child: Node | None = node.get("properties", {}).get(part)
+    child: Node | None = node.get("properties", {}).get(step)
     if child is None and isinstance(additional := node.get("additionalProperties"), dict):
         return additional
     return child
 
 
 def _describe_choices(values: Any) -> str:
+    """Describe a choice of texts, such as: "a", "b" or "c". values: at least one."""
     names = [f'"{value}"' for value in values]
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 def _describe_number(node: Node) -> str:
-    kind = "a whole number" if node["type"] == "integer" else "a number"
+    """Describe a number and its bounds, such as: a whole number from 1 up to 9."""
+    number_kind = "a whole number" if node["type"] == "integer" else "a number"
     bounds = [
-        f"{word} {node[bound]:g}"
-        for bound, word in (("exclusiveMinimum", "above"), ("minimum", "from"), ("maximum", "up to"))
+        f"{bound_word} {node[bound]:g}"
+        for bound, bound_word in (("exclusiveMinimum", "above"), ("minimum", "from"), ("maximum", "up to"))
         if bound in node
     ]
-    return " ".join([kind, *bounds])
+    return " ".join([number_kind, *bounds])
 
 
 def _describe_text(node: Node) -> str:
+    """Describe a text: as a name where it has a pattern (that of `field_types`), else by its length."""
     if "pattern" in node:
         return "text in quotes: a lower-case letter, then up to 63 lower-case letters, digits and underscores"
     shortest, longest = node.get("minLength", 0), node.get("maxLength")
@@ -135,6 +139,7 @@ def _describe_text(node: Node) -> str:
 
 
 def _describe_list(root: Node, node: Node, key: str) -> str:
+    """Describe a list: the number of its entries, and the values that each may have."""
     smallest_count, largest_count = node.get("minItems", 0), node.get("maxItems")
-    count = f"{smallest_count} to {largest_count}" if largest_count else f"{smallest_count} or more"
-    return f"a list of {count} entries, each {describe_allowed(root, node['items'], key)}"
+    count_text = f"{smallest_count} to {largest_count}" if largest_count else f"{smallest_count} or more"
+    return f"a list of {count_text} entries, each {describe_allowed(root, node['items'], key)}"

@@ -9,7 +9,15 @@ from difflib import get_close_matches
 from typing import Any
 
 from protocols.definition.problem import InconsistentError, Problem
-from protocols.document.schema import UNITS, Node, Place, describe_allowed, find_node, list_keys, resolve_reference
+from protocols.document.schema import (
+    UNIT_WORDS,
+    Node,
+    ValuePath,
+    describe_allowed,
+    find_node,
+    list_keys,
+    resolve_reference,
+)
 
 _LONGEST_WORD = 60
 """Longest word (characters) that is compared with known keys: comparing longer ones would take minutes."""
@@ -33,7 +41,7 @@ def collect_problems(root: Node, errors: Sequence[Any]) -> tuple[Problem, ...]:
     return tuple(problems)
 
 
-def format_key_path(root: Node, place: Place) -> str:
+def format_key_path(root: Node, place: ValuePath) -> str:
     """`staircase.steps[2].step_db` from ("staircase", "steps", 1, "step_db"); list entries count from 1."""
     path = ""
     for depth, part in enumerate(place):
@@ -48,7 +56,7 @@ def format_key_path(root: Node, place: Place) -> str:
 def find_nearest_key(key: str, known_keys: Sequence[str]) -> str | None:
     """The known key that was probably meant: first the same quantity with another unit, then a similar spelling;
     None if there is none."""
-    suffixes = tuple(f"_{unit}" for unit in UNITS)
+    suffixes = tuple(f"_{unit}" for unit in UNIT_WORDS)
     for candidate in known_keys:
         if candidate.endswith(suffixes) and candidate.rsplit("_", 1)[0] in (key, key.rsplit("_", 1)[0]):
             return candidate
@@ -73,7 +81,7 @@ def describe_value(value: Any) -> str:
 
 def _translate_error(root: Node, error: Any) -> tuple[Problem, ...]:
     """Problems for one error of pydantic: key in the file, text, allowed values."""
-    place: Place = error["loc"]
+    place: ValuePath = error["loc"]
     if error["type"] == "json_invalid":  # nested too deeply
         return (Problem("The text", f"cannot be read: {error['msg']}", "numbers and nesting of ordinary size"),)
     key = format_key_path(root, place)
@@ -110,7 +118,7 @@ def _describe_problem(error: Any) -> str:
             return f"is {describe_value(value)}"
 
 
-def _report_unknown_key(root: Node, place: Place) -> Problem:
+def _report_unknown_key(root: Node, place: ValuePath) -> Problem:
     """Problem for an unknown key, with the table in which it belongs or the known key that was probably meant."""
     key, known_keys = str(place[-1]), _list_sibling_keys(root, place)
     table = format_key_path(root, place[:-1])
@@ -125,7 +133,7 @@ def _report_unknown_key(root: Node, place: Place) -> Problem:
     return Problem(format_key_path(root, place), problem, ", ".join(known_keys))
 
 
-def _report_wrong_entry_kind(root: Node, place: Place, error: Any) -> Problem:
+def _report_wrong_entry_kind(root: Node, place: ValuePath, error: Any) -> Problem:
     """Problem for an entry of a mixed list whose kind is missing or unknown."""
     node = resolve_reference(root, find_node(root, place) or {})
     tag, choices = node["discriminator"]["propertyName"], node["discriminator"]["mapping"]
@@ -136,7 +144,7 @@ def _report_wrong_entry_kind(root: Node, place: Place, error: Any) -> Problem:
     return Problem(f"{format_key_path(root, place)}.{tag}", problem, " or ".join(f'"{choice}"' for choice in choices))
 
 
-def _list_sibling_keys(root: Node, place: Place) -> tuple[str, ...]:
+def _list_sibling_keys(root: Node, place: ValuePath) -> tuple[str, ...]:
     """Keys that the schema allows in the table that contains this place."""
     table = find_node(root, place[:-1])
     return list_keys(root, table) if table else ()

@@ -3,7 +3,7 @@
 Read `step` first: it is the complete rule, except for runs whose levels the Psi method chooses
 (`protocols.procedure.psi`). The state is a value: `begin_staircase` makes it, `step` returns the next one. Levels are
 in dB re 1 N and not restricted to a grid of steps, because a level that was limited to the cap need not be on that
-grid.
+grid. `study.session.state` folds a session's log with these functions; the simulations of `analysis` use them too.
 
 Source: H. Levitt, Transformed up-down methods in psychoacoustics, J. Acoust. Soc. Am. 49 (1971), 467-477.
 """
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from protocols.definition.staircase_rule import StaircaseRule, StepChange
-from protocols.procedure.psi import Answered, compute_posterior, estimate_threshold, next_level_db
+from protocols.procedure.psi import LevelAndAnswer, choose_level_db, compute_posterior, estimate_threshold
 
 
 class Heading(Enum):
@@ -31,8 +31,11 @@ class StaircaseState:
     level_db: float
     """Level of the next trial, dB re 1 N."""
     right_in_a_row: int = 0
+    """Consecutive right answers since the last wrong answer, or since a step of the up-down rule reset the count."""
     wrong_in_a_row: int = 0
+    """Consecutive wrong answers since the last right answer, or since a step of the up-down rule reset the count."""
     heading: Heading = Heading.NONE
+    """Direction of the last change of level."""
     reversal_levels_db: tuple[float, ...] = ()
     """Level presented in the trial that made each reversal, dB re 1 N."""
     reversal_trials: tuple[int, ...] = ()
@@ -40,10 +43,12 @@ class StaircaseState:
     trials: int = 0
     """Number of trials answered."""
     trials_at_cap: int = 0
+    """Number of trials answered at the cap."""
     pushes_against_cap: int = 0
-    """Number of times the rule asked for a level above the cap."""
+    """Number of times the up-down rule asked for a level above the cap."""
     reversals_at_cap: int = 0
-    answered: tuple[Answered, ...] = ()
+    """Number of reversals whose trial was presented at the cap."""
+    answered: tuple[LevelAndAnswer, ...] = ()
     """All answers of a run whose levels are chosen by Psi; empty for other rules."""
     spread_db: float = math.inf
     """Standard deviation of the threshold's posterior (dB), for a run whose levels are chosen by Psi."""
@@ -63,8 +68,9 @@ def step(rule: StaircaseRule, state: StaircaseState, correct: bool) -> Staircase
     """State after one answer.
 
     The level rises after `up_after_wrong` consecutive wrong answers and falls after `down_after_right` consecutive
-    right ones; a change of direction is a reversal; the run ends with its last reversal. Raises ValueError if the run
-    is already finished.
+    right ones (after one each until the first reversal, with `initial_one_up_one_down`); a change of direction is a
+    reversal; the run ends with its last reversal, or at the rule's trial limit. A rule with `is_bayesian` takes its
+    levels from Psi instead, and ends by `is_complete`. Raises ValueError if the run is already finished.
     """
     if is_finished(rule, state):
         raise ValueError("this run is finished: no answer can follow")
@@ -119,27 +125,29 @@ def _count_answer(rule: StaircaseRule, state: StaircaseState, correct: bool) -> 
 
 
 def _apply_psi(rule: StaircaseRule, state: StaircaseState, correct: bool) -> StaircaseState:
-    """State with the level that Psi chooses after this answer, at most the cap, and the new posterior's spread."""
+    """State with the level that Psi chooses after this answer, at most the cap, and the standard deviation of the new
+    posterior."""
     cap_db, answered = to_db(rule.cap_n), (*state.answered, (state.level_db, correct))
-    probability = compute_posterior(answered, cap_db)
-    level_db = min(next_level_db(probability, cap_db), cap_db)
-    return replace(state, level_db=level_db, answered=answered, spread_db=estimate_threshold(probability, cap_db).sd_db)
+    posterior = compute_posterior(answered, cap_db)
+    level_db = min(choose_level_db(posterior, cap_db), cap_db)
+    return replace(state, level_db=level_db, answered=answered, spread_db=estimate_threshold(posterior, cap_db).sd_db)
 
 
 def _move_level(rule: StaircaseRule, state: StaircaseState, heading: Heading) -> StaircaseState:
-    """Move one step and reset the counters; at the cap an upward movement changes nothing and is no reversal."""
-    reset = replace(state, right_in_a_row=0, wrong_in_a_row=0)
+    """Move the level one step and reset the counters of consecutive answers; at the cap an upward movement is only
+    counted and is no reversal."""
+    reset_state = replace(state, right_in_a_row=0, wrong_in_a_row=0)
     if heading is Heading.UP and _is_at_cap(rule, state.level_db):
-        return replace(reset, pushes_against_cap=state.pushes_against_cap + 1)
+        return replace(reset_state, pushes_against_cap=state.pushes_against_cap + 1)
     is_reversal = state.heading is not Heading.NONE and heading is not state.heading
-    size_db = _find_step_db(rule, state.reversals, is_reversal)
-    unlimited_db = state.level_db + (size_db if heading is Heading.UP else -size_db)
+    step_db = _find_step_db(rule, state.reversals, is_reversal)
+    uncapped_db = state.level_db + (step_db if heading is Heading.UP else -step_db)
     cap_db = to_db(rule.cap_n)
     next_state = replace(
-        reset,
-        level_db=min(unlimited_db, cap_db),
+        reset_state,
+        level_db=min(uncapped_db, cap_db),
         heading=heading,
-        pushes_against_cap=state.pushes_against_cap + (unlimited_db > cap_db + _LEVEL_TOLERANCE_DB),
+        pushes_against_cap=state.pushes_against_cap + (uncapped_db > cap_db + _LEVEL_TOLERANCE_DB),
     )
     if not is_reversal:
         return next_state
@@ -153,7 +161,7 @@ def _move_level(rule: StaircaseRule, state: StaircaseState, heading: Heading) ->
 
 def _find_step_db(rule: StaircaseRule, reversals_before: int, is_reversal: bool) -> float:
     """Size of the next change of level (dB). The phase of `rule.steps` follows from the number of reversals so far;
-    `rule.step_change` determines whether the present reversal counts already."""
+    `rule.step_change` determines whether the present reversal already counts. After the last phase its step remains."""
     reversals_now = reversals_before + is_reversal
     match rule.step_change:
         case StepChange.AFTER_REVERSAL:
@@ -171,17 +179,17 @@ def _find_step_db(rule: StaircaseRule, reversals_before: int, is_reversal: bool)
 
 
 def _count_wrong_needed(rule: StaircaseRule, state: StaircaseState) -> int:
-    """Consecutive wrong answers that raise the level."""
-    return 1 if _in_initial_phase(rule, state) else rule.up_after_wrong
+    """Number of consecutive wrong answers that raise the level."""
+    return 1 if _is_in_initial_phase(rule, state) else rule.up_after_wrong
 
 
 def _count_right_needed(rule: StaircaseRule, state: StaircaseState) -> int:
-    """Consecutive right answers that lower the level."""
-    return 1 if _in_initial_phase(rule, state) else rule.down_after_right
+    """Number of consecutive right answers that lower the level."""
+    return 1 if _is_in_initial_phase(rule, state) else rule.down_after_right
 
 
-def _in_initial_phase(rule: StaircaseRule, state: StaircaseState) -> bool:
-    """Whether the 1 up, 1 down rule applies: until the first reversal, if the protocol asks for it."""
+def _is_in_initial_phase(rule: StaircaseRule, state: StaircaseState) -> bool:
+    """Whether the 1 up, 1 down rule applies: until the first reversal, if the rule has `initial_one_up_one_down`."""
     return rule.initial_one_up_one_down and state.reversals == 0
 
 

@@ -1,8 +1,9 @@
 """English texts, by key, of the sentences ("facts") that a session generates: requests, causes of void trials, notices.
 
 The event log contains these sentences in English. The participant reads them in the language of the protocol, whose
-table of texts (`de.toml`, `es.toml`) has the same keys: `words.Words.fact` recognises a sentence and translates it. A
-name in braces, such as {seconds}, is replaced by a value. Sentences for the experimenter alone are not listed.
+table of texts (`de.toml`, `es.toml`) has the same keys: `words.Words.translate_fact` recognises a sentence and
+translates it. A name in braces, such as {seconds}, is replaced by a value. Sentences for the experimenter alone are not
+listed.
 """
 
 FACTS: dict[str, str] = {

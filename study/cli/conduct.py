@@ -1,4 +1,8 @@
-"""Common part of `study` and `resume`: the participant, and the output at the end."""
+"""Common part of the commands `hapteq study` and `hapteq resume` without the app: in line mode for a person, or with a
+simulated participant. Provides the participant, runs the sitting, and prints the results.
+
+Called by `study.cli.study` and `study.cli.resume`.
+"""
 
 import sys
 from collections.abc import Iterator
@@ -37,13 +41,15 @@ class SittingOptions:
     observer: str | None
     """Name of the simulated participant; None for a person."""
     subject: str | None
+    """Participant code; None: asked at the terminal, or made from the name of the simulated participant."""
     keys: AnswerKeys = DIGITS
+    """Keys with which a person answers."""
     hands_off: bool = False
     """Whether the caller declares, without a terminal to confirm it, that no hand is on a real device's handle."""
 
 
 def run_new_session(
-    sitter: SittingOptions,
+    options: SittingOptions,
     protocol_name: str,
     device: str,
     data: Path,
@@ -51,23 +57,25 @@ def run_new_session(
     as_json: bool,
     model: Path | None = None,
 ) -> None:
-    """Run a new session in line mode or simulated, and print its results. Raises StudyError."""
-    plan = plan_sitting(protocol_name, sitter.subject or _ask_subject(sitter), sitter.observer, seed, data, model)
+    """Run a new session in line mode or simulated, and print its results. protocol_name: name or path of the protocol;
+    data: data folder; seed: None for a random one; as_json: print JSON instead of text; model: file of a fitted
+    model of the device, None without one. Raises StudyError."""
+    plan = plan_sitting(protocol_name, options.subject or _ask_subject(options), options.observer, seed, data, model)
     for note in plan.notes:
         typer.echo(f"Note: {note}", err=True)
-    _confirm_free_handle(sitter.observer, device, sitter.hands_off)
-    in_real_time = sitter.observer is None or needs_real_time(device)
+    _confirm_free_handle(options.observer, device, options.hands_off)
+    in_real_time = options.observer is None or needs_real_time(device)
     clock: Clock = RealClock() if in_real_time else VirtualClock()
-    with _participant(
-        sitter.observer, plan.session.seed, sitter.keys, clock, make_words(plan.session.protocol)
+    with _provide_participant(
+        options.observer, plan.session.seed, options.keys, clock, make_words(plan.session.protocol)
     ) as participant:
         end = conduct_new(plan.session, device, participant)
     print_results(end_sitting(end, RealClock().utc()), as_json)
 
 
 def _confirm_free_handle(observer: str | None, device: str, hands_off: bool) -> None:
-    """Announce that a real device moves by itself for a simulated participant. Raises WrongUseError where that cannot
-    be confirmed."""
+    """Announce that a real device moves by itself, and have it confirmed, where a simulated participant uses one; do
+    nothing otherwise. Raises WrongUseError where that is not confirmed."""
     if observer is not None and device in REAL:
         announce(
             f"A simulated participant ('{observer}') takes this session: the {device} moves by itself, for as long as "
@@ -79,7 +87,8 @@ def _confirm_free_handle(observer: str | None, device: str, hands_off: bool) -> 
 def run_resumed_session(
     session: str, device: str, data: Path, as_json: bool, keys: AnswerKeys = DIGITS, hands_off: bool = False
 ) -> None:
-    """Resume a session in line mode or simulated, and print its results. Raises StudyError."""
+    """Resume a session in line mode or simulated, and print its results; of a closed session, only write the results
+    that are missing and print them. session: name or path of the session; data: data folder. Raises StudyError."""
     folder = find_session(session, data)
     if warning := format_data_folder_warning(folder.path.parent):
         typer.echo(f"Note: {warning}", err=True)
@@ -91,16 +100,18 @@ def run_resumed_session(
     _confirm_free_handle(opened.observer, device, hands_off)
     in_real_time = opened.observer is None or needs_real_time(device)
     clock: Clock = RealClock() if in_real_time else VirtualClock.resume_at(state.sitting.last.utc)
-    with _participant(opened.observer, opened.seed, keys, clock, make_words(state.protocol)) as participant:
+    with _provide_participant(opened.observer, opened.seed, keys, clock, make_words(state.protocol)) as participant:
         end = conduct_resumed(folder, device, participant)
     print_results(end_sitting(end, RealClock().utc()), as_json)
 
 
 @contextmanager
-def _participant(
+def _provide_participant(
     observer: str | None, seed: int, keys: AnswerKeys, clock: Clock, words: Words
 ) -> Iterator[Participant]:
-    """The participant of a sitting; a person is told to wait before, and whose the results are after it."""
+    """Context with the participant of a sitting: simulated, or a person in line mode. A person is asked to wait before
+    it, and told after it that the results are for the experimenter. Raises WrongUseError where standard input is
+    closed."""
     if observer is not None:
         with show_answer_count(f"simulated participant '{observer}'") as show_question:
             yield make_simulated_participant(observer, seed, clock, on_question=show_question)
@@ -119,14 +130,17 @@ def _participant(
     typer.echo(f"\n{words['for_experimenter']}", err=True)
 
 
-def code_of_simulated(observer: str) -> str:
-    """Participant code of a simulated participant: one per kind, so that their sessions stay separate."""
-    return "".join(c for c in observer if c.isascii() and c.isalnum())[:15] + "1"
+def make_simulated_code(observer: str) -> str:
+    """Participant code of a simulated participant: the first 15 ASCII letters and digits of its name, then "1". A
+    separate code per observer keeps their sessions apart."""
+    return "".join(character for character in observer if character.isascii() and character.isalnum())[:15] + "1"
 
 
-def _ask_subject(sitter: SittingOptions) -> str:
-    if sitter.observer is not None:
-        return code_of_simulated(sitter.observer)
+def _ask_subject(options: SittingOptions) -> str:
+    """Participant code: made for a simulated participant, else asked at the terminal until it is valid. Raises
+    WrongUseError without a terminal."""
+    if options.observer is not None:
+        return make_simulated_code(options.observer)
     if sys.stdin is None or not sys.stdin.isatty():
         raise WrongUseError(
             "Whose answers are these?",

@@ -45,7 +45,7 @@ def identify(
 ) -> None:
     """Fit a stable model to the band, test it on held-out data, and write it."""
     from study.cli.progress import show_bar
-    from study.workflows.equalizer.identified_summary import summary, summary_lines
+    from study.workflows.equalizer.identified_summary import format_summary, summarise_model
     from study.workflows.equalizer.identify_model import IdentifyPlan, check_free, identify_model
     from study.workflows.equalizer.report_identification import report_identification
 
@@ -54,7 +54,8 @@ def identify(
     check_free(out)
     with show_bar("Identifying (%)", total=100) as show:
         device = identify_model(plan, lambda share: show(round(100 * share)))
-    typer.echo(json.dumps(summary(device), indent=2) if as_json else "\n".join((str(out), *summary_lines(device))))
+    summary_lines = [json.dumps(summarise_model(device), indent=2)] if as_json else [str(out), *format_summary(device)]
+    typer.echo("\n".join(summary_lines))
     for remark in device.remarks:
         typer.echo(f"Note: {remark}", err=True)
     if report is not None:
@@ -67,8 +68,8 @@ def _band(band: tuple[float, float], limit_from: Path | None) -> tuple[float, fl
     """The stated band, or with `limit_from` the same band up to the direction limit of that analysis."""
     if limit_from is None:
         return band
-    from study.workflows.equalizer.direction_limit import band_of_study
+    from study.workflows.equalizer.direction_limit import read_study_band
 
-    limited_band = band_of_study(limit_from, band[0])
+    limited_band = read_study_band(limit_from, band[0])
     typer.echo(f"Note: {limited_band.origin}", err=True)
     return limited_band.band_hz

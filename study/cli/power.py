@@ -147,7 +147,7 @@ def _make_crowd(protocol: "StudyProtocol", threshold_n: float, effect_db: float)
 
 
 def _format_table(points: Sequence["PowerPoint"], plan: "PowerPlan") -> list[str]:
-    from analysis.threshold_words import threshold_words
+    from analysis.threshold_words import select_threshold_words
     from study.workflows.planning.simulate_power import format_power_lines
 
     first_hz, second_hz = plan.pair_hz
@@ -156,7 +156,7 @@ def _format_table(points: Sequence["PowerPoint"], plan: "PowerPlan") -> list[str
     )
     compared = f"Compared: {first_hz:g} Hz minus {second_hz:g} Hz, {contrast_text}."
     roved = [f"Levels roved by {plan.crowd.rove_db:g} dB, as the protocol says."] if plan.crowd.rove_db else []
-    return [*format_power_lines(points, threshold_words(plan.rule).means), "", compared, *roved]
+    return [*format_power_lines(points, select_threshold_words(plan.rule).means), "", compared, *roved]
 
 
 def _read_delivery(data: Path | None, frequencies_hz: tuple[float, ...]) -> "FeltDelivery | None":

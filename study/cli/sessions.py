@@ -36,12 +36,12 @@ def sessions(
 
 
 def _format_table(lines: "tuple[SessionLine, ...]", remarks: bool, width: int | None) -> Iterator[str]:
-    from study.local_clock import machine_zone
+    from study.local_clock import convert_to_machine_zone
     from study.session.views.local_time import format_times_in_zone
     from study.tui.session_status import format_status
     from study.tui.text_rows import align_row_lines
 
-    offset, begun_texts = format_times_in_zone([line.begun_utc for line in lines], machine_zone)
+    offset, begun_texts = format_times_in_zone([line.begun_utc for line in lines], convert_to_machine_zone)
     header = ("session", "standing", f"begun ({offset})" if offset else "begun", "runs", "answers", "protocol")
     rows = [
         (

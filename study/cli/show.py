@@ -1,4 +1,5 @@
-"""`hapteq show`: one session, or one diagnosis, as the screen shows it; or one recording."""
+"""`hapteq show`: print a session (facts, thresholds, staircases), a diagnosis, or a recording. Registered in
+`study.cli.command_table`."""
 
 import json
 from collections.abc import Iterable
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from study.session.views.archive_views import DiagnosisView, SessionView, Staircase
 
 PLOT_COLUMNS, PLOT_ROWS = 78, 12
-"""Size of a staircase's picture, in characters."""
+"""Width and height of a staircase's plot, in characters."""
 
 
 def show(
@@ -36,27 +37,28 @@ def show(
     from study.importing.arrays.json_arrays import is_own_document
     from study.store.disk.hdf5_file import is_hdf5
 
-    path = Path(target)
-    foreign = path.is_file() and path.suffix.lower() in FOREIGN and not is_own_document(path)
-    if foreign or (path.is_file() and is_hdf5(path)):
+    target_path = Path(target)
+    is_foreign = target_path.is_file() and target_path.suffix.lower() in FOREIGN and not is_own_document(target_path)
+    if is_foreign or (target_path.is_file() and is_hdf5(target_path)):
         _show_recording(Path(target), as_json)
         return
-    document = Path(target) / "diagnosis.json" if (Path(target) / "diagnosis.json").is_file() else Path(target)
-    if document.is_file():
+    diagnosis_path = Path(target) / "diagnosis.json" if (Path(target) / "diagnosis.json").is_file() else Path(target)
+    if diagnosis_path.is_file():
         from study.workflows.views.view_diagnosis import make_diagnosis_view
 
-        diagnosis = make_diagnosis_view(document)
-        _print_lines([json.dumps(asdict(diagnosis), indent=2)] if as_json else _diagnosis_lines(diagnosis))
+        diagnosis = make_diagnosis_view(diagnosis_path)
+        _print_lines([json.dumps(asdict(diagnosis), indent=2)] if as_json else _format_diagnosis(diagnosis))
         return
-    from study.local_clock import machine_zone
+    from study.local_clock import convert_to_machine_zone
     from study.session.views.local_time import to_utc
     from study.workflows.views.view_session import make_session_view
 
-    session = make_session_view(_folder(target, data), to_utc if as_json else machine_zone)
-    _print_lines([json.dumps(asdict(session), indent=2)] if as_json else _session_lines(session, log))
+    session = make_session_view(_find_session_folder(target, data), to_utc if as_json else convert_to_machine_zone)
+    _print_lines([json.dumps(asdict(session), indent=2)] if as_json else _format_session(session, log))
 
 
 def _show_recording(path: Path, as_json: bool) -> None:
+    """Print channels, segments and facts of a recording, or the same as JSON."""
     from study.cli.look import draw_recording_lines, print_lines
     from study.workflows.recording.look_at_recordings import (
         inspect_recordings,
@@ -78,8 +80,9 @@ def _show_recording(path: Path, as_json: bool) -> None:
     )
 
 
-def _folder(target: str, data: Path) -> Path:
-    """Folder of a session, also of one that was withdrawn or cannot be read: these can be shown too."""
+def _find_session_folder(target: str, data: Path) -> Path:
+    """Folder of a session, also of one that was withdrawn or cannot be read: these can be shown too. target: the
+    folder, or its name in `data`. Raises what `find_session` raises for others."""
     from study.store.sessions.archive import find_session, list_session_folders
 
     folder = Path(target) if Path(target).is_dir() else data / target
@@ -87,7 +90,8 @@ def _folder(target: str, data: Path) -> Path:
     return folder if folder.resolve() in session_paths else find_session(target, data).path
 
 
-def _session_lines(view: "SessionView", log: bool) -> Iterable[str]:
+def _format_session(view: "SessionView", log: bool) -> Iterable[str]:
+    """Lines of a session: summary, facts, thresholds, warnings, staircases; with `log` also its events in words."""
     from study.tui.drawing.staircase_drawing import LEGEND
     from study.tui.session_status import describe_session
     from study.tui.text_rows import align_rows
@@ -110,6 +114,7 @@ def _session_lines(view: "SessionView", log: bool) -> Iterable[str]:
 
 
 def _draw_plot(staircase: "Staircase") -> Iterable[str]:
+    """Lines of a staircase: title, plot and summary."""
     from study.tui.drawing.staircase_drawing import draw_staircase, summarize_staircase
 
     yield f"\n{staircase.title}"
@@ -117,7 +122,8 @@ def _draw_plot(staircase: "Staircase") -> Iterable[str]:
     yield summarize_staircase(staircase)
 
 
-def _diagnosis_lines(view: "DiagnosisView") -> Iterable[str]:
+def _format_diagnosis(view: "DiagnosisView") -> Iterable[str]:
+    """Lines of a diagnosis: verdict, effects, rejected candidates, fit, mismatch, notes and the next experiment."""
     from study.tui.text_rows import align_rows
 
     width = columns()
@@ -137,11 +143,12 @@ def _diagnosis_lines(view: "DiagnosisView") -> Iterable[str]:
     yield ""
     yield from view.notes
     if view.next_experiment:
-        yield from ("", "Next", *(f"  {line}" for line in view.next_experiment.splitlines()))
+        yield from ("", "Next", *(f"  {text_line}" for text_line in view.next_experiment.splitlines()))
     if view.report:
         yield f"\nReport: {view.report}"
 
 
 def _print_lines(lines: Iterable[str]) -> None:
+    """Print lines to standard output."""
     for line in lines:
         typer.echo(line)

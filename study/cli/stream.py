@@ -27,7 +27,7 @@ def stream(
 
     folder = find_session(session, data)
     outlet, inbox = MarkerOutlet(folder.log), RequestInbox(folder.path)
-    signals = SignalStreams(folder.path, outlet.signal_outlet)
+    signals = SignalStreams(folder.path, outlet.make_signal_outlet)
 
     def log_clock_offset(offset_s: float) -> None:
         note_text = f"LSL's clock was {offset_s:.6f} s ahead of the session's when that said {time.monotonic():.3f} s."

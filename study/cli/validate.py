@@ -15,9 +15,9 @@ def validate(
     them. Exit code 1 if anything is wrong."""
     from study.errors import ExitCode
     from study.workflows.files.validate_apart import validate_files
-    from study.workflows.files.validate_together import check_together
+    from study.workflows.files.validate_together import check_model_channels
 
-    validations = check_together(list(validate_files(files)))
+    validations = check_model_channels(list(validate_files(files)))
     if as_json:
         rows = [
             {"file": str(v.path), "kind": v.kind, "problems": list(v.problems), "notes": list(v.notes)}

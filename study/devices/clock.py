@@ -1,7 +1,8 @@
 """Clock of a session: real time, or virtual time, in which a simulated session of half an hour runs in a second.
 
 `Clock` is the interface. The code of a session takes the clock as an argument, so that the same code runs in real time
-and in virtual time.
+and in virtual time. `study.devices.drive.virtual_drive` listens to a virtual clock and runs the device's ticks when it
+advances.
 """
 
 import time
@@ -11,11 +12,11 @@ from typing import Protocol
 
 
 class Clock(Protocol):
-    """Interface of the clock of a session: monotonic time, UTC and sleep."""
+    """Interface of the clock of a session: monotonic time, date and time (UTC), and sleep."""
 
     @property
     def virtual(self) -> bool:
-        """Whether time passes only by `sleep`."""
+        """Whether time passes only by `sleep`, as in `VirtualClock`."""
         ...
 
     def now_s(self) -> float:
@@ -27,7 +28,7 @@ class Clock(Protocol):
         ...
 
     def utc(self) -> str:
-        """Date and time, UTC, ISO 8601."""
+        """Date and time, UTC, ISO 8601, in milliseconds."""
         ...
 
 
@@ -37,18 +38,22 @@ class RealClock:
     virtual = False
 
     def now_s(self) -> float:
+        """Time (s) of `time.monotonic`."""
         return time.monotonic()
 
     def sleep(self, seconds: float) -> None:
+        """Wait for this time (s); returns at once for zero or less."""
         if seconds > 0:
             time.sleep(seconds)
 
     def utc(self) -> str:
+        """Date and time of the system, UTC, ISO 8601, in milliseconds."""
         return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
 class VirtualClock:
-    """Time that passes only when the program calls `sleep`. A device that must act meanwhile registers a listener."""
+    """Time that passes only when the program calls `sleep`. start: date and time at its origin; None = now. A simulated
+    device, whose ticks must run during a sleep, registers a listener."""
 
     virtual = True
 
@@ -58,10 +63,11 @@ class VirtualClock:
         self._listeners: list[Callable[[float], None]] = []
 
     def now_s(self) -> float:
+        """Time (s) slept so far."""
         return self._now_s
 
     def sleep(self, seconds: float) -> None:
-        """Advance the time at once, then call each listener."""
+        """Advance the time at once by `seconds`, then call each listener; nothing for zero or less."""
         if seconds <= 0:
             return
         self._now_s += seconds
@@ -69,6 +75,7 @@ class VirtualClock:
             listener(self._now_s)
 
     def utc(self) -> str:
+        """Date and time of the start plus the time slept, UTC, ISO 8601, in milliseconds."""
         return (self._start + timedelta(seconds=self._now_s)).isoformat(timespec="milliseconds")
 
     @classmethod

@@ -1,4 +1,5 @@
-"""Device port: the interface through which the rest of the program uses a haptic device.
+"""Device port: the interface through which the rest of the program uses a haptic device. Implemented by
+`study.devices.safe.SafeDevice` and, over pipes, by `loop_process.remote_device.RemoteDevice`.
 
 Arguments and results are plain values that can be sent between processes, because a real device's 1 kHz loop runs in a
 separate process (`loop_process`). `hold` has no fixed duration, because a participant may feel a stimulus until the
@@ -31,12 +32,14 @@ class DeviceInfo:
 
     name: str
     simulated: bool
+    """Whether there is no hardware, as for a simulation or a replay."""
     sample_rate_hz: float
+    """Rate of the control loop and of the recordings (Hz)."""
     max_force_n: float
     """Largest norm of the force (N)."""
     effective_mass_kg: float
-    """Apparent mass at the handle in the centre of the workspace, from which the stiffness of the centring spring is
-    computed."""
+    """Apparent mass at the handle in the centre of the workspace (kg), from which the stiffness of the centring spring
+    is computed."""
     details: str = ""
     """Serial number, firmware, or the simulation's parameter set."""
     has_sensor: bool = True
@@ -51,15 +54,17 @@ class DeviceSettings:
     """Settings that are fixed from opening to closing: limits, centring spring, and recorded part of each stimulus."""
 
     limits: Limits
+    """Limits on force, slew rate, times and plausible readings."""
     spring_frequency_hz: float
     """Natural frequency of the centring spring with the device's effective mass: K = m (2 pi f)²; 0 = no spring."""
     spring_damping_n_s_per_m: float
+    """Damping coefficient of the centring spring (N s/m)."""
     keep_s: float
-    """Longest recorded part of a held stimulus: the last `keep_s` of its steady part."""
+    """Longest recorded part of a held stimulus (s): the last `keep_s` of its steady part."""
     hand_on_handle: bool
     """Whether a hand holds the handle. A simulated device then carries a simulated hand."""
     place_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Centre of the spring, x, y, z, in the device's axes."""
+    """Centre of the spring, x, y, z, in the device's axes (m)."""
     beyond_hand_ceiling: bool = False
     """Allows force caps up to the device's own maximum instead of the limits for a hand. Never set by a protocol;
     refused with a hand on the handle."""
@@ -95,7 +100,9 @@ class Health:
     """Counters of the safety layer since `hold` or `play`, in ticks where not said otherwise."""
 
     fault: Fault
+    """Fault that ended the stimulus; `Fault.NONE` without one."""
     ticks: int
+    """Ticks since the stimulus began, including missed ones."""
     missed_ticks: int
     """Ticks that were not run in time; the device held its last force meanwhile."""
     stimulus_clipped: int
@@ -131,6 +138,7 @@ class PlaybackResult:
     last `keep_s`. None if the steady part was shorter than a loop or `keep_s`, the shorter one. For `play`: all of it,
     or None after a fault or where it was ended early."""
     health: Health
+    """Counters at the end of the stimulus."""
     truth: Signal | None = None
     """True acceleration of a simulated handle at the same ticks, for tests and benchmarks. None for real devices."""
 
@@ -140,10 +148,11 @@ class Look:
     """Present state of the handle. Position and acceleration are both None without a reading."""
 
     position_m: tuple[float, float, float] | None
-    """x, y, z; None where the encoders gave no numbers."""
+    """x, y, z (m); None where the encoders gave no numbers."""
     acceleration_mps2: tuple[float, float, float] | None
-    """Acceleration by the accelerometer, x, y, z in the device's axes; None without a valid reading."""
+    """Acceleration by the accelerometer, x, y, z in the device's axes (m/s²); None without a valid reading."""
     sensor_clipped: bool
+    """Whether a channel of the accelerometer was at its limit in this reading."""
     buttons: frozenset[int]
     """Numbers of the device's own buttons that are pressed, as its driver counts them."""
     missed_ticks: int
@@ -179,7 +188,8 @@ class Device(Protocol):
         ...
 
     def fault(self) -> Fault:
-        """The fault that ended the present stimulus, `Fault.NONE` without one. Fast enough for every key press."""
+        """The fault that ended the present or last stimulus, `Fault.NONE` without one. Fast enough for every key
+        press."""
         ...
 
     def health(self) -> Health:
@@ -189,8 +199,9 @@ class Device(Protocol):
     def release(self) -> PlaybackResult:
         """Fade out, wait until no force acts, and return recording and counters. To be called after a fault as well.
 
-        Does not raise for a lost device, so that the trial can be logged as void; the next `hold` or `play` does.
-        After FORCE_LEFT the force may still be on: the program then warns the person at the handle.
+        Raises `DeviceError` where nothing is held, but not for a lost device, so that the trial can be logged as void;
+        the next `hold` or `play` does. After FORCE_LEFT the force may still be on: the program then warns the person at
+        the handle.
         """
         ...
 

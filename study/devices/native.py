@@ -1,4 +1,5 @@
 """Calls of C functions (system, device libraries) from numba code without the interpreter lock: clock, sleep, lock.
+Used by the compiled loops of `study.devices.drive` and by the compiled driver of `study.devices.force_dimension`.
 
 A function is given by its address, in an array of int64. Arguments are int32, int64 (also addresses) and float64; on
 64-bit computers these are passed as C expects char, int, pointers and double.
@@ -22,7 +23,8 @@ Addresses = npt.NDArray[np.int64]
 """Addresses of C functions and objects, as 64-bit integers."""
 
 CLOCK, SLEEP, MONOTONIC, ACQUIRE, RELEASE, LOCK, SYSTEM_SIZE = range(7)
-"""Indices into `system_calls`. The addresses at CLOCK and SLEEP are 0 on systems whose own functions are not used."""
+"""Indices into `collect_system_calls`. The addresses at CLOCK and SLEEP are 0 except on Linux with its usual
+monotonic clock."""
 
 _intrinsic: Any = intrinsic
 """These functions of numba as `Any`, because numba declares no types for them."""
@@ -32,20 +34,22 @@ _CLOCK_MONOTONIC, _TIMER_ABSTIME, _INTERRUPTED = 1, 1, 4
 """Constants of Linux (time.h, errno.h)."""
 
 
-def _make_caller(result: Any) -> Any:
-    """Make a numba function call(address, arguments) that calls the C function at an address. result: numba type of its
-    return value; arguments: a tuple."""
+def _make_caller(result_type: Any) -> Any:
+    """Make a numba function call(address, arguments) that calls the C function at an address. result_type: numba type
+    of its return value; arguments: a tuple."""
 
     @_intrinsic
     def call(context: Any, address: Any, arguments: Any) -> Any:
+        """Signature, and code that converts the address to a function pointer and calls it."""
+
         def generate_code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
             c_arguments = _cgutils.unpack_tuple(builder, values[1])
             function_type = ir.FunctionType(
-                _context.get_value_type(result), [argument.type for argument in c_arguments]
+                _context.get_value_type(result_type), [argument.type for argument in c_arguments]
             )
             return builder.call(builder.inttoptr(values[0], function_type.as_pointer()), c_arguments)
 
-        return result(types.int64, arguments), generate_code
+        return result_type(types.int64, arguments), generate_code
 
     return call
 
@@ -56,13 +60,15 @@ call_float = _make_caller(types.float64)
 """call_float(address, arguments): call a C function that returns a double."""
 
 
-def _make_stack_allocator(words: int) -> Any:
-    """Make a numba function that allocates `words` words of 8 bytes on the stack and returns their address."""
+def _make_stack_allocator(word_count: int) -> Any:
+    """Make a numba function that allocates `word_count` words of 8 bytes on the stack and returns their address."""
 
     @_intrinsic
     def allocate(context: Any) -> Any:
+        """Signature, and code that allocates the zeroed words."""
+
         def generate_code(_context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            pointer = _cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(64), words), zfill=True)
+            pointer = _cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(64), word_count), zfill=True)
             return builder.ptrtoint(pointer, ir.IntType(64))
 
         return types.int64(), generate_code
@@ -99,7 +105,7 @@ def write_word(context: Any, address: Any, index: Any, value: Any) -> Any:
 
 
 @njit_inline
-def now_s(system: Addresses) -> float:
+def read_clock_s(system: Addresses) -> float:
     """Monotonic time (s), bit for bit equal to `time.monotonic`."""
     if system[CLOCK] == 0:
         return float(call_float(system[MONOTONIC], ()))
@@ -112,22 +118,22 @@ def now_s(system: Addresses) -> float:
 
 
 @njit_inline
-def sleep_until(system: Addresses, until_s: float) -> None:
-    """Sleep until until_s (s, by `now_s`); resumed after interruptions by signals. To be called only where
+def sleep_until(system: Addresses, wake_time_s: float) -> None:
+    """Sleep until wake_time_s (s, by `read_clock_s`); resumed after interruptions by signals. To be called only where
     `system[SLEEP]` is not 0."""
     wake_time = allocate_2_words()
-    whole_seconds = int(until_s)
+    whole_seconds = int(wake_time_s)
     write_word(wake_time, 0, whole_seconds)
-    write_word(wake_time, 1, int((until_s - whole_seconds) * 1e9))
+    write_word(wake_time, 1, int((wake_time_s - whole_seconds) * 1e9))
     arguments = (np.int32(_CLOCK_MONOTONIC), np.int32(_TIMER_ABSTIME), wake_time, np.int64(0))
     while call_int(system[SLEEP], arguments) == _INTERRUPTED:
         pass
 
 
 @njit_inline
-def acquire(system: Addresses, patience_s: float) -> bool:
-    """Take the lock at `system[LOCK]`. Returns False where it was not free within patience_s (s)."""
-    arguments = (system[LOCK], np.int64(patience_s * 1e6), np.int32(0))
+def acquire(system: Addresses, timeout_s: float) -> bool:
+    """Take the lock at `system[LOCK]`. Returns False where it was not free within timeout_s (s)."""
+    arguments = (system[LOCK], np.int64(timeout_s * 1e6), np.int32(0))
     return bool(call_int(system[ACQUIRE], arguments) == 1)
 
 
@@ -138,8 +144,8 @@ def release(system: Addresses) -> None:
 
 
 class SharedLock:
-    """A lock for Python and compiled code: a lock of the interpreter's C interface, whose functions need no interpreter
-    lock. Its memory is never freed, because a call that hangs may still use it."""
+    """A lock for Python and compiled code: a PyThread lock of CPython's C interface, whose functions do not need the
+    interpreter lock. Its memory is never freed, because a call that hangs may still use it."""
 
     def __init__(self) -> None:
         interpreter = ctypes.pythonapi
@@ -150,9 +156,9 @@ class SharedLock:
         self._acquire = acquire_type(find_address(interpreter.PyThread_acquire_lock_timed))
         self._release = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(find_address(interpreter.PyThread_release_lock))
 
-    def acquire(self, patience_s: float) -> bool:
-        """Take the lock. Returns False where it was not free within patience_s (s)."""
-        return bool(self._acquire(self.address, int(patience_s * 1e6), 0) == 1)
+    def acquire(self, timeout_s: float) -> bool:
+        """Take the lock. Returns False where it was not free within timeout_s (s)."""
+        return bool(self._acquire(self.address, int(timeout_s * 1e6), 0) == 1)
 
     def release(self) -> None:
         """Release the lock; may be called from any thread, but only while the lock is held."""
@@ -174,15 +180,15 @@ def find_address(function: Any) -> int:
     return int(ctypes.cast(function, ctypes.c_void_p).value or 0)
 
 
-def system_calls(lock: SharedLock) -> Addresses:
+def collect_system_calls(lock: SharedLock) -> Addresses:
     """(SYSTEM_SIZE,): addresses of the functions for clock, sleep and lock, and of the lock itself, for compiled code.
     CLOCK and SLEEP are 0 except on Linux with its usual monotonic clock."""
-    calls = np.zeros(SYSTEM_SIZE, dtype=np.int64)
-    calls[MONOTONIC] = find_address(_monotonic)
+    addresses = np.zeros(SYSTEM_SIZE, dtype=np.int64)
+    addresses[MONOTONIC] = find_address(_monotonic)
     if sys.platform == "linux" and time.get_clock_info("monotonic").implementation == "clock_gettime(CLOCK_MONOTONIC)":
         system = ctypes.CDLL(None)
-        calls[CLOCK], calls[SLEEP] = find_address(system.clock_gettime), find_address(system.clock_nanosleep)
-    calls[ACQUIRE] = find_address(ctypes.pythonapi.PyThread_acquire_lock_timed)
-    calls[RELEASE] = find_address(ctypes.pythonapi.PyThread_release_lock)
-    calls[LOCK] = lock.address
-    return calls
+        addresses[CLOCK], addresses[SLEEP] = find_address(system.clock_gettime), find_address(system.clock_nanosleep)
+    addresses[ACQUIRE] = find_address(ctypes.pythonapi.PyThread_acquire_lock_timed)
+    addresses[RELEASE] = find_address(ctypes.pythonapi.PyThread_release_lock)
+    addresses[LOCK] = lock.address
+    return addresses

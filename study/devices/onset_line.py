@@ -21,7 +21,7 @@ from pydantic.dataclasses import dataclass as checked_dataclass
 from protocols.definition.staircase_rule import STRICT
 from study.errors import DeviceError
 
-PATIENCE_S = 0.05
+PULSE_TIMEOUT_S = 0.05
 """Timeout of a pulse (s); a working line needs well below a millisecond."""
 
 CLAIM_PORT, WRITE_DATA, RELEASE_PORT = 0x708B, 0x40017086, 0x708C
@@ -62,6 +62,7 @@ class PulseSettings:
     """Table `[pulse]` of the lab's file: kind of line, port and pulse."""
 
     kind: Literal["serial-byte", "serial-dtr", "serial-rts", "parallel"]
+    """A byte or a control line of a serial port, or the data lines of a parallel port."""
     port: str
     """Such as /dev/ttyUSB0 or COM3 (serial), /dev/parport0 (parallel)."""
     code: Annotated[int, Field(ge=1, le=255)] = 1
@@ -79,10 +80,11 @@ class PulseSettings:
 
 
 class OnsetLine:
-    """Sends trigger pulses. Only a separate thread calls the line, so that `pulse` never raises and waits at most
-    `PATIENCE_S`.
+    """Sends trigger pulses. Only a separate thread calls the line, so that `send_pulse` never raises and waits at most
+    `PULSE_TIMEOUT_S`.
 
-    open_line: opens the line; raises OSError. line: the line if it is open already; None: the first pulse opens it."""
+    open_line: opens the line; may raise any exception. line: the line if it is open already; None: the first pulse
+    opens it."""
 
     def __init__(
         self, settings: PulseSettings, open_line: Callable[[PulseSettings], Line], line: Line | None = None
@@ -95,17 +97,17 @@ class OnsetLine:
         self._thread = threading.Thread(target=self._run_thread, name="onset line", daemon=True)
         self._thread.start()
 
-    def pulse(self) -> Pulse:
-        """Send a pulse, and wait at most `PATIENCE_S` until the driver has accepted it. A lost pulse states its
+    def send_pulse(self) -> Pulse:
+        """Send a pulse, and wait at most `PULSE_TIMEOUT_S` until the driver has accepted it. A lost pulse states its
         reason."""
         if self._busy.locked():
             return self._make_lost_pulse("the previous pulse has not been finished")
         answer: SimpleQueue[Pulse] = SimpleQueue()
         self._requests.put(answer)
         try:
-            return answer.get(timeout=PATIENCE_S)
+            return answer.get(timeout=PULSE_TIMEOUT_S)
         except Empty:
-            return self._make_lost_pulse(f"the line accepted none within {1000 * PATIENCE_S:g} ms")
+            return self._make_lost_pulse(f"the line accepted none within {1000 * PULSE_TIMEOUT_S:g} ms")
 
     def close(self) -> None:
         """Lower and close the line; waits at most 1 s for its thread. Never raises."""
@@ -113,13 +115,15 @@ class OnsetLine:
         self._thread.join(1.0)
 
     def _run_thread(self) -> None:
+        """Send the requested pulses until `close`, then close the line."""
         while (answer := self._requests.get()) is not None:
             with self._busy:
-                self._send_pulse(answer)
+                self._raise_and_lower(answer)
         self._close_line()
 
-    def _send_pulse(self, answer: SimpleQueue[Pulse]) -> None:
-        """Raise the line, put the result into `answer`, and lower the line after `width_s`."""
+    def _raise_and_lower(self, answer: SimpleQueue[Pulse]) -> None:
+        """Open the line if needed, raise it, put the result into `answer`, and lower it after `width_s` (s). A line
+        that fails is closed."""
         try:
             self._line = self._line or self._open_line(self._settings)
             self._line.raise_level()
@@ -141,12 +145,13 @@ class OnsetLine:
                     shut_down()
 
     def _make_lost_pulse(self, trouble: str) -> Pulse:
+        """Result for a pulse that may not have been sent. trouble: the reason."""
         return Pulse(self._settings.words, None, trouble)
 
 
 def open_onset_line(settings: PulseSettings) -> OnsetLine:
-    """Open the line before a session: opening resets some boards, which then accept no byte for a second or two.
-    Raises `DeviceError` for a line that cannot be opened."""
+    """Open the line of the lab's file before a session: opening resets some boards, which then accept no byte for a
+    second or two. Raises `DeviceError` for a line that cannot be opened."""
     try:
         line = open_port(settings)
     except (OSError, ValueError) as problem:
@@ -161,7 +166,7 @@ def open_onset_line(settings: PulseSettings) -> OnsetLine:
 def open_port(settings: PulseSettings) -> Line:
     """Open the serial or parallel line. Raises OSError, ValueError, and `DeviceError` where pyserial is missing."""
     if settings.kind == "parallel":
-        return _Parallel(settings)
+        return _ParallelPort(settings)
     try:
         import serial
     except ImportError as error:
@@ -170,15 +175,19 @@ def open_port(settings: PulseSettings) -> Line:
             "The package pyserial is not installed.",
             "Install hapteq with its hardware extra: pip install '.[hardware]'.",
         ) from error
-    line = serial.Serial(baudrate=settings.baud, write_timeout=PATIENCE_S, exclusive=True)
+    line = serial.Serial(baudrate=settings.baud, write_timeout=PULSE_TIMEOUT_S, exclusive=True)
     if settings.kind != "serial-byte":
         line.dtr = line.rts = False  # before `open`, which would otherwise send a pulse
     line.port = settings.port
     line.open()
-    return _SerialByte(line, settings.code) if settings.kind == "serial-byte" else _SerialControl(line, settings.kind)
+    return (
+        _SerialBytePort(line, settings.code)
+        if settings.kind == "serial-byte"
+        else _SerialControlLine(line, settings.kind)
+    )
 
 
-class _SerialByte:
+class _SerialBytePort:
     """A byte on a serial port; a zero byte ends the pulse."""
 
     def __init__(self, line: Any, code: int) -> None:
@@ -194,10 +203,11 @@ class _SerialByte:
         self._line.close()
 
     def _send_code(self, code: int) -> None:
+        """Send a byte. Raises OSError."""
         self._line.write(bytes([code]))
 
 
-class _SerialControl:
+class _SerialControlLine:
     """A control line of a serial port. kind: serial-dtr or serial-rts."""
 
     def __init__(self, line: Any, kind: str) -> None:
@@ -213,7 +223,7 @@ class _SerialControl:
         self._line.close()
 
 
-class _Parallel:
+class _ParallelPort:
     """The data lines of a parallel port through Linux' ppdev. Tested with a scripted driver only."""
 
     def __init__(self, settings: PulseSettings) -> None:
@@ -222,23 +232,24 @@ class _Parallel:
         self._code = settings.code
         self._file = Path(settings.port).open("r+b", buffering=0)  # noqa: SIM115 - open as long as the line is
         try:
-            self._control(CLAIM_PORT, None)
+            self._send_ioctl(CLAIM_PORT, None)
         except OSError:
             self._file.close()
             raise
 
     def raise_level(self) -> None:
-        self._control(WRITE_DATA, self._code)
+        self._send_ioctl(WRITE_DATA, self._code)
 
     def lower_level(self) -> None:
-        self._control(WRITE_DATA, 0)
+        self._send_ioctl(WRITE_DATA, 0)
 
     def close(self) -> None:
         with contextlib.suppress(OSError):
-            self._control(RELEASE_PORT, None)
+            self._send_ioctl(RELEASE_PORT, None)
         self._file.close()
 
-    def _control(self, request: int, value: int | None) -> None:
+    def _send_ioctl(self, request: int, value: int | None) -> None:
+        """Send an ioctl request with a byte as its argument; value None: without one. Raises OSError."""
         import fcntl
 
         fcntl.ioctl(self._file, request, 0 if value is None else bytes([value]))

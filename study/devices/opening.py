@@ -1,5 +1,6 @@
-"""Opens devices by name. The rest of the program reaches a device only through this module, and every device that it
-opens is behind the safety layer (`study.devices.safe`).
+"""Opens devices by name. The rest of the program reaches a device only through this module. Every device that it
+returns for playing forces is behind the safety layer (`study.devices.safe`); only `accept_device` also commands past
+it, to test the cap of the vendor's library.
 
 Modules that take long to import (numba above all) are imported when a device is opened, so that the command line starts
 at once.
@@ -49,7 +50,8 @@ SIMULATIONS = (SIMULATED, FRICTIONLESS)
 
 
 def needs_real_time(name: str) -> bool:
-    """Whether the device with this name runs in real time; simulated and replayed devices run in virtual time."""
+    """Whether the device with this name runs in real time; simulated devices, also those from a recording or a
+    calibration file, run in virtual time."""
     return name not in SIMULATIONS and not name.startswith((REPLAY, CALIBRATED))
 
 
@@ -61,18 +63,18 @@ class LinkageSource(Protocol):
         """Name, rate, maximum force and mass of the device."""
         ...
 
-    def at(self, position_m: "FloatArray") -> "LinkageReading | None":
+    def compute_reading_at(self, position_m: "FloatArray") -> "LinkageReading | None":
         """The linkage at a position (3,), m, also where the handle is elsewhere; None out of reach. Raises
         `DeviceError`."""
         ...
 
-    def angles_at(self, position_m: "FloatArray") -> "FloatArray | None":
+    def compute_angles_at(self, position_m: "FloatArray") -> "FloatArray | None":
         """Joint angles (3,), rad, at a position of the handle (3,), m; None out of reach. Raises `DeviceError`."""
         ...
 
     def check_frame(self) -> None:
-        """Raises `DeviceError` where the positions of `at` and `angles_at` are not in the axes of the device's
-        readings, in which a calibration of the linkage needs them."""
+        """Raises `DeviceError` where the positions of `compute_reading_at` and `compute_angles_at` are not in the axes
+        of the device's readings, in which a calibration of the linkage needs them."""
         ...
 
 
@@ -82,9 +84,9 @@ def open_device(
     """Open a device behind the safety layer. seed: of the random numbers of a simulated device. own_process: run the
     loop of a real device in a separate process, which alone holds the device; False within that process, and in tests.
     telemetry: path of the caller's telemetry ring; empty: a new ring, if in real time and own_process. Raises
-    `DeviceError`."""
+    `DeviceError`, and `StudyError` for a recording or calibration that cannot be used."""
     if name not in SIMULATIONS and name not in REAL and not name.startswith((REPLAY, CALIBRATED)):
-        raise _unknown_device(name)
+        raise _make_unknown_device_error(name)
     if name in REAL and clock.virtual:
         raise DeviceError(
             "A real device needs real time", f"'{name}' was to be played faster than time passes.", "Use a real clock."
@@ -122,9 +124,9 @@ def open_linkage(name: str) -> "Iterator[LinkageSource]":
     """Context with the source of a device's linkage: joint angles, Jacobian and inertia by position. Nothing moves, and
     a real device stays braked. Raises `DeviceError`."""
     if name in REAL:
-        from study.devices.force_dimension.linkage import vendor_linkage
+        from study.devices.force_dimension.linkage import open_vendor_linkage
 
-        with vendor_linkage(name) as linkage:
+        with open_vendor_linkage(name) as linkage:
             yield linkage
     elif name == SIMULATED:
         from study.devices.simulated.simulated_linkage import make_simulated_linkage
@@ -132,7 +134,7 @@ def open_linkage(name: str) -> "Iterator[LinkageSource]":
         yield make_simulated_linkage()
     else:
         raise (
-            _unknown_device(name)
+            _make_unknown_device_error(name)
             if ":" not in name
             else DeviceError(
                 "This device has no linkage that can be read",
@@ -142,7 +144,8 @@ def open_linkage(name: str) -> "Iterator[LinkageSource]":
         )
 
 
-def _unknown_device(name: str) -> DeviceError:
+def _make_unknown_device_error(name: str) -> DeviceError:
+    """Error for a name that belongs to no device; it lists the known names."""
     return DeviceError(
         f"There is no device called {name!r}",
         f"Known are {', '.join(DEVICES)}, {REPLAY}FILE.h5 for a recording, and {CALIBRATED}FILE.h5 for a calibration.",
@@ -227,28 +230,28 @@ def save_accelerometer_calibration(table: str) -> Path:
     return write_sensor_table(table)
 
 
-def lab_file_path() -> Path:
+def get_lab_file_path() -> Path:
     """Path of the lab's settings of its device; the file need not exist."""
-    from study.devices.force_dimension.lab import lab_file
+    from study.devices.force_dimension.lab import locate_lab_file
 
-    return lab_file()
+    return locate_lab_file()
 
 
-def device_folder() -> Path:
+def get_device_folder() -> Path:
     """Folder of this computer's data about its device: settings, acceptance, baseline and daily checks."""
-    return lab_file_path().parent
+    return get_lab_file_path().parent
 
 
 def find_accepted_baseline(info: DeviceInfo, today: date) -> tuple[str, str]:
-    """File name (in `device_folder`) and SHA-256 of the baseline recording of the acceptance; both empty where none was
-    made. Raises `DeviceError` where this device was not accepted, or too long ago."""
+    """File name (in `get_device_folder()`) and SHA-256 of the baseline recording of the acceptance; both empty where
+    none was made. Raises `DeviceError` where this device was not accepted, or too long ago."""
     from study.devices.force_dimension.acceptance import check_accepted
 
     return check_accepted(info, today)
 
 
-def limit_test_force_n() -> float:
-    """Force with which `accept_device` pushes the handle (N)."""
+def get_limit_test_force_n() -> float:
+    """Cap (N) under which `accept_device` tests the device, and the force that it holds on the handle."""
     from study.devices.force_dimension.force_limit_check import TEST_FORCE_N
 
     return TEST_FORCE_N
@@ -259,8 +262,9 @@ def accept_device(
 ) -> str:
     """Acceptance test of the force limit, with no hand on the handle: command more than the cap, hold a small force,
     stop the loop on purpose; write the acceptance if the device got no more than the cap and dropped the force. Returns
-    a sentence with the results. Raises `DeviceError`. The caller has made all other checks before. baseline: file name
-    and SHA-256 of the recording for the daily check."""
+    a sentence with the results. Raises `DeviceError`. The caller (`study.workflows.checks.examine_setup`) has made all
+    other checks before. operator: name of the person; baseline: file name and SHA-256 of the recording for the daily
+    check."""
     from study.devices.force_dimension.acceptance import Acceptance, write_acceptance
     from study.devices.force_dimension.force_limit_check import (
         COMMAND_TO_CAP_RATIO,

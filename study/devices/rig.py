@@ -81,7 +81,7 @@ class CompiledIo:
     write: Callable[..., Any]
     """write(calls, cells, force_n): force_n, shape (3,). Returns 0, or an error code > 0."""
     calls: npt.NDArray[np.int64]
-    """Addresses of C functions: `study.devices.native.system_calls`, followed by the driver's own."""
+    """Addresses of C functions: `study.devices.native.collect_system_calls`, followed by the driver's own."""
     cells: FloatArray
     """State of the driver, as `sense` and `write` use it."""
     samples: FloatArray
@@ -143,7 +143,7 @@ class CompiledRig:
     buttons: Callable[[], frozenset[int]] = read_no_buttons
     """Numbers of the pressed buttons."""
     prepare: Callable[[FloatArray, bool, int], None] = skip_preparation
-    """prepare(rows, repeats, wait): called before a stimulus begins, for a replay, which does not respond to force.
+    """prepare(rows, repeats, wait): called before a stimulus begins; used by a replay, which does not respond to force.
     rows (n, 3), N: played once or, if `repeats`, repeatedly; the first row comes after `wait` ticks."""
     simulate_hand: Callable[[bool], None] = ignore_hand
     """simulate_hand(on_handle): True: the simulated hand takes the handle; False: it lets go."""

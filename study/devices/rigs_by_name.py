@@ -9,7 +9,7 @@ from pathlib import Path
 
 from study.devices.device import CALIBRATED, REPLAY, DeviceSettings
 from study.devices.force_dimension.models import MODELS
-from study.devices.force_dimension.rigs import force_dimension_rig
+from study.devices.force_dimension.rigs import open_force_dimension_rig
 from study.devices.rig import CompiledRig, Rig
 from study.devices.simulated.omega3 import build_omega3
 from study.devices.simulated.parameters import Omega3Parameters
@@ -58,7 +58,7 @@ def _build_simulated(
 
 def _make_real_rig(name: str, settings: DeviceSettings, seed: int) -> Rig:
     """The rig of a real device. `seed` is not used, because nothing in the driver is random."""
-    return force_dimension_rig(name, settings)
+    return open_force_dimension_rig(name, settings)
 
 
 RIGS_BY_NAME: dict[str, Callable[[DeviceSettings, int], Rig | CompiledRig]] = {

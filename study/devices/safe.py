@@ -56,7 +56,7 @@ class SafeDevice:
         if not isinstance(rig, CompiledRig):
             check_hardware(rig.drops_force_after_s, rig.info, settings)
         self._info = rig.info
-        self._simulated_hand = rig.simulate_hand if isinstance(rig, CompiledRig) else ignore_hand
+        self._set_simulated_hand = rig.simulate_hand if isinstance(rig, CompiledRig) else ignore_hand
         self._own_clock_sensor = rig if isinstance(rig, OwnClockSensor) else None
         self._limits = settings.limits
         self._hand_on_handle = settings.hand_on_handle
@@ -83,7 +83,7 @@ class SafeDevice:
     def hold(self, stimulus: HeldStimulus) -> None:
         self._require_idle()
         check_stimulus(stimulus, self._limits, self._info.sample_rate_hz)
-        self._start(lambda: self._governor.begin_hold(stimulus))
+        self._start_stimulus(lambda: self._governor.begin_hold(stimulus))
         self._held_stimulus = stimulus
 
     def hold_unchecked(self, stimulus: HeldStimulus) -> None:
@@ -92,11 +92,11 @@ class SafeDevice:
         if self._hand_on_handle:
             raise _make_usage_error("A hand is on the handle.", "Open it without.")
         self._require_idle()
-        self._start(lambda: self._governor.begin_hold(stimulus))
+        self._start_stimulus(lambda: self._governor.begin_hold(stimulus))
         self._held_stimulus = stimulus
 
     def keep_alive(self) -> None:
-        self._governor.sign_of_life()
+        self._governor.restart_watchdog()
         self._drive.check()
 
     def fault(self) -> Fault:
@@ -105,7 +105,7 @@ class SafeDevice:
         return Fault.STOPPED if self._governor.stop_requested and fault is not Fault.FORCE_LEFT else fault
 
     def health(self) -> Health:
-        return self._add_failure_reason(replace(self._governor.health(), fault=self.fault()))
+        return self._add_failure_reason(replace(self._governor.collect_health(), fault=self.fault()))
 
     def _add_failure_reason(self, health: Health) -> Health:
         """The counters with the reason of a lost device (`why`), if the rig has failed."""
@@ -127,7 +127,7 @@ class SafeDevice:
     def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> PlaybackResult:
         self._require_idle()
         check_commands(commands, self._limits, self._info.sample_rate_hz)
-        self._start(lambda: self._governor.begin_play(commands))
+        self._start_stimulus(lambda: self._governor.begin_play(commands))
         try:
             self._wait_for_playback(SETTLE_S + commands.duration_s, on_progress)
         except BaseException:
@@ -138,7 +138,7 @@ class SafeDevice:
         return record_commands(self._governor, self._info, self._own_clock_sensor)
 
     def look(self) -> Look:
-        """Wait for the loop's next reading, at most `realtime_drive.PATIENCE_S`."""
+        """Wait for the loop's next reading, at most `realtime_drive.READING_TIMEOUT_S`."""
         self._drive.check()
         has_reading = not self._closing and self._drive.refresh()
         missed_ticks = self._governor.missed if self._held_stimulus is not None or self._runner.moving else 0
@@ -146,7 +146,7 @@ class SafeDevice:
 
     def simulate_hand(self, on_handle: bool) -> None:
         self._require_idle()
-        self._simulated_hand(on_handle)
+        self._set_simulated_hand(on_handle)
 
     def stop(self) -> None:
         self._governor.request_stop()
@@ -231,7 +231,7 @@ class SafeDevice:
         if self._held_stimulus is not None:
             raise _make_playing_error()
 
-    def _start(self, begin_stimulus: Callable[[], None]) -> None:
+    def _start_stimulus(self, begin_stimulus: Callable[[], None]) -> None:
         """Start the ticks of a stimulus. begin_stimulus: hands the stimulus to the governor. Raises `DeviceError` for a
         lost device, or one that still moves."""
 
@@ -243,9 +243,9 @@ class SafeDevice:
                 self._governor.abandon(Fault.NONE)
                 raise
 
-        started = self._drive.start(begin_and_prepare)
+        has_started = self._drive.start(begin_and_prepare)
         self._require_connected()
-        if not started:
+        if not has_started:
             raise _make_playing_error()
 
     def _require_connected(self) -> None:

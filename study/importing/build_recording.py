@@ -1,7 +1,7 @@
 """Build one recording in SI units from files and a map, with a report of every conversion.
 
 For each part (one file, or one run in it): arrays are read, the clocks of its loggers aligned, and its channels put
-onto one time grid (`part_signals`). The parts are then concatenated and converted to SI units, and segments are found
+onto one time grid (`resample_part`). The parts are then concatenated and converted to SI units, and segments are found
 if the map states none. Called by `study.workflows.recording.import_recording` and `diagnose_real`.
 """
 
@@ -26,8 +26,8 @@ from study.importing.map_format.import_map import ChannelMap, ComputedMap, Impor
 from study.importing.map_format.map_errors import ImportProblemError, ImportRefusedError
 from study.importing.map_format.map_files import PartFiles, assign_files
 from study.importing.map_format.map_segments import place_segments
-from study.importing.part_signals import Key, PartSignals, part_signals
-from study.importing.time_base import NUMBERED_HZ, drop_doubled_rows, make_time_base
+from study.importing.part_signals import Key, PartSignals, resample_part
+from study.importing.time_base import PLACEHOLDER_RATE_HZ, drop_doubled_rows, make_time_base
 
 _MAX_LISTED_PARTS = 3
 """Most parts that a sentence names."""
@@ -143,7 +143,7 @@ def _build_part(
     for note in dict.fromkeys((*(note for arrays in arrays_by_path.values() for note in arrays.notes), *notes)):
         report(note)
     aligned = align_signals(tuple(loggers), report)
-    signals = part_signals(import_map, files.part, aligned, report, counter.step)
+    signals = resample_part(import_map, files.part, aligned, report, counter.step)
     numbers = {name: aligned[0].names.compute_number(text) for name, text in import_map.numbers.items()}
     facts = {"file": files.file.name, "prefix": files.part.prefix, "clock_start_s": signals.grid.start_s, **numbers}
     offsets = {logger.clock.name: logger.base.offset_s for logger in aligned[1:]}
@@ -189,7 +189,7 @@ def _list_unit_remarks(import_map: ImportMap) -> Iterator[str]:
     if unitless:
         yield f"No unit is stated for {', '.join(unitless)}: the numbers are kept as they are (unit {UNSTATED})."
     if any(clock.unknown for clock in import_map.clock):
-        yield f"No time is known: samples are numbered, at {NUMBERED_HZ:g} Hz."
+        yield f"No time is known: samples are numbered, at {PLACEHOLDER_RATE_HZ:g} Hz."
 
 
 def _concatenate(import_map: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]) -> Recording:

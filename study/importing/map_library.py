@@ -18,7 +18,7 @@ from study.importing.expressions.expression import find_names
 from study.importing.expressions.namespace import make_namespace
 from study.importing.header_map import find_header_problems, make_header_map, read_without_map
 from study.importing.map_format.import_map import ImportMap
-from study.importing.map_format.map_errors import NOTHING_WRITTEN, ImportProblemError, MapNeededError, suggestion
+from study.importing.map_format.map_errors import NOTHING_WRITTEN, ImportProblemError, MapNeededError, suggest_name
 from study.importing.map_format.map_files import assign_files
 from study.importing.map_format.map_toml import KIND, is_map, parse_map
 from study.importing.map_skeleton import make_map_skeleton
@@ -76,7 +76,7 @@ def read_map(name: str) -> MapFile:
     if path.suffix != ".toml" and not path.exists():
         raise WrongUseError(
             "There is no such map",
-            f"'{name}' is neither a file nor a map that comes with hapteq{suggestion(name, list_shipped_maps())}; "
+            f"'{name}' is neither a file nor a map that comes with hapteq{suggest_name(name, list_shipped_maps())}; "
             f"these are {', '.join(list_shipped_maps())}.",
             "Give the name of one of them, or the path of a map of yours.",
         )

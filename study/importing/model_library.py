@@ -5,7 +5,7 @@ from importlib.resources import files as resources
 from pathlib import Path
 
 from study.errors import WrongUseError
-from study.importing.map_format.map_errors import suggestion
+from study.importing.map_format.map_errors import suggest_name
 
 
 def list_shipped_models() -> tuple[str, ...]:
@@ -24,6 +24,6 @@ def model_for(name: str, folder: Path) -> Path:
     raise WrongUseError(
         "There is no such model",
         f"'{name}' is neither a file in {folder.name} nor a model that comes with hapteq"
-        f"{suggestion(name, list_shipped_models())}; these are {', '.join(list_shipped_models())}.",
+        f"{suggest_name(name, list_shipped_models())}; these are {', '.join(list_shipped_models())}.",
         "Correct `model` in the map's [diagnosis], or leave it out: then a linear one is fitted.",
     )

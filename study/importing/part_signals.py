@@ -1,4 +1,4 @@
-"""Channels of one part of a recording, resampled to one uniform time grid.
+"""Channels of one part of a recording, resampled to one uniform time grid. Called by `build_recording`.
 
 The grid covers the time range in which all clocks have samples. Channels whose samples lie on the grid are copied; all
 others are resampled as the map states. Computed channels are then evaluated on the grid.
@@ -16,9 +16,9 @@ from study.importing.expressions.functions import Value
 from study.importing.expressions.namespace import Namespace
 from study.importing.map_format.import_map import ChannelMap, ImportMap, PartMap
 from study.importing.map_format.map_errors import ImportProblemError
-from study.importing.time_base import MOST_SAMPLES
+from study.importing.time_base import MAX_SAMPLES
 
-_OF_COMMANDS = (
+_COMMAND_ADVICE = (
     'A command that moves in straight lines between its samples has resample = "linear" and, at the top of the map, '
     'hold = "linear"; one that stays until the next has "held" and hold = "zero-order"'
 )
@@ -50,27 +50,27 @@ class _GridClock:
         return self.grid.times_s()
 
 
-def part_signals(
+def resample_part(
     import_map: ImportMap,
     part: PartMap,
     loggers: tuple[Logger, ...],
     report: Callable[[str], None],
-    step: Callable[[], None],
+    on_channel: Callable[[], None],
 ) -> PartSignals:
-    """Channels of one part on its grid. `report` is called with a sentence for each deviation from the file, `step`
-    after each channel. Raises ImportProblemError."""
-    by_clock = {logger.clock.name: logger for logger in loggers}
-    first = loggers[0].clock.name
+    """Put the channels of one part on its grid. `report` is called with a sentence for each deviation from the file,
+    `on_channel` after each channel. loggers: aligned to the first. Raises ImportProblemError."""
+    logger_by_clock = {logger.clock.name: logger for logger in loggers}
+    first_clock = loggers[0].clock.name
     sources: list[tuple[ChannelMap, Samples]] = []
     for channel in import_map.channel:
-        logger = by_clock[channel.clock or first]
+        logger = logger_by_clock[channel.clock or first_clock]
         values = _read_values(channel, logger, import_map)
         sources.append((channel, logger.base.make_samples(values)))
     grid = _make_grid(import_map, part, loggers, [samples for _, samples in sources])
     columns: dict[Key, FloatArray] = {}
     for channel, samples in sources:
         columns[channel.role, channel.name] = _put_on_grid(channel, samples, grid, report)
-        step()
+        on_channel()
     for logger in loggers:
         for remark in filter(None, (logger.base.describe_gaps(), logger.base.describe_wander())):
             report(remark)
@@ -80,7 +80,7 @@ def part_signals(
         columns[computed.role, computed.name] = _compute_channel(
             computed.name, computed.value, columns_by_name, grid, loggers[0].names
         )
-        step()
+        on_channel()
     return PartSignals(grid, columns)
 
 
@@ -112,9 +112,9 @@ def _count_samples(logger: Logger, import_map: ImportMap) -> int:
     one."""
     if logger.base.stamps_s is not None:
         return len(logger.base.stamps_s)
-    first = import_map.clock[0].name
+    first_clock = import_map.clock[0].name
     for channel in import_map.channel:
-        if (channel.clock or first) == logger.clock.name:
+        if (channel.clock or first_clock) == logger.clock.name:
             values = logger.names.compute_value(channel.value, logger.base)
             if values.ndim == 1:
                 return len(values)
@@ -124,14 +124,15 @@ def _count_samples(logger: Logger, import_map: ImportMap) -> int:
 def _make_grid(import_map: ImportMap, part: PartMap, loggers: tuple[Logger, ...], sources: list[Samples]) -> Grid:
     """Grid over the time range common to all channels, at the stated rate or the highest of the clocks. Raises
     ImportProblemError for uneven stamps without a stated rate, and for too many or too few samples."""
-    uneven = [logger for logger in loggers if not logger.base.rate_hz]
-    if uneven and not import_map.rate_hz:
-        steps_ms = np.diff(uneven[0].base.times_s(0)) * 1e3
+    uneven_loggers = [logger for logger in loggers if not logger.base.rate_hz]
+    if uneven_loggers and not import_map.rate_hz:
+        steps_ms = np.diff(uneven_loggers[0].base.times_s(0)) * 1e3
         raise ImportProblemError(
-            f"clock '{uneven[0].clock.name}' has uneven stamps (steps of {steps_ms.min():.4g} to {steps_ms.max():.4g} "
-            "ms); state the rate_hz of the recording, and resample (held, band-limited, linear) of each channel: "
-            f"at the top of the map rate_hz = {uneven[0].base.fastest_hz:.4g}, under each [[channel]] "
-            f'resample = "linear". {_OF_COMMANDS}'
+            f"clock '{uneven_loggers[0].clock.name}' has uneven stamps (steps of {steps_ms.min():.4g} to "
+            f"{steps_ms.max():.4g} ms); state the rate_hz of the recording, and resample (held, band-limited, linear) "
+            "of each channel: "
+            f"at the top of the map rate_hz = {uneven_loggers[0].base.fastest_hz:.4g}, under each [[channel]] "
+            f'resample = "linear". {_COMMAND_ADVICE}'
         )
     rate_hz = import_map.rate_hz or max(logger.base.rate_hz for logger in loggers)
     begin_s = max(float(samples.times_s[0]) for samples in sources)
@@ -144,10 +145,10 @@ def _make_grid(import_map: ImportMap, part: PartMap, loggers: tuple[Logger, ...]
         origin_s = float(logger.base.times_s(1)[0]) + logger.base.offset_s
         begin_s = origin_s + np.ceil((begin_s - origin_s) * rate_hz - TIME_TOLERANCE) / rate_hz
     count = int(np.floor((end_s - begin_s) * rate_hz + TIME_TOLERANCE)) + 1
-    if count > MOST_SAMPLES:
+    if count > MAX_SAMPLES:
         raise ImportProblemError(
             f"{part.file}: {end_s - begin_s:.9g} s at {rate_hz:g} Hz are {count:.3g} samples, more than "
-            f"{MOST_SAMPLES:.0e}; state a lower rate_hz, or take parts with start_s and stop_s"
+            f"{MAX_SAMPLES:.0e}; state a lower rate_hz, or take parts with start_s and stop_s"
         )
     if count < 2:
         raise ImportProblemError(
@@ -159,19 +160,19 @@ def _make_grid(import_map: ImportMap, part: PartMap, loggers: tuple[Logger, ...]
 def _put_on_grid(channel: ChannelMap, samples: Samples, grid: Grid, report: Callable[[str], None]) -> FloatArray:
     """Samples of a channel on the grid (grid.count,): copied where they lie on it, otherwise resampled. Raises
     ImportProblemError where the map does not state how to resample."""
-    first = (grid.start_s - float(samples.times_s[0])) * grid.rate_hz
-    if _has_same_rate(samples, grid) and abs(first - round(first)) < TIME_TOLERANCE:
-        column = samples.values[round(first) : round(first) + grid.count]
+    first_index = (grid.start_s - float(samples.times_s[0])) * grid.rate_hz
+    if _has_same_rate(samples, grid) and abs(first_index - round(first_index)) < TIME_TOLERANCE:
+        column = samples.values[round(first_index) : round(first_index) + grid.count]
     elif channel.resample == "":
         raise ImportProblemError(
             f"channel '{channel.name}' has to be resampled to {grid.rate_hz:g} Hz; state how: resample = \"held\" for "
             'a command that stays until the next, "band-limited" for a signal sampled behind a filter, or "linear", '
-            f"under its [[channel]] in the map.{' ' + _OF_COMMANDS if channel.role == 'command' else ''}"
+            f"under its [[channel]] in the map.{' ' + _COMMAND_ADVICE if channel.role == 'command' else ''}"
         )
     else:
         column = _resample(channel, channel.resample, samples, grid, report)
-    if missing := int(np.isnan(column).sum()):
-        report(f"{channel.name}: {missing} of {len(column)} samples are missing.")
+    if missing_count := int(np.isnan(column).sum()):
+        report(f"{channel.name}: {missing_count} of {len(column)} samples are missing.")
     return column
 
 
@@ -196,21 +197,24 @@ def _resample(
 
 
 def _compute_channel(
-    name: str, text: str, columns: Mapping[str, FloatArray], grid: Grid, file: Namespace
+    name: str, expression: str, columns: Mapping[str, FloatArray], grid: Grid, file_namespace: Namespace
 ) -> FloatArray:
-    """Evaluate a computed channel on the grid (grid.count,). Raises ImportProblemError for another shape or infinite
-    values."""
-    arrays = {**file.arrays, "clock_s": grid.times_s(), "rate_hz": np.array(grid.rate_hz), **columns}
+    """Evaluate the expression of a computed channel on the grid (grid.count,). columns: the channels by name. Raises
+    ImportProblemError for another shape or infinite values."""
+    arrays = {**file_namespace.arrays, "clock_s": grid.times_s(), "rate_hz": np.array(grid.rate_hz), **columns}
     try:
-        value = Namespace(arrays, file.definitions, file.file_name, file.budget).compute_value(text, _GridClock(grid))
+        value = Namespace(
+            arrays, file_namespace.definitions, file_namespace.file_name, file_namespace.budget
+        ).compute_value(expression, _GridClock(grid))
     except ImportProblemError as error:
         raise ImportProblemError(f"computed channel '{name}': {error}") from error
     if value.ndim == 0:
         return np.full(grid.count, float(value))
     if value.shape != (grid.count,):
         raise ImportProblemError(
-            f"computed channel '{name}': {text} has the shape {value.shape}, but the recording has {grid.count} samples"
+            f"computed channel '{name}': {expression} has the shape {value.shape}, but the recording has "
+            f"{grid.count} samples"
         )
     if np.isinf(value).any():
-        raise ImportProblemError(f"computed channel '{name}': {text} holds infinite values")
+        raise ImportProblemError(f"computed channel '{name}': {expression} holds infinite values")
     return value

@@ -3,7 +3,7 @@
 Stamps are refused where they are missing, run backwards (a counter that wraps around, a clock that is set back),
 repeat, or jump; the message names the key of the map that corrects them. Stamps that are uniform apart from rounding
 and skipped rows give a rate and the index of each sample (`uniform_stamps`). Rows that a logger wrote twice are removed
-(`drop_doubled_rows`). Called by `build_recording`.
+(`drop_doubled_rows`). Called by `build_recording`, `alignment` and `part_signals`.
 """
 
 from dataclasses import dataclass, replace
@@ -18,17 +18,17 @@ from study.importing.expressions.functions import Value
 from study.importing.expressions.namespace import Namespace, NoTime
 from study.importing.map_format.import_map import ClockMap
 from study.importing.map_format.map_errors import ImportProblemError
-from study.importing.uniform_stamps import UNEVEN, IntArray, fit_uniform_rate, last_decimal
+from study.importing.uniform_stamps import GRID_TOLERANCE, IntArray, find_decimal_unit, fit_uniform_rate
 
-_USUAL_GAP = 3
+_GAP_STEPS = 3
 """A step longer than this many median steps is a gap, unless the map states `gap_s`."""
 _HOUR_S = 3600.0
 """Step (s) of a clock that is set to summer time or back."""
 _COUNTER_LIMITS = (2**16, 2**24, 2**31, 2**32, 10**6, 10**9)
 """Values at which counters of loggers wrap around to 0, in the unit of the file."""
-NUMBERED_HZ = 1.0
+PLACEHOLDER_RATE_HZ = 1.0
 """Placeholder rate (Hz) of samples whose time is unknown."""
-MOST_SAMPLES = 10**8
+MAX_SAMPLES = 10**8
 """Most samples of a recording (28 hours at 1 kHz). A wrong stamp would otherwise fill the memory with missing
 samples."""
 
@@ -85,7 +85,7 @@ class TimeBase:
         if self.stamps_s is None or self.sample_index is None:
             return ""
         deviation_s = float(np.max(np.abs(self.times_s(0) - self.stamps_s)))
-        if deviation_s * self.rate_hz <= UNEVEN:
+        if deviation_s * self.rate_hz <= GRID_TOLERANCE:
             return ""
         return (
             f"Clock '{self.name}': its stamps are uniform apart from the rounding of their last decimal, so "
@@ -96,18 +96,20 @@ class TimeBase:
         """The values (n,) with their times by the reference clock. Rows that a uniform logger skipped become NaN,
         unless the map says that there are no gaps."""
         times_s = self.times_s(len(values)) + self.offset_s
-        widest_s = 0.0 if self.sample_index is None else float(np.max(np.diff(self.sample_index))) / self.rate_hz
+        longest_step_s = 0.0 if self.sample_index is None else float(np.max(np.diff(self.sample_index))) / self.rate_hz
         if (
             self.sample_index is not None
             and self.sample_index[-1] > len(self.sample_index) - 1
-            and widest_s <= self.gap_s
+            and longest_step_s <= self.gap_s
         ):
             return Samples(times_s, values, 0.0, self.gap_s)  # the map declares that nothing is missing between them
         if self.sample_index is None or self.sample_index[-1] == len(self.sample_index) - 1:
             return Samples(times_s, values, self.rate_hz, self.gap_s)
-        padded = np.full(self.sample_index[-1] + 1, np.nan)
-        padded[self.sample_index] = values
-        return Samples(times_s[0] + np.arange(len(padded)) / self.rate_hz, padded, self.rate_hz, self.gap_s)
+        padded_values = np.full(self.sample_index[-1] + 1, np.nan)
+        padded_values[self.sample_index] = values
+        return Samples(
+            times_s[0] + np.arange(len(padded_values)) / self.rate_hz, padded_values, self.rate_hz, self.gap_s
+        )
 
 
 def make_time_base(clock: ClockMap, names: Namespace) -> TimeBase:
@@ -115,7 +117,7 @@ def make_time_base(clock: ClockMap, names: Namespace) -> TimeBase:
     ImportProblemError where the rate is not positive or the stamps are unusable."""
     if clock.time:
         return _make_base_from_stamps(clock, names)
-    rate_hz = NUMBERED_HZ if clock.unknown else clock.rate_hz or names.compute_number(clock.rate)
+    rate_hz = PLACEHOLDER_RATE_HZ if clock.unknown else clock.rate_hz or names.compute_number(clock.rate)
     if not rate_hz > 0:
         raise ImportProblemError(f"clock '{clock.name}': its rate, {clock.rate}, is {rate_hz:g}; it must be above 0")
     return TimeBase(clock.name, rate_hz, None, None, clock.gap_s or 1.5 / rate_hz)
@@ -136,8 +138,8 @@ def _make_base_from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
         )
     if problem := _find_stamp_problem(stamps_s, _as_expression(clock.time, names), unit.factor):
         raise ImportProblemError(f"clock '{clock.name}': {clock.time} {problem}")
-    rate_hz, sample_index = fit_uniform_rate(stamps_s, last_decimal(stamps_s / unit.factor) * unit.factor)
-    if sample_index is not None and sample_index[-1] >= MOST_SAMPLES:
+    rate_hz, sample_index = fit_uniform_rate(stamps_s, find_decimal_unit(stamps_s / unit.factor) * unit.factor)
+    if sample_index is not None and sample_index[-1] >= MAX_SAMPLES:
         jump_row = int(np.argmax(np.diff(stamps_s)))
         raise ImportProblemError(
             f"clock '{clock.name}': {clock.time} jumps from {stamps_s[jump_row]:.9g} to {stamps_s[jump_row + 1]:.9g} s "
@@ -145,22 +147,23 @@ def _make_base_from_stamps(clock: ClockMap, names: Namespace) -> TimeBase:
             "samples long, most of them missing. Correct the stamps, or cut the file there into several, which are "
             "imported together"
         )
-    gap_s = clock.gap_s or _USUAL_GAP * float(np.median(np.diff(stamps_s)))
+    gap_s = clock.gap_s or _GAP_STEPS * float(np.median(np.diff(stamps_s)))
     # On a uniform grid, one skipped row is a gap.
     if sample_index is not None and not clock.gap_s:
         gap_s = min(gap_s, 1.5 / rate_hz)
     return TimeBase(clock.name, rate_hz, stamps_s, sample_index, gap_s)
 
 
-def _as_expression(time: str, names: Namespace) -> str:
-    """The stamps as an expression that a map can contain: names that are no identifiers go into array('…')."""
-    return f"array('{time}')" if time in names.arrays and not time.isidentifier() else time
+def _as_expression(array_name: str, names: Namespace) -> str:
+    """The stamps as an expression that a map can contain: the name of an array that is no identifier is written as
+    array('…')."""
+    return f"array('{array_name}')" if array_name in names.arrays and not array_name.isidentifier() else array_name
 
 
-def _find_stamp_problem(stamps_s: Value, time: str, unit_s: float) -> str:
+def _find_stamp_problem(stamps_s: Value, time_expression: str, unit_s: float) -> str:
     """Problem with the stamps (n,) and the key of the map that corrects it, as a clause after the name of the stamps;
-    empty if they are finite and increase without a jump of an hour. time: expression of the stamps. unit_s: their
-    unit."""
+    empty if they are finite and increase without a jump of an hour. time_expression: expression of the stamps; unit_s:
+    their unit (s)."""
     if not np.isfinite(stamps_s).all():
         row = int(np.argmax(~np.isfinite(stamps_s)))
         return f"is no number at sample {row}; time is never missing"
@@ -176,11 +179,11 @@ def _find_stamp_problem(stamps_s: Value, time: str, unit_s: float) -> str:
         if limit and stamps_s.max() < limit * unit_s and stamps_s.min() >= 0:
             return (
                 f"{problem}, as a counter that restarts at {limit}; the map's [[clock]] mends it: "
-                f'time = "{time} + {limit} * cumsum(diff({time}) < 0)"'
+                f'time = "{time_expression} + {limit} * cumsum(diff({time_expression}) < 0)"'
             )
         if abs(backward_s - _HOUR_S) > _HOUR_S / 60:
             return f"{problem}; put the rows in order, or cut the file there into several, which are imported together"
-        expression = f"{time} + {_HOUR_S / unit_s:g} * cumsum(diff({time}) < 0)"
+        expression = f"{time_expression} + {_HOUR_S / unit_s:g} * cumsum(diff({time_expression}) < 0)"
         return (
             f'{problem}, as a clock that is set back by an hour; the map\'s [[clock]] mends it: time = "{expression}"'
         )
@@ -194,7 +197,8 @@ def _find_stamp_problem(stamps_s: Value, time: str, unit_s: float) -> str:
         )
     hour_steps = np.flatnonzero(np.abs(steps_s - _HOUR_S) < 10 * float(np.median(steps_s)))
     if len(hour_steps) == 1 and float(np.median(steps_s)) < _HOUR_S / 1000:
-        expression = f"{time} - {_HOUR_S / unit_s:g} * cumsum(diff({time}) > {steps_s[hour_steps[0]] / 2 / unit_s:.4g})"
+        is_jump_text = f"diff({time_expression}) > {steps_s[hour_steps[0]] / 2 / unit_s:.4g}"
+        expression = f"{time_expression} - {_HOUR_S / unit_s:g} * cumsum({is_jump_text})"
         return (
             f"jumps ahead by an hour at sample {hour_steps[0] + 1}, as a clock that is set to summer time; the map's "
             f'[[clock]] mends it: time = "{expression}"'
@@ -203,24 +207,25 @@ def _find_stamp_problem(stamps_s: Value, time: str, unit_s: float) -> str:
 
 
 def drop_doubled_rows(clock: ClockMap, names: Namespace) -> tuple[Namespace, str]:
-    """The arrays without rows that repeat the row above, and a sentence with their number. Nothing is removed if any
-    row with a repeated stamp has other values than the row above. Raises ImportProblemError."""
+    """Remove rows that repeat the row above, with the same stamp. Returns the arrays without them, and a sentence with
+    their number, empty where nothing is removed: without stamps, without repeated ones, or if any row with a repeated
+    stamp has other values (row counters aside) than the row above. Raises ImportProblemError."""
     if not clock.time:
         return names, ""
     stamps: Value = names.compute_value(clock.time, NoTime())
     if stamps.ndim != 1 or len(stamps) < 2:
         return names, ""
-    repeated = np.flatnonzero(stamps[1:] == stamps[:-1]) + 1
+    repeated_rows = np.flatnonzero(stamps[1:] == stamps[:-1]) + 1
     row_arrays = [
         array for array in names.arrays.values() if _has_row_count(array, len(stamps)) and not _is_counter(array)
     ]
-    if not len(repeated) or not all(_is_repeated(array, repeated) for array in row_arrays):
+    if not len(repeated_rows) or not all(_is_repeated(array, repeated_rows) for array in row_arrays):
         return names, ""
-    kept_rows = np.delete(np.arange(len(stamps)), repeated)
+    kept_rows = np.delete(np.arange(len(stamps)), repeated_rows)
     arrays = {
         name: array[kept_rows] if _has_row_count(array, len(stamps)) else array for name, array in names.arrays.items()
     }
-    rows_text = f"{len(repeated)} row{'s' if len(repeated) > 1 else ''}"
+    rows_text = f"{len(repeated_rows)} row{'s' if len(repeated_rows) > 1 else ''}"
     remark = f"Clock '{clock.name}': {rows_text} logged twice (the same stamp, the same values) left out."
     return replace(names, arrays=arrays), remark
 

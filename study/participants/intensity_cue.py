@@ -41,20 +41,22 @@ class IntensityCue:
         choice_draw, time_draw = draw_uniform(felt, seed, 2)
         sign = 1.0 if felt.direction_shown == 1 else -1.0
         detection = WeibullCurve(self.detection_n, DETECTION_SLOPE)
-        distance = detection.compute_d_prime if felt.phase is Phase.DETECTION else self.d_prime
-        share_of_1 = NormalDist().cdf(sign * distance(felt.level_n) / 2 + self._rove_deviation(felt))
-        return Reply(1 if choice_draw < share_of_1 else 2, draw_response_time_s(time_draw))
+        d_prime_at_level = detection.compute_d_prime if felt.phase is Phase.DETECTION else self.compute_d_prime
+        probability_of_1 = NormalDist().cdf(
+            sign * d_prime_at_level(felt.level_n) / 2 + self._compute_rove_deviation(felt)
+        )
+        return Reply(1 if choice_draw < probability_of_1 else 2, draw_response_time_s(time_draw))
 
-    def _rove_deviation(self, felt: PerceivedStimulus) -> float:
+    def _compute_rove_deviation(self, felt: PerceivedStimulus) -> float:
         """Change of the felt strength by roving, in standard deviations; 0 without roving and in detection trials."""
         if felt.nominal_n is None or felt.phase is Phase.DETECTION:
             return 0.0
-        return 20.0 * math.log10(felt.level_n / felt.nominal_n) / self._noise_db(felt.level_n)
+        return 20.0 * math.log10(felt.level_n / felt.nominal_n) / self._compute_noise_db(felt.level_n)
 
-    def _noise_db(self, level_n: float) -> float:
+    def _compute_noise_db(self, level_n: float) -> float:
         """Standard deviation of the felt strength at this level (dB)."""
         return self.noise_db * math.hypot(1.0, self.detection_n / level_n)
 
-    def d_prime(self, level_n: float) -> float:
-        """Sensitivity d' at this level (N)."""
-        return self.difference_db / self._noise_db(level_n)
+    def compute_d_prime(self, level_n: float) -> float:
+        """Compute the sensitivity d' for the direction at this level (N)."""
+        return self.difference_db / self._compute_noise_db(level_n)

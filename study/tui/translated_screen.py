@@ -35,7 +35,7 @@ class TranslatedScreen(Screen[Reply]):
         binding, key_display = active.binding, active.binding.key_display
         translated = replace(
             binding,
-            description=self.words.key(binding.description),
-            key_display=key_display and self.words.key(key_display),
+            description=self.words.translate_key(binding.description),
+            key_display=key_display and self.words.translate_key(key_display),
         )
         return active._replace(binding=translated)

@@ -69,7 +69,7 @@ def describe_void_trial(reason: str, words: Words = ENGLISH_WORDS) -> str:
         return words["void_screen"]
     if reason.endswith(ACCELERATION_MISSING):
         return words["void_sensor"]
-    return words.fill("void_because", {"reason": words.fact(reason)})
+    return words.fill("void_because", {"reason": words.translate_fact(reason)})
 
 
 def describe_refusal(outcome: Literal["refused", "excluded"], words: Words = ENGLISH_WORDS) -> tuple[str, ...]:

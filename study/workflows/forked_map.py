@@ -25,6 +25,7 @@ from typing import Any, TypeVar
 from equalizer.effects.effect import Effect, effects_by_address
 
 Result = TypeVar("Result")
+"""Type of the result of a task."""
 MIN_FORKED_WORK_S = 0.1
 """Shortest expected duration (s) of the work that is shared among processes; forking alone takes a fifth of it."""
 _TOKEN_BYTES, _MAX_TOKENS = 4, 8192
@@ -113,14 +114,14 @@ class _SharedTasks:
             while children:
                 results_by_task.update(_receive(children[0][1], self._known_effects))
                 with _block_signals():
-                    _reap(*children.pop(0))
+                    _reap_child(*children.pop(0))
         finally:
             with _block_signals():
                 os.close(self._tokens)
                 for process_id, read_end in children:
                     with suppress(ProcessLookupError):
                         os.kill(process_id, signal.SIGKILL)
-                    _reap(process_id, read_end)
+                    _reap_child(process_id, read_end)
         return self._order_results(results_by_task)
 
     def _order_results(self, results_by_task: dict[int, tuple[Any, Exception | None]]) -> list[Any]:
@@ -141,7 +142,7 @@ class _SharedTasks:
     def _fork_worker(self, children: list[tuple[int, int]]) -> bool:
         """Start a process and append (process id, reading end of its pipe) to `children`; False if the system
         refuses."""
-        spent_s, parent_id = measure_processor_s(), os.getpid()
+        processor_s, parent_id = measure_processor_s(), os.getpid()
         # Signals wait: an exception here would leave a process that is not in `children`, or would let the child return
         # from this function and continue the work of its parent.
         with _block_signals():
@@ -158,25 +159,25 @@ class _SharedTasks:
                 return False
             if not process_id:
                 try:
-                    # With a reading end open here, writing results would block for ever after the parent has ended.
+                    # With a reading end open here, writing results would block forever after the parent has ended.
                     for pipe_end in (read_end, *(earlier_pipe for _, earlier_pipe in children)):
                         os.close(pipe_end)
-                    self._run_child(write_end, parent_id, spent_s)
+                    self._run_child(write_end, parent_id, processor_s)
                 finally:
                     os._exit(0)
             children.append((process_id, read_end))
             os.close(write_end)
         return True
 
-    def _run_child(self, write_end: int, parent_id: int, spent_s: float) -> None:
+    def _run_child(self, write_end: int, parent_id: int, parent_processor_s: float) -> None:
         """In the child: take tasks and write their results to the pipe. write_end: its descriptor. parent_id: process
-        id of the parent. spent_s: processor time (s) used before the fork."""
+        id of the parent. parent_processor_s: processor time (s) used before the fork."""
         # A terminal sends Ctrl-C to all processes; the child ignores it, and its parent ends it.
         for signal_number in _SIGNALS:
             signal.signal(signal_number, signal.SIG_IGN if signal_number == signal.SIGINT else signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
         _serial_context.append(True)
-        _inherited_processor_s[0] = spent_s
+        _inherited_processor_s[0] = parent_processor_s
         packed_results = _pack(self._run_tasks(guarded=True, parent_id=parent_id), self._known_effects)
         with os.fdopen(write_end, "wb") as pipe:
             pipe.write(packed_results)
@@ -214,7 +215,7 @@ def _block_signals() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
 
 
-def _reap(process_id: int, read_end: int) -> None:
+def _reap_child(process_id: int, read_end: int) -> None:
     """Close the pipe of a child and wait for the end of its process, so that it does not remain as a zombie."""
     os.close(read_end)
     with suppress(ChildProcessError):

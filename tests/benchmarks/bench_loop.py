@@ -59,7 +59,7 @@ def us_of_c(folder: Path, rig) -> float:
     command = [*vendor_stub.compiler(), "-std=c11", "-O2", "-shared", "-fPIC", "-o", str(library), str(source)]
     subprocess.run(command, check=True, timeout=240)
     two_calls = ctypes.CDLL(str(library)).two_calls
-    read, send = (ctypes.c_void_p(int(address)) for address in rig._handle.library.addresses(LIBRARY[:2]))
+    read, send = (ctypes.c_void_p(int(address)) for address in rig._handle.library.find_addresses(LIBRARY[:2]))
     return us_each(lambda: two_calls(read, send, TICKS))
 
 

@@ -14,9 +14,9 @@ from numba import njit
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.tracking.lqr import lqr_kernel
 from equalizer.tracking.lqr.changing_direction import TurningTransient, make_rotatable_transient
-from equalizer.tracking.lqr.lqr import stored_gains, track
-from equalizer.tracking.lqr.riccati import backward_gains
-from equalizer.tracking.lqr.rotation import normal_basis, rotation_basis
+from equalizer.tracking.lqr.lqr import compute_stored_gains, track
+from equalizer.tracking.lqr.riccati import compute_backward_gains
+from equalizer.tracking.lqr.rotation import compute_normal_basis, compute_rotation_basis
 from equalizer.tracking.lqr.tracking_problem import TrackingProblem, TrackingWeights, make_tracking_problem
 
 _DENSE = Path(__file__).parents[1] / "equalizer" / "tracking" / "lqr" / "dense_least_squares.py"
@@ -49,7 +49,7 @@ def problem_of(order: int) -> TrackingProblem:
 
 def plain(problem: TrackingProblem, wanted: np.ndarray) -> np.ndarray:
     """The recipe, written in numpy: gains backward, costate backward, model forward; every trajectory anew."""
-    gains = backward_gains(problem, len(wanted))
+    gains = compute_backward_gains(problem, len(wanted))
     A, B, C, D, Q = problem.A, problem.B, problem.C, problem.D, problem.Q
     g, v, x = np.empty((len(wanted), 3)), np.zeros(problem.order), np.zeros(problem.order)
     for k in range(len(wanted) - 1, -1, -1):
@@ -70,14 +70,14 @@ def seconds(action: Callable[[], object], times: int) -> float:
 def forms(order: int, samples: int, dense: bool) -> dict[str, tuple[Callable[[], np.ndarray], int]]:
     """Each with how often it is timed. All give the forces for one trajectory."""
     problem, wanted = problem_of(order), np.random.default_rng(0).standard_normal((samples, 3))
-    gains, axes = stored_gains(problem, samples), np.eye(3)
-    nine, three = rotation_basis(gains, wanted), normal_basis(gains, wanted[:, 0])
+    gains, axes = compute_stored_gains(problem, samples), np.eye(3)
+    nine, three = compute_rotation_basis(gains, wanted), compute_normal_basis(gains, wanted[:, 0])
     every: dict[str, tuple[Callable[[], np.ndarray], int]] = {
         "plain numpy recursion": (lambda: plain(problem, wanted), max(2, 7500 // samples)),
-        "compiled recursion": (lambda: track(stored_gains(problem, samples), wanted).forces, 20),
+        "compiled recursion": (lambda: track(compute_stored_gains(problem, samples), wanted).forces, 20),
         "stored gains": (lambda: track(gains, wanted).forces, 100),
-        "rotation basis": (lambda: nine.forces(axes), 10_000),
-        "basis of a normal": (lambda: three.forces(axes[0]), 10_000),
+        "rotation basis": (lambda: nine.compute_forces(axes), 10_000),
+        "basis of a normal": (lambda: three.compute_forces(axes[0]), 10_000),
     }
     if dense:
         every["dense least squares"] = (lambda: dense_least_squares.least_squares_forces(problem, wanted), 1)
@@ -130,7 +130,7 @@ def tick_times_ns(transient: TurningTransient) -> np.ndarray:
 
 def ticks() -> bool:
     problem = problem_of(ORDER)
-    gains = stored_gains(problem, SAMPLES)
+    gains = compute_stored_gains(problem, SAMPLES)
     taken = tick_times_ns(make_rotatable_transient(gains, np.random.default_rng(0).standard_normal((SAMPLES, 3)))) / 1e3
     shares = ", ".join(f"{share:g} % {np.percentile(taken, share):.3f}" for share in (50, 90, 99, 99.9, 99.99))
     over = int((taken > ALLOWED_TICK_US).sum())

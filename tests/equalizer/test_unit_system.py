@@ -6,7 +6,7 @@ import pytest
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME, find_matrix_unit
 from equalizer.plant.mechanical_model import MechanicalModel, adopt_recording_units
 from equalizer.plant.mechanical_model_toml import format_mechanical_model, parse_mechanical_model
-from equalizer.signals.unit_system import LINEAR, ROTATIONAL, UnitSystem, system_of
+from equalizer.signals.unit_system import LINEAR, ROTATIONAL, UnitSystem, determine_unit_system
 
 MOTOR = UnitSystem("A", "rad")
 
@@ -33,7 +33,7 @@ def test_no_number_of_an_effect_is_a_force_where_the_command_is_none():
 
 
 def test_the_motion_is_what_a_speed_or_acceleration_is_the_rate_of():
-    assert [system_of(("N",), (unit,)).length for unit in ("m", "m/s", "m/s^2", "rad/s", "1")] == [
+    assert [determine_unit_system(("N",), (unit,)).length for unit in ("m", "m/s", "m/s^2", "rad/s", "1")] == [
         "m", "m", "m", "rad", "1",
     ]  # fmt: skip
 

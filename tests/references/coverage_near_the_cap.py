@@ -19,7 +19,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from analysis.psychophysics.catch_trials import wilson_interval
+from analysis.psychophysics.catch_trials import compute_wilson_interval
 from analysis.psychophysics.group_contrasts import compute_contrasts
 from analysis.psychophysics.hierarchy.curve import Family
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
@@ -105,7 +105,7 @@ def _cell_lines(rows: list[dict[str, list[float]]]) -> list[str]:
 
 
 def _share(found: np.ndarray) -> str:
-    lower, upper = wilson_interval(int(np.sum(found)), len(found))
+    lower, upper = compute_wilson_interval(int(np.sum(found)), len(found))
     return f"{100 * np.mean(found):.1f} % ({100 * lower:.1f} to {100 * upper:.1f})"
 
 

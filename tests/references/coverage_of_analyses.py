@@ -19,8 +19,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from analysis.psychophysics.anova import compute_one_way_anova
-from analysis.psychophysics.comparisons import compare_all
-from analysis.psychophysics.coverage.coverage_words import CASES_HZ, MeasuredCoverage, coverage_lines
+from analysis.psychophysics.comparisons import compare_group_means
+from analysis.psychophysics.coverage.coverage_words import THRESHOLDS_BY_HZ, MeasuredCoverage, format_coverage_table
 from analysis.psychophysics.coverage.measured_coverage import MEASURED
 from analysis.psychophysics.group_contrasts import compute_contrasts
 from analysis.psychophysics.hierarchy.primary import compute_primary_analysis
@@ -70,7 +70,7 @@ def _named(threshold_n):
 def _published(threshold_n) -> Iterator[Found]:
     """Tukey's intervals hold a difference of mean thresholds in newtons: of people who are normal in dB."""
     mean_n = np.array(MEDIANS_N) * math.exp((SPREAD_DB * math.log(10.0) / 20.0) ** 2 / 2.0)
-    for pair in compare_all(compute_one_way_anova(_named(threshold_n))).pairs:
+    for pair in compare_group_means(compute_one_way_anova(_named(threshold_n))).pairs:
         if pair.first == "5 Hz":
             place = HZ.index(float(pair.second.split()[0]))
             yield "tukey", HZ[place], None, pair.lower <= mean_n[place] - mean_n[0] <= pair.upper
@@ -88,7 +88,7 @@ def measure(studies: int) -> list[MeasuredCoverage]:
     found: dict[tuple[str, float], list[tuple[float | None, bool]]] = {}
     for number in range(studies):
         for name, frequency_hz, error, covers in judge(number):
-            if frequency_hz in CASES_HZ or name == "one-way":
+            if frequency_hz in THRESHOLDS_BY_HZ or name == "one-way":
                 found.setdefault((name, frequency_hz), []).append((error, bool(covers)))
     rows = []
     for (name, frequency_hz), each in found.items():
@@ -100,7 +100,7 @@ def measure(studies: int) -> list[MeasuredCoverage]:
 
 MODULE_DOCSTRING = '''"""Measured coverage near the force cap: how many intervals of a study report hold the true value.
 
-Reports print these counts beside each interval (`coverage_words`). Each row: analysis (`coverage_words.NAMES`),
+Reports print these counts beside each interval (`coverage_words`). Each row: analysis (`coverage_words.TITLES`),
 frequency (Hz; 0 where all frequencies are judged together), mean error (dB; None where the analysis gives no size in
 dB), intervals of 95 % that held the truth (one-way: studies in which a difference was found that was not there), and
 all intervals.
@@ -124,7 +124,7 @@ def module_text(rows: list[MeasuredCoverage]) -> str:
 
 def page_text(page: str, rows: list[MeasuredCoverage]) -> str:
     before, rest = page.split(BEGIN)
-    return f"{before}{BEGIN}\n\n" + "\n".join(coverage_lines(rows)) + f"\n\n{END}{rest.split(END)[1]}"
+    return f"{before}{BEGIN}\n\n" + "\n".join(format_coverage_table(rows)) + f"\n\n{END}{rest.split(END)[1]}"
 
 
 if __name__ == "__main__":
@@ -132,4 +132,4 @@ if __name__ == "__main__":
     counted = measure(asked) if asked else list(MEASURED)
     MODULE.write_text(module_text(counted), "utf-8")
     PAGE.write_text(page_text(PAGE.read_text("utf-8"), counted), "utf-8")
-    sys.stdout.write("\n".join(coverage_lines(counted)) + "\n")
+    sys.stdout.write("\n".join(format_coverage_table(counted)) + "\n")

@@ -16,7 +16,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from analysis.psychophysics.bias import estimate_response_bias
-from analysis.psychophysics.catch_trials import wilson_interval
+from analysis.psychophysics.catch_trials import compute_wilson_interval
 from analysis.psychophysics.criterion_drift import estimate_criterion_drifts
 from analysis.psychophysics.study_warnings import DRIFT_LEVEL, LEFT_OUT_LEVEL, STRONG_BIAS
 from protocols.trial import Trial
@@ -101,7 +101,7 @@ def main(studies: int, seed: int) -> None:
 def show(kind: str, found: dict[str, list[bool]]) -> None:
     cells = []
     for company, flagged in found.items():
-        lower, upper = wilson_interval(sum(flagged), len(flagged))
+        lower, upper = compute_wilson_interval(sum(flagged), len(flagged))
         share = 100 * np.mean(flagged)
         cells.append(f"{company} {share:.1f} % ({100 * lower:.1f} to {100 * upper:.1f})")
     sys.stdout.write(f"{kind:22} {len(flagged)} sessions: {', '.join(cells)}\n")

@@ -26,7 +26,7 @@ import numpy as np
 from scipy.stats import chi2
 from scipy.stats import t as student
 
-from analysis.psychophysics.catch_trials import wilson_interval
+from analysis.psychophysics.catch_trials import compute_wilson_interval
 from analysis.psychophysics.group_contrasts import compute_contrasts
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
 from analysis.psychophysics.hierarchy.inference import compute_pseudo_thresholds
@@ -116,7 +116,7 @@ def print_results(folder: Path) -> None:
 
 
 def _share(found: list[bool]) -> str:
-    lower, upper = wilson_interval(sum(found), len(found))
+    lower, upper = compute_wilson_interval(sum(found), len(found))
     return f"{100 * sum(found) / len(found):.1f} % ({100 * lower:.1f} to {100 * upper:.1f})"
 
 

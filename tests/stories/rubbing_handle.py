@@ -10,7 +10,7 @@ from equalizer.identification.mechanical.modal_structure import to_driven_axes
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Tolerance
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.tracking.feedforward.band_part import band_part
+from equalizer.tracking.feedforward.band_pass import filter_to_band
 from equalizer.tracking.feedforward.trajectory import Trajectory
 from equalizer.tracking.learning.iteration import rms
 from study.cli.main import main
@@ -58,7 +58,7 @@ class RubbingHandle:
         assert main(["identify", *recordings, "--out", str(model), *options]) == 0
         assert main(["equalize", str(model), str(wanted), "--out", str(forces), *options]) == 0
         meant, played = (read_trajectory(path).signal.samples for path in (wanted, forces))
-        left = band_part(self._device().play(played) - meant, RATE_HZ, BAND_HZ)
+        left = filter_to_band(self._device().play(played) - meant, RATE_HZ, BAND_HZ)
         errors = [rms(left) / rms(meant), *(rms(left[:, axis]) / rms(meant[:, axis]) for axis in range(3))]
         return np.array(errors), float(np.linalg.norm(played, axis=1).max())
 
@@ -97,8 +97,8 @@ def nominal(modes) -> MechanicalModel:
 
 def _wanted(seed: int) -> FloatArray:
     """Two seconds of noise in the band, 1.8 m/s² rms per axis, and rest around it."""
-    noise = band_part(np.random.default_rng(seed).standard_normal((6000, 3)), RATE_HZ, BAND_HZ)[2000:4000]
+    noise = filter_to_band(np.random.default_rng(seed).standard_normal((6000, 3)), RATE_HZ, BAND_HZ)[2000:4000]
     fade = np.clip(np.minimum(np.arange(2000), np.arange(2000)[::-1]) / 100, 0, 1)[:, None]
     rows = np.zeros((2600, 3))
     rows[300:-300] = 1.8 * noise / noise.std(axis=0) * (0.5 - 0.5 * np.cos(np.pi * fade))
-    return np.asarray(band_part(rows, RATE_HZ, BAND_HZ))
+    return np.asarray(filter_to_band(rows, RATE_HZ, BAND_HZ))

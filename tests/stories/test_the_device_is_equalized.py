@@ -74,7 +74,7 @@ def played(device, equalizer, axis):
     wave = np.fft.irfft(BAND * np.exp(1j * phases), LOOP)
     wanted = np.zeros((LOOP, 3))
     wanted[:, axis] = 2.0 * wave / np.abs(wave).max()
-    loop = equalizer.periodic(Signal(wanted, RATE_HZ, "acceleration", "m/s^2", ("ax", "ay", "az"))).samples
+    loop = equalizer.compute_loop_commands(Signal(wanted, RATE_HZ, "acceleration", "m/s^2", ("ax", "ay", "az"))).samples
     rising = np.minimum(1.0, np.arange(LOOP) / 1000)[:, None]
     commands = np.concatenate([rising * loop, loop, loop])
     truth = device.play(Signal(commands, RATE_HZ, "force", "N", ("fx", "fy", "fz"))).truth.samples

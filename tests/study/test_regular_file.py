@@ -14,7 +14,7 @@ from study.importing.map_format.import_map import CsvMap
 from study.importing.map_library import find_map, read_map
 from study.regular_file import RefusedFileError, open_regular, read_regular
 from study.store.disk.file_errors import CannotReadError
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.disk.text_file import read_text
 from study.store.formats.diagnosis_file import read_diagnosis
 from study.store.formats.identified_model_file import read_identified_model
@@ -51,7 +51,7 @@ READERS = {
     "repeats": (read_repeats, ".json"),
     "reproduction": (read_reproduction, ".json"),
     "text": (read_text, ".txt"),
-    "fingerprint": (sha256_of, ".h5"),
+    "fingerprint": (compute_sha256, ".h5"),
     "protocol": (lambda path: read_protocol(str(path)), ".toml"),
     "map": (lambda path: read_map(str(path)), ".toml"),
     "log": (read_log, ".jsonl"),

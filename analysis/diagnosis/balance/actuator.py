@@ -18,7 +18,7 @@ from typing import cast
 import numpy as np
 
 from analysis.diagnosis.balance.command_laws import (
-    AS_COMMANDED,
+    IDEAL_ACTUATOR,
     CommandLaw,
     PiecewiseCommandLaw,
     make_command_laws,
@@ -141,7 +141,7 @@ def find_actuator(
         return replacement
     # Laws of the position are left out where the balance is solved for it: they would reproduce it.
     sums = _list_sums(search) if target is None else [()]
-    unchanged_error, motion_laws = min((inverse.sum_errors(AS_COMMANDED, entry), entry) for entry in sums)
+    unchanged_error, motion_laws = min((inverse.sum_errors(IDEAL_ACTUATOR, entry), entry) for entry in sums)
     laws = _select_promising(inverse, kinds, (1 - FURTHER_LAW_OF_ALL / 2) * unchanged_error, motion_laws)
     if not laws:
         return None
@@ -200,7 +200,7 @@ def _replace_motion_laws(inverse: InverseBalance, kinds: LawKinds, named_laws: t
         return None
     # Half of the gain required below, because the sums only approximate the laws.
     error_share = 1 - COMMAND_LAW_LEAVES / 2 if len(named_laws) == 1 else 1 / (1 - COMMAND_RIVAL_LEAVES_MORE)
-    largest_error = error_share * inverse.sum_errors(AS_COMMANDED, named_laws)
+    largest_error = error_share * inverse.sum_errors(IDEAL_ACTUATOR, named_laws)
     laws = _select_promising(inverse, kinds, largest_error, ())
     if not laws:
         return None
@@ -268,8 +268,8 @@ def _judge_law(
 ) -> JudgedLaw:
     """The law with its gain and rivals. sums: laws of the motion fitted without and with the law of the command."""
     laws_without, laws_with = sums
-    reduced, full = inverse.evaluate_law(AS_COMMANDED, laws_without, True), inverse.evaluate_law(law, laws_with, True)
-    linear = float(inverse.evaluate_law(AS_COMMANDED, (), True).sum())
+    reduced, full = inverse.evaluate_law(IDEAL_ACTUATOR, laws_without, True), inverse.evaluate_law(law, laws_with, True)
+    linear = float(inverse.evaluate_law(IDEAL_ACTUATOR, (), True).sum())
     draws = draw_bootstrap_blocks(len(full))
     rival_errors = [(inverse.evaluate_law(rival, laws_with, True), rival.effect) for rival in rivals]
     largest_error = float(full.sum()) / (1 - COMMAND_RIVAL_LEAVES_MORE)
@@ -293,7 +293,7 @@ def _find_objection(law: CommandLaw, gain: float, low: float, equivalents: tuple
             "leave, and not most of it"
         )
     # A curve of the command and a force that changes with the distance are different physics.
-    different = [effect for effect in equivalents if effect not in EFFECTS_BY_NAME or law.factor_at is not None]
+    different = [effect for effect in equivalents if effect not in EFFECTS_BY_NAME or law.position_factor is not None]
     if different or len(equivalents) >= LARGEST_CLASS:
         return f"these data cannot distinguish it from {', '.join(equivalents)}"
     return "" if law.effect in EFFECTS_BY_NAME or law.formula else "hapteq cannot simulate it yet"

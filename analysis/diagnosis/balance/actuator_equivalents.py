@@ -1,4 +1,4 @@
-"""Withdraws the name of a law of motion where a law of the actuator explains the data equally well.
+"""Withdraws the name of a law of motion where a law of the actuator explains the data equally well. Used by `balances`.
 
 With the velocity v, acceleration a and command u of an axis, the force balance is
 m a + d v + F_c sgn v + c v |v| = g(u). It does not identify its laws uniquely in three cases:
@@ -20,17 +20,18 @@ from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.balance.structures import SLIDING, Structure, improves_significantly
 from analysis.diagnosis.settings import MOVES_MOST_OF_THE_TIME, STILL_SHARE
 
-DEAD_BAND = "force_deadband"
-EQUIVALENT_LAWS = {"quadratic_damping": "force_nonlinearity", DEAD_BAND: "coulomb_friction"}
-"""For each law, the law that explains the same motion where inertia is negligible."""
-BACKWARDS = "the motion never changes direction"
-"""Reason, in a message, for a law that is not named."""
+DEAD_BAND_EFFECT = "force_deadband"
+EQUIVALENT_LAWS = {"quadratic_damping": "force_nonlinearity", DEAD_BAND_EFFECT: "coulomb_friction"}
+"""For each law, the effect with the same motion where inertia is negligible; for the dead band, also where the axis
+rests in it."""
+NO_REVERSAL_REASON = "the motion never changes direction"
+"""Reason, in a message, why a law is not distinguished from its equivalent."""
 
 
-def doubt_laws_of_actuator(balance: Balance) -> Balance:
+def withdraw_ambiguous_names(balance: Balance) -> Balance:
     """The balance of a driven axis without the names of laws that its actuator explains equally well. Where this leaves
     no law of the command with a name, the other laws lose theirs too: they were fitted to the force behind that law."""
-    laws = tuple(_doubt_law(law, balance) for law in balance.laws)
+    laws = tuple(_withdraw_ambiguous_name(law, balance) for law in balance.laws)
     command_laws = [law.law.effect for law in balance.named if not law.has_column]
     if command_laws and not any(law.named and not law.has_column for law in laws):
         reason = f"it was found together with {command_laws[0]}, which these data do not confirm"
@@ -38,52 +39,60 @@ def doubt_laws_of_actuator(balance: Balance) -> Balance:
     return replace(balance, laws=laws)
 
 
-def _doubt_law(judged_law: JudgedLaw, balance: Balance) -> JudgedLaw:
-    """The law, with its name withdrawn or with its equivalent added, by the three cases of the module's docstring."""
+def _withdraw_ambiguous_name(judged_law: JudgedLaw, balance: Balance) -> JudgedLaw:
+    """The law, with its name withdrawn or with its equivalent added, by the three cases of the module's docstring;
+    unchanged where none applies."""
     regression, effect = balance.search.regression, judged_law.law.effect
-    if judged_law.named and effect == DEAD_BAND and not judged_law.has_column and _rests_in_dead_band(regression):
+    if (
+        judged_law.named
+        and effect == DEAD_BAND_EFFECT
+        and not judged_law.has_column
+        and _is_at_rest_in_dead_band(regression)
+    ):
         return replace(
-            judged_law, equivalents=tuple(dict.fromkeys((*judged_law.equivalents, EQUIVALENT_LAWS[DEAD_BAND])))
+            judged_law, equivalents=tuple(dict.fromkeys((*judged_law.equivalents, EQUIVALENT_LAWS[DEAD_BAND_EFFECT])))
         )
     if not judged_law.named or judged_law.law.channel < 0:
         return judged_law
-    if effect in SLIDING and not _reverses(regression, judged_law.law.channel):
-        return _add_equivalent(judged_law, DEAD_BAND, BACKWARDS)
+    if effect in SLIDING and not _has_reversal(regression, judged_law.law.channel):
+        return _add_equivalent(judged_law, DEAD_BAND_EFFECT, NO_REVERSAL_REASON)
     if effect == "quadratic_damping":
         has_friction = any(
             law.law.effect in SLIDING and law.law.channel == judged_law.law.channel for law in balance.named
         )
-        if has_friction and not _reverses(regression, judged_law.law.channel):
-            return _add_equivalent(judged_law, "force_nonlinearity", BACKWARDS)
+        if has_friction and not _has_reversal(regression, judged_law.law.channel):
+            return _add_equivalent(judged_law, "force_nonlinearity", NO_REVERSAL_REASON)
     if effect in EQUIVALENT_LAWS and not _has_inertia(regression, balance.chosen.laws):
         return _add_equivalent(judged_law, EQUIVALENT_LAWS[effect], "the inertia is negligible in this recording")
     return judged_law
 
 
-def _rests_in_dead_band(regression: Regression) -> bool:
-    """Whether the axis rests in most samples in which its dead band passes no force. The forces of the regression are
-    those behind the dead band, so that such samples have a force of exactly 0."""
+def _is_at_rest_in_dead_band(regression: Regression) -> bool:
+    """Whether the axis rests in most samples in which its dead band passes no force; False without such samples. The
+    forces of the regression are those behind the dead band, so that such samples have a force of exactly 0."""
     motions, axis, driven_channel = regression.motions, regression.axis, regression.base_terms.driven_channel
-    speed = np.concatenate([motion.velocity[motion.fit, driven_channel] for motion in motions])
+    velocity = np.concatenate([motion.velocity[motion.fit, driven_channel] for motion in motions])
     force = np.concatenate([motion.force[motion.fit, axis] for motion in motions])
-    is_moving = speed**2 > STILL_SHARE * np.mean(speed**2)
+    is_moving = velocity**2 > STILL_SHARE * np.mean(velocity**2)
     return bool(np.mean(is_moving[force == 0.0]) < MOVES_MOST_OF_THE_TIME) if np.any(force == 0.0) else False
 
 
-def _add_equivalent(judged_law: JudgedLaw, twin: str, reason: str) -> JudgedLaw:
-    """The law with a reason not to name it, and with its equivalent (`twin`) added to its class."""
-    equivalents = tuple(dict.fromkeys((twin, *judged_law.equivalents)))
+def _add_equivalent(judged_law: JudgedLaw, equivalent: str, reason: str) -> JudgedLaw:
+    """The law with a reason not to name it, and with its equivalent added in front of its class."""
+    equivalents = tuple(dict.fromkeys((equivalent, *judged_law.equivalents)))
     return replace(
-        judged_law, equivalents=equivalents, objection=f"these data cannot distinguish it from {twin}, because {reason}"
+        judged_law,
+        equivalents=equivalents,
+        objection=f"these data cannot distinguish it from {equivalent}, because {reason}",
     )
 
 
-def _reverses(regression: Regression, channel: int) -> bool:
+def _has_reversal(regression: Regression, channel: int) -> bool:
     """Whether the motion changes direction: the sum of squared velocities of the weaker direction exceeds
     `STILL_SHARE` of that of the stronger."""
     velocity = np.concatenate([motion.velocity[motion.fit, channel] for motion in regression.motions])
-    power = [float(np.sum(np.maximum(sign * velocity, 0.0) ** 2)) for sign in (1.0, -1.0)]
-    return min(power) > STILL_SHARE * max(power)
+    power_by_direction = [float(np.sum(np.maximum(sign * velocity, 0.0) ** 2)) for sign in (1.0, -1.0)]
+    return min(power_by_direction) > STILL_SHARE * max(power_by_direction)
 
 
 def _has_inertia(regression: Regression, laws: tuple[int, ...]) -> bool:
@@ -92,13 +101,15 @@ def _has_inertia(regression: Regression, laws: tuple[int, ...]) -> bool:
     columns, driven_channel = regression.select_columns(laws), regression.base_terms.driven_channel
     if regression.mass is not None or not np.isfinite(regression.motions[0].band_hz):
         return True
-    massless = [column for column in columns if column != driven_channel]
-    without_mass, with_mass = (
-        Structure(laws, regression.cross_validate(column_set)) for column_set in (massless, columns)
+    columns_without_mass = [column for column in columns if column != driven_channel]
+    massless_structure, structure_with_mass = (
+        Structure(laws, regression.cross_validate(column_set)) for column_set in (columns_without_mass, columns)
     )
     weights = regression.fit_weights(columns)
     mass, damping = (
         float(weights[columns.index(k)]) for k in (driven_channel, len(regression.motions[0].channels) + driven_channel)
     )
     # A time constant m / d below a sample cannot be distinguished from the hold of the command.
-    return mass * regression.motions[0].rate_hz > max(damping, 0.0) and improves_significantly(without_mass, with_mass)
+    return mass * regression.motions[0].rate_hz > max(damping, 0.0) and improves_significantly(
+        massless_structure, structure_with_mass
+    )

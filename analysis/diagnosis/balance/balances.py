@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.balance.actuator import DrivenAxis, find_balance
-from analysis.diagnosis.balance.actuator_equivalents import doubt_laws_of_actuator
+from analysis.diagnosis.balance.actuator_equivalents import withdraw_ambiguous_names
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
 from analysis.diagnosis.balance.linear_part import find_driven_channels, search_with_linear_part
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motion_band_hz, compute_motions
@@ -108,7 +108,7 @@ def _fit_balances(
         for quantity in recordings[0].command.quantities
     ]
     return tuple(
-        doubt_laws_of_actuator(
+        withdraw_ambiguous_names(
             find_balance(motions, DrivenAxis(axis, rotational, targets[axis]), excluded, time_left, map_)
         )
         for axis in axes

@@ -1,4 +1,4 @@
-"""Static nonlinearities of an actuator, with their parameters on grids that span the amplitudes of the command.
+"""Laws of an actuator, static nonlinearities and slew limits, on grids of parameters that span the command's range.
 
 Laws of the motion are further columns of the regression of the commanded force. The laws in this file change that
 force itself, f = g(u), so that they are tested in the balance solved for the acceleration (`inverse_balance`). All
@@ -24,10 +24,10 @@ DEADBAND_QUANTILES, SATURATION_QUANTILES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0
     0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98,
 )  # fmt: skip
 """Quantiles of the command's magnitude at which a dead band ends, and at which an actuator saturates."""
-CURVE_QUANTILES = (0.05, 0.1, 0.2, 0.3)
+POWER_CURVE_QUANTILES = (0.05, 0.1, 0.2, 0.3)
 """Quantiles of the command's magnitude at which a power curve begins."""
-CURVE_EXPONENTS = (0.3, 0.5, 0.7, 1.4, 2.0)
-"""Exponents of the command beyond that point: below 1 for valves and magnets that saturate, 2 for propellers."""
+POWER_CURVE_EXPONENTS = (0.3, 0.5, 0.7, 1.4, 2.0)
+"""Exponents of the command beyond that quantile: below 1 for valves and magnets that saturate, 2 for propellers."""
 SQUARE_SHARES = (-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0)
 """Shares of the force at the largest command that grow with the square of the command."""
 GAP_SHARES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
@@ -47,16 +47,17 @@ jump."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CommandLaw:
-    """A static nonlinearity of the actuator with fixed parameters: the force as a function of command and position."""
+    """A law of the actuator with fixed parameters: the force as a function of the command (with a slew limit, also of
+    its past) and the position."""
 
     effect: str
     """Name of the vocabulary, or a new one in the same style for physics that it lacks."""
     values: dict[str, float]
     """Its fixed parameters by name, in SI units or relative."""
     columns: Callable[[FloatArray, dict[str, float]], FloatArray]
-    """Columns (n, weights) of a command (n,): their weighted sum is the force; a single column is the force up to a
-    gain."""
-    factor_at: Callable[[FloatArray, dict[str, float]], FloatArray] | None = None
+    """Maps a command (n,) and `values` to columns (n, weights): their weighted sum is the force; a single column is the
+    force up to a gain."""
+    position_factor: Callable[[FloatArray, dict[str, float]], FloatArray] | None = None
     """Maps positions (n,) and the values to the factor of the force (n,); None = it does not depend on the position."""
     flexible: bool = False
     """Whether it has more free parameters than the other laws, and is chosen only with a clearly smaller error."""
@@ -71,9 +72,11 @@ class CommandLaw:
         return 1
 
     def compute_columns(self, command: FloatArray, position: FloatArray) -> FloatArray:
-        """Compute the columns (n, weights) at command and position (n,) each; in N (N m) after `scale_to`."""
+        """Compute the columns (n, weights) at command and position (n,) each; in N (N m) only after `scale_to`."""
         columns = self.scale * self.columns(command, self.values)
-        return columns if self.factor_at is None else columns * self.factor_at(position, self.values)[:, None]
+        return (
+            columns if self.position_factor is None else columns * self.position_factor(position, self.values)[:, None]
+        )
 
     def scale_to(self, command: FloatArray, position: FloatArray) -> "CommandLaw":
         """Scale a law that has a formula so that its force fits the command (least squares): the mass fitted with it is
@@ -88,12 +91,12 @@ class CommandLaw:
         return None if self.formula is None else self.formula(self.values, self.scale)
 
 
-AS_COMMANDED = CommandLaw("as_commanded", {}, lambda u, _: u[:, None])
+IDEAL_ACTUATOR = CommandLaw("as_commanded", {}, lambda u, _: u[:, None])
 """The ideal actuator, whose force is the command: the law to which the others are compared."""
 
 
 def make_command_laws(command: FloatArray) -> Iterator[CommandLaw]:
-    """Make all static nonlinearities of the actuator, over their grids of parameters. command: (n,), finite."""
+    """Make the static nonlinearities that depend on the command alone, over their grids. command: (n,), finite."""
     magnitude = np.abs(command)
     for width in _compute_distinct_quantiles(magnitude, DEADBAND_QUANTILES):
         for jump in (0.0, 1.0):
@@ -104,11 +107,13 @@ def make_command_laws(command: FloatArray) -> Iterator[CommandLaw]:
             {"limit": limit},
             lambda u, parameters: np.clip(u, -parameters["limit"], parameters["limit"])[:, None],
         )
-    largest = float(magnitude.max(initial=0.0)) or 1.0
+    largest_command = float(magnitude.max(initial=0.0)) or 1.0
     for square in SQUARE_SHARES:
-        yield CommandLaw("force_nonlinearity", {"square": square, "reference": largest}, _compute_square_law_force)
-    for width in (0.0, *_compute_distinct_quantiles(magnitude, CURVE_QUANTILES)):
-        for power in CURVE_EXPONENTS:
+        yield CommandLaw(
+            "force_nonlinearity", {"square": square, "reference": largest_command}, _compute_square_law_force
+        )
+    for width in (0.0, *_compute_distinct_quantiles(magnitude, POWER_CURVE_QUANTILES)):
+        for power in POWER_CURVE_EXPONENTS:
             values = {"width": width, "power": power}
             yield CommandLaw(
                 "actuator_curve", values, _compute_power_law_force, flexible=True, formula=_make_power_formula
@@ -120,9 +125,11 @@ def make_slew_laws(commands: Sequence[FloatArray], rate_hz: float) -> Iterator[C
     """Make slew-rate limits: the output follows the command at a limited rate, as of a servo. commands: (n,) each. The
     rates range from the full stroke within the longest command to its fastest change. A rate is left out where the
     limited output hardly ever reaches the command, so that only the sign of the command would matter."""
-    fastest = max(float(np.abs(np.diff(command)).max(initial=0.0)) for command in commands) * rate_hz
-    slowest = float(np.ptp(np.concatenate(commands))) * rate_hz / max(len(command) for command in commands)
-    for rate in np.geomspace(slowest, fastest, SLEW_LIMIT_COUNT)[:-1] if 0 < slowest < fastest else ():
+    fastest_rate = max(float(np.abs(np.diff(command)).max(initial=0.0)) for command in commands) * rate_hz
+    slowest_rate = float(np.ptp(np.concatenate(commands))) * rate_hz / max(len(command) for command in commands)
+    for rate in (
+        np.geomspace(slowest_rate, fastest_rate, SLEW_LIMIT_COUNT)[:-1] if 0 < slowest_rate < fastest_rate else ()
+    ):
         law = CommandLaw("slew_limit", {"rate": float(rate)}, partial(_compute_slewed_force, 1 / rate_hz))
         reaches_command = [
             np.abs(law.columns(command, law.values)[:, 0] - command) < rate / rate_hz for command in commands
@@ -143,9 +150,9 @@ def make_electromagnet_laws(position: FloatArray) -> Iterator[CommandLaw]:
     low, high = float(position.min()), float(position.max())
     for direction, nearest_position in ((1.0, low), (-1.0, high)):
         for gap in GAP_SHARES:
-            for columns in (_square_command, AS_COMMANDED.columns):
-                factor_at = partial(_compute_attraction_factor, direction, nearest_position)
-                yield CommandLaw("electromagnet", {"gap": gap * (high - low)}, columns, factor_at, True)
+            for columns in (_square_command, IDEAL_ACTUATOR.columns):
+                position_factor = partial(_compute_attraction_factor, direction, nearest_position)
+                yield CommandLaw("electromagnet", {"gap": gap * (high - low)}, columns, position_factor, True)
 
 
 def _compute_attraction_factor(

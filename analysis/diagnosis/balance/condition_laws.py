@@ -31,7 +31,7 @@ def _make_laws_of_condition(condition: Condition, index: int, channel: int, scal
     for width in widths:
         yield Law(
             "condition_dependent_friction", channel, (float(width),), _make_friction_columns(channel, index),
-            _read_friction_values, bounded=width_bounds, formula=_make_friction_formula(condition),
+            _read_friction_values, bounds=width_bounds, formula=_make_friction_formula(condition),
         )  # fmt: skip
     if np.isfinite(scales.band_hz):
         yield Law(

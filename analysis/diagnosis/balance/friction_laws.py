@@ -22,16 +22,16 @@ import numpy as np
 from analysis.diagnosis.balance.law import (
     Columns,
     Law,
-    Numbers,
+    NonlinearParameters,
     Scales,
+    compute_relative_time,
     filter_from_rest,
     name_positive_weight,
     name_weights,
-    relative_time,
     smooth_sign,
 )
 from analysis.diagnosis.balance.motion import Motion
-from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
+from equalizer.effects.simulation.dry_friction_kernel import compute_bristle_deflection
 from equalizer.effects.simulation.forces_along_motion import REST_SPEED_SHARE
 from equalizer.signals.signal import FloatArray
 
@@ -57,7 +57,7 @@ def make_friction_laws(c: int, scales: Scales) -> Iterator[Law]:
     for width in sign_widths:
         yield Law(
             "coulomb_friction", c, (float(width),), lambda m, n: smooth_sign(m.velocity[:, c : c + 1], n[0]),
-            name_positive_weight("level"), bounded=speed_bounds,
+            name_positive_weight("level"), bounds=speed_bounds,
         )  # fmt: skip
     for stribeck_speed in scales.speed * np.geomspace(0.03, 1.5, 7):
         yield Law(
@@ -66,13 +66,14 @@ def make_friction_laws(c: int, scales: Scales) -> Iterator[Law]:
             (float(stribeck_speed),),
             _make_stribeck_columns(c, least_width),
             _read_stribeck_values,
-            bounded=speed_bounds,
+            bounds=speed_bounds,
         )
     presliding_lengths = np.geomspace(0.003, 0.5, 7) if scales.turns else scales.travel * np.geomspace(0.001, 0.3, 9)
     for width in presliding_lengths:
         yield Law(
-            "presliding_hysteresis", c, (float(width),), lambda m, n: bristle_bend(m.position[:, c], n[0])[:, None],
-            _read_presliding_values, bounded=((0.1 * presliding_lengths[0], presliding_lengths[-1]),),
+            "presliding_hysteresis", c, (float(width),),
+            lambda m, n: compute_bristle_deflection(m.position[:, c], n[0])[:, None],
+            _read_presliding_values, bounds=((0.1 * presliding_lengths[0], presliding_lengths[-1]),),
         )  # fmt: skip
     yield Law("asymmetric_friction", c, (), _make_asymmetric_columns(c, least_width), _read_asymmetric_values)
     if np.isfinite(scales.band_hz):
@@ -84,21 +85,21 @@ def make_friction_laws(c: int, scales: Scales) -> Iterator[Law]:
 def _make_stribeck_columns(c: int, width: float) -> Columns:
     """Columns (n, 2): the smoothed sign sigma, and sigma exp(-(v / v_s)^2). width: of the sign, m/s (rad/s)."""
 
-    def compute_columns(m: Motion, n: Numbers) -> FloatArray:
+    def compute_columns(m: Motion, n: NonlinearParameters) -> FloatArray:
         v = m.velocity[:, c : c + 1]
         return np.hstack([smooth_sign(v, width), smooth_sign(v, width) * np.exp(-((v / n[0]) ** 2))])
 
     return compute_columns
 
 
-def _read_stribeck_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
+def _read_stribeck_values(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
     """Convert weights to the levels at high and zero speed and the Stribeck velocity; None unless both are positive."""
     if w[0] <= 0 or w[1] <= 0:
         return None
     return {"coulomb": float(w[0]), "static": float(w[0] + w[1]), "speed": n[0]}
 
 
-def _read_presliding_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
+def _read_presliding_values(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
     """Convert the weight to level and presliding stiffness; None where the level is not positive."""
     return {"level": float(w[0]), "stiffness": float(w[0] / n[0])} if w[0] > 0 else None
 
@@ -113,7 +114,7 @@ def _make_asymmetric_columns(c: int, width: float) -> Columns:
     )
 
 
-def _read_asymmetric_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
+def _read_asymmetric_values(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
     """Convert weights to one level per direction; None unless both are positive."""
     return {"level_positive": float(w[0]), "level_negative": float(w[1])} if w.min() > 0 else None
 
@@ -121,14 +122,14 @@ def _read_asymmetric_values(w: FloatArray, n: Numbers, mass: float) -> dict[str,
 def _make_drifting_columns(c: int, width: float) -> Columns:
     """Columns (n, 2): the smoothed sign, and the same times the time from -1 to 1."""
 
-    def compute_columns(m: Motion, _: Numbers) -> FloatArray:
+    def compute_columns(m: Motion, _: NonlinearParameters) -> FloatArray:
         sign = smooth_sign(m.velocity[:, [c]], width)
-        return np.hstack([sign, sign * relative_time(m)])
+        return np.hstack([sign, sign * compute_relative_time(m)])
 
     return compute_columns
 
 
-def _read_drifting_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
+def _read_drifting_values(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
     """Convert weights to level and change; None where the friction would be negative somewhere in the part, and drive
     the motion."""
     return {"level": float(w[0]), "change": float(w[1])} if w[0] > abs(w[1]) else None
@@ -137,14 +138,14 @@ def _read_drifting_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, f
 def _make_parabolic_columns(c: int, width: float) -> Columns:
     """Columns (n, 3): the smoothed sign times 1, q and q^2."""
 
-    def compute_columns(m: Motion, _: Numbers) -> FloatArray:
+    def compute_columns(m: Motion, _: NonlinearParameters) -> FloatArray:
         sign, q = smooth_sign(m.velocity[:, [c]], width), m.position[:, [c]]
         return np.hstack([sign, sign * q, sign * q**2])
 
     return compute_columns
 
 
-def _read_parabolic_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
+def _read_parabolic_values(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
     """Convert weights to level, slope and curvature; None where the friction would be negative at q = 0. At other
     positions the effect limits a negative parabola to zero."""
     if w[0] <= 0:
@@ -161,11 +162,13 @@ def make_damping_laws(c: int, scales: Scales) -> Iterator[Law]:
         "quadratic_damping", c, (), lambda m, _: m.velocity[:, [c]] * np.abs(m.velocity[:, [c]]),
         name_positive_weight("coefficient"),
     )  # fmt: skip
-    yield Law("drifting_damping", c, (), lambda m, _: m.velocity[:, [c]] * relative_time(m), name_weights("change"))
-    for tau in np.geomspace(0.5 / scales.band_hz, scales.seconds / 10, 7):
+    yield Law(
+        "drifting_damping", c, (), lambda m, _: m.velocity[:, [c]] * compute_relative_time(m), name_weights("change")
+    )
+    for tau in np.geomspace(0.5 / scales.band_hz, scales.duration_s / 10, 7):
         yield Law(
             "viscoelastic_relaxation", c, (float(tau),),
             lambda m, n: filter_from_rest(m.velocity[:, [c]], m.rate_hz, lambda s: n[0] / (1 + n[0] * s)),
             lambda w, n, mass: {"stiffness": float(w[0]), "time_constant": n[0]} if w[0] > 0 else None,
-            linear=True, bounded=((0.1 / scales.band_hz, scales.seconds / 4),),
+            linear=True, bounds=((0.1 / scales.band_hz, scales.duration_s / 4),),
         )  # fmt: skip

@@ -77,11 +77,11 @@ class Balance:
         """Linear laws in addition to mass, damping and stiffness, of the base terms and of the chosen structure."""
         return (*self.search.regression.base_terms.laws, *(law.law for law in self.laws if law.law.linear))
 
-    def without_names(self, reason: str) -> "Balance":
+    def withdraw_names(self, reason: str) -> "Balance":
         """A copy in which no law is named. reason: objection, as a sentence, to each law that has none."""
         return replace(self, laws=tuple(replace(law, objection=law.objection or reason) for law in self.laws))
 
-    def error_of(self, laws: Sequence[int]) -> float:
+    def compute_error(self, laws: Sequence[int]) -> float:
         """Held-out error with these laws, relative to the signal's rms. laws: indices in the regression."""
         regression = self.search.regression
         return float(np.sqrt(_compute_errors(regression, laws).sum() / _sum_signal_power(regression)))
@@ -105,7 +105,7 @@ def judge_laws(search: StructureSearch) -> Balance:
 
 def _has_two_frictions(regression: Regression, laws: Sequence[int]) -> bool:
     """Whether these laws contain two frictions of the same channel. laws: indices in the regression."""
-    keys = [regression.laws[number].key for number in laws]
+    keys = [regression.laws[law_index].key for law_index in laws]
     channels = [channel for effect, channel in set(keys) if effect in find_family("coulomb_friction")]
     return len(channels) > len(set(channels))
 
@@ -118,7 +118,7 @@ def _judge_structure(search: StructureSearch, chosen: Structure) -> Balance:
     ceiling = _compute_ceiling(regression, errors)
     excess = max(float(linear.sum() - ceiling), 1e-6 * float(linear.sum()), 1e-300)
     coverage = 1 - float(errors.sum() - ceiling) / excess
-    laws = [_judge_law(regression, chosen.laws, number, (errors, excess, coverage)) for number in chosen.laws]
+    laws = [_judge_law(regression, chosen.laws, law_index, (errors, excess, coverage)) for law_index in chosen.laws]
     further_laws = _judge_further_laws(regression, chosen, (errors, excess))
     ratios = [float(np.sqrt(error / _sum_signal_power(regression))) for error in (linear.sum(), errors.sum(), ceiling)]
     checked_laws = _name_once_per_family(sorted(laws, key=lambda law: -law.gain))
@@ -177,24 +177,24 @@ def _compute_ceiling(regression: Regression, chosen_errors: FloatArray) -> float
 
 
 def _judge_law(
-    regression: Regression, laws: Sequence[int], number: int, reference: tuple[FloatArray, float, float]
+    regression: Regression, laws: Sequence[int], law_index: int, reference: tuple[FloatArray, float, float]
 ) -> JudgedLaw:
-    """Test law `number` of `laws`. reference: errors (blocks,) with all of `laws`; decrease of the error by all laws of
-    the regression together; share of that decrease by `laws`."""
+    """Test law `law_index` of `laws`. reference: errors (blocks,) with all of `laws`; decrease of the error by all laws
+    of the regression together; share of that decrease by `laws`."""
     full, excess, coverage = reference
-    other_laws = tuple(index for index in laws if index != number)
+    other_laws = tuple(index for index in laws if index != law_index)
     reduced = _compute_errors(regression, other_laws)
-    gain, low = bootstrap_gain(reduced, full)
+    gain, gain_low = bootstrap_gain(reduced, full)
     share = float((reduced - full).sum()) / excess
-    law = regression.laws[number]
-    values = dict(zip(laws, fit_values(regression, laws), strict=True))[number]
-    equivalents, likely = _find_equivalents(regression, other_laws, number, (reduced, full))
+    law = regression.laws[law_index]
+    values = dict(zip(laws, fit_values(regression, laws), strict=True))[law_index]
+    equivalents, probability = _find_equivalents(regression, other_laws, law_index, (reduced, full))
     force_share = float(np.sqrt(max(float((reduced - full).sum()), 0.0) / _sum_signal_power(regression)))
-    small = f"it explains {100 * force_share:.1f} % of the force, less than such recordings can confirm"
-    objection = _find_objection(law, values, (gain, low, share, coverage), equivalents) or (
-        small if force_share < LAW_OF_SIGNAL else ""
+    weakness = f"it explains {100 * force_share:.1f} % of the force, less than such recordings can confirm"
+    objection = _find_objection(law, values, (gain, gain_low, share, coverage), equivalents) or (
+        weakness if force_share < LAW_OF_SIGNAL else ""
     )
-    ratio = compute_force_ratio(regression, laws, number)
+    ratio = compute_force_ratio(regression, laws, law_index)
     is_physical = values is not None and ratio <= LARGEST_LAW_FORCE
     if not objection and ratio > LARGEST_LAW_FORCE:
         objection = f"its force would be {ratio:.0f} times the recorded force, almost cancelled by other terms"
@@ -204,8 +204,8 @@ def _judge_law(
         stands_for, law = law.effect, replace(law, effect=SIMULATED_AS[law.effect])
     formula = None if law.formula is None or values is None else law.formula(values)
     return JudgedLaw(
-        number, law, values or {}, gain, low, share, equivalents, likely, objection, stands_for, formula=formula,
-        is_physical=is_physical,
+        law_index, law, values or {}, gain, gain_low, share, equivalents, probability, objection, stands_for,
+        formula=formula, is_physical=is_physical,
         confirmed_by_folds=is_confirmed_by_folds((reduced, full), _compute_fold_errors(regression, (other_laws, laws))),
     )  # fmt: skip
 
@@ -218,14 +218,14 @@ def _compute_fold_errors(regression: Regression, law_sets: Sequence[Sequence[int
 
 
 def _find_equivalents(
-    regression: Regression, other_laws: tuple[int, ...], number: int, errors: tuple[FloatArray, FloatArray]
+    regression: Regression, other_laws: tuple[int, ...], law_index: int, errors: tuple[FloatArray, FloatArray]
 ) -> tuple[tuple[str, ...], float]:
-    """Effects with a similar error in place of a law, and the share of bootstrap draws in which none is better."""
-    reduced, full = errors
-    own_law = regression.laws[number]
+    """Effects with a similar error in place of a law; share of draws in which none but a refinement is better."""
+    reduced_errors, full_errors = errors
+    tested_law = regression.laws[law_index]
     best_by_effect: dict[str, tuple[float, tuple[int, ...]]] = {}
     for index, law in enumerate(regression.laws):
-        if law.effect == own_law.effect or law.linear or (own_law.linear and not law.linear):
+        if law.effect == tested_law.effect or law.linear or (tested_law.linear and not law.linear):
             continue
         laws = (*other_laws, index)
         if any(regression.laws[k].key == law.key for k in other_laws) or fit_values(regression, laws)[-1] is None:
@@ -233,31 +233,31 @@ def _find_equivalents(
         error = float(regression.cross_validate(regression.select_columns(laws)).sum())
         if law.effect not in best_by_effect or error < best_by_effect[law.effect][0]:
             best_by_effect[law.effect] = error, laws
-    total_gain = float((reduced - full).sum())
-    equivalents, draws = [], draw_bootstrap_blocks(len(full))
-    is_first = np.ones(BOOTSTRAP_DRAWS, dtype=np.bool_)
+    total_gain = float((reduced_errors - full_errors).sum())
+    equivalents, draws = [], draw_bootstrap_blocks(len(full_errors))
+    is_best = np.ones(BOOTSTRAP_DRAWS, dtype=np.bool_)
     for effect, (_, laws) in best_by_effect.items():
-        excess = _compute_errors(regression, laws) - full
-        if own_law.effect not in list_simpler(effect):
-            is_first &= excess[draws].sum(axis=1) >= 0
+        excess = _compute_errors(regression, laws) - full_errors
+        if tested_law.effect not in list_simpler(effect):
+            is_best &= excess[draws].sum(axis=1) >= 0
         # Of two equally good laws, the simpler: a law of another kind with more parameters must have a smaller error.
-        has_more = count_parameters(regression, laws[-1:]) > count_parameters(regression, [number])
-        limit = 0.0 if has_more and effect not in find_family(own_law.effect) else RIVAL_STAYS_BEHIND * total_gain
+        is_richer = count_parameters(regression, laws[-1:]) > count_parameters(regression, [law_index])
+        limit = 0.0 if is_richer and effect not in find_family(tested_law.effect) else RIVAL_STAYS_BEHIND * total_gain
         if float(excess.sum()) <= limit:
             equivalents.append((float(excess.sum()), effect))
-    return tuple(effect for _, effect in sorted(equivalents)), float(is_first.mean())
+    return tuple(effect for _, effect in sorted(equivalents)), float(is_best.mean())
 
 
 def _find_objection(
     law: Law, values: dict[str, float] | None, scores: tuple[float, float, float, float], equivalents: tuple[str, ...]
 ) -> str:
     """Reason not to name a law, as a sentence; empty if it is named. scores: gain, its bound, share, coverage."""
-    gain, low, share, coverage = scores
+    gain, gain_low, share, coverage = scores
     if law.linear:
         return "it is a linear model of a higher order: part of the first model and no missing physics"
     if values is None:
         return "its parameters have signs that such physics cannot have"
-    if low <= 0:
+    if gain_low <= 0:
         return "its gain on held-out data is not larger than its variation between stretches of the recording"
     if share < LAW_OF_CEILING and gain < FURTHER_LAW_OF_ALL:
         return f"it explains {100 * share:.1f} % of what all laws together explain"
@@ -265,36 +265,36 @@ def _find_objection(
         return (f"even with it, {100 * (1 - coverage):.0f} % of what all laws together explain remain: the main cause "
                 "is another")  # fmt: skip
     family = find_family(law.effect) | (CONDITION_LAWS if law.effect in CONDITION_LAWS else set())
-    of_other_family = [effect for effect in equivalents if effect not in family]
+    other_families = [effect for effect in equivalents if effect not in family]
     rivals = [effect for effect in equivalents if law.effect not in list_simpler(effect)]
-    if of_other_family or (len(rivals) >= LARGEST_CLASS and not {law.effect, *rivals} <= FRICTIONS):
-        return f"these data cannot distinguish it from {', '.join(of_other_family or equivalents)}"
-    simulated = law.formula is not None or not {law.effect, SIMULATED_AS.get(law.effect)}.isdisjoint(EFFECTS_BY_NAME)
-    return "" if simulated else "hapteq cannot simulate it yet"
+    if other_families or (len(rivals) >= LARGEST_CLASS and not {law.effect, *rivals} <= FRICTIONS):
+        return f"these data cannot distinguish it from {', '.join(other_families or equivalents)}"
+    is_simulated = law.formula is not None or not {law.effect, SIMULATED_AS.get(law.effect)}.isdisjoint(EFFECTS_BY_NAME)
+    return "" if is_simulated else "hapteq cannot simulate it yet"
 
 
 def _judge_further_laws(
     regression: Regression, chosen: Structure, reference: tuple[FloatArray, float]
 ) -> tuple[JudgedLaw, ...]:
-    """The best law of each effect in addition to the chosen structure, if its gain is significant, by falling gain."""
+    """Of the best law of each other effect, the eight with the least error: those with a significant gain, by it."""
     chosen_errors, excess = reference
     effects = {regression.laws[index].effect for index in chosen.laws}
-    best: dict[str, tuple[float, int]] = {}
-    for number, law in enumerate(regression.laws):
-        if law.effect in effects or fit_values(regression, (*chosen.laws, number))[-1] is None:
+    best_by_effect: dict[str, tuple[float, int]] = {}
+    for law_no, law in enumerate(regression.laws):
+        if law.effect in effects or fit_values(regression, (*chosen.laws, law_no))[-1] is None:
             continue
-        error = float(regression.cross_validate(regression.select_columns((*chosen.laws, number))).sum())
-        if law.effect not in best or error < best[law.effect][0]:
-            best[law.effect] = error, number
+        error = float(regression.cross_validate(regression.select_columns((*chosen.laws, law_no))).sum())
+        if law.effect not in best_by_effect or error < best_by_effect[law.effect][0]:
+            best_by_effect[law.effect] = error, law_no
     judged_laws = []
-    for _, number in sorted(best.values())[:8]:
-        laws = (*chosen.laws, number)
+    for _, law_no in sorted(best_by_effect.values())[:8]:
+        laws = (*chosen.laws, law_no)
         errors = _compute_errors(regression, laws)
         gain, low = bootstrap_gain(chosen_errors, errors)
         values, share = fit_values(regression, laws)[-1] or {}, float((chosen_errors - errors).sum()) / excess
         reason = ("it explains too little in addition to the named laws" if chosen.laws
                   else WEAK_GAINS[gain > FURTHER_LAW_GAIN])  # fmt: skip
         if gain > 0 and low > 0:
-            law, physical = regression.laws[number], compute_force_ratio(regression, laws, number) <= LARGEST_LAW_FORCE
-            judged_laws.append(JudgedLaw(number, law, values, gain, low, share, (), 0.0, reason, is_physical=physical))
+            law, physical = regression.laws[law_no], compute_force_ratio(regression, laws, law_no) <= LARGEST_LAW_FORCE
+            judged_laws.append(JudgedLaw(law_no, law, values, gain, low, share, (), 0.0, reason, is_physical=physical))
     return tuple(sorted(judged_laws, key=lambda judged_law: -judged_law.gain))

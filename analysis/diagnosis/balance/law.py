@@ -1,4 +1,5 @@
 """A term of a force balance: its columns along a measured motion, and the parameters that follow from its weights.
+The laws themselves are made by `laws`, `friction_laws` and `condition_laws`, and fitted by `regression`.
 
 The balance of one axis is linear in its weights w,
 
@@ -18,11 +19,11 @@ from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 from analysis.diagnosis.balance.motion import Motion
 from equalizer.signals.signal import FloatArray
 
-Numbers = tuple[float, ...]
+NonlinearParameters = tuple[float, ...]
 """Nonlinear parameters: speeds, pitches, time constants; in SI units."""
-Columns = Callable[[Motion, Numbers], FloatArray]
+Columns = Callable[[Motion, NonlinearParameters], FloatArray]
 """Maps a motion and nonlinear parameters to the law's regressors (n, weights)."""
-Values = Callable[[FloatArray, Numbers, float], dict[str, float] | None]
+WeightConverter = Callable[[FloatArray, NonlinearParameters, float], dict[str, float] | None]
 """Maps weights (weights,), nonlinear parameters and the moving mass to the effect's parameters; None where the signs
 are not physical."""
 
@@ -46,15 +47,15 @@ class Law:
     """Name of the vocabulary, or a new one in the same style for physics that it lacks."""
     channel: int
     """Channel of the motion that it depends on; -1 = none."""
-    numbers: Numbers
+    numbers: NonlinearParameters
     """Values of its nonlinear parameters."""
     columns: Columns
     """Makes the regressors (n, weights) of a motion."""
-    values: Values
+    values: WeightConverter
     """Converts fitted weights to the parameters of the effect."""
     linear: bool = False
     """Whether it is linear in the motion, so that a linear model of a higher order could replace it."""
-    bounded: tuple[tuple[float, float], ...] = ()
+    bounds: tuple[tuple[float, float], ...] = ()
     """Bounds of each nonlinear parameter within which it is refined; empty: as given."""
     formula: Callable[[dict[str, float]], Formula] | None = None
     """Maps its parameters to the formula that simulations use where the catalogue has no such effect."""
@@ -87,7 +88,7 @@ class Scales:
     """Peak to peak, from `low` to `high`."""
     low: float
     high: float
-    seconds: float
+    duration_s: float
     """Duration of all fit samples."""
     band_hz: float
     """Upper end of the band; infinite without a time axis."""
@@ -96,19 +97,19 @@ class Scales:
     rotational: bool
 
 
-def scales_of(motions: Sequence[Motion], channel: int, rotational: bool) -> Scales:
-    """Sizes of a channel's motion over the samples to fit of all motions: rms speed, travel and its ends, duration."""
+def measure_scales(motions: Sequence[Motion], channel: int, rotational: bool) -> Scales:
+    """Measure a channel's motion over the samples to fit of all motions: rms speed, travel and its ends, duration."""
     position = np.concatenate([motion.position[motion.fit, channel] for motion in motions])
     velocity = np.concatenate([motion.velocity[motion.fit, channel] for motion in motions])
     low, high = float(position.min()), float(position.max())
-    seconds = sum(int(motion.fit.sum()) for motion in motions) / motions[0].rate_hz
+    duration_s = sum(int(motion.fit.sum()) for motion in motions) / motions[0].rate_hz
     speed = float(np.sqrt(np.mean(velocity**2)))
     turns = rotational and high - low > 4 * np.pi
-    return Scales(speed, high - low, low, high, seconds, motions[0].band_hz, turns, rotational)
+    return Scales(speed, high - low, low, high, duration_s, motions[0].band_hz, turns, rotational)
 
 
-def relative_time(motion: Motion) -> FloatArray:
-    """(n, 1): rises linearly from -1 to 1 over the part."""
+def compute_relative_time(motion: Motion) -> FloatArray:
+    """Compute (n, 1): time within the recorded part, scaled to rise linearly from -1 to 1."""
     return np.linspace(-1.0, 1.0, len(motion.force))[:, None]
 
 
@@ -117,22 +118,24 @@ def smooth_sign(velocity: FloatArray, width: float) -> FloatArray:
     return np.asarray(np.tanh(velocity / width))
 
 
-def name_weights(*names: str) -> Values:
-    """A `Values` that gives the weights these names, in their order, with either sign."""
+def name_weights(*names: str) -> WeightConverter:
+    """A `WeightConverter` that gives the weights these names, in their order, with either sign."""
     return lambda w, n, mass: dict(zip(names, map(float, w), strict=True))
 
 
-def name_positive_weight(name: str) -> Values:
-    """A `Values` for a single weight that is physical only where it is positive; else None."""
+def name_positive_weight(name: str) -> WeightConverter:
+    """A `WeightConverter` for a single weight that is physical only where it is positive; else None."""
     return lambda w, n, mass: {name: float(w[0])} if w[0] > 0 else None
 
 
-def filter_from_rest(samples: FloatArray, rate_hz: float, gain: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """(n, k): samples through a linear filter that starts from rest. gain: its continuous transfer function at
+def filter_from_rest(
+    samples: FloatArray, rate_hz: float, transfer_function: Callable[[FloatArray], FloatArray]
+) -> FloatArray:
+    """(n, k): samples (n, k) through a linear filter that starts from rest. transfer_function: continuous, at
     s = i omega, omega (lines,) in rad/s. Computed by FFT, zero-padded to twice the length so that the filter's memory,
     which must be shorter than the samples, does not wrap round."""
-    count = len(samples)
-    padded = next_fast_len(2 * count, real=True)
-    spectrum = rfft(samples, padded, axis=0)
-    s = 2j * np.pi * rfftfreq(padded, 1 / rate_hz)
-    return np.asarray(irfft(gain(s)[:, None] * spectrum, padded, axis=0)[:count])
+    sample_count = len(samples)
+    padded_length = next_fast_len(2 * sample_count, real=True)
+    spectrum = rfft(samples, padded_length, axis=0)
+    s = 2j * np.pi * rfftfreq(padded_length, 1 / rate_hz)
+    return np.asarray(irfft(transfer_function(s)[:, None] * spectrum, padded_length, axis=0)[:sample_count])

@@ -17,13 +17,13 @@ from analysis.diagnosis.balance.friction_laws import make_damping_laws, make_fri
 from analysis.diagnosis.balance.law import (
     Columns,
     Law,
-    Numbers,
+    NonlinearParameters,
     Scales,
-    Values,
+    WeightConverter,
+    compute_relative_time,
     filter_from_rest,
+    measure_scales,
     name_weights,
-    relative_time,
-    scales_of,
 )
 from analysis.diagnosis.balance.motion import Motion
 from equalizer.effects.gravity_torque import LEAST_TRAVEL_RAD
@@ -53,7 +53,7 @@ def make_laws(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
     """Make all laws of all channels except `make_cogging_law`, whose pitch is found from the residual of the others.
     Laws that need a time axis are left out where the band is infinite."""
     for channel in range(len(motions[0].channels)):
-        scales = scales_of(motions, channel, rotational)
+        scales = measure_scales(motions, channel, rotational)
         yield from make_friction_laws(channel, scales)
         yield from make_damping_laws(channel, scales)
         yield from make_stiffness_laws(channel, scales)
@@ -65,7 +65,7 @@ def make_laws(motions: Sequence[Motion], rotational: bool) -> Iterator[Law]:
 
             yield from make_condition_laws(motions, channel, scales)
     if np.isfinite(motions[0].band_hz) and motions[0].order < 2:
-        yield Law("drifting_force", -1, (), lambda m, _: relative_time(m), name_weights("change"))
+        yield Law("drifting_force", -1, (), lambda m, _: compute_relative_time(m), name_weights("change"))
 
 
 def _compute_longest_pitch(scales: Scales) -> float:
@@ -87,7 +87,7 @@ def make_cogging_law(channel: int, pitch: float, scales: Scales) -> Law:
         lambda w, n, mass: {
             "amplitude": float(np.hypot(*w)), "pitch": n[0], "phase": float(np.arctan2(-w[1], -w[0])),
         } if n[0] <= longest else None,
-        bounded=((0.9 * pitch, min(1.1 * pitch, longest)),),
+        bounds=((0.9 * pitch, min(1.1 * pitch, longest)),),
     )  # fmt: skip
 
 
@@ -142,22 +142,22 @@ def make_stiffness_laws(c: int, scales: Scales) -> Iterator[Law]:
         for end, side in ((scales.high - share * scales.travel, 1.0), (scales.low + share * scales.travel, -1.0)):
             yield Law(
                 "end_stop", c, (float(end),),
-                _make_stop_columns(c, side), _make_stop_reader(side), bounded=((scales.low, scales.high),),
+                _make_stop_columns(c, side), _make_stop_reader(side), bounds=((scales.low, scales.high),),
             )  # fmt: skip
     for half_gap in scales.travel * np.array(HALF_GAPS):
         # Added to the balance's own spring term k x, it gives k (x - clip(x)): a spring that acts beyond the gap only.
         yield Law(
             "backlash", c, (float(half_gap),), lambda m, n: -np.clip(m.position[:, [c]], -n[0], n[0]),
             lambda w, n, mass: {"gap": 2 * n[0], "contact_stiffness": float(w[0])} if w[0] > 0 else None,
-            bounded=((1e-3 * scales.travel, 0.45 * scales.travel),),
+            bounds=((1e-3 * scales.travel, 0.45 * scales.travel),),
         )  # fmt: skip
 
 
-def _make_stop_reader(side: float) -> Values:
+def _make_stop_reader(side: float) -> WeightConverter:
     """Make the function that converts weights to the parameters of an end stop towards `side` (+1 or -1). They include
     `side` only where the sign of the position does not imply it. None for a stiffness that is not positive."""
 
-    def read_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
+    def read_values(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
         side_parameter = {} if side * n[0] > 0 else {"side": side}
         return {"position": n[0], "stiffness": float(w[0]), "opposite": 0.0, **side_parameter} if w[0] > 0 else None
 
@@ -183,7 +183,7 @@ def make_dynamic_laws(c: int, scales: Scales) -> Iterator[Law]:
         for f in scales.band_hz * np.array(MODE_FREQUENCIES):
             yield Law(
                 "extra_mode", c, (float(f), ratio), lambda m, n: _compute_mode_force(m, c, n), _read_mode_values,
-                linear=True, bounded=((0.005 * scales.band_hz, 1.5 * scales.band_hz), (0.002, 1.0)),
+                linear=True, bounds=((0.005 * scales.band_hz, 1.5 * scales.band_hz), (0.002, 1.0)),
             )  # fmt: skip
     # With a first-order lag, the command is (1 + T s) times the delivered force. Only T s M a is no base term.
     yield Law(
@@ -192,7 +192,7 @@ def make_dynamic_laws(c: int, scales: Scales) -> Iterator[Law]:
     )  # fmt: skip
 
 
-def _compute_mode_force(m: Motion, c: int, n: Numbers) -> FloatArray:
+def _compute_mode_force(m: Motion, c: int, n: NonlinearParameters) -> FloatArray:
     """Compute (n, 1): force per kg of a body on a spring and damper at the axis: the axis acceleration times
     (omega² + 2 zeta omega s) / (s² + 2 zeta omega s + omega²). n: frequency (Hz) and damping ratio zeta."""
     omega, damping = 2 * np.pi * n[0], 2 * n[1] * 2 * np.pi * n[0]
@@ -201,6 +201,6 @@ def _compute_mode_force(m: Motion, c: int, n: Numbers) -> FloatArray:
     )
 
 
-def _read_mode_values(w: FloatArray, n: Numbers, mass: float) -> dict[str, float] | None:
+def _read_mode_values(w: FloatArray, n: NonlinearParameters, mass: float) -> dict[str, float] | None:
     """Convert weights to frequency (Hz), mass (kg or kg m²) and damping ratio; None where the mass is not positive."""
     return {"frequency": n[0], "mass": float(w[0]), "damping_ratio": n[1]} if w[0] > 0 else None

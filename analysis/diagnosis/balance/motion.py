@@ -19,7 +19,7 @@ from analysis.diagnosis.data.measured_motion import fill_gaps, is_quasi_static, 
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.settings import MOTION_EDGE_PERIODS, MOTION_OVERSAMPLED, MOVING_BAND_SHARE
 from analysis.diagnosis.types import Mask
-from equalizer.effects.discovered_law import condition_names, law_channels
+from equalizer.effects.discovered_law import collect_channels, name_conditions
 from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY
 from equalizer.signals.band_limited import compute_low_pass_gain, extend_as_odd
 from equalizer.signals.recording import Hold, Recording
@@ -281,7 +281,7 @@ def _standardise_conditions(records: Sequence[Observed]) -> tuple[tuple[Conditio
     filled_samples = [fill_gaps(signal.samples) for signal in signals if signal is not None]
     stacked = np.vstack(filled_samples)
     mean, spread = stacked.mean(axis=0), stacked.std(axis=0)
-    names = condition_names(law_channels(records[0].recording))
+    names = name_conditions(collect_channels(records[0].recording))
     varying = np.flatnonzero(spread > 0)
     conditions = tuple(Condition(names[k], float(mean[k]), float(spread[k])) for k in varying)
     return conditions, [(samples[:, varying] - mean[varying]) / spread[varying] for samples in filled_samples]

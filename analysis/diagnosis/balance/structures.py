@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.balance.law import BaseTerms, Law, Scales, scales_of
+from analysis.diagnosis.balance.law import BaseTerms, Law, Scales, measure_scales
 from analysis.diagnosis.balance.laws import find_likely_pitches, make_cogging_law, make_laws
 from analysis.diagnosis.balance.model_base import GivenBase, build_regression_with_model, explains_enough
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
@@ -81,7 +81,7 @@ def search_structures(
     left out. base: None = mass, damping and stiffness alone. Raises NoMotionError where nothing can be fitted."""
     if not any(motion.mask_valid_samples(motion.fit).any() for motion in motions):
         raise NoMotionError("too few samples with motion are available for the fit")
-    scales = [scales_of(motions, c, rotational) for c in range(len(motions[0].channels))]
+    scales = [measure_scales(motions, c, rotational) for c in range(len(motions[0].channels))]
     turns = any(scale.turns for scale in scales)
     fixed = {(law.key, law.numbers) for law in (base.laws if isinstance(base, BaseTerms) else ())}
     laws = [
@@ -213,7 +213,7 @@ def refine_parameters(regression: Regression, structures: Sequence[Structure]) -
     refined: set[int] = set()
     for structure in structures:
         for place, number in enumerate(structure.laws):
-            if number not in refined and regression.laws[number].bounded:
+            if number not in refined and regression.laws[number].bounds:
                 refined.add(number)
                 fitted = replace(keep_laws(regression, structure.laws), test=())  # only the parameters are used
                 replaced = replace_law(regression, number, _refine_law(fitted, place))
@@ -239,7 +239,7 @@ def _refine_law(regression: Regression, place: int) -> Law:
 
 def _list_neighbours(law: Law) -> Iterator[Law]:
     """The law with each nonlinear parameter moved by each factor, within its bounds."""
-    for place, (low, high) in enumerate(law.bounded):
+    for place, (low, high) in enumerate(law.bounds):
         # Over a travel of many pitches, the phase of cogging turns by a multiple of a pitch's relative change.
         share = 0.05 if law.effect == "cogging" else 1.0
         for factor in STEP_FACTORS:

@@ -26,7 +26,7 @@ from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import PlacedEffect, Structure
 from equalizer.effects.placing import place_recorded_effects
 from equalizer.effects.simulation.bodies import build_bodies
-from equalizer.effects.simulation.forces_along_motion import actuator_force, effect_forces_along_motion
+from equalizer.effects.simulation.forces_along_motion import compute_actuator_force, compute_effect_forces_along_motion
 from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
 from equalizer.signals.recording import Recording
@@ -93,8 +93,8 @@ def _prepare_axis_data(record: Observed, motion: Motion, model: MechanicalModel)
     structure = _apply_structural_effects(add_carried_weight(model, recording), known_effects)
     required = compute_required_force(structure, compute_band_motion(motion.position[:, :m], rate_hz, motion.band_hz))
     axis_motion = required.axis_position, required.axis_velocity, required.axis_acceleration
-    applied = actuator_force(model, motion.force, rate_hz, known_effects, recording.hold)
-    effect_force = effect_forces_along_motion(
+    applied = compute_actuator_force(model, motion.force, rate_hz, known_effects, recording.hold)
+    effect_force = compute_effect_forces_along_motion(
         structure, known_effects, axis_motion, (motion.force, applied - required.force), rate_hz
     )
     stride = max(int(rate_hz / (LEAST_SAMPLES_PER_PERIOD * motion.band_hz)), 1)

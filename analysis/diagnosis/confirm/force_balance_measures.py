@@ -18,7 +18,7 @@ from analysis.diagnosis.confirm.fitting_measures import CONSTANT_ADDED, FittingM
 from analysis.diagnosis.data.measured_motion import is_quasi_static, is_read_as_free
 from analysis.diagnosis.errors.choose_measure import Compared, MeasureChoice, make_force_measure, make_measure
 from analysis.diagnosis.first_model.model_from_balance import build_first_model, compute_law_power_share
-from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduce_recordings
+from analysis.diagnosis.first_model.reduced_recordings import is_reduction_needed, reduce_recordings
 from analysis.diagnosis.forces.predicted_force import PredictedForce
 from analysis.diagnosis.settings import LAWS_WITHIN
 from equalizer.plant.mechanical_model import MechanicalModel, MechanicalModelError
@@ -95,7 +95,7 @@ def choose_forces_of_balance(
         return fitting
     remarks = tuple(remark for remark in fitting.chosen.remarks if remark != CONSTANT_ADDED)
     chosen = replace(chosen, remarks=(*remarks, BALANCE_PREDICTS_BETTER))
-    return FittingMeasure(linear, chosen, is_reduced=is_reduced(balances))
+    return FittingMeasure(linear, chosen, is_reduced=is_reduction_needed(balances))
 
 
 def _model_of_balances(
@@ -103,7 +103,7 @@ def _model_of_balances(
 ) -> tuple[Sequence[Recording], MechanicalModel | None]:
     """The recordings with one body per command, and the linear model that the balances' parameters make of it; None
     where they make no model."""
-    reduced = reduce_recordings(recordings, balances) if is_reduced(balances) else recordings
+    reduced = reduce_recordings(recordings, balances) if is_reduction_needed(balances) else recordings
     return reduced, build_first_model(balances, reduced[0], name)
 
 

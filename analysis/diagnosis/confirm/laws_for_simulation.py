@@ -107,10 +107,10 @@ def make_hypothesis(axis: int, judged_law: JudgedLaw, recording: Recording) -> H
     if judged_law.formula is not None:
         # Imported here: few diagnoses have such a law.
         from analysis.diagnosis.errors.law_hypothesis import hypothesis_of_law
-        from equalizer.effects.discovered_law import axis_names
+        from equalizer.effects.discovered_law import derive_axis_letters
         from equalizer.laws.law import Law
 
-        name, formula = axis_names(recording.command.channels)[axis], judged_law.formula
+        name, formula = derive_axis_letters(recording.command.channels)[axis], judged_law.formula
         text = _AXIS_SIGNALS.sub(lambda signal: f"{_SIGNAL_PREFIX[signal[0]]}{name}", formula.text)
         return hypothesis_of_law(Law(text, formula.numbers, (), formula.acts_on, name), axis, recording)
     parameters = EFFECTS_BY_NAME[judged_law.law.effect].parameters

@@ -27,10 +27,10 @@ from analysis.diagnosis.settings import (
     LEAST_FAULT_GAIN,
 )
 
-T_BOUND = float(stdtrit(FOLDS - 1, 0.975))
-"""Half-width of a 95 % confidence interval in standard errors: quantile of Student's t with FOLDS - 1 degrees of
-freedom. A parameter within it of its value without a fault may have that value."""
-SAME_EFFECT = {
+T_QUANTILE = float(stdtrit(FOLDS - 1, 0.975))
+"""Half-width of a 95 % confidence interval in standard errors: quantile 0.975 of Student's t with FOLDS - 1 degrees of
+freedom. A fault is not named where its parameter may have the value without a fault."""
+ALIASES = {
     "transport_delay": ("logger_offset",),
     "logger_offset": ("transport_delay",),
     "force_offset": ("constant_force",),
@@ -49,40 +49,41 @@ class Decision:
 
     named: JudgedFault | None
     equivalents: tuple[str, ...]
-    """Effects that fit as well in its place (class)."""
+    """Effects that fit about as well in its place (class); empty where none is named."""
     probability: float
-    """Share of bootstrap draws in which no significant rival has a smaller error; refinements do not count."""
+    """Share of bootstrap draws in which no accepted rival has a smaller error, refinements not counted; 0 without a
+    name."""
     unnamed: tuple[tuple[JudgedFault, str], ...]
     """Candidates that are not named, each with the reason in words."""
 
 
-def choose_fault(comparison: Comparison, responses: int) -> Decision:
-    """Choose the fault or class to name, and list the other candidates. responses: number of response channels."""
+def choose_fault(comparison: Comparison, response_count: int) -> Decision:
+    """Choose the fault or class to name, and list the other candidates. response_count: number of response channels."""
     tested = [(fault, _find_objection(fault, comparison.differ_but_for(fault))) for fault in comparison.faults]
-    passing = [fault for fault, note in tested if note == ""]
+    accepted = [fault for fault, note in tested if note == ""]
     unnamed = tuple((fault, note) for fault, note in tested if fault.gain > 0 and note)
-    if not passing:
+    if not accepted:
         return Decision(None, (), 0.0, unnamed)
-    best = _choose_simplest(passing, comparison)
-    rivals = [fault for fault in passing if fault is not best]
-    distinct = [rival for rival in rivals if not _refines(rival, best)]
+    best = _choose_simplest(accepted, comparison)
+    rivals = [fault for fault in accepted if fault is not best]
+    distinct = [rival for rival in rivals if not _is_finer(rival, best)]
     inseparable = [rival for rival in distinct if _is_inseparable(best, rival, comparison)]
-    failed = [fault for fault, note in tested if note and fault.gain >= LEAST_FAULT_GAIN and not _refines(fault, best)]
-    inseparable += [fault for fault in rivals if _refines(fault, best) and _is_significantly_better(fault, best)]
+    failed = [fault for fault, note in tested if note and fault.gain >= LEAST_FAULT_GAIN and not _is_finer(fault, best)]
+    inseparable += [fault for fault in rivals if _is_finer(fault, best) and _is_significantly_better(fault, best)]
     peers = (
         *inseparable,
-        *_find_insignificant(failed, best, comparison)[: max(LARGEST_FAULT_CLASS - 1 - len(inseparable), 0)],
+        *_find_inconclusive(failed, best, comparison)[: max(LARGEST_FAULT_CLASS - 1 - len(inseparable), 0)],
     )
-    better_failed = [
-        fault for fault in failed if fault.gain_low > 0 and _compute_gap(fault, best) < -_least_gap(best, comparison)
+    better = [
+        fault for fault in failed if fault.gain_low > 0 and _get_gap(fault, best) < -_get_least_gap(best, comparison)
     ]
-    aliases = SAME_EFFECT.get(best.fault.effect, ()) if responses == 1 or best.fault.effect == "force_offset" else ()
+    aliases = ALIASES.get(best.fault.effect, ()) if response_count == 1 or best.fault.effect == "force_offset" else ()
     equivalents = tuple(name for name in dict.fromkeys((*(rival.fault.effect for rival in peers), *aliases))
                   if name != best.fault.effect)  # fmt: skip
     other_axes = [rival.fault.axis for rival in peers if rival.fault.effect == best.fault.effect]
     reason = ""
-    if better_failed:
-        reason = f"{get_noun(better_failed[0].fault.effect)} explains more, but is not significant itself"
+    if better:
+        reason = f"{get_noun(better[0].fault.effect)} explains more, but is not significant itself"
     elif best.share < FAULT_MAIN_PART:
         reason = (
             f"it explains {100 * best.share:.0f} % of the difference between these recordings: the main cause is "
@@ -92,29 +93,27 @@ def choose_fault(comparison: Comparison, responses: int) -> Decision:
         reason = "these data cannot distinguish it from " + ", ".join(equivalents)
     elif other_axes:
         reason = f"these data do not show whether it is on {best.fault.axis} or on {', '.join(other_axes)}"
-    rejected = tuple((rival, REFINEMENT_REASON if _refines(rival, best) else RIVAL_REASON) for rival in rivals)
+    rejected = tuple((rival, REFINEMENT_REASON if _is_finer(rival, best) else RIVAL_REASON) for rival in rivals)
     if reason:
         return Decision(None, (), 0.0, ((best, reason), *rejected, *unnamed))
-    remaining = tuple(item for item in (*rejected, *unnamed) if item[0] not in peers)
+    remaining = tuple(candidate for candidate in (*rejected, *unnamed) if candidate[0] not in peers)
     return Decision(best, equivalents, _estimate_probability_of_best(best, distinct), remaining)
 
 
-def _find_insignificant(
-    insignificant: Sequence[JudgedFault], best: JudgedFault, comparison: Comparison
-) -> list[JudgedFault]:
+def _find_inconclusive(failed: Sequence[JudgedFault], best: JudgedFault, comparison: Comparison) -> list[JudgedFault]:
     """Candidates that fail a test of `_find_objection` although their gain has a lower bound above 0, and whose error
     differs too little from that of the best, which passes all tests: either may be the cause."""
     return [
         judged_fault
-        for judged_fault in insignificant
+        for judged_fault in failed
         if judged_fault.fault.effect != best.fault.effect
         and judged_fault.gain_low > 0
-        and abs(_compute_gap(judged_fault, best)) <= _least_gap(best, comparison)
+        and abs(_get_gap(judged_fault, best)) <= _get_least_gap(best, comparison)
     ]
 
 
-def _refines(candidate: JudgedFault, best: JudgedFault) -> bool:
-    """Whether `candidate` contains `best` as a special case, so that it always fits better."""
+def _is_finer(candidate: JudgedFault, best: JudgedFault) -> bool:
+    """Whether `candidate` contains `best` as a special case at the same axis, so that it always fits better."""
     return best.fault.effect in candidate.fault.simpler and best.fault.axis == candidate.fault.axis
 
 
@@ -122,32 +121,32 @@ def _choose_simplest(significant: Sequence[JudgedFault], comparison: Comparison)
     """The fault with the smallest error, or a special case of it that these data cannot distinguish from it."""
     best = min(significant, key=lambda judged_fault: float(judged_fault.errors.sum()))
     for candidate in significant:
-        if _refines(best, candidate) and _is_inseparable(best, candidate, comparison):
+        if _is_finer(best, candidate) and _is_inseparable(best, candidate, comparison):
             return candidate
     return best
 
 
-def _find_objection(fault: JudgedFault, differ: bool) -> str:
-    """Reason not to name a fault; empty if it passes all tests. differ: whether the clean and the faulty set differ by
-    more than stretches of a single set do. If not, the fault must gain about equally in all blocks, which excludes slow
-    changes during a recording."""
+def _find_objection(fault: JudgedFault, sets_differ: bool) -> str:
+    """Reason not to name a fault; empty if it passes all tests. sets_differ: whether the clean and the faulty set
+    differ by more than stretches of a single set do. If not, the fault must gain about equally in all blocks, which
+    excludes slow changes during a recording."""
     if fault.gain < LEAST_FAULT_GAIN or fault.gain_low <= 0:
         return "its gain is not larger than its variation between stretches of the recordings"
     is_steady = fault.gain_low >= FAULT_STEADY * fault.gain and not fault.fault.varies
-    if not differ and not is_steady:
+    if not sets_differ and not is_steady:
         return "stretches of one set differ as much as the sets do"
     if fault.gain <= FAULT_BEYOND * fault.control_gain:
         return (
             f"its gain between stretches of one set is {fault.control_gain:.2g} already, and {fault.gain:.2g} between "
             "the two sets"
         )
-    main = next(iter(fault.values))
-    if abs(_distance_from_none(fault, main)) <= T_BOUND * fault.spread[main]:
+    main_parameter = next(iter(fault.values))
+    if abs(_compute_distance_from_no_fault(fault, main_parameter)) <= T_QUANTILE * fault.spread[main_parameter]:
         return "the confidence interval of its parameter includes the value without the fault"
     return ""
 
 
-def _distance_from_none(fault: JudgedFault, name: str) -> float:
+def _compute_distance_from_no_fault(fault: JudgedFault, name: str) -> float:
     """Distance of a parameter from its value without a fault: 1 for a gain, else 0."""
     return fault.values[name] - (1.0 if name == "gain" else 0.0)
 
@@ -158,7 +157,7 @@ def _is_inseparable(best: JudgedFault, rival: JudgedFault, comparison: Compariso
     excess_errors = rival.errors - best.errors
     draws = draw_bootstrap_blocks(len(excess_errors))
     return bool(
-        excess_errors.sum() <= _least_gap(best, comparison)
+        excess_errors.sum() <= _get_least_gap(best, comparison)
         or np.quantile(excess_errors[draws].sum(axis=1), BOOTSTRAP_LEVEL) <= 0
     )
 
@@ -172,12 +171,12 @@ def _is_significantly_better(refinement: JudgedFault, best: JudgedFault) -> bool
     )
 
 
-def _compute_gap(rival: JudgedFault, best: JudgedFault) -> float:
-    """Sum of squares of another fault minus that of the best."""
+def _get_gap(rival: JudgedFault, best: JudgedFault) -> float:
+    """Sum of squared errors with `rival` undone, minus that with the best undone."""
     return float((rival.errors - best.errors).sum())
 
 
-def _least_gap(best: JudgedFault, comparison: Comparison) -> float:
+def _get_least_gap(best: JudgedFault, comparison: Comparison) -> float:
     """Least difference between a rival's error and that of the best, as sums of squares, at which both are
     distinguished: a share of the reduction by the best, or of its remaining error, the smaller of both."""
     remaining_error = float(best.errors.sum())
@@ -189,7 +188,7 @@ def _least_gap(best: JudgedFault, comparison: Comparison) -> float:
 def _estimate_probability_of_best(best: JudgedFault, rivals: Sequence[JudgedFault]) -> float:
     """Share of bootstrap draws over blocks in which no rival has a smaller error than the best."""
     draws = draw_bootstrap_blocks(len(best.errors))
-    is_first = np.ones(BOOTSTRAP_DRAWS, dtype=np.bool_)
+    is_best = np.ones(BOOTSTRAP_DRAWS, dtype=np.bool_)
     for rival in rivals:
-        is_first &= (rival.errors - best.errors)[draws].sum(axis=1) >= 0
-    return float(is_first.mean())
+        is_best &= (rival.errors - best.errors)[draws].sum(axis=1) >= 0
+    return float(is_best.mean())

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.balance.law import Law, scales_of
+from analysis.diagnosis.balance.law import Law, measure_scales
 from analysis.diagnosis.balance.laws import find_likely_pitches, make_cogging_law, make_laws
 from analysis.diagnosis.balance.motion import Motion, compute_motions, filter_band_pass
 from analysis.diagnosis.balance.regression import Regression, build_regression, keep_laws
@@ -72,7 +72,7 @@ class ForceBase:
 def build_force_base(motions: Sequence[Motion], axis: int, rotational: bool) -> ForceBase:
     """Build the base model of one axis: select laws first among the general laws, then with cogging at the pitches that
     the residual force shows. motions: of the compared recordings; all known samples are fitted to."""
-    scales = [scales_of(motions, channel, rotational) for channel in range(len(motions[0].channels))]
+    scales = [measure_scales(motions, channel, rotational) for channel in range(len(motions[0].channels))]
     turns = any(scale.turns for scale in scales)
     regression = build_regression(motions, axis, list(make_laws(motions, rotational)), turns)
     residuals = regression.compute_residuals(regression.select_columns(_select_laws(regression)))

@@ -16,7 +16,7 @@ from analysis.diagnosis.contrast.fault import ClockRate
 from analysis.diagnosis.contrast.joint_products import solve_residual_weights
 from analysis.diagnosis.contrast.sensor_base import SensorBase
 from analysis.diagnosis.settings import CLOCK_FASTEST, CONTRAST_BLOCKS, LATE_STEP
-from equalizer.effects.starts.response_starts import lateness
+from equalizer.effects.starts.response_starts import estimate_lag
 from equalizer.signals.signal import FloatArray
 
 
@@ -73,7 +73,7 @@ def _estimate_delay_rows(compared: ComparedBase) -> float:
     max_lag = len(contributions) // 4
     if max_lag < 1:
         return 0.0
-    delay = lateness(contributions[:, [0]], contributions[:, [1]], max_lag)
+    delay = estimate_lag(contributions[:, [0]], contributions[:, [1]], max_lag)
     return delay if 1 <= delay < max_lag else 0.0
 
 

@@ -6,7 +6,7 @@ With q the position from the middle of the travel, v the velocity, a the acceler
     added_mass             m a               hardening_stiffness    k3 q^3
     viscous_damping        d v               coulomb_friction       F sigma
     quadratic_damping      c v |v|           asymmetric_friction    F+ max(sigma, 0) + F- min(sigma, 0)
-    added_stiffness        k q               presliding_hysteresis  F z (Dahl's law, `bristle_bend`)
+    added_stiffness        k q               presliding_hysteresis  F z (Dahl's law, `compute_bristle_deflection`)
     end_stop               k max(|q| - q0, 0) sgn q                cogging   A sin(2 pi q / pitch + phase)
 """
 
@@ -20,7 +20,7 @@ from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.contrast.fault import Fault, ParametersOf, Undo, Variant, proportional_parameter
 from analysis.diagnosis.contrast.part import Part
-from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
+from equalizer.effects.simulation.dry_friction_kernel import compute_bristle_deflection
 from equalizer.signals.signal import FloatArray
 
 Shape = Callable[[Motion], FloatArray]
@@ -150,7 +150,9 @@ def _make_presliding_variant(axis: _Axis, distance: float) -> Variant:
     """Dahl's friction with the presliding distance `distance` (m or rad)."""
     parameters_of: ParametersOf = lambda s: {"level": float(s[0]), "stiffness": float(s[0]) / distance}  # noqa: E731
     return Variant(
-        (axis.subtract(lambda m: bristle_bend(m.position[:, axis.channel], distance)),), parameters_of, lower_bound=0.0
+        (axis.subtract(lambda m: compute_bristle_deflection(m.position[:, axis.channel], distance)),),
+        parameters_of,
+        lower_bound=0.0,
     )
 
 

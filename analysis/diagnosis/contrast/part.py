@@ -1,4 +1,7 @@
-"""Parts of recordings without long gaps, as arrays in which a fault can be undone by replacing samples (`fault`)."""
+"""Parts of recordings without long gaps, as arrays in which a fault can be undone by replacing samples (`fault`).
+
+`rank_faults` and `compare_with_reference` split the faulty and the clean recordings into parts.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +28,7 @@ class Part:
     response: FloatArray
     """(n, p): responses, in SI units."""
     position: FloatArray | None
-    """(n, d): measured positions; None where there are none."""
+    """(n, d): measured positions, in SI units; None where none were measured."""
     known: Mask
     """(n,): samples of response and position that were recorded, not interpolated."""
     start: int
@@ -61,21 +64,25 @@ def split_into_parts(recordings: Sequence[Recording]) -> tuple[Part, ...]:
     parts: list[Part] = []
     for recording in recordings:
         for start, stop in find_parts(recording):
-            first = max(start, len(recording) - PART_MOST_SAMPLES)
-            if first >= stop:
+            first_used = max(start, len(recording) - PART_MOST_SAMPLES)
+            if first_used >= stop:
                 continue
-            known_indices = np.flatnonzero(_finite_samples(cut_part(recording, first, stop)))
+            known_indices = np.flatnonzero(_mask_finite_samples(cut_part(recording, first_used, stop)))
             if len(known_indices) and known_indices[-1] - known_indices[0] + 1 >= PART_LEAST_SAMPLES:
-                parts.append(_fill_part(recording, first + int(known_indices[0]), first + int(known_indices[-1]) + 1))
+                parts.append(
+                    _fill_part(recording, first_used + int(known_indices[0]), first_used + int(known_indices[-1]) + 1)
+                )
     return tuple(parts)
 
 
-def _finite_samples(part: Recording) -> Mask:
+def _mask_finite_samples(part: Recording) -> Mask:
+    """(n,): samples at which all channels of response and position were recorded."""
     signals = [part.response.samples, *([] if part.position is None else [part.position.samples])]
     return np.asarray(np.isfinite(np.hstack(signals)).all(axis=1), dtype=np.bool_)
 
 
 def _fill_part(recording: Recording, start: int, stop: int) -> Part:
+    """The samples from `start` to before `stop`, with missing ones interpolated (`fill_gaps`)."""
     part = cut_part(recording, start, stop)
     position = None if part.position is None else fill_gaps(part.position.samples)
     return Part(
@@ -83,11 +90,12 @@ def _fill_part(recording: Recording, start: int, stop: int) -> Part:
         fill_gaps(part.command.samples),
         fill_gaps(part.response.samples),
         position,
-        _finite_samples(part),
+        _mask_finite_samples(part),
         start,
         len(recording),
     )
 
 
 def _replace_samples(signal: Signal | None, samples: FloatArray | None) -> Signal | None:
+    """The signal with these samples; None where either is None."""
     return None if signal is None or samples is None else replace(signal, samples=samples)

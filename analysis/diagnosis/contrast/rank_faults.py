@@ -10,7 +10,7 @@ No real device repeats itself exactly, and a fault with free parameters gains a 
 the same gain is computed between stretches of one set, where no fault can have appeared; E(f) is raised by the median
 of these gains. A confidence bound of the corrected gain comes from resampling blocks (bootstrap), standard errors of a
 fault's values from leaving out groups of blocks in turn (delete-a-group jackknife; Efron and Tibshirani, An
-Introduction to the Bootstrap, 1993, chapter 11).
+Introduction to the Bootstrap, 1993, chapter 11). Called by `compare_with_reference`; `decide` names a fault.
 """
 
 from collections.abc import Iterator, Sequence
@@ -75,9 +75,9 @@ def rank_faults(
     for bases, motions in bases_of(*sides):
         with suppress(np.linalg.LinAlgError, ValueError):
             compared_bases, faults = _prepare_bases(*sides, bases, motions)
-            trial = try_faults(compared_bases, [fault for fault in faults if fault.effect not in excluded], time_left)
-            if not isinstance(bases[0], ForceBase) or _do_forces_balance(compared_bases, trial.tried):
-                return _judge_faults(compared_bases, trial)
+            trials = try_faults(compared_bases, [fault for fault in faults if fault.effect not in excluded], time_left)
+            if not isinstance(bases[0], ForceBase) or _are_forces_balanced(compared_bases, trials.tried):
+                return _judge_faults(compared_bases, trials)
     return None
 
 
@@ -115,14 +115,14 @@ def _prepare_bases(
     return compared_bases, faults
 
 
-def _judge_faults(compared_bases: Sequence[ComparedBase], trial: TriedFaults) -> Comparison:
+def _judge_faults(compared_bases: Sequence[ComparedBase], trials: TriedFaults) -> Comparison:
     """All tried faults with their gains, the smallest error first, and the errors with no fault undone."""
-    unchanged_pairs = trial.unchanged_pairs
+    unchanged_pairs = trials.unchanged_pairs
     baseline_fit = fit_sizes(unchanged_pairs, None)
-    faulty_samples = sum(compared.faulty.count for compared in compared_bases)
-    samples = faulty_samples + sum(compared.clean.count for compared in compared_bases)
+    faulty_sample_count = sum(compared.faulty.count for compared in compared_bases)
+    sample_count = faulty_sample_count + sum(compared.clean.count for compared in compared_bases)
     judged_faults = sorted(
-        (_judge_fault(compared_bases, tried_variant, baseline_fit, samples) for tried_variant in trial.tried),
+        (_judge_fault(compared_bases, tried_variant, baseline_fit, sample_count) for tried_variant in trials.tried),
         key=lambda judged_fault: float(judged_fault.errors.sum()),
     )
     folds = zip(SIXTHS, _leave_out_sixths(unchanged_pairs), strict=True)
@@ -131,35 +131,35 @@ def _judge_faults(compared_bases: Sequence[ComparedBase], trial: TriedFaults) ->
     control_excesses = [
         max(_yield_control_excesses([np.array(products) for products in side])) for side in (clean, faulty)
     ]
-    first = compared_bases[0]
+    first_base = compared_bases[0]
     return Comparison(
         faults=tuple(judged_faults),
         errors=baseline_fit.errors,
-        samples=samples,
-        faulty_samples=faulty_samples,
+        samples=sample_count,
+        faulty_samples=faulty_sample_count,
         held_out_squares=held_out_squares,
-        faulty_share=min(compute_unexplained_share(first.base, first.faulty.parts), 1.0),
+        faulty_share=min(compute_unexplained_share(first_base.base, first_base.faulty.parts), 1.0),
         control_excess=max(control_excesses),
         clean_control_excess=control_excesses[0],
-        by_force=isinstance(first.base, ForceBase),
-        step_s=first.row_s,
-        complete=trial.complete,
+        by_force=isinstance(first_base.base, ForceBase),
+        step_s=first_base.row_s,
+        complete=trials.complete,
     )
 
 
-def _do_forces_balance(compared_bases: Sequence[ComparedBase], trials: Sequence[TriedVariant]) -> bool:
+def _are_forces_balanced(compared_bases: Sequence[ComparedBase], trials: Sequence[TriedVariant]) -> bool:
     """Whether the force balances fit the faulty set, either with no fault or with the best fault undone. trials: the
     best first."""
-    axes = [compared for compared in compared_bases if isinstance(compared.base, ForceBase)]
+    force_bases = [compared for compared in compared_bases if isinstance(compared.base, ForceBase)]
     if all(
         compute_unexplained_share_of_rows(axis_base.base, axis_base.faulty.rows, axis_base.faulty.masks) < BALANCE_HOLDS
-        for axis_base in axes
+        for axis_base in force_bases
     ):
         return True
     return any(
         all(
             compute_unexplained_share_of_rows(axis_base.base, *_undo_fault(axis_base, best_variant)) < BALANCE_HOLDS
-            for axis_base in axes
+            for axis_base in force_bases
         )
         for best_variant in trials[:1]
     )
@@ -172,7 +172,8 @@ def _undo_fault(compared: ComparedBase, tried_variant: TriedVariant) -> tuple[li
     rows, masks = list(compared.faulty.rows), list(compared.faulty.masks)
     for k, (unchanged_rows, mask) in enumerate(zip(compared.faulty.rows, compared.faulty.masks, strict=True)):
         rows[k] = unchanged_rows + sum(
-            size * (undone.rows[k] - unchanged_rows) for size, undone in zip(fit.sizes, undone_rows, strict=True)
+            fitted_size * (undone.rows[k] - unchanged_rows)
+            for fitted_size, undone in zip(fit.sizes, undone_rows, strict=True)
         )
         masks[k] = mask & ~np.any([undone.lost[k] for undone in undone_rows if undone.lost], axis=0)
     return rows, masks
@@ -182,67 +183,69 @@ def _yield_control_excesses(sides: Sequence[FloatArray]) -> Iterator[float]:
     """Relative excess error within one set: for each division into two stretches, the error of a single fit to both
     over the sum of separate fits, less 1. sides: per base, the set's products (blocks, k, k)."""
 
-    def error(blocks: Sequence[int]) -> float:
-        return sum(compute_own_fit_error(side[list(blocks)].sum(axis=0)) for side in sides)
+    def sum_errors(blocks: Sequence[int]) -> float:
+        return sum(compute_own_fit_error(products[list(blocks)].sum(axis=0)) for products in sides)
 
-    joint_error = error(ALL_BLOCKS)
+    joint_error = sum_errors(ALL_BLOCKS)
     for stretch in CONTROL_STRETCHES:
-        separate = error(stretch) + error([block for block in ALL_BLOCKS if block not in stretch])
-        yield joint_error / max(separate, 1e-300) - 1
+        separate_error = sum_errors(stretch) + sum_errors([block for block in ALL_BLOCKS if block not in stretch])
+        yield joint_error / max(separate_error, 1e-300) - 1
 
 
 def _judge_fault(
-    compared_bases: Sequence[ComparedBase], tried_variant: TriedVariant, baseline_fit: Fit, samples: int
+    compared_bases: Sequence[ComparedBase], tried_variant: TriedVariant, baseline_fit: Fit, sample_count: int
 ) -> JudgedFault:
     """The fault with its values and their standard errors, its gain, and the gains of the negative control.
-    baseline_fit: the fit with no fault undone. samples: number in both sets, over all bases."""
+    baseline_fit: the fit with no fault undone. sample_count: in both sets, over all bases."""
     fit, fault, variant, pairs = tried_variant
     folds = _leave_out_sixths(pairs)
-    fits = [fit_sizes(fold_pairs, variant) for fold_pairs in folds]
+    fold_fits = [fit_sizes(fold_pairs, variant) for fold_pairs in folds]
     # Errors count at the size that was accepted; only the standard errors need the free size of a timing fault.
-    allowed = restrict_sizes(variant)
-    allowed_fits = [fit_sizes(fold_pairs, allowed) for fold_pairs in folds] if variant.exact else fits
+    allowed_variant = restrict_sizes(variant)
+    allowed_fits = [fit_sizes(fold_pairs, allowed_variant) for fold_pairs in folds] if variant.exact else fold_fits
     held_out_squares = sum(
         compute_held_out_error(fold_pairs, fold_fit.sizes, left_out)
         for left_out, fold_pairs, fold_fit in zip(SIXTHS, folds, allowed_fits, strict=True)
     )
     # The negative control takes long, and a fault with hardly any gain needs none.
-    gains = (
-        list(_yield_control_gains(compared_bases, fault, allowed, fit.sizes))
+    control_gains = (
+        list(_yield_control_gains(compared_bases, fault, allowed_variant, fit.sizes))
         if baseline_fit.error > (1 + LEAST_FAULT_GAIN) * fit.error
         else [0.0]
     )
-    median_control_gain = max(float(np.median(gains)), 0.0)
+    median_control_gain = max(float(np.median(control_gains)), 0.0)
     errors = fit.errors * (1 + median_control_gain)
     draws = draw_bootstrap_blocks(len(errors))
     drawn_gains = baseline_fit.errors[draws].sum(axis=1) / np.maximum(errors[draws].sum(axis=1), 1e-300) - 1
     # With a separate base for each set, errors are white with rms 1: their sum of squares is the number of samples.
-    error, excess = float(errors.sum()), baseline_fit.error - samples
+    corrected_error, excess = float(errors.sum()), baseline_fit.error - sample_count
     return JudgedFault(
         fault=fault,
         values=variant.parameters_of(fit.sizes),
-        spread=_standard_errors(variant, [fold.sizes for fold in fits], _fit_without_clean_sixths(pairs, variant)),
+        spread=_estimate_standard_errors(
+            variant, [fold.sizes for fold in fold_fits], _fit_without_clean_sixths(pairs, variant)
+        ),
         errors=errors,
-        gain=baseline_fit.error / max(error, 1e-300) - 1,
-        control_gain=max([0.0, *gains]) - median_control_gain,
-        share=(baseline_fit.error - error) / excess if excess > 0 else 0.0,
+        gain=baseline_fit.error / max(corrected_error, 1e-300) - 1,
+        control_gain=max([0.0, *control_gains]) - median_control_gain,
+        share=(baseline_fit.error - corrected_error) / excess if excess > 0 else 0.0,
         held_out_squares=held_out_squares,
         gain_low=float(np.quantile(drawn_gains, BOOTSTRAP_LEVEL)),
         control_excess=max(_yield_control_excesses([pair.undone.undo_sizes(fit.sizes) for pair in pairs])),
     )
 
 
-def _standard_errors(
+def _estimate_standard_errors(
     variant: Variant, without_faulty: Sequence[FloatArray], without_clean: Sequence[FloatArray]
 ) -> dict[str, float]:
     """Standard error of each value of a fault: root of the sum of the jackknife variances of both sets, from the sizes
     with each sixth left out, and of the squared error due to the spacing of the variants."""
-    sets = [[variant.parameters_of(sizes) for sizes in fold_sizes] for fold_sizes in (without_faulty, without_clean)]
+    sides = [[variant.parameters_of(sizes) for sizes in fold_sizes] for fold_sizes in (without_faulty, without_clean)]
     return {
         name: float(
-            np.sqrt(variant.grid_error**2 + sum(_jackknife_variance([fold[name] for fold in side]) for side in sets))
+            np.sqrt(variant.grid_error**2 + sum(_estimate_variance([fold[name] for fold in side]) for side in sides))
         )
-        for name in sets[0][0]
+        for name in sides[0][0]
     }
 
 
@@ -258,7 +261,7 @@ def _fit_without_clean_sixths(pairs: Sequence[Pair], variant: Variant) -> list[F
     return [fit_sizes(fold, variant).sizes for fold in folds]
 
 
-def _jackknife_variance(values: Sequence[float]) -> float:
+def _estimate_variance(values: Sequence[float]) -> float:
     """Jackknife variance of a number, from its g values with each of g groups left out: (g - 1) / g times the sum of
     their squared deviations."""
     return float((len(values) - 1) * np.var(values))

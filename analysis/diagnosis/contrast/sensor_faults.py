@@ -38,7 +38,7 @@ from analysis.diagnosis.contrast.fault import (
 from analysis.diagnosis.contrast.interpolation import noise_gain, resample, shift_samples
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.settings import CLOCK_FASTEST, REVERSAL_OF_GAP
-from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
+from equalizer.effects.simulation.dry_friction_kernel import compute_bristle_deflection
 from equalizer.signals.signal import FloatArray
 
 ReadingChange = Callable[[FloatArray, float], FloatArray]
@@ -160,7 +160,7 @@ def _undo_play(y: FloatArray, gap: float) -> FloatArray:
     """Estimate (n,): the motion that drives a reading y (n,) through a backlash. It leads the reading by half the gap,
     reverses at an extreme of the reading, and has crossed the gap when the reading reverses. In between, the lead
     changes with the square of time."""
-    direction = np.sign(bristle_bend(y, REVERSAL_OF_GAP * gap))
+    direction = np.sign(compute_bristle_deflection(y, REVERSAL_OF_GAP * gap))
     lead = 0.5 * direction
     reversals = np.flatnonzero(direction[1:] * direction[:-1] < 0) + 1
     for start, reversal in pairwise([0, *reversals.tolist()]):

@@ -18,7 +18,7 @@ from analysis.diagnosis.settings import (
     NOISE_STRETCHES,
     STEP_FACTOR,
 )
-from equalizer.effects.starts.lattice import confirm_lattice_step, lattice_step
+from equalizer.effects.starts.lattice import confirm_lattice_step, find_lattice_step
 from equalizer.plant.effect_vocabulary import Place
 from equalizer.signals.signal import FloatArray
 
@@ -85,7 +85,7 @@ def find_quantization(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFa
         faulty_values, clean_values = (
             np.concatenate([part.command[:, channel] for part in parts]) for parts in (faulty, clean)
         )
-        step = lattice_step(faulty_values)
+        step = find_lattice_step(faulty_values)
         has_many_values = len(np.unique(clean_values)) > 2 * len(np.unique(faulty_values))
         if has_many_values and step is not None and step > STEP_FACTOR * confirm_lattice_step(clean_values, step):
             return SignalFault("force_quantization", "actuator", (channel,), {"step": step})

@@ -5,6 +5,7 @@ parameters (such as a corner frequency) and an unknown size s. Undoing it change
 column: exactly where the fault is linear in s, and to first order otherwise. The size is found by least squares,
 jointly with the parameters of the intact device (`joint_products`). Where undoing is not linear, the fault is
 linearised again about the size that was found: a Gauss-Newton iteration, which keeps the size with the smallest error.
+Called by `rank_faults`.
 """
 
 from collections.abc import Sequence
@@ -19,7 +20,7 @@ from analysis.diagnosis.types import TimeBudget
 
 ALL_BLOCKS = tuple(range(CONTRAST_BLOCKS))
 """Numbers of all blocks into which the samples are divided for cross-validation."""
-VARIANTS_APPROACHED = 3
+RELINEARISED_VARIANTS = 3
 """Of a fault that is valid at size 1 only: number of its variants that are linearised again, besides the best of all
 sizes. Chosen by hand; each takes as long as a first try."""
 
@@ -50,7 +51,7 @@ class TriedFaults:
 def try_faults(compared_bases: Sequence[ComparedBase], faults: Sequence[Fault], time_left: TimeBudget) -> TriedFaults:
     """Try the faults in order, each on all bases together, until the time runs out. Faults of which no variant is
     well-conditioned are left out."""
-    clean = [compared.compute_grams(compared.clean, []).blocks for compared in compared_bases]
+    clean_blocks_by_base = [compared.compute_grams(compared.clean, []).blocks for compared in compared_bases]
     unchanged_pairs = [
         Pair(
             compared.compute_grams(compared.faulty, []),
@@ -58,10 +59,10 @@ def try_faults(compared_bases: Sequence[ComparedBase], faults: Sequence[Fault], 
             tuple(clean_blocks),
             (compared.clean.scale / compared.faulty.scale) ** 2,
         )
-        for compared, clean_blocks in zip(compared_bases, clean, strict=True)
+        for compared, clean_blocks in zip(compared_bases, clean_blocks_by_base, strict=True)
     ]
-    best: list[TriedVariant] = []
-    complete = False
+    best_variants: list[TriedVariant] = []
+    is_complete = False
     for fault in faults:
         if not time_left():
             break
@@ -71,10 +72,10 @@ def try_faults(compared_bases: Sequence[ComparedBase], faults: Sequence[Fault], 
             if (trial := _try_variant(unchanged_pairs, compared_bases, fault, variant))
         ]
         if trials:
-            best.append(_best_of(trials, unchanged_pairs, compared_bases))
+            best_variants.append(_choose_best_variant(trials, unchanged_pairs, compared_bases))
     else:
-        complete = True
-    return TriedFaults(unchanged_pairs, sorted(best, key=_error_of), complete)
+        is_complete = True
+    return TriedFaults(unchanged_pairs, sorted(best_variants, key=_get_error), is_complete)
 
 
 def _try_variant(
@@ -91,26 +92,30 @@ def _try_variant(
         )
         for compared, pair in zip(compared_bases, unchanged_pairs, strict=True)
     ]
-    well_conditioned = all(pair.undone.is_well_conditioned(variant) for pair in pairs)
-    return TriedVariant(fit_sizes(pairs, variant), fault, variant, pairs) if well_conditioned else None
+    is_well_conditioned = all(pair.undone.is_well_conditioned(variant) for pair in pairs)
+    return TriedVariant(fit_sizes(pairs, variant), fault, variant, pairs) if is_well_conditioned else None
 
 
-def _error_of(trial: TriedVariant) -> float:
-    """Sum of squared errors with the fault undone; a sort key."""
+def _get_error(trial: TriedVariant) -> float:
+    """Get the sum of squared errors with the fault undone; a sort key."""
     return trial.fit.error
 
 
-def _best_of(
+def _choose_best_variant(
     trials: Sequence[TriedVariant], unchanged_pairs: Sequence[Pair], compared_bases: Sequence[ComparedBase]
 ) -> TriedVariant:
     """The variant with the smallest error, after linearisation about its size. Of a fault that is valid at size 1 only
     (`Variant.exact`), several are compared at size 1: at another size, a wrong variant may have the smallest error."""
-    first = min(trials, key=_error_of)
-    if not first.variant.exact:
-        return _iterate_linearisation(first, unchanged_pairs, compared_bases)
-    at_size_1 = sorted(trials, key=lambda trial: _error_of(_fit_allowed_size(trial)))[:VARIANTS_APPROACHED]
+    best_at_any_size = min(trials, key=_get_error)
+    if not best_at_any_size.variant.exact:
+        return _iterate_linearisation(best_at_any_size, unchanged_pairs, compared_bases)
+    best_at_size_1 = sorted(trials, key=lambda trial: _get_error(_fit_allowed_size(trial)))[:RELINEARISED_VARIANTS]
     return min(
-        (_iterate_linearisation(trial, unchanged_pairs, compared_bases) for trial in (first, *at_size_1)), key=_error_of
+        (
+            _iterate_linearisation(trial, unchanged_pairs, compared_bases)
+            for trial in (best_at_any_size, *best_at_size_1)
+        ),
+        key=_get_error,
     )
 
 
@@ -118,7 +123,8 @@ def _iterate_linearisation(
     current: TriedVariant, unchanged_pairs: Sequence[Pair], compared_bases: Sequence[ComparedBase]
 ) -> TriedVariant:
     """The best fit of at most `UNDOING_ROUNDS` Gauss-Newton iterations. Each linearises the fault about the size that
-    the last iteration found, until that size changes by a share of less than `SIZE_IS_NEAR`."""
+    the last iteration found. They end where that size changes by a share of less than `SIZE_IS_NEAR`, where undoing is
+    linear or ill-conditioned, and, unless only size 1 is valid, where the error no longer falls."""
     best = _fit_allowed_size(current)
     for _ in range(UNDOING_ROUNDS):
         fit, fault, variant, _ = current
@@ -128,7 +134,7 @@ def _iterate_linearisation(
         if relinearised is None:
             break
         current, previous_best = relinearised, best
-        best = min(best, _fit_allowed_size(current), key=_error_of)
+        best = min(best, _fit_allowed_size(current), key=_get_error)
         if best is previous_best and not variant.exact:
             break
     return best

@@ -1,7 +1,8 @@
 """Tests whether a recording was made in closed loop: commands depend on the responses (controller, virtual spring).
 
 Where the excitation was recorded, its difference from the command shows the feedback. Otherwise the test is that of
-Granger (1969): whether past responses improve the prediction of the command from its own past.
+Granger (Econometrica 37 (1969), 424): whether past responses improve the prediction of the command from its own past.
+The choice of error measures and of first models uses the result.
 """
 
 import numpy as np
@@ -11,18 +12,19 @@ from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray
 
 PAST_SAMPLES = 6
-"""Number of past samples of each signal from which the command is predicted. By hand."""
+"""Number of past samples of each signal from which the command is predicted. Set by hand."""
 _LEAST_SAMPLES = 200
-"""Fewest known samples for the test."""
+"""Fewest rows with all samples known; with fewer, the test is not made and the loop counts as open."""
 
 
 def is_in_closed_loop(recording: Recording) -> bool:
     """Whether the recording was made under feedback: by the difference of command and recorded excitation, else by
-    whether the responses up to each sample help to predict the command that is written just after (Granger 1969)."""
+    whether the responses up to each sample help to predict the command that is written just after (Granger 1969).
+    Without excitation, False for other holds than zero-order: a command may then depend on the sample after it."""
     command = recording.command.samples
     if recording.excitation is not None:
         feedback = command - recording.excitation.samples
-        return bool(_rms(feedback) > FED_BACK_SHARE * _rms(command))
+        return bool(_compute_rms(feedback) > FED_BACK_SHARE * _compute_rms(command))
     if recording.hold is not Hold.ZERO_ORDER:
         # The command written just before a sample may already depend on the sample after it.
         return False
@@ -31,7 +33,7 @@ def is_in_closed_loop(recording: Recording) -> bool:
 
 def _is_predicted_by_responses(command: FloatArray, recording: Recording) -> bool:
     """Whether past responses improve the prediction of the command from its own past: Granger causality, by the ratio
-    of the rms residuals of two autoregressions."""
+    of the rms residuals of two autoregressions. command: (n,), of one axis."""
     signals = [recording.response.samples]
     if recording.position is not None:
         signals.append(recording.position.samples)
@@ -44,14 +46,14 @@ def _is_predicted_by_responses(command: FloatArray, recording: Recording) -> boo
     own_past = np.column_stack([command[rows - lag] for lag in range(1, PAST_SAMPLES + 1)] + [np.ones(len(rows))])
     response_past = np.column_stack([measured[rows - lag] for lag in range(PAST_SAMPLES)])
     own_past_rms, full_rms = (
-        _residual_rms(command[rows], own_past),
-        _residual_rms(command[rows], np.hstack([own_past, response_past])),
+        _compute_residual_rms(command[rows], own_past),
+        _compute_residual_rms(command[rows], np.hstack([own_past, response_past])),
     )
     # A smooth command is predicted by its own past alone, so that the test has no power.
-    return bool(own_past_rms > 1e-6 * _rms(command[:, None]) and full_rms < PREDICTED_SHARE * own_past_rms)
+    return bool(own_past_rms > 1e-6 * _compute_rms(command[:, None]) and full_rms < PREDICTED_SHARE * own_past_rms)
 
 
-def _residual_rms(target: FloatArray, regressors: FloatArray) -> float:
+def _compute_residual_rms(target: FloatArray, regressors: FloatArray) -> float:
     """Rms residual of the least-squares fit of `target` (n,) by the columns of `regressors` (n, k)."""
     scale = np.linalg.norm(regressors, axis=0)
     columns = regressors / np.where(scale > 0, scale, 1.0)
@@ -59,5 +61,6 @@ def _residual_rms(target: FloatArray, regressors: FloatArray) -> float:
     return float(np.sqrt(np.mean((target - columns @ coefficients) ** 2)))
 
 
-def _rms(samples: FloatArray) -> float:
+def _compute_rms(samples: FloatArray) -> float:
+    """Root mean square over all samples and channels, about zero."""
     return float(np.sqrt(np.mean(samples**2)))

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.data.observed_parts import MOST_PERIODS, find_parts
-from analysis.diagnosis.noise.rounding import rounding_step
+from analysis.diagnosis.noise.rounding import find_rounding_step
 from analysis.wording import conjoin
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
@@ -132,7 +132,7 @@ def _is_exact_repeat(later_period: FloatArray, earlier_period: FloatArray) -> bo
         difference = np.abs(later_column - earlier_column)
         if difference.max() <= EXACT_TOLERANCE * np.abs(later_column).max():
             continue
-        step = rounding_step(later_column)
+        step = find_rounding_step(later_column)
         if difference.max() > 1.5 * step or np.sqrt(np.mean(difference**2)) > ROUNDED_TOLERANCE * np.std(later_column):
             return False
     return True

@@ -10,7 +10,7 @@ import numpy as np
 
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
-from equalizer.signals.unit_system import FORCES, system_of
+from equalizer.signals.unit_system import FORCE_UNITS, determine_unit_system
 
 CONVERTED = {"m": ("force", "N"), "rad": ("torque", "N m")}
 """Quantity and unit of the converted command, by the motion's unit."""
@@ -24,12 +24,15 @@ def with_force_constant(recording: Recording, constants: Sequence[float]) -> tup
     """The recording with its commands as forces, and a sentence about it. constants: a single value for all commands or
     a value for each, in N or N m per unit of the command. Raises NoForceConstant where the motion has no SI unit, a
     command is a force already, or the constants are of a wrong number, zero or not finite."""
-    command, length_unit = recording.command, system_of(recording.command.units, recording.response.units).length
+    command, length_unit = (
+        recording.command,
+        determine_unit_system(recording.command.units, recording.response.units).length,
+    )
     if length_unit not in CONVERTED:
         raise NoForceConstant(
             f"the motion is in {length_unit}: no force constant makes SI of it, so give its unit in the map"
         )
-    if any(unit in FORCES for unit in command.units):
+    if any(unit in FORCE_UNITS for unit in command.units):
         raise NoForceConstant(f"the command is a force already (in {command.units[0]}), so it has no force constant")
     if len(constants) not in (1, len(command.channels)):
         raise NoForceConstant(f"{len(constants)} force constants were given, for {len(command.channels)} commands")

@@ -23,7 +23,7 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit
 from analysis.diagnosis.errors.tuning import Tuning
-from equalizer.effects.discovered_law import axis_names
+from equalizer.effects.discovered_law import derive_axis_letters
 
 _COUPLING_FORMULA = re.compile(rf"p0\*(v?)([{AXES}])")
 """Formula of a force that is linear in the motion of an axis; groups: "v" for velocity or nothing for position, and the
@@ -149,7 +149,7 @@ def can_coupling_imitate(tuning: Tuning, fitted: Fitted, inputs: tuple[str, ...]
 def _find_coupled_laws(fitted: Fitted, inputs: tuple[str, ...]) -> dict[tuple[str, int, int], tuple[int, float]]:
     """Index of the claim and factor of each force that is linear in the motion of an axis, by prefix of the motion ("v"
     or empty), axis of the force and axis of the motion."""
-    names, couplings = axis_names(inputs), {}
+    names, couplings = derive_axis_letters(inputs), {}
     for claim_index, (claim, law) in enumerate(
         zip(fitted.hypothesis.claims, list_fitted_laws(fitted.hypothesis), strict=True)
     ):

@@ -13,7 +13,7 @@ from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import AXES
 from analysis.diagnosis.errors.hypothesis import Hypothesis, combine_hypotheses
 from analysis.diagnosis.errors.law_hypothesis import hypothesis_of_law
-from equalizer.effects.discovered_law import axis_names, has_memory, law_channels, response_signal_names
+from equalizer.effects.discovered_law import collect_channels, derive_axis_letters, has_memory, list_response_signals
 from equalizer.laws.law import Law
 from equalizer.signals.recording import Recording
 
@@ -27,8 +27,8 @@ def convert_sum_to_law(term_sum: Sum, recording: Recording) -> Law:
     """Convert a sum to a law with parameters in SI units: p0 is the first term's factor, followed by that term's own
     parameters, then the factor and parameters of the next term. Signals get the recording's names. A force that depends
     on commands alone and has no memory becomes a law of the command, f + sum, because such a law can be inverted."""
-    channels = law_channels(recording)
-    axis_names_in_law, reading_names = axis_names(channels.inputs), response_signal_names(channels)
+    channels = collect_channels(recording)
+    axis_names_in_law, reading_names = derive_axis_letters(channels.inputs), list_response_signals(channels)
     term_formulas: list[str] = []
     parameters: list[float] = []
     for term, factor in zip(term_sum.terms, term_sum.factors, strict=True):
@@ -42,7 +42,7 @@ def convert_sum_to_law(term_sum: Sum, recording: Recording) -> Law:
 
     formula = _SIGNAL_PATTERN.sub(use_recording_name, " + ".join(term_formulas))
     if term_sum.acts_on == "response":
-        axis_name = axis_names(channels.outputs)[term_sum.axis]
+        axis_name = derive_axis_letters(channels.outputs)[term_sum.axis]
         return Law(f"{reading_names[term_sum.axis]} + {formula}", tuple(parameters), (), "response", axis_name)
     law = Law(formula, tuple(parameters), (), "force", axis_names_in_law[term_sum.axis])
     if all(name.startswith("f") for name in term_sum.variables) and not has_memory(law):

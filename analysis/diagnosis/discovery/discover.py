@@ -21,7 +21,7 @@ from analysis.diagnosis.discovery.grammar import AXES
 from analysis.diagnosis.discovery.matched_filter import View, build_views
 from analysis.diagnosis.discovery.screen_terms import build_normal_equations, cross_validate_terms
 from analysis.diagnosis.discovery.snap_exponents import snap_exponents
-from analysis.diagnosis.discovery.view_terms import view_terms
+from analysis.diagnosis.discovery.view_terms import list_view_terms
 from analysis.diagnosis.errors.hypothesis import remove_claim
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit
 from analysis.diagnosis.search.explain import Explanation
@@ -140,7 +140,7 @@ def _find_next_law(context: SearchContext, base_fit: Fitted, time_left: TimeBudg
     """The next law: sums screened in the views with the largest excess, the best fitted. None where nothing fits."""
     views = build_views(context.measure, context.tuning, base_fit)
     ranked_by_view = [
-        (view, search_best_sums(build_normal_equations(view), view_terms(view), time_left))
+        (view, search_best_sums(build_normal_equations(view), list_view_terms(view), time_left))
         for view in _select_views_to_search(views)
     ]
     candidates = sorted(

@@ -1,7 +1,7 @@
 """Evaluates the formula of a term along the samples of a recording, and collects the signals that formulas may contain.
 
 Formulas without memory are evaluated by NumPy on all samples at once; those with memory, such as delays and filters, by
-the sample-by-sample evaluator of `equalizer.laws`.
+the sample-by-sample evaluator of `equalizer.laws`. Called by `matched_filter`, `fit_sum` and `discover`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -23,8 +23,8 @@ _NUMPY_FUNCTIONS: Mapping[str, Callable[..., FloatArray]] = {
 }  # fmt: skip
 
 
-def columns_of(evidence: Evidence) -> Columns:
-    """Signals (n,) by their names in the grammar, in SI units: position x, velocity vx and command fx of the first
+def name_signals(evidence: Evidence) -> Columns:
+    """Name the signals (n,) as the grammar does, in SI units: position x, velocity vx and command fx of the first
     axis, ax of the first response channel as the model predicts it (free of noise), and so on; time t in s."""
     n, m = evidence.command.shape
     columns = {"t": np.arange(n) / evidence.sample_rate_hz}
@@ -36,23 +36,23 @@ def columns_of(evidence: Evidence) -> Columns:
     return {name: np.ascontiguousarray(column) for name, column in columns.items()}
 
 
-def evaluate_shape(shape: str, numbers: Sequence[float], columns: Columns, rate_hz: float) -> FloatArray:
-    """(n,): the formula `shape` with these parameters; NaN or inf outside its domain. columns: signals by name,
-    (n,)."""
+def evaluate_shape(shape: str, parameters: Sequence[float], columns: Columns, rate_hz: float) -> FloatArray:
+    """(n,): the formula `shape` with these parameters; NaN or inf outside its domain. columns: signals (n,) by name, as
+    from `name_signals`. rate_hz: sample rate, used by formulas with memory."""
     tree = parse_formula(shape, template=True)[0]
     with np.errstate(all="ignore"):
         if any(isinstance(node, Apply) and node.name in MEMORY_OPERATORS for node in iterate_nodes(tree)):
-            return evaluate(Law(shape, tuple(numbers), (), "force", "x"), columns, rate_hz)
-        return np.array(np.broadcast_to(_value(tree, numbers, columns), columns["t"].shape))
+            return evaluate(Law(shape, tuple(parameters), (), "force", "x"), columns, rate_hz)
+        return np.array(np.broadcast_to(_evaluate_node(tree, parameters, columns), columns["t"].shape))
 
 
-def _value(tree: Node, numbers: Sequence[float], columns: Columns) -> FloatArray:
+def _evaluate_node(node: Node, parameters: Sequence[float], columns: Columns) -> FloatArray:
     """Value of a node of the parsed formula, recursively: a scalar, or an array (n,) where it contains a signal."""
-    match tree:
+    match node:
         case Number(value):
             return np.float64(value)  # type: ignore[return-value]
-        case Free(place):
-            return np.float64(numbers[place])  # type: ignore[return-value]
-        case Apply(name, parts):
-            return _NUMPY_FUNCTIONS[name](*(_value(part, numbers, columns) for part in parts))
-    return columns[tree.name] if tree.name != "pi" else np.float64(np.pi)  # type: ignore[return-value]
+        case Free(parameter_index):
+            return np.float64(parameters[parameter_index])  # type: ignore[return-value]
+        case Apply(name, arguments):
+            return _NUMPY_FUNCTIONS[name](*(_evaluate_node(argument, parameters, columns) for argument in arguments))
+    return columns[node.name] if node.name != "pi" else np.float64(np.pi)  # type: ignore[return-value]

@@ -19,7 +19,7 @@ from analysis.diagnosis.discovery.antisymmetric_pairs import (
 )
 from analysis.diagnosis.discovery.convert_sum import convert_sum_to_hypothesis, list_fitted_laws
 from analysis.diagnosis.discovery.fit_sum import Sum
-from analysis.diagnosis.discovery.snap_exponents import is_full_limit
+from analysis.diagnosis.discovery.snap_exponents import is_full_soft_limit
 from analysis.diagnosis.errors.hypothesis import combine_hypotheses
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.search.compare_candidates import refine
@@ -133,7 +133,7 @@ def _count_parameters(pair: tuple[FittedCandidate, Sum]) -> int:
     of a soft limit that is 1."""
     candidate, term_sum = pair
     law = list_fitted_laws(candidate.fitted.hypothesis)[-1]
-    count = 0 if law is None else -int(is_full_limit(law, LAW_NEAR))
+    count = 0 if law is None else -int(is_full_soft_limit(law, LAW_NEAR))
     for term in term_sum.terms:
         simple_exponents = [
             k for k in term.exponents if abs(2 * term.numbers[k] - round(2 * term.numbers[k])) < 2 * LAW_NEAR

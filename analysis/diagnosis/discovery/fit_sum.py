@@ -69,7 +69,7 @@ def compute_term_column(view: View, term: Term) -> FloatArray | None:
         force = evaluate_shape(term.shape, term.numbers, record.columns, record.rate_hz)
         if not np.isfinite(force).all():
             return None
-        filtered_by_record.append(record.column(force, view.output))
+        filtered_by_record.append(record.compute_column(force, view.output))
     return np.concatenate(filtered_by_record)
 
 

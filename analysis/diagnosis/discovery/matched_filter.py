@@ -7,7 +7,7 @@ For each spectral line, with the residuals r of all channels and their frequency
 so that only the part of r that such a force can cause is kept, white noise stays white, and inner products of filtered
 forces equal those of the simulated responses h f. A candidate force then costs two Fourier transforms instead of a
 simulation. Where forces are compared, h is minus the gain of the band's low pass; what is added to a reading is limited
-to the band of the commands and not filtered otherwise.
+to the band of the commands and not filtered otherwise. Called by `discover`.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from analysis.diagnosis.data.observed import Observed
-from analysis.diagnosis.discovery.evaluate_shape import columns_of
+from analysis.diagnosis.discovery.evaluate_shape import name_signals
 from analysis.diagnosis.discovery.grammar import AXES, Columns
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.output_error import DIFFERENCE_STEP, Fitted
@@ -69,30 +69,30 @@ class FilteredRecord:
 
     def filter_forces(self, forces: FloatArray) -> FloatArray:
         """(kept samples, m + p): outputs for the residuals that forces (n, m), N, cause together. A force acts as in
-        `column`."""
-        mean = forces.copy()
-        mean[:-1] = 0.5 * (forces[1:] + forces[:-1])
-        spectrum = rfft(mean, self.length, axis=0)[: len(self.force_response)]
+        `compute_column`."""
+        step_mean = forces.copy()
+        step_mean[:-1] = 0.5 * (forces[1:] + forces[:-1])
+        spectrum = rfft(step_mean, self.length, axis=0)[: len(self.force_response)]
         return self._filter_spectrum(np.einsum("lcm,lm->lc", self.force_response, spectrum))
 
-    def column(self, added: FloatArray, output: int) -> FloatArray:
+    def compute_column(self, added: FloatArray, output: int) -> FloatArray:
         """(kept samples,): output of one filter. added: (n,), a force along its axis, N, or a change of its reading.
         The force between two samples is the mean of both, because the model's commands are held over a step."""
         lines, axes = self.strength.shape
         if output >= axes:
             spectrum = rfft(added, self.length)[:lines] / self.reading_units[output - axes]
         else:
-            mean = added.copy()
-            mean[:-1] = 0.5 * (added[1:] + added[:-1])
-            spectrum = rfft(mean, self.length)[:lines] * self.strength[:, output]
+            step_mean = added.copy()
+            step_mean[:-1] = 0.5 * (added[1:] + added[:-1])
+            spectrum = rfft(step_mean, self.length)[:lines] * self.strength[:, output]
         return self._select_blocks(spectrum[:, None])[:, 0]
 
     def _select_blocks(self, spectrum: ComplexArray) -> FloatArray:
         """(kept samples, outputs): time series of a spectrum (lines, outputs), decimated to its band, in the blocks
         only. Sums of squares are those at the full rate."""
-        count = 2 * (len(spectrum) - 1)
-        filtered = irfft(spectrum, count, axis=0) * np.sqrt(count / self.length)
-        return np.concatenate([filtered[part] for part in self.block_slices])
+        sample_count = 2 * (len(spectrum) - 1)
+        filtered = irfft(spectrum, sample_count, axis=0) * np.sqrt(sample_count / self.length)
+        return np.concatenate([filtered[block] for block in self.block_slices])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,14 +129,14 @@ def build_views(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[
     )
     residual = np.concatenate(
         [
-            filtered.filter_residuals(_zero_missing(record_residuals))
+            filtered.filter_residuals(_set_missing_to_zero(record_residuals))
             for filtered, record_residuals in zip(filtered_records, fitted.residuals, strict=True)
         ]
     )
-    columns = np.array(
+    changes = np.array(
         [
-            _compute_parameter_columns(measure, tuning, fitted, filtered_records, number)
-            for number in range(len(fitted.deviations))
+            _compute_parameter_columns(measure, tuning, fitted, filtered_records, index)
+            for index in range(len(fitted.deviations))
         ]
     )
     edges = _compute_block_edges(filtered_records)
@@ -146,107 +146,108 @@ def build_views(measure: ErrorMeasure, tuning: Tuning, fitted: Fitted) -> tuple[
         acts_on: ActsOn = "force" if output < model.inputs else "response"
         axis = output if output < model.inputs else output - model.inputs
         constant = np.concatenate(
-            [filtered.column(np.ones(len(filtered.missing_force)), output) for filtered in filtered_records]
+            [filtered.compute_column(np.ones(len(filtered.missing_force)), output) for filtered in filtered_records]
         )
-        tuned = np.vstack([columns[:, :, output].reshape(-1, len(residual)), constant])
+        columns = np.vstack([changes[:, :, output].reshape(-1, len(residual)), constant])
         noise = (
             _compute_noise(measure, filtered_records, axis)
             if acts_on == "force"
             else float((measure.noise / measure.unit)[axis] ** 2)
         )
         views.append(
-            View(output, acts_on, axis, filtered_records, residual[:, output], tuned, to_calibration, edges, noise)
+            View(output, acts_on, axis, filtered_records, residual[:, output], columns, to_calibration, edges, noise)
         )
     return tuple(views)
 
 
-def _zero_missing(residuals: FloatArray) -> FloatArray:
+def _set_missing_to_zero(residuals: FloatArray) -> FloatArray:
     """Residuals with 0 where a reading is missing."""
     return np.where(np.isfinite(residuals), residuals, 0.0)
 
 
 def _compute_parameter_columns(
-    measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, filtered_records: Sequence[FilteredRecord], number: int
+    measure: ErrorMeasure, tuning: Tuning, fitted: Fitted, filtered_records: Sequence[FilteredRecord], index: int
 ) -> FloatArray:
-    """(s, m + p): change of all outputs by one standard deviation of one of the model's parameters, by its number. For
+    """(s, m + p): change of all outputs by one standard deviation of one of the model's parameters, by its index. For
     mass, damping and stiffness it is that of their force along the measured motion, exact even for a wrong model; for
     modes, a finite difference of simulations without the hypothesis; 0 where no such model is valid."""
     m = tuning.model.inputs
-    pairs = [(i, j) for i in range(m) for j in range(i, m)]
-    if number < 3 * len(pairs):
+    axis_pairs = [(i, j) for i in range(m) for j in range(i, m)]
+    if index < 3 * len(axis_pairs):
         return np.concatenate(
             [
-                filtered.filter_forces(_compute_parameter_force(filtered, tuning, pairs, number))
+                filtered.filter_forces(_compute_parameter_force(filtered, tuning, axis_pairs, index))
                 for filtered in filtered_records
             ]
         )
     base_residuals = measure.residuals(tuning.tune(fitted.deviations), ())
     for step in (DIFFERENCE_STEP, -DIFFERENCE_STEP):
         shifted_deviations = fitted.deviations.copy()
-        shifted_deviations[number] += step
+        shifted_deviations[index] += step
         try:
             shifted_residuals = measure.residuals(tuning.tune(shifted_deviations), ())
         except (MechanicalModelError, np.linalg.LinAlgError):
             continue
-        change = [
-            filtered.filter_residuals(_zero_missing((base_record - shifted_record) / step))
+        output_changes = [
+            filtered.filter_residuals(_set_missing_to_zero((base_record - shifted_record) / step))
             for filtered, base_record, shifted_record in zip(
                 filtered_records, base_residuals, shifted_residuals, strict=True
             )
         ]
-        return np.concatenate(change)
-    sample_count = sum(part.stop - part.start for filtered in filtered_records for part in filtered.block_slices)
+        return np.concatenate(output_changes)
+    sample_count = sum(block.stop - block.start for filtered in filtered_records for block in filtered.block_slices)
     return np.zeros((sample_count, m + len(filtered_records[0].reading_units)))
 
 
 def _compute_parameter_force(
-    record: FilteredRecord, tuning: Tuning, pairs: Sequence[tuple[int, int]], number: int
+    record: FilteredRecord, tuning: Tuning, axis_pairs: Sequence[tuple[int, int]], parameter_index: int
 ) -> FloatArray:
     """(n, m), N: external force equivalent to one standard deviation more of a mass, damping or stiffness entry."""
-    order, (i, j) = number // len(pairs), pairs[number % len(pairs)]
+    order, (i, j) = parameter_index // len(axis_pairs), axis_pairs[parameter_index % len(axis_pairs)]
     forces = np.zeros_like(record.missing_force)
     for axis, motion_axis in {(i, j), (j, i)}:
         name = AXES[motion_axis]
-        motion = (
+        motion_by_order = (
             np.gradient(record.columns[f"v{name}"]) * record.rate_hz,
             record.columns[f"v{name}"],
             record.columns[name],
         )
-        forces[:, axis] -= tuning.deviation[number] * motion[order]
+        forces[:, axis] -= tuning.deviation[parameter_index] * motion_by_order[order]
     return forces
 
 
 def _filter_record(measure: ErrorMeasure, record: Observed, evidence: Evidence) -> FilteredRecord:
-    """The filters of one record, up to the line below which `LAW_POWER_KEPT` of the commands' power lies."""
+    """The filters of one record, up to a line just above that below which `LAW_POWER_KEPT` of the command power
+    lies."""
     rate_hz, n = evidence.sample_rate_hz, len(evidence.command)
     length = next_fast_len(n + int(_SETTLING_S * rate_hz), real=True)
-    lines = rfftfreq(length, 1 / rate_hz)
-    power = np.cumsum(np.sum(np.abs(rfft(evidence.command, length, axis=0)) ** 2, axis=1))
-    last = int(1.1 * np.searchsorted(power, LAW_POWER_KEPT * power[-1])) + 8
-    last = min(next_fast_len(last, real=True) + 1, len(lines))
-    force_response = _compute_force_response(measure, evidence, lines[:last])
+    lines_hz = rfftfreq(length, 1 / rate_hz)
+    cumulative_power = np.cumsum(np.sum(np.abs(rfft(evidence.command, length, axis=0)) ** 2, axis=1))
+    line_count = int(1.1 * np.searchsorted(cumulative_power, LAW_POWER_KEPT * cumulative_power[-1])) + 8
+    line_count = min(next_fast_len(line_count, real=True) + 1, len(lines_hz))
+    force_response = _compute_force_response(measure, evidence, lines_hz[:line_count])
     strength = np.sqrt(np.sum(np.abs(force_response) ** 2, axis=1))
     strength = np.maximum(strength, 1e-9 * strength.max(axis=0))
-    share = 2 * (last - 1) / length
+    ratio = 2 * (line_count - 1) / length
     # The response to a force near the record's end is not recorded to its end, so that the last samples are left out.
     end = n - min(_count_settling_samples(measure, evidence), n // 4)
-    block_slices = tuple(slice(int(a * share), int(min(b, end) * share)) for a, b in _list_blocks(record) if a < end)
-    forces = isinstance(measure, PredictedForce)
-    units = measure.unit[: 0 if forces else evidence.response.shape[1]]
+    block_slices = tuple(
+        slice(int(start * ratio), int(min(stop, end) * ratio)) for start, stop in _list_blocks(record) if start < end
+    )
+    compares_forces = isinstance(measure, PredictedForce)
+    units = measure.unit[: 0 if compares_forces else evidence.response.shape[1]]
     return FilteredRecord(
-        columns_of(evidence), evidence.axis_force, rate_hz, length, force_response, strength, units, block_slices
+        name_signals(evidence), evidence.axis_force, rate_hz, length, force_response, strength, units, block_slices
     )
 
 
-def _compute_force_response(measure: ErrorMeasure, evidence: Evidence, lines: FloatArray) -> ComplexArray:
-    """(lines, c, m), 1/N: see `FilteredRecord`. lines: frequencies, Hz."""
+def _compute_force_response(measure: ErrorMeasure, evidence: Evidence, f_hz: FloatArray) -> ComplexArray:
+    """(lines, c, m), 1/N: see `FilteredRecord`. f_hz: frequencies (lines,)."""
     if isinstance(measure, PredictedForce):
         m = evidence.command.shape[1]
-        band_gain = (
-            compute_low_pass_gain(lines, measure.band_hz)[:, None, None] if np.isfinite(measure.band_hz) else 1.0
-        )
-        return np.asarray(-np.ones((len(lines), 1, 1)) * np.eye(m) * band_gain / measure.unit[:, None], dtype=complex)
-    transfer = compute_axis_transfer(evidence.model, evidence.sample_rate_hz, lines)
+        band_gain = compute_low_pass_gain(f_hz, measure.band_hz)[:, None, None] if np.isfinite(measure.band_hz) else 1.0
+        return np.asarray(-np.ones((len(f_hz), 1, 1)) * np.eye(m) * band_gain / measure.unit[:, None], dtype=complex)
+    transfer = compute_axis_transfer(evidence.model, evidence.sample_rate_hz, f_hz)
     c = len(measure.unit)
     return np.asarray(np.concatenate([transfer.response, transfer.position], axis=1)[:, :c] / measure.unit[:, None])
 
@@ -255,36 +256,36 @@ def _count_settling_samples(measure: ErrorMeasure, evidence: Evidence) -> int:
     """Samples until the response to a force has decayed (`SETTLED_CONSTANTS` of the slowest time constant)."""
     if isinstance(measure, PredictedForce):
         return 0
-    slowest = float(
+    largest_eigenvalue = float(
         np.abs(np.linalg.eigvals(discretise_model(evidence.model, 1 / evidence.sample_rate_hz).transition)).max()
     )
-    return int(SETTLED_CONSTANTS / -np.log(slowest)) if slowest < 1 else len(evidence.command)
+    return int(SETTLED_CONSTANTS / -np.log(largest_eigenvalue)) if largest_eigenvalue < 1 else len(evidence.command)
 
 
 def _list_blocks(record: Observed) -> list[tuple[int, int]]:
     """Start and stop of the segments that are not held out; with fewer than `LAW_BLOCKS` of them, of as many equal
     parts of the samples."""
-    used = record.fit | record.choose
-    edges = [
-        (segment.start, min(segment.stop, len(used)))
+    is_used = record.fit | record.choose
+    blocks = [
+        (segment.start, min(segment.stop, len(is_used)))
         for segment in record.recording.segments
-        if segment.start < len(used) and used[segment.start : segment.stop].mean() > 0.5
+        if segment.start < len(is_used) and is_used[segment.start : segment.stop].mean() > 0.5
     ]
-    if len(edges) >= LAW_BLOCKS:
-        return edges
-    used_indices = np.flatnonzero(used)
-    cuts = (
+    if len(blocks) >= LAW_BLOCKS:
+        return blocks
+    used_indices = np.flatnonzero(is_used)
+    block_edges = (
         np.linspace(used_indices[0], used_indices[-1] + 1, LAW_BLOCKS + 1).astype(int).tolist()
         if len(used_indices)
         else []
     )
-    return list(pairwise(cuts))
+    return list(pairwise(block_edges))
 
 
 def _compute_block_edges(filtered_records: Sequence[FilteredRecord]) -> tuple[int, ...]:
     """Edges of all blocks where the kept samples of the records follow one another."""
-    sizes = [part.stop - part.start for filtered in filtered_records for part in filtered.block_slices]
-    return tuple(np.cumsum([0, *sizes]).tolist())
+    block_lengths = [block.stop - block.start for filtered in filtered_records for block in filtered.block_slices]
+    return tuple(np.cumsum([0, *block_lengths]).tolist())
 
 
 def _compute_noise(measure: ErrorMeasure, filtered_records: Sequence[FilteredRecord], axis: int) -> float:

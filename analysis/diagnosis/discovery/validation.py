@@ -25,7 +25,7 @@ from analysis.diagnosis.search.parsimony import are_inseparable
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.settings import LAW_PLACEBO, LAW_SAME, LAW_STABLE, LOUDER_RATIO, NOISE_KNOWN_TO
 from analysis.wording import conjoin
-from equalizer.effects.discovered_law import axis_names
+from equalizer.effects.discovered_law import derive_axis_letters
 from equalizer.signals.recording import Segment
 from equalizer.signals.signal import FloatArray
 
@@ -271,7 +271,7 @@ def _format_ranges_of_motion(
     measure, fitted = context.full_measure, explanation.after.fitted
     model, placed = context.tuning.tune(fitted.deviations), fitted.hypothesis.list_placed_effects()
     evidence = measure.evidence(model, placed, fitted.residuals)
-    letters = axis_names(measure.records[0].recording.command.channels)
+    letters = derive_axis_letters(measure.records[0].recording.command.channels)
     length_unit, time_unit = model.system.length, model.system.time
     ranges = []
     for axis, letter in enumerate(letters):

@@ -2,12 +2,12 @@
 
 With the differences e of ln a, measured less predicted (`band_power`), and deviations d of the model's own parameters,
 
-    J = (sum of rho(e / s) + d'd) / N        s² = spread² + FLOOR²
+    J = (sum of rho(e / s) + d'd) / N        s² = spread² + SPREAD_FLOOR²
     rho(x) = x² for |x| <= k, else k (2 |x| - k)        k = HUBER_THRESHOLD
 
 with Huber's loss rho (Huber, Ann. Math. Stat. 35:73, 1964) over the N fitted bands. Simulations of impacts are chaotic:
 the spread of ln a between simulations whose parameters differ by rounding sets the weights, and derivatives are central
-differences over large steps.
+differences over large steps. Called by `refine_band_power` and, for rattling play, by `search.impacts`.
 """
 
 from dataclasses import dataclass, replace
@@ -23,8 +23,8 @@ from equalizer.plant.mechanical_model import MechanicalModelError
 from equalizer.signals.signal import FloatArray
 
 STEP_LIMITS, STEP_RATIO = (0.02, 0.2), 12.0
-"""Least and largest finite-difference step of a logarithmic parameter; and its ratio to `FreeParameter.move` between
-these limits."""
+"""Least and largest finite-difference step of a logarithmic parameter; and its ratio to
+`FreeParameter.difference_step` between these limits."""
 LONGEST_STEP = 0.5
 """Largest Gauss-Newton step of a logarithmic parameter; for others it is two finite-difference steps."""
 MOST_CHANCE_SHARE = 0.8
@@ -33,7 +33,7 @@ LEAST_INFORMATION = 1e-6
 """Lower limit of the information on a combination of parameters to which the prediction is not sensitive."""
 STEP_FACTORS = (1.0, 0.3, 0.1, 0.03)
 """Factors on a step that are tried in turn (line search)."""
-FLOOR = 0.04
+SPREAD_FLOOR = 0.04
 """Least standard deviation of ln a: no simulation of impacts predicts it better."""
 HUBER_THRESHOLD = 2.0
 """Threshold k of Huber's loss, in standard deviations. The loss is robust, because effects other than the fitted one
@@ -46,10 +46,10 @@ PERTURBATION = 1e-9
 """Difference in the coordinate of a parameter (mostly its logarithm) between the simulations of an ensemble."""
 
 
-def perturb(hypothesis: Hypothesis, number: int) -> Hypothesis:
-    """The hypothesis with its coordinates moved by `number` times `PERTURBATION`: a further member of an ensemble of
-    simulations, which diverge because impacts are chaotic."""
-    return replace(hypothesis, point=hypothesis.point + number * PERTURBATION)
+def perturb(hypothesis: Hypothesis, member_index: int) -> Hypothesis:
+    """The hypothesis with its coordinates moved by `member_index` times `PERTURBATION`: a further member of an ensemble
+    of simulations, which diverge because impacts are chaotic."""
+    return replace(hypothesis, point=hypothesis.point + member_index * PERTURBATION)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,8 +70,8 @@ class BandPowerProblem:
         """(stretches, bands, c): mean prediction over the ensemble; NaN throughout where the model is invalid."""
         members = range(self.ensemble if len(hypothesis.point) else 1)
 
-        def simulate_member(number: int) -> FloatArray:
-            return self._predict_member(deviations, perturb(hypothesis, number))
+        def simulate_member(member_index: int) -> FloatArray:
+            return self._predict_member(deviations, perturb(hypothesis, member_index))
 
         return np.asarray(np.mean(list(self.map_(simulate_member, members)), axis=0))  # type: ignore[arg-type]
 
@@ -88,7 +88,7 @@ class BandPowerProblem:
         """(stretches, bands, c): 1 / s; 0 for held-out stretches and bands below the noise."""
         is_fitted = np.array([stretch.part != "test" for stretch in self.power.stretches], dtype=np.bool_)
         is_compared = np.isfinite(self.power.measured) & is_fitted[:, None, None]
-        return np.asarray(np.where(is_compared, 1 / np.hypot(self.spread, FLOOR), 0.0))
+        return np.asarray(np.where(is_compared, 1 / np.hypot(self.spread, SPREAD_FLOOR), 0.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -113,18 +113,21 @@ def evaluate_hypothesis(problem: BandPowerProblem, deviations: FloatArray, hypot
     weights = problem.weights
     if not np.isfinite(predicted[weights > 0]).all():
         return BandPowerFit(hypothesis, deviations, predicted, np.inf, np.zeros(0))
-    weighted_errors = _weight(problem, problem.power.measured - predicted)
-    cost = (float(_huber(weighted_errors).sum()) + float(deviations @ deviations)) / max(len(weighted_errors), 1)
+    weighted_errors = _select_weighted(problem, problem.power.measured - predicted)
+    cost = (float(_compute_huber_loss(weighted_errors).sum()) + float(deviations @ deviations)) / max(
+        len(weighted_errors), 1
+    )
     return BandPowerFit(hypothesis, deviations, predicted, cost, np.zeros(0))
 
 
 def fit_band_power(problem: BandPowerProblem, start: BandPowerFit, rounds: int) -> BandPowerFit:
-    """The best fit within a number of Gauss-Newton steps; never worse than the start."""
+    """The best fit within a number of Gauss-Newton steps; never worse than the start, and unchanged for an invalid
+    one."""
     best = start
     for _ in range(rounds):
         if not np.isfinite(best.cost):
             return best
-        next_fit = _gauss_newton_step(problem, best)
+        next_fit = _take_gauss_newton_step(problem, best)
         cost_decrease = best.cost - next_fit.cost
         best = next_fit if cost_decrease > 0 else replace(best, errors=next_fit.errors)
         if cost_decrease < CONVERGED_SHARE * best.cost:
@@ -135,30 +138,33 @@ def fit_band_power(problem: BandPowerProblem, start: BandPowerFit, rounds: int) 
 def differentiate_hypothesis(problem: BandPowerProblem, iterate: BandPowerFit) -> FloatArray:
     """(parameters, stretches, bands, c): derivatives of ln a by the hypothesis's coordinates (central differences)."""
     parameters = iterate.hypothesis.parameters
-    jobs = [(number, sign) for number in range(len(parameters)) for sign in (1.0, -1.0)]
+    jobs = [(parameter_index, sign) for parameter_index in range(len(parameters)) for sign in (1.0, -1.0)]
 
     def predict_displaced(job: tuple[int, float]) -> FloatArray:
-        number, sign = job
+        parameter_index, sign = job
         point = iterate.hypothesis.point.copy()
-        point[number] += sign * _step(parameters[number])
+        point[parameter_index] += sign * _get_step(parameters[parameter_index])
         return problem.predict(iterate.deviations, replace(iterate.hypothesis, point=point))
 
     predictions: list[FloatArray] = list(problem.map_(predict_displaced, jobs))  # type: ignore[arg-type]
     return np.array(
         [
-            (forward - backward) / (2 * _step(parameter))
+            (forward - backward) / (2 * _get_step(parameter))
             for parameter, forward, backward in zip(parameters, predictions[::2], predictions[1::2], strict=True)
         ]
     ).reshape(len(parameters), *iterate.predicted.shape)
 
 
-def _gauss_newton_step(problem: BandPowerProblem, iterate: BandPowerFit) -> BandPowerFit:
-    """The fit after a bounded step with line search, with its standard errors; its cost may be higher than before."""
-    hypothesis_columns = np.array([_weight(problem, column) for column in differentiate_hypothesis(problem, iterate)])
-    errors = _weight(problem, problem.power.measured - iterate.predicted)
+def _take_gauss_newton_step(problem: BandPowerProblem, iterate: BandPowerFit) -> BandPowerFit:
+    """The fit after a bounded step with line search, with its standard errors; its cost is higher than before where no
+    factor of `STEP_FACTORS` reduces it."""
+    hypothesis_columns = np.array(
+        [_select_weighted(problem, column) for column in differentiate_hypothesis(problem, iterate)]
+    )
+    errors = _select_weighted(problem, problem.power.measured - iterate.predicted)
     tuned_count = 0 if problem.jacobian_by_deviations is None else len(iterate.deviations)
     model_columns = [
-        _weight(problem, column)
+        _select_weighted(problem, column)
         for column in (() if problem.jacobian_by_deviations is None else problem.jacobian_by_deviations)
     ]
     columns = np.vstack([*model_columns, *hypothesis_columns])
@@ -173,7 +179,7 @@ def _gauss_newton_step(problem: BandPowerProblem, iterate: BandPowerFit) -> Band
         rhs[:tuned_count] -= iterate.deviations
         information[:tuned_count, :tuned_count] += np.eye(tuned_count)
     information += 1e-9 * np.diag(np.maximum(np.diagonal(information), 1e-9))
-    low, high = _step_bounds(iterate, tuned_count)
+    low, high = _compute_step_bounds(iterate, tuned_count)
     step = solve_bounded_step(information, rhs, low, high)
     next_fit = iterate
     for factor in STEP_FACTORS:
@@ -195,10 +201,12 @@ def _estimate_errors(problem: BandPowerProblem, iterate: BandPowerFit, informati
     parameters of five simulated devices (seeds 7000 to 7004) were wrong by 1.09 standard errors (rms)."""
     parameters = iterate.hypothesis.parameters
     first_parameter = len(information) - len(parameters)
-    scatter = _weight(problem, np.broadcast_to(np.asarray(problem.spread, dtype=np.float64), iterate.predicted.shape))
+    scatter = _select_weighted(
+        problem, np.broadcast_to(np.asarray(problem.spread, dtype=np.float64), iterate.predicted.shape)
+    )
     kept_share = np.ones(len(information))
     for k, parameter in enumerate(parameters, start=first_parameter):
-        scatter_information = float(scatter @ scatter) / (2 * problem.ensemble * _step(parameter) ** 2)
+        scatter_information = float(scatter @ scatter) / (2 * problem.ensemble * _get_step(parameter) ** 2)
         kept_share[k] -= min(scatter_information / max(float(information[k, k]), 1e-300), MOST_CHANCE_SHARE)
     values, vectors = np.linalg.eigh(information * np.sqrt(np.outer(kept_share, kept_share)))
     values = np.maximum(values, max(1e-9 * float(values[-1]), LEAST_INFORMATION))
@@ -206,33 +214,41 @@ def _estimate_errors(problem: BandPowerProblem, iterate: BandPowerFit, informati
     return np.asarray(np.sqrt(variances[first_parameter:]))
 
 
-def _step_bounds(iterate: BandPowerFit, tuned_count: int) -> tuple[FloatArray, FloatArray]:
+def _compute_step_bounds(iterate: BandPowerFit, tuned_count: int) -> tuple[FloatArray, FloatArray]:
     """Bounds of a step, (tuned_count + parameters,) each: the model's own parameters stay within 3 standard
-    deviations of their calibration."""
+    deviations of their calibration, those of the hypothesis within their limits and a largest step."""
     parameters = iterate.hypothesis.parameters
     largest_steps = np.array(
-        [LONGEST_STEP if parameter.parameter.scale == "log" else 2 * _step(parameter) for parameter in parameters]
+        [LONGEST_STEP if parameter.parameter.scale == "log" else 2 * _get_step(parameter) for parameter in parameters]
     )
-    bounds = np.array([parameter.bounds for parameter in parameters]).reshape(-1, 2) - iterate.hypothesis.point[:, None]
-    low = np.concatenate([-3.0 - iterate.deviations[:tuned_count], np.clip(bounds[:, 0], -largest_steps, 0.0)])
-    high = np.concatenate([3.0 - iterate.deviations[:tuned_count], np.clip(bounds[:, 1], 0.0, largest_steps)])
-    return low, high
+    relative_bounds = (
+        np.array([parameter.bounds for parameter in parameters]).reshape(-1, 2) - iterate.hypothesis.point[:, None]
+    )
+    lower_bounds = np.concatenate(
+        [-3.0 - iterate.deviations[:tuned_count], np.clip(relative_bounds[:, 0], -largest_steps, 0.0)]
+    )
+    upper_bounds = np.concatenate(
+        [3.0 - iterate.deviations[:tuned_count], np.clip(relative_bounds[:, 1], 0.0, largest_steps)]
+    )
+    return lower_bounds, upper_bounds
 
 
-def _step(parameter: FreeParameter) -> float:
+def _get_step(parameter: FreeParameter) -> float:
     """Step of the finite differences, in the parameter's coordinate."""
     if parameter.parameter.scale != "log":
         return parameter.difference_step
     return float(np.clip(STEP_RATIO * parameter.difference_step, *STEP_LIMITS))
 
 
-def _huber(errors: FloatArray) -> FloatArray:
+def _compute_huber_loss(errors: FloatArray) -> FloatArray:
     """Huber's loss rho of the module's equation, element by element."""
-    size = np.abs(errors)
-    return np.asarray(np.where(size <= HUBER_THRESHOLD, size**2, HUBER_THRESHOLD * (2 * size - HUBER_THRESHOLD)))
+    magnitude = np.abs(errors)
+    return np.asarray(
+        np.where(magnitude <= HUBER_THRESHOLD, magnitude**2, HUBER_THRESHOLD * (2 * magnitude - HUBER_THRESHOLD))
+    )
 
 
-def _weight(problem: BandPowerProblem, values: FloatArray) -> FloatArray:
-    """(N,): weighted values of (stretches, bands, c) in the fitted bands."""
+def _select_weighted(problem: BandPowerProblem, values: FloatArray) -> FloatArray:
+    """(N,): values (stretches, bands, c) in the fitted bands, times their weights 1 / s."""
     weights = problem.weights
     return np.asarray((values * weights)[weights > 0])

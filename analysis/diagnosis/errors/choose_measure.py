@@ -19,7 +19,7 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.error_measure_rule import UNTIMED, Choice, choose_measure, count_samples_to_settle
 from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.noise.noise_floor import NoiseFloor, estimate_noise_floor
-from analysis.diagnosis.noise.rounding import rounding_step
+from analysis.diagnosis.noise.rounding import find_rounding_step
 from analysis.diagnosis.settings import UNKNOWN_NOISE_SHARE
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.placing import place_recorded_effects
@@ -173,6 +173,6 @@ def _subtract_rounding_noise(floor: NoiseFloor, record: Observed) -> FloatArray:
     rms_noise = floor.response_rms
     if floor.method != "repeats":
         return rms_noise
-    steps = np.array([rounding_step(record.measured[:, c]) for c in range(len(rms_noise))])
+    steps = np.array([find_rounding_step(record.measured[:, c]) for c in range(len(rms_noise))])
     unrounded_noise = np.asarray(np.sqrt(np.maximum(rms_noise**2 - steps**2 / 12, 0.0)))
     return np.where(unrounded_noise > LEAST_DITHER * steps, unrounded_noise, rms_noise)

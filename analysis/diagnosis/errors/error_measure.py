@@ -25,7 +25,7 @@ class ErrorMeasure(Protocol):
 
     @property
     def records(self) -> tuple[Observed, ...]:
-        """The compared records. Their `measured` are the c channels: response and position, or forces."""
+        """The n samples of each compared record. `measured` has the c channels: response and position, or forces."""
 
     @property
     def noise(self) -> FloatArray:
@@ -40,7 +40,8 @@ class ErrorMeasure(Protocol):
         """Lower limit of rms errors relative to the noise: smaller errors are set to it."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
-        """The measure on the same records with other sample roles."""
+        """The measure on other records, which usually differ in sample roles alone; some implementations require equal
+        number and lengths."""
 
     def with_floor(self, rms: FloatArray) -> Self:
         """The measure with an error floor: further noise, added to its own as a root sum of squares, and 1 as its least

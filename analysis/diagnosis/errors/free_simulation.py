@@ -3,11 +3,13 @@
     e(t) = (y(t) - yhat(t)) / unit        yhat: simulated from rest at the first sample, without measured feedback
 
 The residual holds the noise and the whole effect of the missing physics, because no measured sample corrects the
-simulation. Made by `choose_measure`; the other measures compare short windows (`windows`) or forces (`force_views`).
+simulation. Made by `choose_measure`; the other measures compare short windows (`windows`) or forces
+(`predicted_force`).
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from typing import Self
 
 import numpy as np
@@ -47,7 +49,7 @@ class FreeSimulation:
     least: float = 0.0
     """Least error in units of the noise, to which smaller errors are set; 1 with a floor."""
     step_factor: int = 1
-    """Factor by which the time steps of motion-dependent forces are lengthened."""
+    """Factor by which the time steps of motion-dependent forces are lengthened, to save time (`short_recordings`)."""
     restarts: tuple[Restarts, ...] = ()
     """Per record, the samples at which its parts were joined, and the state in which each part begins; empty where no
     record consists of parts."""
@@ -62,8 +64,9 @@ class FreeSimulation:
 
     def shorten(self) -> "FreeSimulation":
         """The measure without the samples after the last to fit or to choose by, and without records that have none."""
-        used_records = [record for record in self.records if (record.fit | record.choose).any()]
-        return replace(self, records=tuple(record.shorten() for record in used_records))
+        used = [bool((record.fit | record.choose).any()) for record in self.records]
+        records = tuple(record.shorten() for record in compress(self.records, used))
+        return replace(self, records=records, restarts=tuple(compress(self.restarts, used)))
 
     def can_observe(self, effect: Effect) -> bool:
         """True for every effect: each changes the simulated response or position."""
@@ -88,11 +91,11 @@ class FreeSimulation:
         sample_indices: npt.NDArray[np.int64],
     ) -> FloatArray:
         """(k, 2n): positions, then velocities of the n coordinates just before the samples `sample_indices` (k,)."""
-        signals = record.recording
-        all_effects = apply_conditions((*self.model_effects, *effects), signals)
-        model = add_carried_weight(model, signals)
+        recording = record.recording
+        all_effects = apply_conditions((*self.model_effects, *effects), recording)
+        model = add_carried_weight(model, recording)
         return simulate_states_before(
-            model, record.command, (signals.sample_rate_hz, signals.hold), all_effects, sample_indices
+            model, record.command, (recording.sample_rate_hz, recording.hold), all_effects, sample_indices
         )
 
     def _simulate(
@@ -104,18 +107,18 @@ class FreeSimulation:
         restarts: Restarts | None = None,
     ) -> SimulationResult:
         """One record simulated by the function `simulate`, or restarted at each part where parts were joined."""
-        signals, p = record.recording, model.outputs
+        recording, p = record.recording, model.outputs
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
         measurement = Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording))
-        model = add_carried_weight(model, signals)
+        model = add_carried_weight(model, recording)
         all_effects = [
             _lengthen_steps(placed_effect, self.step_factor)
-            for placed_effect in apply_conditions((*self.model_effects, *effects), signals)
+            for placed_effect in apply_conditions((*self.model_effects, *effects), recording)
         ]
         if restarts is not None:
-            sampling = signals.sample_rate_hz, signals.hold
+            sampling = recording.sample_rate_hz, recording.hold
             return simulate_windows(model, record.command, sampling, all_effects, measurement, restarts)
-        return simulate(model, record.command, signals.sample_rate_hz, all_effects, signals.hold, measurement)
+        return simulate(model, record.command, recording.sample_rate_hz, all_effects, recording.hold, measurement)
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
@@ -148,6 +151,6 @@ def _subtract_prediction(measured: FloatArray, simulated: SimulationResult) -> F
     return difference
 
 
-def predict_channels(simulated: SimulationResult, channel_count: int) -> FloatArray:
-    """(n, count): the first `channel_count` simulated channels, the response before the position."""
+def stack_simulated_channels(simulated: SimulationResult, channel_count: int) -> FloatArray:
+    """(n, channel_count): the first of the simulated channels, the response before the position."""
     return np.hstack([simulated.response, simulated.position])[:, :channel_count]

@@ -85,11 +85,11 @@ class Hypothesis:
     @property
     def parameters(self) -> tuple[FreeParameter, ...]:
         """The free parameters, one per coordinate of the point."""
-        groups = [claim.effect.parameters for claim in self.claims for _ in range(claim.groups)]
+        parameters_by_group = [claim.effect.parameters for claim in self.claims for _ in range(claim.groups)]
         return tuple(
             FreeParameter(p, _compute_coordinate_unit(p, start))
-            for group, start in zip(groups, self.starts, strict=True)
-            for p in group
+            for group_parameters, start in zip(parameters_by_group, self.starts, strict=True)
+            for p in group_parameters
             if not p.fixed
         )
 
@@ -112,8 +112,8 @@ class Hypothesis:
 
     def list_effects_of(self, claim_index: int) -> tuple[PlacedEffect, ...]:
         """The placed effects of one claim, one per group, with the values at the hypothesis's own point."""
-        first = sum(claim.groups for claim in self.claims[:claim_index])
-        return self.list_placed_effects()[first : first + self.claims[claim_index].groups]
+        first_group = sum(claim.groups for claim in self.claims[:claim_index])
+        return self.list_placed_effects()[first_group : first_group + self.claims[claim_index].groups]
 
 
 def has_motion_forces(hypothesis: Hypothesis) -> bool:
@@ -122,7 +122,7 @@ def has_motion_forces(hypothesis: Hypothesis) -> bool:
 
 
 def remove_claim(hypothesis: Hypothesis, claim_index: int) -> Hypothesis:
-    """The hypothesis without the claim of this number, and without the claim's starts and parameters."""
+    """The hypothesis without the claim of this index, and without the claim's starts and parameters."""
     group_start = sum(claim.groups for claim in hypothesis.claims[:claim_index])
     group_stop = group_start + hypothesis.claims[claim_index].groups
     coordinate_counts = [
@@ -142,10 +142,14 @@ def move_point(hypothesis: Hypothesis, step: FloatArray, along_values: bool) -> 
     compensates for that of the effect (two masses), the cost has a valley that is straight in the values only."""
     if not along_values:
         return replace(hypothesis, point=hypothesis.point + step)
-    logarithmic = np.array([free.parameter.scale == "log" for free in hypothesis.parameters], dtype=np.bool_)
+    logarithmic = np.array(
+        [free_parameter.parameter.scale == "log" for free_parameter in hypothesis.parameters], dtype=np.bool_
+    )
     increments = np.where(logarithmic, np.log1p(np.maximum(step, -0.9)), step)
-    low, high = np.array([free.bounds for free in hypothesis.parameters]).reshape(-1, 2).T
-    return replace(hypothesis, point=np.clip(hypothesis.point + increments, low, high))
+    lower_bounds, upper_bounds = (
+        np.array([free_parameter.bounds for free_parameter in hypothesis.parameters]).reshape(-1, 2).T
+    )
+    return replace(hypothesis, point=np.clip(hypothesis.point + increments, lower_bounds, upper_bounds))
 
 
 def make_claim_hypothesis(claim: Claim, values: Sequence[Values]) -> Hypothesis:
@@ -174,16 +178,17 @@ NO_EFFECTS = Hypothesis((), (), np.zeros(0))
 def generate_near_equivalents(hypothesis: Hypothesis) -> Iterator[Hypothesis]:
     """Variants of the hypothesis in which one effect at a time has other values with almost the same response
     (`Effect.near_equivalents`)."""
-    parameters, start = hypothesis.parameters, 0
-    for placed in hypothesis.list_placed_effects():
-        stop = start + sum(not p.fixed for p in placed.effect.parameters)
-        for alternative in placed.effect.near_equivalents(placed.values):
+    parameters, first_coordinate = hypothesis.parameters, 0
+    for placed_effect in hypothesis.list_placed_effects():
+        coordinate_stop = first_coordinate + sum(not p.fixed for p in placed_effect.effect.parameters)
+        for alternative in placed_effect.effect.near_equivalents(placed_effect.values):
             point = hypothesis.point.copy()
-            point[start:stop] = [
-                free.to_coordinate(alternative[free.parameter.name]) for free in parameters[start:stop]
+            point[first_coordinate:coordinate_stop] = [
+                free_parameter.to_coordinate(alternative[free_parameter.parameter.name])
+                for free_parameter in parameters[first_coordinate:coordinate_stop]
             ]
             yield replace(hypothesis, point=point)
-        start = stop
+        first_coordinate = coordinate_stop
 
 
 def _compute_coordinate_unit(p: Parameter, start: Values) -> float:

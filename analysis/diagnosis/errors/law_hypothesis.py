@@ -1,10 +1,10 @@
 """Converts a discovered law, a formula that is no effect of the catalogue, to a hypothesis that `output_error` can fit.
 
-The free numbers of the formula become the parameters of an effect (`law_effect`) at one axis or response channel.
+The free numbers of the formula become the parameters of an effect (`make_law_effect`) at one axis or response channel.
 """
 
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, make_claim_hypothesis
-from equalizer.effects.discovered_law import law_channels, law_effect, law_values
+from equalizer.effects.discovered_law import collect_channels, get_law_values, make_law_effect
 from equalizer.laws.law import Law
 from equalizer.signals.recording import Recording
 
@@ -12,5 +12,5 @@ from equalizer.signals.recording import Recording
 def hypothesis_of_law(law: Law, axis: int, recording: Recording) -> Hypothesis:
     """Hypothesis with a single claim: the law at an axis, or at a channel for a law of the response. The fit starts
     from the law's own values. axis: index, from 0."""
-    effect = law_effect(law, law_channels(recording))
-    return make_claim_hypothesis(Claim(effect, "one", (axis,)), [law_values(law)])
+    effect = make_law_effect(law, collect_channels(recording))
+    return make_claim_hypothesis(Claim(effect, "one", (axis,)), [get_law_values(law)])

@@ -38,8 +38,8 @@ DAMPING_UNCERTAINTY_RATIO = 10.0
 accurately."""
 ROUNDING_SHARE = 1e-9
 """Share of a matrix's largest element by which an eigenvalue may be negative by rounding."""
-_LEAST_MASS = 1e-3
-"""Least factor on a mode's mass, so that its square root exists for any deviation."""
+_LEAST_MASS_FACTOR = 1e-3
+"""Least factor 1 + dm on a mode's mass, so that its square root exists for any deviation."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,12 +70,14 @@ class Tuning:
         """Whether a parameter has moved to its bound, or nearly. deviations: (parameters,), in standard deviations."""
         return bool(np.abs(deviations).max(initial=0.0) >= AT_RETUNING_BOUND * self.bound)
 
-    def is_possible(self, deviations: FloatArray) -> bool:
+    def is_physical(self, deviations: FloatArray) -> bool:
         """Whether damping and stiffness stay physical with these deviations (parameters,): positive semidefinite, or no
         more indefinite than in the given model. With the wider bound a parameter may vanish or change its sign. Raises
-        as `tune`."""
-        tuned, original = self.tune(deviations), self.model
-        return _is_as_definite(tuned.damping, original.damping) and _is_as_definite(tuned.stiffness, original.stiffness)
+        MechanicalModelError as `tune`."""
+        tuned_model, given_model = self.tune(deviations), self.model
+        return _is_as_definite(tuned_model.damping, given_model.damping) and _is_as_definite(
+            tuned_model.stiffness, given_model.stiffness
+        )
 
     def to_changes(self, deviations: FloatArray) -> FloatArray:
         """(parameters,): deviations, in standard deviations, as changes of the parameters, SI or relative."""
@@ -90,8 +92,8 @@ def make_tuning(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuni
     axis_pairs = [(i, j) for i in range(m) for j in range(i, m)]
     axis_names = [f"{input_channels[i]}{'' if i == j else ' ' + input_channels[j]}" for i, j in axis_pairs]
     mode_indices = range(len(modal_model.frequency_hz))
-    names = [f"{quantity} {axis}" for quantity in ("mass", "damping", "stiffness") for axis in axis_names]
-    names += [
+    parameter_names = [f"{quantity} {axis}" for quantity in ("mass", "damping", "stiffness") for axis in axis_names]
+    parameter_names += [
         f"{quantity} of the mode at {modal_model.frequency_hz[k]:.3g} Hz"
         for quantity in ("frequency", "mass", "damping")
         for k in mode_indices
@@ -114,19 +116,19 @@ def make_tuning(model: MechanicalModel, input_channels: tuple[str, ...]) -> Tuni
     units = [find_matrix_unit(part, model.system) for part in MATRIX_UNITS]
     return Tuning(
         model,
-        tuple(names),
+        tuple(parameter_names),
         deviation,
         tuple(unit for unit in units for _ in axis_pairs) + ("1",) * (3 * len(mode_indices)),
-        lambda deviations: _tune(model, modal_model, axis_pairs, np.asarray(deviations) * deviation),
+        lambda deviations: _apply_changes(model, modal_model, axis_pairs, np.asarray(deviations) * deviation),
     )
 
 
 def _is_as_definite(matrix: FloatArray, original: FloatArray) -> bool:
     """Whether the smallest eigenvalue of the symmetric part is not negative, or no smaller than that of `original`."""
-    least_eigenvalue, original_least = (
+    least_eigenvalue, original_eigenvalue = (
         float(eigvalsh((candidate + candidate.T) / 2)[0]) for candidate in (matrix, original)
     )
-    return least_eigenvalue >= min(original_least, 0.0) - ROUNDING_SHARE * float(np.abs(original).max())
+    return least_eigenvalue >= min(original_eigenvalue, 0.0) - ROUNDING_SHARE * float(np.abs(original).max())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,8 +138,9 @@ class _CraigBamptonModel:
     mass: FloatArray
     damping: FloatArray
     stiffness: FloatArray
-    back: FloatArray
-    """Transformation of a matrix back to the model's coordinates: back.T @ matrix @ back."""
+    inverse_basis: FloatArray
+    """Inverse of the basis of these coordinates; inverse_basis.T @ matrix @ inverse_basis is in the model's
+    coordinates."""
     frequency_hz: FloatArray
     """(modes,): natural frequencies with the driven axes held."""
 
@@ -153,12 +156,12 @@ def _read_stated_deviation(deviation: float | None, axis_block: FloatArray) -> f
 def _transform_to_craig_bampton(model: MechanicalModel) -> _CraigBamptonModel:
     """The model in Craig-Bampton coordinates: constraint modes (static shapes) of the driven axes, then fixed-interface
     modes."""
-    driven = compute_driven_axes(model)
-    interior_basis = null_space(driven.T)
-    m = driven.shape[1]
+    driven_axes = compute_driven_axes(model)
+    interior_basis = null_space(driven_axes.T)
+    m = driven_axes.shape[1]
     # Dual basis of the driven axes, so that a force along one axis moves that axis alone.
-    axes = driven @ np.linalg.inv(driven.T @ driven)
-    basis = axes
+    dual_axes = driven_axes @ np.linalg.inv(driven_axes.T @ driven_axes)
+    basis = dual_axes
     frequency = np.zeros(0)
     if interior_basis.shape[1]:
         interior_stiffness, interior_mass = (
@@ -168,8 +171,10 @@ def _transform_to_craig_bampton(model: MechanicalModel) -> _CraigBamptonModel:
         eigenvalues, shapes = eigh((interior_stiffness + interior_stiffness.T) / 2, interior_mass)
         frequency = np.sqrt(np.maximum(eigenvalues, 0.0)) / (2 * np.pi)
         # Static deflection of the inner coordinates with the axes, so that axes and modes share no stiffness.
-        static = -np.linalg.lstsq(interior_stiffness, interior_basis.T @ model.stiffness @ axes, rcond=None)[0]
-        basis = np.hstack([axes + interior_basis @ static, interior_basis @ shapes])
+        static_deflection = -np.linalg.lstsq(
+            interior_stiffness, interior_basis.T @ model.stiffness @ dual_axes, rcond=None
+        )[0]
+        basis = np.hstack([dual_axes + interior_basis @ static_deflection, interior_basis @ shapes])
     mass, damping, stiffness = (
         np.asarray(basis.T @ matrix @ basis) for matrix in (model.mass, model.damping, model.stiffness)
     )
@@ -178,7 +183,7 @@ def _transform_to_craig_bampton(model: MechanicalModel) -> _CraigBamptonModel:
     return _CraigBamptonModel(mass, damping, stiffness, np.linalg.inv(basis), frequency)
 
 
-def _tune(
+def _apply_changes(
     model: MechanicalModel, modal_model: _CraigBamptonModel, axis_pairs: list[tuple[int, int]], changes: FloatArray
 ) -> MechanicalModel:
     """The model with its parameters changed by `changes` (parameters,), in their units; equations: module docstring."""
@@ -193,12 +198,12 @@ def _tune(
     mass, damping, stiffness = matrices
     for k in range(mode_count):
         mode_row = m + k
-        coupling, mass_factor = modal_model.mass[:m, mode_row], max(1 + mass_change[k], _LEAST_MASS)
+        coupling, mass_factor = modal_model.mass[:m, mode_row], max(1 + mass_change[k], _LEAST_MASS_FACTOR)
         # A mode of unit mass adds coupling coupling^T to the mass that the axes carry at low frequencies.
         mass[:m, :m] += (mass_factor - 1) * np.outer(coupling, coupling)
         mass[:m, mode_row] *= np.sqrt(mass_factor)
         mass[mode_row, :m] *= np.sqrt(mass_factor)
         stiffness[mode_row, mode_row] *= (1 + frequency_change[k]) ** 2
         damping[mode_row, mode_row] *= (1 + frequency_change[k]) * (1 + damping_change[k])
-    mass, damping, stiffness = (modal_model.back.T @ matrix @ modal_model.back for matrix in matrices)
+    mass, damping, stiffness = (modal_model.inverse_basis.T @ matrix @ modal_model.inverse_basis for matrix in matrices)
     return replace(model, mass=(mass + mass.T) / 2, damping=damping, stiffness=stiffness)

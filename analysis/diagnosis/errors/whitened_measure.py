@@ -63,11 +63,11 @@ class WhiteningFilter:
         )
         return np.where(is_known, filtered[: len(residual)], np.nan)
 
-    def has_full_history(self, residual: FloatArray) -> Mask:
+    def mask_full_history(self, residual: FloatArray) -> Mask:
         """(n,): mask of the samples of a residual (n, c) for which all samples that the filter uses are known."""
-        unknown = np.concatenate([np.ones(self.lags), ~np.isfinite(residual).all(axis=1)])
-        unknown_before = np.concatenate([[0.0], np.cumsum(unknown)])
-        return np.asarray(unknown_before[self.lags + 1 :] == unknown_before[: len(residual)], dtype=np.bool_)
+        is_unknown = np.concatenate([np.ones(self.lags), ~np.isfinite(residual).all(axis=1)])
+        cumulative_unknown = np.concatenate([[0.0], np.cumsum(is_unknown)])
+        return np.asarray(cumulative_unknown[self.lags + 1 :] == cumulative_unknown[: len(residual)], dtype=np.bool_)
 
 
 def fit_whitening_filter(residuals: Sequence[FloatArray], white_noise_rms: FloatArray) -> WhiteningFilter:
@@ -108,11 +108,12 @@ class WhitenedMeasure:
 
     @property
     def records(self) -> tuple[Observed, ...]:
-        """The compared records; samples without full history of the filter have no role."""
+        """The compared records. After `whiten_measure`, samples without full history of the filter have no role."""
         return self.base_measure.records
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
-        """The measure on other records, with the same filter."""
+        """The measure on other records, with the same filter. Their sample roles are kept, also where the filter has no
+        full history."""
         return replace(self, base_measure=self.base_measure.with_records(records))
 
     def with_floor(self, rms: FloatArray) -> Self:
@@ -120,7 +121,7 @@ class WhitenedMeasure:
         return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
 
     def shorten(self) -> Self:
-        """The measure without the samples after the last to fit or to choose by."""
+        """The measure without the samples after the last to fit or to choose by, as in the base measure."""
         return replace(self, base_measure=self.base_measure.shorten())
 
     def can_observe(self, effect: Effect) -> bool:
@@ -136,19 +137,21 @@ class WhitenedMeasure:
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
-        """Evidence from the residuals before whitening: estimators of starting values need time series."""
+        """Evidence from the residuals before whitening, because estimators of starting values need time series of
+        motions. residuals: not used."""
         return self.base_measure.evidence(model, effects, self.base_measure.residuals(model, effects))
 
 
 def whiten_measure(base_measure: ErrorMeasure, whitening: WhiteningFilter, noise: FloatArray) -> WhitenedMeasure:
-    """The measure with whitened residuals. noise: (c,), see `WhitenedMeasure`."""
+    """The measure with whitened residuals; samples without full history of the filter lose their roles. noise: (c,),
+    see `WhitenedMeasure`."""
     records = tuple(_leave_out_warm_up(record, whitening) for record in base_measure.records)
     return WhitenedMeasure(base_measure.with_records(records), whitening, noise, noise)
 
 
 def _leave_out_warm_up(record: Observed, whitening: WhiteningFilter) -> Observed:
     """The record without roles for samples whose filter output depends on unknown samples."""
-    has_history = whitening.has_full_history(record.measured)
+    has_history = whitening.mask_full_history(record.measured)
     return replace(
         record, fit=record.fit & has_history, choose=record.choose & has_history, test=record.test & has_history
     )

@@ -16,10 +16,10 @@ from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.data.recorded_conditions import add_carried_weight, apply_conditions
 from analysis.diagnosis.errors.error_measure_rule import WINDOW_S
 from analysis.diagnosis.errors.evidence_from_residuals import fill_gaps
-from analysis.diagnosis.errors.free_simulation import predict_channels
+from analysis.diagnosis.errors.free_simulation import stack_simulated_channels
 from equalizer.effects.effect import Effect, PlacedEffect, Structure
 from equalizer.effects.simulation.bodies import Restarts, build_bodies
-from equalizer.effects.simulation.forces_along_motion import actuator_force
+from equalizer.effects.simulation.forces_along_motion import compute_actuator_force
 from equalizer.effects.simulation.sensor_path import low_pass
 from equalizer.effects.simulation.simulator import Measurement, SimulationResult, simulate_windows
 from equalizer.effects.starts.evidence import Evidence
@@ -40,7 +40,7 @@ class Windows:
 
     records: tuple[Observed, ...]
     states: tuple[FloatArray, ...]
-    """Per record (windows, 2 coordinates): initial state of each window."""
+    """Per record (windows, 2 coordinates): initial state of each window, positions before velocities."""
     unit: FloatArray
     """(c,): unit of a residual, in each channel's own unit."""
     noise: FloatArray
@@ -87,8 +87,8 @@ class Windows:
         sample is missing."""
         all_effects = (*self.model_effects, *effects)
         return tuple(
-            self._simulate_from_states(model, all_effects, *pair)[1]
-            for pair in zip(self.records, self.states, strict=True)
+            self._simulate_from_states(model, all_effects, *record_and_states)[1]
+            for record_and_states in zip(self.records, self.states, strict=True)
         )
 
     def evidence(
@@ -108,39 +108,41 @@ class Windows:
         recording, p = record.recording, model.outputs
         model = add_carried_weight(model, recording)
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
-        length = count_window_samples(self.window_s, recording.sample_rate_hz)
+        window_samples = count_window_samples(self.window_s, recording.sample_rate_hz)
         simulated = simulate_windows(
             model,
             record.command,
             (recording.sample_rate_hz, recording.hold),
             apply_conditions(effects, recording),
             Measurement(record.measured[:, :p], self.noise[:p], position, len(record.recording)),
-            Restarts(length * np.arange(len(states)), states),
+            Restarts(window_samples * np.arange(len(states)), states),
         )
         with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
-            residual = (record.measured - predict_channels(simulated, record.measured.shape[1])) / self.unit
+            residual = (record.measured - stack_simulated_channels(simulated, record.measured.shape[1])) / self.unit
         structure = build_bodies(
             model, [effect for effect in effects if isinstance(effect.effect.action, Structure)]
         ).structure
-        return simulated, self._remove_state_errors(structure, residual, recording.sample_rate_hz, length)
+        return simulated, self._remove_state_errors(structure, residual, recording.sample_rate_hz, window_samples)
 
     def _remove_state_errors(
-        self, structure: MechanicalModel, residual: FloatArray, sample_rate_hz: float, length: int
+        self, structure: MechanicalModel, residual: FloatArray, sample_rate_hz: float, window_samples: int
     ) -> FloatArray:
         """(n, c): residuals without their projection on the free motions from other initial states, window by
-        window."""
+        window; unchanged where a simulation or a free motion diverges."""
         n, c = residual.shape
         # A fit may try an unstable model, whose free motion overflows: its residuals are returned as they are.
         with np.errstate(over="ignore", invalid="ignore"):
-            free_motion = _compute_free_motion(structure, sample_rate_hz, min(length, n), c) / self.unit[:, None]
+            free_motion = (
+                _compute_free_motion(structure, sample_rate_hz, min(window_samples, n), c) / self.unit[:, None]
+            )
             finite = np.isfinite(residual).all() and np.isfinite(np.sum(free_motion**2))
         if not finite:
             return residual
-        full_windows_end = n // length * length
+        full_windows_end = n // window_samples * window_samples
         projected = residual.copy()
         if full_windows_end:
             projected[:full_windows_end] = _project_out(
-                residual[:full_windows_end].reshape(-1, length * c), free_motion.reshape(length * c, -1)
+                residual[:full_windows_end].reshape(-1, window_samples * c), free_motion.reshape(window_samples * c, -1)
             ).reshape(-1, c)
         if n > full_windows_end:
             projected[full_windows_end:] = _project_out(
@@ -157,7 +159,9 @@ class Windows:
         simulated, residual = self._simulate_from_states(model, effects, record, states)
         recording, p = record.recording, model.outputs
         model = add_carried_weight(model, recording)
-        actuator_forces = actuator_force(model, record.command, recording.sample_rate_hz, effects, recording.hold)
+        actuator_forces = compute_actuator_force(
+            model, record.command, recording.sample_rate_hz, effects, recording.hold
+        )
         motion = smooth_motion(model, record, actuator_forces + simulated.axis_force, self.unit)
         measured, predicted = fill_gaps(record.measured, residual * self.unit, simulated)
         has_position = measured.shape[1] > p
@@ -190,7 +194,7 @@ def build_windows(
     states = []
     for record in records:
         rate_hz = record.recording.sample_rate_hz
-        actuator_forces = actuator_force(model, record.command, rate_hz, (), record.recording.hold)
+        actuator_forces = compute_actuator_force(model, record.command, rate_hz, (), record.recording.hold)
         motion: SmoothedMotion = smooth_motion(
             add_carried_weight(model, record.recording), record, actuator_forces, unit
         )
@@ -206,14 +210,16 @@ def count_window_samples(window_s: float, sample_rate_hz: float) -> int:
 def _compute_free_motion(
     structure: MechanicalModel, sample_rate_hz: float, window_samples: int, channel_count: int
 ) -> FloatArray:
-    """(length, c, 2n): free response of the channels to each unit initial state."""
-    steps = discretise_model(structure, 1 / sample_rate_hz)
-    states = np.empty((window_samples, *steps.transition.shape))
-    states[0] = np.eye(len(steps.transition))
+    """(window_samples, c, 2n): free response of the channels to each unit initial state, in the channels' units."""
+    discrete_model = discretise_model(structure, 1 / sample_rate_hz)
+    states = np.empty((window_samples, *discrete_model.transition.shape))
+    states[0] = np.eye(len(discrete_model.transition))
     for k in range(1, window_samples):
-        states[k] = steps.transition @ states[k - 1]
-    response = low_pass(states.transpose(0, 2, 1) @ steps.response.T, sample_rate_hz, structure.sensor.bandwidth_hz)
-    outputs = np.concatenate([response, states.transpose(0, 2, 1) @ steps.position.T], axis=2)
+        states[k] = discrete_model.transition @ states[k - 1]
+    response = low_pass(
+        states.transpose(0, 2, 1) @ discrete_model.response.T, sample_rate_hz, structure.sensor.bandwidth_hz
+    )
+    outputs = np.concatenate([response, states.transpose(0, 2, 1) @ discrete_model.position.T], axis=2)
     return np.asarray(outputs[:, :, :channel_count].transpose(0, 2, 1))
 
 

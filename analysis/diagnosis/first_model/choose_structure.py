@@ -24,7 +24,7 @@ from analysis.diagnosis.first_model.model_structures import (
     fit_structure,
 )
 from analysis.diagnosis.settings import MODES_GAIN, REMAINDER_REPORTED, RICHER_STRUCTURE_GAIN
-from equalizer.identification.mechanical.mechanical_free_simulation import simulation_errors
+from equalizer.identification.mechanical.mechanical_free_simulation import compute_simulation_errors
 from equalizer.identification.mechanical.mechanical_lines import compute_segment_lines, split_fit_and_test
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -176,7 +176,7 @@ def _compare_with_two_modes(
         float(select_bound(line.frequency_hz[line.excited])) for line in lines for select_bound in (np.min, np.max)
     ]
     simulation_rms = [
-        float(simulation_errors(model, lines, (min(band_edges_hz), max(band_edges_hz)))[0][-1])
+        float(compute_simulation_errors(model, lines, (min(band_edges_hz), max(band_edges_hz)))[0][-1])
         for model in (choice.fit.model, modal_fit.model)
     ]
     comparison = (

@@ -27,20 +27,20 @@ BALANCE_QUANTITIES = (frozenset(DERIVATIVE_OF_QUANTITY) | {"force", "torque"}) -
 
 
 def infer_quantities(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
-    """The recordings with the quantity of their responses, and a sentence about the assumption; unchanged, with an
-    empty sentence, where a quantity was stated or none can be assumed. recordings: alike in channels, units and
-    rate."""
+    """The recordings with the quantity of their responses, and a sentence about the assumption. Unchanged, with an
+    empty sentence, where a quantity was stated; where no force drives the device and a unit is stated; and for a
+    voltage that behaves like a position. recordings: alike in channels, units and rate."""
     first_recording = recordings[0]
     if set(first_recording.response.quantities) & BALANCE_QUANTITIES:
         return recordings, ""
     if quantities_in_names := _infer_from_names(first_recording):
-        return tuple(
-            _with_quantity(recording, quantities_in_names) for recording in recordings
-        ), _format_names_sentence(first_recording, quantities_in_names)
+        return tuple(_set_quantity(recording, quantities_in_names) for recording in recordings), _format_names_sentence(
+            first_recording, quantities_in_names
+        )
     if not is_driven(recordings):
         if set(first_recording.response.units) != {UNSTATED}:
             return recordings, ""
-        return tuple(_with_quantity(recording, "position") for recording in recordings), (
+        return tuple(_set_quantity(recording, "position") for recording in recordings), (
             f"The recording does not state what {conjoin(list(first_recording.response.channels))} measures; it was "
             "taken for a position that moves freely; if it is a speed, state that in the map (quantity)."
         )
@@ -49,7 +49,7 @@ def infer_quantities(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
     if quantity == "position" and set(first_recording.response.quantities) == {"voltage"}:
         return recordings, ""
     names = conjoin(list(first_recording.response.channels))
-    return tuple(_with_quantity(recording, quantity) for recording in recordings), (
+    return tuple(_set_quantity(recording, quantity) for recording in recordings), (
         f"The recording does not state what {names} measures; it was taken for a {quantity}, as its time series "
         "suggests; if it is another quantity, state that in the map (quantity)."
     )
@@ -57,11 +57,11 @@ def infer_quantities(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording
 
 def _infer_from_names(recording: Recording) -> tuple[str, ...]:
     """Quantities of the responses by the channels' names and units; empty where these determine none."""
-    from equalizer.signals.quantity_words import quantity_in  # only where a quantity is missing
+    from equalizer.signals.quantity_words import detect_quantity  # only where a quantity is missing
 
     response = recording.response
     quantities = [
-        inferred if unit == UNSTATED and (inferred := quantity_in(name)) in BALANCE_QUANTITIES else quantity
+        inferred if unit == UNSTATED and (inferred := detect_quantity(name)) in BALANCE_QUANTITIES else quantity
         for name, unit, quantity in zip(response.channels, response.units, response.quantities, strict=True)
     ]
     return tuple(quantities) if set(quantities) & BALANCE_QUANTITIES else ()
@@ -81,7 +81,7 @@ def _infer_from_balance(recordings: Sequence[Recording]) -> str:
     """Quantity of the first response by the force balance of the first command (see above); a position where the
     balance cannot be computed."""
     channel_count = len(recordings[0].response.channels)
-    as_positions = [replace(_with_quantity(recording, "position"), position=None) for recording in recordings]
+    as_positions = [replace(_set_quantity(recording, "position"), position=None) for recording in recordings]
     try:
         motions = compute_motions(observe_parts(as_positions, channel_count))
         regression = build_regression(motions, 0, (), turns=False)
@@ -93,18 +93,18 @@ def _infer_from_balance(recordings: Sequence[Recording]) -> str:
         return "position"
 
     def compute_error_increase(columns: Sequence[int]) -> float:
-        """Increase of the cross-validated error without these columns, relative to the power."""
+        """Increase of the cross-validated squared error without these columns, relative to the force's power."""
         errors_without = regression.cross_validate([k for k in all_columns if k not in columns])
         return float((errors_without - regression.cross_validate(all_columns)).sum()) / force_power
 
     motion_count = len(motions[0].channels)
-    derivative_needed, response_needed = (
+    acceleration_increase, position_increase = (
         compute_error_increase(range(motion_count)),
         compute_error_increase(range(2 * motion_count, 3 * motion_count)),
     )
-    return "velocity" if derivative_needed < DERIVATIVE_NEEDED <= response_needed else "position"
+    return "velocity" if acceleration_increase < DERIVATIVE_NEEDED <= position_increase else "position"
 
 
-def _with_quantity(recording: Recording, quantity: str | tuple[str, ...]) -> Recording:
+def _set_quantity(recording: Recording, quantity: str | tuple[str, ...]) -> Recording:
     """The recording with this quantity of all response channels, or with one per channel."""
     return replace(recording, response=replace(recording.response, quantity=quantity))

@@ -13,7 +13,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.balance.motion import Motion
-from analysis.diagnosis.first_model.reduced_recordings import is_reduced
+from analysis.diagnosis.first_model.reduced_recordings import is_reduction_needed
 from analysis.diagnosis.settings import FOUND_NUMBERS_OPEN, MASSLESS_SHARE
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, MechanicalModelError, Tolerance
 from equalizer.signals.recording import Recording
@@ -68,13 +68,13 @@ def _find_common_delay_s(balances: Sequence[Balance]) -> float:
     """The delay (s) that all commands share. 0 where their delays differ, because a model has a single delay, and where
     the recordings are reduced, because the reduction already removes the delay."""
     delays = {balance.search.regression.base_terms.delay_s for balance in balances}
-    return delays.pop() if len(delays) == 1 and not is_reduced(balances) else 0.0
+    return delays.pop() if len(delays) == 1 and not is_reduction_needed(balances) else 0.0
 
 
 def build_plain_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
     """`build_first_model` where at least one law is named and there is one body per command: no further fit is needed
     then. None otherwise, or where the matrices are no valid model."""
-    if not any(balance.named for balance in balances) or is_reduced(balances):
+    if not any(balance.named for balance in balances) or is_reduction_needed(balances):
         return None
     try:
         return build_first_model(balances, recording, name)

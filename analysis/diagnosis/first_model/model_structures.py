@@ -11,7 +11,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from analysis.diagnosis.balance.law import scales_of
+from analysis.diagnosis.balance.law import measure_scales
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motions
 from analysis.diagnosis.balance.regression import Regression
 from analysis.diagnosis.data.measured_motion import is_read_as_free, select_time_unit
@@ -114,7 +114,7 @@ def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
         raise NoMotionError("not every command has exactly one measured motion")
     if not any(motion.mask_valid_samples(motion.fit).any() for motion in motions):
         raise NoMotionError("too few samples with motion are available for the fit")
-    turns = any(scales_of(motions, axis, first.is_rotational).turns for axis in range(count))
+    turns = any(measure_scales(motions, axis, first.is_rotational).turns for axis in range(count))
     untimed = not np.isfinite(motions[0].band_hz)
     return BalancedRecordings(
         first, build_regressions(motions, turns), untimed, turns, first.is_rotational, is_read_as_free(first)

@@ -2,7 +2,7 @@
 
 These are forces of motions other than the driven ones, of modes, and of a delayed command, with the weights of the
 force balance. The reduced command drives one measured motion each, so that nonlinear laws are fitted and drawn as for
-any device.
+any device. Called by `model_from_balance` and `force_balance_measures`.
 """
 
 from collections.abc import Sequence
@@ -15,10 +15,10 @@ from analysis.diagnosis.balance.motion import Motion, find_motion_signal
 from analysis.diagnosis.data.observed_parts import find_parts
 from equalizer.signals.recording import Hold, Recording
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.signals.unit_system import system_of
+from equalizer.signals.unit_system import determine_unit_system
 
 
-def is_reduced(balances: Sequence[Balance]) -> bool:
+def is_reduction_needed(balances: Sequence[Balance]) -> bool:
     """Whether commands must be reduced: a balance has linear terms beyond one body per command, or integrated motions,
     and every named law is a column of the regression (a law of the command acts on the whole command, not on a
     part)."""
@@ -31,30 +31,32 @@ def is_reduced(balances: Sequence[Balance]) -> bool:
 
 
 def reduce_recordings(recordings: Sequence[Recording], balances: Sequence[Balance]) -> tuple[Recording, ...]:
-    """The recordings with reduced commands and the driven motions as response. recordings: those of the balances."""
-    reduced, first_part = [], 0
+    """The recordings with reduced commands and the driven motions as response, without position and excitation.
+    recordings: those of the balances, in the same order."""
+    reduced_recordings, first_part = [], 0
     for recording in recordings:
         parts = find_parts(recording)
-        reduced.append(_reduce(recording, parts, balances, first_part))
+        reduced_recordings.append(_reduce_recording(recording, parts, balances, first_part))
         first_part += len(parts)
-    return tuple(reduced)
+    return tuple(reduced_recordings)
 
 
-def _reduce(
+def _reduce_recording(
     recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], first_part: int
 ) -> Recording:
-    """A reduced recording. parts: start and stop of each. first_part: index of its first part among all motions."""
+    """A reduced recording. parts: start and stop of each, in samples. first_part: index of its first part among all
+    motions."""
     command = recording.command.samples.copy()
     for axis, balance in enumerate(balances):
         regression = balance.search.regression
-        for number, (start, stop) in enumerate(parts, first_part):
-            motion = regression.motions[number]
-            remaining_force = motion.force[:, axis] - _other_linear_force(balance, motion)
+        for part_index, (start, stop) in enumerate(parts, first_part):
+            motion = regression.motions[part_index]
+            remaining_force = motion.force[:, axis] - _compute_other_linear_force(balance, motion)
             # Below the band of an integrated motion there is no motion to balance the force.
             command[start:stop, axis] = (
                 motion.filter_to_band(remaining_force[:, None])[:, 0] if motion.order == 2 else remaining_force
             )
-    response, integrated = _driven_motions(recording, parts, balances, first_part)
+    response, is_integrated = _extract_driven_motions(recording, parts, balances, first_part)
     return replace(
         recording,
         command=replace(recording.command, samples=command),
@@ -62,49 +64,49 @@ def _reduce(
         position=None,
         excitation=None,
         # An integrated motion is already centred in the steps.
-        hold=Hold.BAND_LIMITED if integrated else recording.hold,
+        hold=Hold.BAND_LIMITED if is_integrated else recording.hold,
     )
 
 
-def _other_linear_force(balance: Balance, motion: Motion) -> FloatArray:
+def _compute_other_linear_force(balance: Balance, motion: Motion) -> FloatArray:
     """(n,), N (N m): linear force of the balance without the driven motion's own mass, damping and stiffness. The named
     laws are part of the regression, but not of this force."""
-    regression, d = balance.search.regression, len(motion.channels)
-    linear = [judged_law.place for judged_law in balance.laws if judged_law.law.linear]
+    regression, motion_count = balance.search.regression, len(motion.channels)
+    linear_laws = [judged_law.place for judged_law in balance.laws if judged_law.law.linear]
     weights = regression.fit_weights(
-        regression.select_columns([*linear, *(judged_law.place for judged_law in balance.named)])
+        regression.select_columns([*linear_laws, *(judged_law.place for judged_law in balance.named)])
     )
     # The constant force of the base stays in the command, for the later fit.
     weights = np.delete(weights, regression.base - 1)
-    motion_columns = [motion.acceleration, motion.velocity, motion.position][: regression.matrices // d]
+    motion_columns = [motion.acceleration, motion.velocity, motion.position][: regression.matrices // motion_count]
     columns = np.hstack([*motion_columns, *(law.columns(motion, law.numbers) for law in balance.linear_laws)])
-    has_other_motions = d > motion.force.shape[1]
+    has_other_motions = motion_count > motion.force.shape[1]
     is_subtracted = [
-        k >= regression.matrices or (has_other_motions and k % d != regression.base_terms.driven_channel)
+        k >= regression.matrices or (has_other_motions and k % motion_count != regression.base_terms.driven_channel)
         for k in range(columns.shape[1])
     ]
     return np.asarray(columns[:, is_subtracted] @ weights[: columns.shape[1]][is_subtracted])
 
 
-def _driven_motions(
+def _extract_driven_motions(
     recording: Recording, parts: Sequence[tuple[int, int]], balances: Sequence[Balance], first_part: int
 ) -> tuple[Signal, bool]:
     """The driven motions, and whether they are integrals of measured accelerations."""
     regression = balances[0].search.regression
-    measured = find_motion_signal(recording)
-    assert measured is not None
-    d = len(regression.motions[0].channels)
+    measured_motion = find_motion_signal(recording)
+    assert measured_motion is not None
+    motion_count = len(regression.motions[0].channels)
     driven_channels = [
-        k if d <= len(balances) else balances[k].search.regression.base_terms.driven_channel
-        for k in range(min(d, len(balances)))
+        k if motion_count <= len(balances) else balances[k].search.regression.base_terms.driven_channel
+        for k in range(min(motion_count, len(balances)))
     ]
-    samples, order = measured.samples.copy(), regression.motions[0].order
-    quantities, units = measured.quantities, measured.units
+    samples, order = measured_motion.samples.copy(), regression.motions[0].order
+    quantities, units = measured_motion.quantities, measured_motion.units
     if order == 2:
-        for number, (start, stop) in enumerate(parts, first_part):
-            samples[start:stop] = regression.motions[number].position
-        units = tuple(system_of(recording.command.units, (unit,)).length for unit in units)
+        for part_index, (start, stop) in enumerate(parts, first_part):
+            samples[start:stop] = regression.motions[part_index].position
+        units = tuple(determine_unit_system(recording.command.units, (unit,)).length for unit in units)
         quantities = tuple("angle" if unit == "rad" else "position" for unit in units)
-    return replace(measured, samples=samples, quantity=quantities, unit=units).select_channels(
+    return replace(measured_motion, samples=samples, quantity=quantities, unit=units).select_channels(
         driven_channels
     ), order == 2

@@ -20,7 +20,7 @@ from analysis.diagnosis.forces.inverse_response import compute_inverse_response
 from analysis.diagnosis.forces.predicted_force import PredictedForce, count_edge_samples
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from equalizer.effects.simulation.forces_along_motion import actuator_force
+from equalizer.effects.simulation.forces_along_motion import compute_actuator_force
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.band_limited import compute_low_pass_gain, filter_low_pass
 from equalizer.signals.signal import FloatArray, Signal
@@ -59,7 +59,7 @@ def build_force_views(
         choose_measured_motion(record.recording, model, floor) for record, floor in zip(records, floors, strict=True)
     ]
     applied_forces = [
-        actuator_force(model, record.command, record.recording.sample_rate_hz, (), record.recording.hold)
+        compute_actuator_force(model, record.command, record.recording.sample_rate_hz, (), record.recording.hold)
         for record in records
     ]
     band_hz = band_hz or _choose_band_hz(records, motions, applied_forces, floors, model)

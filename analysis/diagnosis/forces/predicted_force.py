@@ -23,7 +23,7 @@ from analysis.diagnosis.forces.inverse_dynamics import (
 )
 from equalizer.effects.effect import AxisForce, Effect, OnCommand, PlacedEffect, Structure
 from equalizer.effects.simulation.bodies import build_bodies
-from equalizer.effects.simulation.forces_along_motion import actuator_force, effect_forces_along_motion
+from equalizer.effects.simulation.forces_along_motion import compute_actuator_force, compute_effect_forces_along_motion
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.band_limited import filter_low_pass
@@ -57,32 +57,35 @@ class PredictedForce:
     least: float = 0.0
     """Least error in units of the noise, to which smaller errors are set: 0, or 1 after `with_floor`."""
     cache: dict[tuple[str, int], tuple[tuple[object, ...], object]] = field(default_factory=dict)
-    """Cache of the last inputs and result by kind and record, because many laws are tested on the same model and
-    command."""
+    """Cache of the last inputs and result by name ("required", "applied") and record index, because many laws are
+    tested on the same model and command."""
 
     def with_records(self, records: tuple[Observed, ...]) -> Self:
+        """The measure on other records, which must match `motions` in number and length."""
         return replace(self, records=records)
 
     def with_floor(self, rms: FloatArray) -> Self:
+        """The measure with noise of this rms (m,), N (N m), added in power, and 1 as its least error."""
         return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
 
     def shorten(self) -> "PredictedForce":
-        pairs = [
+        """The measure without the samples after the last to fit or to choose by, and without records that have none."""
+        records_and_motions = [
             (self._shorten_record(record), motion)
             for record, motion in zip(self.records, self.motions, strict=True)
             if (record.fit | record.choose).any()
         ]
-        records = tuple(record for record, _ in pairs)
-        motions = tuple(self._cut_motion(motion, len(record.command)) for record, motion in pairs)
+        records = tuple(record for record, _ in records_and_motions)
+        motions = tuple(self._cut_motion(motion, len(record.command)) for record, motion in records_and_motions)
         return replace(self, records=records, motions=motions)
 
-    def _cut_motion(self, motion: BandMotion, count: int) -> BandMotion:
-        """The motion of the first `count` samples, filtered anew where samples are cut off."""
+    def _cut_motion(self, motion: BandMotion, sample_count: int) -> BandMotion:
+        """The motion of the first `sample_count` samples, filtered anew where samples are cut off."""
         position = motion.position
         return (
             motion
-            if count == len(position)
-            else compute_band_motion(position[:count], motion.sample_rate_hz, self.band_hz)
+            if sample_count == len(position)
+            else compute_band_motion(position[:sample_count], motion.sample_rate_hz, self.band_hz)
         )
 
     def _shorten_record(self, record: Observed) -> Observed:
@@ -97,80 +100,88 @@ class PredictedForce:
         return isinstance(effect.action, (Structure, AxisForce, OnCommand))
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
+        """Per record (n, m): applied less required force, in units of `unit`. Raises numpy.linalg.LinAlgError where the
+        model's outputs do not determine its motion."""
         return tuple(
-            self._balance_forces(model, (*self.model_effects, *effects), index).residual / self.unit
-            for index in range(len(self.records))
+            self._balance_forces(model, (*self.model_effects, *effects), record_index).residual / self.unit
+            for record_index in range(len(self.records))
         )
 
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
+        """Per record, the motion and missing force from which starting values are estimated. residuals: not used,
+        because the force balance gives them again."""
         return tuple(
-            self._gather_evidence(model, (*self.model_effects, *effects), index) for index in range(len(self.records))
+            self._gather_evidence(model, (*self.model_effects, *effects), record_index)
+            for record_index in range(len(self.records))
         )
 
-    def _balance_forces(self, model: MechanicalModel, effects: Sequence[PlacedEffect], index: int) -> "_Balance":
+    def _balance_forces(self, model: MechanicalModel, effects: Sequence[PlacedEffect], record_index: int) -> "_Balance":
         """The force balance of a record. Its residual is scaled by the actuator's rms command over its rms force: a
         smaller actuator gain would otherwise reduce every error."""
-        record, motion = self.records[index], self.motions[index]
+        record, motion = self.records[record_index], self.motions[record_index]
         rate_hz = record.recording.sample_rate_hz
         model = add_carried_weight(model, record.recording)
         structure = build_bodies(
             model, [effect for effect in effects if isinstance(effect.effect.action, Structure)]
         ).structure
         required = self._compute_cached(
-            "required", index, (structure, motion), lambda: compute_required_force(structure, motion)
+            "required", record_index, (structure, motion), lambda: compute_required_force(structure, motion)
         )
-        applied = self._compute_actuator_force(model, effects, index)
+        applied = self._compute_actuator_force(model, effects, record_index)
         next_force = np.concatenate([required.force[1:], required.force[-1:]])
         axis_motion = required.axis_position, required.axis_velocity, required.axis_acceleration
         unbalanced_force = applied.band_force - (required.force + next_force) / 2
         effects = apply_conditions(effects, record.recording)
-        effect_force = effect_forces_along_motion(
+        effect_force = compute_effect_forces_along_motion(
             structure, effects, axis_motion, (record.command, unbalanced_force), rate_hz
         )
         # Both are means over the step that begins at a sample; the required force is the mean around the sample.
         total_force = applied.centred_force
         if effect_force.any():
             total_force = total_force + filter_low_pass(effect_force, rate_hz, self.band_hz, delay_s=0.5 / rate_hz)
-        command_rms = _rms(record.command)
-        scale = command_rms / np.maximum(_rms(applied.force), LEAST_ACTUATOR_SHARE * command_rms + np.finfo(float).tiny)
+        command_rms = _compute_rms(record.command)
+        scale = command_rms / np.maximum(
+            _compute_rms(applied.force), LEAST_ACTUATOR_SHARE * command_rms + np.finfo(float).tiny
+        )
         return _Balance(required, (total_force - required.force) * scale, total_force)
 
     def _compute_actuator_force(
-        self, model: MechanicalModel, effects: Sequence[PlacedEffect], index: int
+        self, model: MechanicalModel, effects: Sequence[PlacedEffect], record_index: int
     ) -> "_ActuatorForce":
         """The force of the actuators for a record; cached where no effect changes the command."""
-        record = self.records[index]
+        record = self.records[record_index]
         rate_hz, hold = record.recording.sample_rate_hz, record.recording.hold
         command_effects = [effect for effect in effects if isinstance(effect.effect.action, OnCommand)]
 
-        def compute() -> _ActuatorForce:
-            force = actuator_force(model, record.command, rate_hz, command_effects, hold)
+        def compute_force() -> _ActuatorForce:
+            force = compute_actuator_force(model, record.command, rate_hz, command_effects, hold)
             centred = filter_low_pass(force, rate_hz, self.band_hz, delay_s=0.5 / rate_hz)
             return _ActuatorForce(force, filter_low_pass(force, rate_hz, self.band_hz), centred)
 
         return (
-            compute()
+            compute_force()
             if command_effects
-            else self._compute_cached("applied", index, (model.actuator, record.command), compute)
+            else self._compute_cached("applied", record_index, (model.actuator, record.command), compute_force)
         )
 
     def _compute_cached(
-        self, kind: str, index: int, inputs: tuple[object, ...], compute: Callable[[], _Result]
+        self, cache_name: str, record_index: int, inputs: tuple[object, ...], compute: Callable[[], _Result]
     ) -> _Result:
-        """The cached result where all inputs are identical objects (`is`), else a new result."""
-        cached = self.cache.get((kind, index))
+        """The cached result where all inputs are identical objects (`is`), else the result of `compute`. cache_name,
+        record_index: key of the cache."""
+        cached = self.cache.get((cache_name, record_index))
         if cached is None or any(
             cached_input is not current_input for cached_input, current_input in zip(cached[0], inputs, strict=True)
         ):
             cached = inputs, compute()
-            self.cache[kind, index] = cached
+            self.cache[cache_name, record_index] = cached
         return cast(_Result, cached[1])
 
-    def _gather_evidence(self, model: MechanicalModel, effects: Sequence[PlacedEffect], index: int) -> Evidence:
+    def _gather_evidence(self, model: MechanicalModel, effects: Sequence[PlacedEffect], record_index: int) -> Evidence:
         """The evidence from which effects estimate starting values: motion, residual and force of a record."""
-        record, balance = self.records[index], self._balance_forces(model, effects, index)
+        record, balance = self.records[record_index], self._balance_forces(model, effects, record_index)
         return Evidence(
             model=add_carried_weight(model, record.recording),
             sample_rate_hz=record.recording.sample_rate_hz,
@@ -211,6 +222,6 @@ class _Balance:
     """(n, m): applied force, effects included."""
 
 
-def _rms(samples: FloatArray) -> FloatArray:
+def _compute_rms(samples: FloatArray) -> FloatArray:
     """(m,): root mean square of samples (n, m) over time."""
     return np.asarray(np.sqrt(np.mean(samples**2, axis=0)))

@@ -30,31 +30,36 @@ class CleanFloor:
     """Number of clean recordings."""
 
     @property
-    def beyond(self) -> float:
+    def margin_factor(self) -> float:
         """Factor on the largest observed share, because the next recording may exceed it: 1 + 1 / recordings."""
         return 1 + 1 / max(self.recordings, 1)
 
-    def share(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
-        """Share of a cell. Where clean recordings never drove this input, the largest share of the same channel and
-        octave; 0 without any."""
+    def get_share(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
+        """Get the share of a cell. Where clean recordings never drove this input, the largest share of the same channel
+        and octave; 0 without any."""
         cell_share = self.shares.get((output, quantity, input, band_hz))
         if cell_share is not None:
             return cell_share
-        channel_shares = [s for (o, q, _, b), s in self.shares.items() if (o, q, b) == (output, quantity, band_hz)]
+        channel_shares = [
+            share
+            for (channel_output, channel_quantity, _, octave), share in self.shares.items()
+            if (channel_output, channel_quantity, octave) == (output, quantity, band_hz)
+        ]
         return max(channel_shares, default=0.0)
 
 
-def clean_floor_sentence(floor: CleanFloor, channels: Sequence[str]) -> str:
-    """Sentence about the clean recordings; empty without any."""
+def describe_clean_floor(floor: CleanFloor, channels: Sequence[str]) -> str:
+    """Sentences about the model error on the clean recordings; empty without any. channels: names, as in
+    `CleanFloor.channels`."""
     if not floor.channels:
         return ""
     shares = conjoin([f"{name} {100 * share:.2g} %" for name, share in zip(channels, floor.channels, strict=False)])
-    count = f"{floor.recordings} clean recording{'s' if floor.recordings != 1 else ''}"
+    source = f"{floor.recordings} clean recording{'s' if floor.recordings != 1 else ''}"
     text = (
-        f"The difference between a device without faults and its re-tuned model was estimated from {count}: {shares} "
-        f"of the channel's signal (the largest observed; in the map, times {floor.beyond:.2g}). This difference "
+        f"The difference between a device without faults and its re-tuned model was estimated from {source}: {shares} "
+        f"of the channel's signal (the largest observed; in the map, times {floor.margin_factor:.2g}). This difference "
         "counts as noise here, with its distribution over frequency. An effect is named only where it explains more "
-        f"than {floor.beyond:.2g} times as much of the diagnosed recordings as of a clean one."
+        f"than {floor.margin_factor:.2g} times as much of the diagnosed recordings as of a clean one."
     )
     if max(floor.channels) <= LEARNED_TOO_MUCH:
         return text

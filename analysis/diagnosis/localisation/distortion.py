@@ -40,7 +40,7 @@ from analysis.diagnosis.localisation.segment_spectra import SegmentSpectrum, com
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.noise.periods import Periods, compute_period_spectra, find_settled_periods
 from analysis.diagnosis.types import Mask
-from equalizer.identification.frequency_response.experiments import instrument_signal
+from equalizer.identification.frequency_response.experiments import select_instrument_signal
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 
@@ -105,7 +105,7 @@ def find_distortions(recording: Recording, floor: NoiseFloor) -> Distortions:
     if not floor.is_known:
         return Distortions((), ("The noise is not known, so distortion cannot be distinguished from it.",))
     settled_periods = find_settled_periods(recording)
-    excitation = instrument_signal(recording)
+    excitation = select_instrument_signal(recording)
     hold_samples = compute_hold_samples(excitation)
     lines = [
         find_detection_lines(compute_period_spectra(excitation, period).mean(axis=0), hold_samples)

@@ -22,7 +22,7 @@ from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
 from analysis.diagnosis.localisation.residual_spectra import compute_residual_spectra
 from analysis.diagnosis.localisation.state_dependence import find_error_states, find_force_states
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
-from equalizer.effects.placing import axis_letter
+from equalizer.effects.placing import shorten_axis_name
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -100,7 +100,7 @@ def _list_possible_entries(
     sensor. frequency_hz: (lines,). with_position: whether the position is compared in addition to the response."""
     transfer = compute_axis_transfer(model, recording.sample_rate_hz, frequency_hz)
     forces = np.concatenate([transfer.response, transfer.position], axis=1) if with_position else transfer.response
-    axes = tuple(axis_letter(channel, recording.command.channels) for channel in recording.command.channels)
+    axes = tuple(shorten_axis_name(channel, recording.command.channels) for channel in recording.command.channels)
     p, channel_count = model.outputs, forces.shape[1]
     identity = np.eye(channel_count, dtype=np.complex128)[None]
     entries = [Entry(f"a force along {axis}", "mechanism", axis, forces[:, :, [k]]) for k, axis in enumerate(axes)]

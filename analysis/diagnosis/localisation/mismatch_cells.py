@@ -39,7 +39,7 @@ class Margin:
 
     def compute_share(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
         """Return the margin of a cell, as a share of its signal."""
-        return float(np.hypot(self.share, self.learned.share(output, quantity, input, band_hz)))
+        return float(np.hypot(self.share, self.learned.get_share(output, quantity, input, band_hz)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,13 +175,13 @@ def adjust_cell_p_values(cells: Sequence[MismatchCell]) -> tuple[MismatchCell, .
 
 def learn_floor(clean_cells: Sequence[Sequence[MismatchCell]]) -> CleanFloor:
     """Return the largest share of each cell over clean recordings and levels, times a factor that is larger for fewer
-    recordings (`CleanFloor.beyond`). clean_cells: the cells of each recording."""
+    recordings (`CleanFloor.margin_factor`). clean_cells: the cells of each recording."""
     shares: dict[tuple[str, str, str, Band], float] = {}
     for cells in clean_cells:
         for cell in cells:
             cell_key = (cell.output, cell.quantity, cell.input, cell.band_hz)
             shares[cell_key] = max(shares.get(cell_key, 0.0), cell.share)
-    factor = CleanFloor(recordings=len(clean_cells)).beyond
+    factor = CleanFloor(recordings=len(clean_cells)).margin_factor
     return CleanFloor({cell_key: factor * share for cell_key, share in shares.items()}, recordings=len(clean_cells))
 
 

@@ -21,7 +21,7 @@ from analysis.diagnosis.data.spectral_lines import (
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.periods import Periods, compute_mean_spectrum, find_settled_periods
 from analysis.diagnosis.types import Mask
-from equalizer.identification.frequency_response.experiments import instrument_signal
+from equalizer.identification.frequency_response.experiments import select_instrument_signal
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import compute_line_spectra, hann
@@ -106,8 +106,8 @@ def _sum_period_octaves(
 ) -> list[ResidualLines]:
     """Compute the residual power of the mean period, by octave of the driven band; empty where no line is driven.
     residual: (n, channels)."""
-    excitation = compute_mean_spectrum(instrument_signal(recording), periods)
-    driven = find_detection_lines(excitation, compute_hold_samples(instrument_signal(recording)))
+    excitation = compute_mean_spectrum(select_instrument_signal(recording), periods)
+    driven = find_detection_lines(excitation, compute_hold_samples(select_instrument_signal(recording)))
     if driven is None:
         return []
     lines_hz = periods.compute_line_frequencies(recording.sample_rate_hz)
@@ -145,11 +145,11 @@ def _sum_window_octaves(
     length = min(round(_WINDOW_S * recording.sample_rate_hz), segment.stop - segment.start)
     all_starts = range(segment.start, segment.stop - length + 1, max(length // 2, 1))
     starts = [start for start in all_starts if usable[start : start + length].all()]
-    command = instrument_signal(recording)[segment.start : segment.stop]
+    command = select_instrument_signal(recording)[segment.start : segment.stop]
     if length < 16 or not starts or not np.isfinite(command).all():
         return []
     lines_hz: FloatArray = np.arange(1.0, (length + 1) // 2) * (recording.sample_rate_hz / length)
-    excitation = np.sum(_compute_window_power(instrument_signal(recording), starts, length), axis=2)
+    excitation = np.sum(_compute_window_power(select_instrument_signal(recording), starts, length), axis=2)
     response = _compute_window_power(observation.measured, starts, length)
     residual_power = _compute_window_power(residual, starts, length)
     noise = np.broadcast_to(_compute_noise_power(observation, lines_hz, 1) / length, response.shape)

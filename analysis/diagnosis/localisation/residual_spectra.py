@@ -16,7 +16,7 @@ from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.noise.periods import Periods, compute_period_spectra, find_settled_periods
 from analysis.diagnosis.types import Mask
-from equalizer.identification.frequency_response.experiments import instrument_signal
+from equalizer.identification.frequency_response.experiments import select_instrument_signal
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import ComplexArray, FloatArray
 
@@ -67,10 +67,10 @@ def compute_residual_spectra(
         return None
     lines_hz = segments[0].compute_line_frequencies(recording.sample_rate_hz)
     excitation = np.stack(
-        [compute_period_spectra(instrument_signal(recording), segment).mean(axis=0) for segment in segments]
+        [compute_period_spectra(select_instrument_signal(recording), segment).mean(axis=0) for segment in segments]
     )
     total_excitation = np.sqrt(np.sum(np.abs(excitation) ** 2, axis=0)).astype(np.complex128)
-    driven = find_detection_lines(total_excitation, compute_hold_samples(instrument_signal(recording)))
+    driven = find_detection_lines(total_excitation, compute_hold_samples(select_instrument_signal(recording)))
     if driven is None:
         return None
     first_line, last_line = np.flatnonzero(driven.driven)[[0, -1]]

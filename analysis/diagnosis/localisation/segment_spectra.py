@@ -12,8 +12,8 @@ import numpy as np
 from analysis.diagnosis.data.spectral_lines import DetectionLines, find_driven_inputs
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.periods import Periods, compute_period_spectra
-from equalizer.identification.frequency_response.experiments import instrument_signal
-from equalizer.identification.frequency_response.noise_floor import period_variance, smooth_over_lines
+from equalizer.identification.frequency_response.experiments import select_instrument_signal
+from equalizer.identification.frequency_response.noise_floor import compute_period_variance, smooth_over_lines
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import ComplexArray, FloatArray, Signal
 
@@ -90,7 +90,7 @@ def name_driven_inputs(recording: Recording, periods: Periods) -> str:
     """Return the names of the inputs that are driven in the first of the periods, joined by "+"."""
     first_period = slice(periods.starts[0], periods.starts[0] + periods.length)
     return "+".join(
-        find_driven_inputs(instrument_signal(recording)[first_period].var(axis=0), recording.command.channels)
+        find_driven_inputs(select_instrument_signal(recording)[first_period].var(axis=0), recording.command.channels)
     )
 
 
@@ -107,7 +107,7 @@ def _estimate_mean(
     response: (periods, lines, channels). floor: noise variance of one period, the lower limit. rounding:
     (channels,)."""
     count = len(response)
-    spread = period_variance(response) if count > 1 else floor
+    spread = compute_period_variance(response) if count > 1 else floor
     smoothed_spread = np.maximum(floor, smooth_over_lines(spread, _SMOOTHED_LINES))
     return response.mean(axis=0), smoothed_spread / count + rounding, spread
 

@@ -16,7 +16,7 @@ from analysis.diagnosis.localisation.block_permutation import IntArray
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell
 from analysis.diagnosis.localisation.mismatch_rows import StateMismatch
 from analysis.diagnosis.localisation.state_regions import (
-    MIDDLE_PHRASE,
+    MIDDLE_REGION_PHRASE,
     Disturbance,
     State,
     StateRegion,
@@ -24,7 +24,7 @@ from analysis.diagnosis.localisation.state_regions import (
 )
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, STATE_CROWDED, STATES_NAMED
 from analysis.diagnosis.types import Mask
-from equalizer.effects.placing import axis_letter
+from equalizer.effects.placing import shorten_axis_name
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
@@ -50,7 +50,7 @@ def find_force_states(
         channel_cells = [cell for cell in cells if cell.beyond_noise and channel in cell.input.split("+")]
         if not channel_cells:
             continue
-        axis_symbol = axis_letter(channel, recording.command.channels)
+        axis_symbol = shorten_axis_name(channel, recording.command.channels)
         length_unit = system.length
         velocity_symbol = "ω" if length_unit == "rad" else "v"
         command = evidence.command[:, axis_index]
@@ -128,7 +128,7 @@ def _correct_p_values(groups: Sequence[Sequence[StateMismatch]], tests_per_group
 
 def _is_informative(region: StateRegion) -> bool:
     """Whether a region says more than where most samples are. A middle of a state has no meaning in mechanics."""
-    if region.words.startswith(MIDDLE_PHRASE):
+    if region.words.startswith(MIDDLE_REGION_PHRASE):
         return False
     return region.criterion == "sign" or region.share > STATE_CROWDED * region.occupied
 

@@ -20,20 +20,22 @@ from analysis.wording import typeset
 from equalizer.signals.signal import FloatArray
 
 StateKind = Literal["position", "velocity", "command", "response", "time"]
-_BINS = 12
-"""Number of bins of a state, with equally many samples each."""
+_BIN_COUNT = 12
+"""Number of bins of a state, with equally many samples each as far as equal values allow."""
 PERMUTATIONS = 60
 """Number of permutations of blocks."""
 _LEAST_CONCENTRATION = 1.5
 """Least ratio of a bin's mean square to the expected one, for the bin to belong to a region."""
 _LEAST_SHARE = 0.05
 """Least share of the power that bin means must explain."""
-_TINY = np.finfo(np.float64).tiny
+_SMALLEST_NORMAL = np.finfo(np.float64).tiny
+"""Smallest normal number, against divisions by zero."""
 _LEAST_EXPECTED = 1e-9
 """Least expected power of a bin, relative to the mean; bins below it, such as those at rest, are not tested."""
-MIDDLE_PHRASE = "at middling"
+MIDDLE_REGION_PHRASE = "at middling"
 """First words of the text for a region with neither small nor large values of a state."""
-_READABLE = {"m": ("mm", 1e3), "rad": ("deg", 180 / np.pi)}
+_DISPLAY_UNITS = {"m": ("mm", 1e3), "rad": ("deg", 180 / np.pi)}
+"""Units in which positions are written, with the factor from SI."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +47,7 @@ class State:
     """Symbol in the result: "v", "x", "fx", "ax", "t"."""
     unit: str
     values: FloatArray
-    """(n,)"""
+    """(n,), in `unit`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,7 +55,7 @@ class Disturbance:
     """A residual, or the force that would explain it."""
 
     values: FloatArray
-    """(n,)"""
+    """(n,), NaN where missing."""
     strata: IntArray
     """(n,): number of the condition or segment; -1 = not used. Conditions differ in what is driven and at which level,
     so samples are compared within them only."""
@@ -83,8 +85,9 @@ def find_state_regions(
     disturbance: Disturbance, states: Sequence[State], seed: int, permutations: int = PERMUTATIONS
 ) -> tuple[StateRegion, ...]:
     """Regions with a concentration of at least `_LEAST_CONCENTRATION`, or with bin means that explain `_LEAST_SHARE` of
-    the power: the smallest p-value first, then the largest share. p-values are of single tests, by block permutation
-    within segments, and not compared with a limit here; they depend on the seed in their third digit.
+    the power: the smallest p-value first, then the largest share. Empty with fewer than ten samples per bin, or for a
+    disturbance of zeros. p-values are of single tests, by block permutation within segments, and not compared with a
+    limit here; they depend on the seed in their third digit.
 
     The size is tested for every state (over the magnitude of velocity, command and response), the sign for position and
     velocity only.
@@ -95,27 +98,27 @@ def find_state_regions(
         if state.values.shape != disturbance.values.shape:
             raise ValueError(f"{state.symbol} has shape {state.values.shape}, not {disturbance.values.shape}")
     is_used = (disturbance.strata >= 0) & np.isfinite(disturbance.values)
-    if is_used.sum() < 10 * _BINS or not disturbance.values[is_used].any():
+    if is_used.sum() < 10 * _BIN_COUNT or not disturbance.values[is_used].any():
         return ()
-    used = np.flatnonzero(is_used)[np.argsort(disturbance.strata[is_used], kind="stable")]
-    values, strata = disturbance.values[used], disturbance.strata[used]
-    random = np.random.default_rng(seed)
-    block = compute_block_length(values)
+    used_indices = np.flatnonzero(is_used)[np.argsort(disturbance.strata[is_used], kind="stable")]
+    values, strata = disturbance.values[used_indices], disturbance.strata[used_indices]
+    generator = np.random.default_rng(seed)
+    block_length = compute_block_length(values)
     regions: list[StateRegion] = []
-    motion_states = [(state, state.values[used]) for state in states if state.kind != "time"]
+    motion_states = [(state, state.values[used_indices]) for state in states if state.kind != "time"]
     if motion_states:
-        expected = _mean_square_by_stratum(values, strata)
+        expected = _compute_stratum_mean_square(values, strata)
         regions += _test_states(
-            _Sample(values, expected, strata, block, is_constant=True), motion_states, permutations, random
+            _Sample(values, expected, strata, block_length, is_constant=True), motion_states, permutations, generator
         )
-    times = [(state, _locate_in_stratum(strata)) for state in states if state.kind == "time"]
-    if times and disturbance.signal is not None:
-        signal = disturbance.signal[used] ** 2
-        share = _mean_square_by_stratum(values, strata) / np.maximum(
-            _mean_square_by_stratum(disturbance.signal[used], strata), _TINY
+    time_states = [(state, _locate_in_stratum(strata)) for state in states if state.kind == "time"]
+    if time_states and disturbance.signal is not None:
+        signal_power = disturbance.signal[used_indices] ** 2
+        power_share = _compute_stratum_mean_square(values, strata) / np.maximum(
+            _compute_stratum_mean_square(disturbance.signal[used_indices], strata), _SMALLEST_NORMAL
         )
-        driven = _Sample(values, share * signal, strata, block, is_constant=False)
-        regions += _test_states(driven, times, permutations, random)
+        time_sample = _Sample(values, power_share * signal_power, strata, block_length, is_constant=False)
+        regions += _test_states(time_sample, time_states, permutations, generator)
     return tuple(sorted(regions, key=lambda region: (region.p_value, -region.share)))
 
 
@@ -134,42 +137,42 @@ class _Sample:
 
 
 def _test_states(
-    sample: _Sample, states: Sequence[tuple[State, FloatArray]], permutations: int, random: np.random.Generator
+    sample: _Sample, states: Sequence[tuple[State, FloatArray]], permutations: int, generator: np.random.Generator
 ) -> list[StateRegion]:
     """Regions of all states, from one set of permutations. states: with their values at the used samples."""
-    by_size = [_assign_equal_bins(np.abs(values) if _uses_magnitude(state) else values) for state, values in states]
-    by_sign = [_assign_equal_bins(values) for state, values in states if _has_sign(state)]
-    total, counts = float(np.sum(sample.values**2)), [np.bincount(labels) for labels in by_sign]
-    constant_expected = [_sum_by_bin(labels, sample.expected) for labels in by_size] if sample.is_constant else []
+    size_bins = [_assign_equal_bins(np.abs(values) if _uses_magnitude(state) else values) for state, values in states]
+    sign_bins = [_assign_equal_bins(values) for state, values in states if _has_sign(state)]
+    total_power, counts = float(np.sum(sample.values**2)), [np.bincount(labels) for labels in sign_bins]
+    constant_expected = [_sum_by_bin(labels, sample.expected) for labels in size_bins] if sample.is_constant else []
 
-    def statistics(order: IntArray) -> FloatArray:
+    def compute_statistics(order: IntArray) -> FloatArray:
         permuted = sample.values[order]
         power = permuted**2
-        expected_sums = constant_expected or [_sum_by_bin(labels, sample.expected[order]) for labels in by_size]
-        sizes = [
+        expected_sums = constant_expected or [_sum_by_bin(labels, sample.expected[order]) for labels in size_bins]
+        size_statistics = [
             _compute_unevenness(_sum_by_bin(labels, power), expected)
-            for labels, expected in zip(by_size, expected_sums, strict=True)
+            for labels, expected in zip(size_bins, expected_sums, strict=True)
         ]
-        signs = [
-            float(np.sum(_sum_by_bin(labels, permuted) ** 2 / count)) / total
-            for labels, count in zip(by_sign, counts, strict=True)
+        sign_statistics = [
+            float(np.sum(_sum_by_bin(labels, permuted) ** 2 / count)) / total_power
+            for labels, count in zip(sign_bins, counts, strict=True)
         ]
-        return np.array(sizes + signs)
+        return np.array(size_statistics + sign_statistics)
 
-    p_values = compute_permutation_p_values(statistics, sample.strata, sample.block, permutations, random)
+    p_values = compute_permutation_p_values(compute_statistics, sample.strata, sample.block, permutations, generator)
     regions = []
-    for (state, values), bins, p_value in zip(states, by_size, p_values, strict=False):
+    for (state, values), bins, p_value in zip(states, size_bins, p_values, strict=False):
         region = _find_region(state, values, bins, sample)
         if region is not None:
-            share, occupied, words = region
-            regions.append(StateRegion(state.kind, state.symbol, "size", share, occupied, float(p_value), words))
-    signed = [state for state, _ in states if _has_sign(state)]
-    for state, bins, p_value in zip(signed, by_sign, p_values[len(states) :], strict=True):
+            share, occupied, description = region
+            regions.append(StateRegion(state.kind, state.symbol, "size", share, occupied, float(p_value), description))
+    sign_states = [state for state, _ in states if _has_sign(state)]
+    for state, bins, p_value in zip(sign_states, sign_bins, p_values[len(states) :], strict=True):
         means = _sum_by_bin(bins, sample.values) / np.bincount(bins)
-        share = float(np.sum(np.bincount(bins) * means**2)) / total
+        share = float(np.sum(np.bincount(bins) * means**2)) / total_power
         if share >= _LEAST_SHARE:
-            words = describe_dependence(state.symbol, means)
-            regions.append(StateRegion(state.kind, state.symbol, "sign", share, 1.0, float(p_value), words))
+            description = describe_dependence(state.symbol, means)
+            regions.append(StateRegion(state.kind, state.symbol, "sign", share, 1.0, float(p_value), description))
     return regions
 
 
@@ -177,35 +180,43 @@ def _find_region(state: State, values: FloatArray, bins: IntArray, sample: _Samp
     """`share`, `occupied` and `words` of a `StateRegion`: the adjacent bins of at least `_LEAST_CONCENTRATION` that
     contain the largest; None where no bin reaches it."""
     power = sample.values**2
-    one_stratum = bool((sample.strata == sample.strata[0]).all())
+    is_one_stratum = bool((sample.strata == sample.strata[0]).all())
     expected = _sum_by_bin(bins, sample.expected)
-    ratio = _sum_by_bin(bins, power) / np.maximum(expected, max(_LEAST_EXPECTED * float(expected.mean()), _TINY))
-    top = int(np.argmax(ratio))
-    if ratio[top] < _LEAST_CONCENTRATION:
+    ratio = _sum_by_bin(bins, power) / np.maximum(
+        expected, max(_LEAST_EXPECTED * float(expected.mean()), _SMALLEST_NORMAL)
+    )
+    peak_bin = int(np.argmax(ratio))
+    if ratio[peak_bin] < _LEAST_CONCENTRATION:
         return None
-    first = last = top
-    while first > 0 and ratio[first - 1] >= _LEAST_CONCENTRATION:
-        first -= 1
-    while last < len(ratio) - 1 and ratio[last + 1] >= _LEAST_CONCENTRATION:
-        last += 1
-    in_region = (bins >= first) & (bins <= last)
-    share = float(power[in_region].sum() / max(float(power.sum()), _TINY))
+    first_bin = last_bin = peak_bin
+    while first_bin > 0 and ratio[first_bin - 1] >= _LEAST_CONCENTRATION:
+        first_bin -= 1
+    while last_bin < len(ratio) - 1 and ratio[last_bin + 1] >= _LEAST_CONCENTRATION:
+        last_bin += 1
+    in_region = (bins >= first_bin) & (bins <= last_bin)
+    share = float(power[in_region].sum() / max(float(power.sum()), _SMALLEST_NORMAL))
     centre = float(np.average(values[in_region], weights=power[in_region]))
-    words = describe_region(state.kind, state.symbol, state.unit, (first, last, len(ratio)), centre, one_stratum)
-    return share, float(np.mean(in_region)), words
+    description = describe_region(
+        state.kind, state.symbol, state.unit, (first_bin, last_bin, len(ratio)), centre, is_one_stratum
+    )
+    return share, float(np.mean(in_region)), description
 
 
 def _compute_unevenness(observed: FloatArray, expected: FloatArray) -> float:
     """Chi-squared statistic of bin powers against the expected ones, over the total power."""
     total = float(expected.sum())
     populated = expected > _LEAST_EXPECTED * total / len(expected)
-    return float(np.sum((observed - expected)[populated] ** 2 / expected[populated])) / total if total > _TINY else 0.0
+    return (
+        float(np.sum((observed - expected)[populated] ** 2 / expected[populated])) / total
+        if total > _SMALLEST_NORMAL
+        else 0.0
+    )
 
 
 def _locate_in_stratum(strata: IntArray) -> FloatArray:
     """(n,): relative position of each sample in its stratum, 0 to 1. strata: (n,), sorted."""
-    _, first, number, length = np.unique(strata, return_index=True, return_inverse=True, return_counts=True)
-    return np.asarray((np.arange(len(strata)) - first[number]) / length[number], dtype=np.float64)
+    _, first, stratum_index, length = np.unique(strata, return_index=True, return_inverse=True, return_counts=True)
+    return np.asarray((np.arange(len(strata)) - first[stratum_index]) / length[stratum_index], dtype=np.float64)
 
 
 def _sum_by_bin(bins: IntArray, weights: FloatArray) -> FloatArray:
@@ -213,16 +224,16 @@ def _sum_by_bin(bins: IntArray, weights: FloatArray) -> FloatArray:
     return np.asarray(np.bincount(bins, weights), dtype=np.float64)
 
 
-def _mean_square_by_stratum(values: FloatArray, strata: IntArray) -> FloatArray:
+def _compute_stratum_mean_square(values: FloatArray, strata: IntArray) -> FloatArray:
     """(n,): mean square of the values in the stratum of each sample."""
-    _, numbers = np.unique(strata, return_inverse=True)
-    mean = _sum_by_bin(numbers, values**2) / np.bincount(numbers)
-    return np.asarray(mean[numbers], dtype=np.float64)
+    _, stratum_indices = np.unique(strata, return_inverse=True)
+    mean = _sum_by_bin(stratum_indices, values**2) / np.bincount(stratum_indices)
+    return np.asarray(mean[stratum_indices], dtype=np.float64)
 
 
 def _assign_equal_bins(values: FloatArray) -> IntArray:
     """(n,): bin numbers of values (n,), in bins of equal count as far as equal values allow."""
-    edges = np.unique(np.quantile(values, np.linspace(0, 1, _BINS + 1)[1:-1]))
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, _BIN_COUNT + 1)[1:-1]))
     return np.unique(np.searchsorted(edges, values, side="right"), return_inverse=True)[1].astype(np.int64)
 
 
@@ -232,26 +243,26 @@ def _uses_magnitude(state: State) -> bool:
 
 
 def _has_sign(state: State) -> bool:
-    """Whether the mean of the disturbance per bin is tested, too."""
+    """Whether the mean of the disturbance per bin is tested, too: whether its sign follows the state."""
     return state.kind in ("position", "velocity")
 
 
 def describe_region(
-    kind: str, symbol: str, unit: str, bins: tuple[int, int, int], centre: float, one_stratum: bool
+    kind: str, symbol: str, unit: str, bins: tuple[int, int, int], centre: float, is_one_stratum: bool
 ) -> str:
     """Words for a region of the state, such as "near x = 12 mm". bins: first and last of it, and the number of all.
     centre: mean state of the mismatch in it."""
-    first, last, count = bins
-    is_lowest, is_highest = first == 0, last == count - 1
+    first_bin, last_bin, bin_count = bins
+    is_lowest, is_highest = first_bin == 0, last_bin == bin_count - 1
     if kind == "time":
         phrase = "midway through" if is_lowest == is_highest else "late in" if is_highest else "early in"
-        return f"{phrase} {'the record' if one_stratum else 'each segment'}"
+        return f"{phrase} {'the record' if is_one_stratum else 'each segment'}"
     if kind == "position":
-        display_unit, factor = _READABLE.get(unit, (unit, 1.0))
-        return f"near {symbol} = {typeset(f'{centre * factor:.2g}')} {display_unit}".rstrip()
+        display_unit, display_factor = _DISPLAY_UNITS.get(unit, (unit, 1.0))
+        return f"near {symbol} = {typeset(f'{centre * display_factor:.2g}')} {display_unit}".rstrip()
     if is_lowest and not is_highest:
         return f"near {symbol} = 0" if kind == "velocity" else f"where |{symbol}| is small"
-    return f"where |{symbol}| is large" if is_highest else f"{MIDDLE_PHRASE} |{symbol}|"
+    return f"where |{symbol}| is large" if is_highest else f"{MIDDLE_REGION_PHRASE} |{symbol}|"
 
 
 def describe_dependence(symbol: str, means: FloatArray) -> str:

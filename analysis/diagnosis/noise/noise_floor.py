@@ -9,7 +9,7 @@ import numpy as np
 
 from analysis.diagnosis.noise.channel_noise import ChannelNoise
 from analysis.diagnosis.noise.periods import Periods, find_settled_periods
-from analysis.diagnosis.noise.quiet_noise import quiet_band_noise, rest_noise
+from analysis.diagnosis.noise.quiet_noise import estimate_quiet_band_noise, estimate_rest_noise
 from analysis.diagnosis.noise.repeat_noise import add_repeating_rounding, estimate_repeat_noise
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
@@ -56,7 +56,7 @@ def estimate_noise_floor(recording: Recording) -> NoiseFloor:
     rate = recording.sample_rate_hz
     lines_hz: FloatArray = np.arange(1.0, _LINES + 1) * (rate / 2 / (_LINES + 1))
     signals = [recording.response] + ([] if recording.position is None else [recording.position])
-    rest_estimates = [rest_noise(recording, signal.samples, lines_hz) for signal in signals]
+    rest_estimates = [estimate_rest_noise(recording, signal.samples, lines_hz) for signal in signals]
     if all(rest_estimate is not None for rest_estimate in rest_estimates):
         remark = "Nothing repeats in this recording: its noise was measured at rest."
         return _build_floor(
@@ -66,7 +66,7 @@ def estimate_noise_floor(recording: Recording) -> NoiseFloor:
             signals,
             remark,
         )
-    quiet_estimates = [quiet_band_noise(recording, signal.samples, lines_hz) for signal in signals]
+    quiet_estimates = [estimate_quiet_band_noise(recording, signal.samples, lines_hz) for signal in signals]
     if all(quiet_estimate is not None for quiet_estimate in quiet_estimates):
         remark = (
             "Nothing repeats in this recording and it never rests: its noise was measured above the driven band and "

@@ -2,26 +2,26 @@
 
 At rest, the noise is estimated from windowed spectra, or at high frequencies from third differences, which remove slow
 ringing after an excitation. Without rest, the median power of the lines above the driven band is taken, which single
-harmonics do not change, and the noise is assumed to be white.
+harmonics do not change, and the noise is assumed to be white. Called by `noise_floor` and `repeat_noise`.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.identification.frequency_response.experiments import instrument_signal
+from equalizer.identification.frequency_response.experiments import select_instrument_signal
 from equalizer.identification.frequency_response.noise_floor import (
-    interpolate_rest,
-    rest_intervals,
-    rest_powers,
+    compute_rest_powers,
+    find_rest_intervals,
+    interpolate_rest_density,
     smooth_over_lines,
 )
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, find_runs
 from equalizer.signals.spectral_density import hann
 
-_LEAST_SAMPLES = 8
-"""Least number of samples of a window: recordings at less than 32 Hz have no window."""
+_LEAST_WINDOW_SAMPLES = 8
+"""Least number of samples of a window at rest: recordings at less than 30 Hz have no window."""
 _WINDOW_S = 0.25
 """Length of a window at rest (s)."""
 _UNDRIVEN_SHARE = 1e-4
@@ -45,48 +45,51 @@ class FastNoise:
     """(windows, channels): degrees of freedom of the variance."""
 
 
-def fast_noise_at_rest(recording: Recording, samples: FloatArray) -> FastNoise | None:
-    """Noise from third differences in windows of 0.25 s, from 0.25 s after the end of an excitation. samples: (n,
-    channels). None where there is no such window."""
-    length = round(_WINDOW_S * recording.sample_rate_hz)
-    if length < _LEAST_SAMPLES:
+def estimate_fast_rest_noise(recording: Recording, samples: FloatArray) -> FastNoise | None:
+    """Estimate the noise from third differences in windows of 0.25 s, from 0.25 s after the end of an excitation.
+    samples: (n, channels), of the recording. None where there is no such window without gaps."""
+    window_samples = round(_WINDOW_S * recording.sample_rate_hz)
+    if window_samples < _LEAST_WINDOW_SAMPLES:
         return None
     variances = []
-    for start, stop in rest_intervals(recording, _WINDOW_S):
-        for window_start in range(start, stop - length + 1, length):
-            window = samples[window_start : window_start + length]
+    for start, stop in find_rest_intervals(recording, _WINDOW_S):
+        for window_start in range(start, stop - window_samples + 1, window_samples):
+            window = samples[window_start : window_start + window_samples]
             if np.isfinite(window).all():
                 variances.append(np.mean(np.diff(window, n=3, axis=0) ** 2, axis=0) / _DIFFERENCE_GAIN)
     if not variances:
         return None
     variance: FloatArray = np.array(variances)
-    return FastNoise(variance, np.full(variance.shape, (length - 3) / _DIFFERENCE_LOSS))
+    return FastNoise(variance, np.full(variance.shape, (window_samples - 3) / _DIFFERENCE_LOSS))
 
 
-def rest_noise(recording: Recording, samples: FloatArray, frequency_hz: FloatArray) -> tuple[FloatArray, float] | None:
-    """Density (lines, channels) at `frequency_hz` and its degrees of freedom. None without a rest of a quarter of a
-    second, or where a reading is constant at rest, because an encoder's steps then hide its noise."""
-    length = round(_WINDOW_S * recording.sample_rate_hz)
-    if length < _LEAST_SAMPLES:
-        return None
-    powers = rest_powers(recording, samples, length)
-    if not powers:
-        return None
-    lines_hz: FloatArray = np.arange(1.0, length // 2) * (recording.sample_rate_hz / length)
-    mean = np.mean(powers, axis=0)
-    if not mean.any(axis=0).all():
-        return None
-    density = interpolate_rest(mean, lines_hz, frequency_hz)
-    # Windows overlap by half, and a Hann window correlates neighbouring lines: about half of all lines are independent.
-    return density, float(len(powers) * length / 2)
-
-
-def quiet_band_noise(
+def estimate_rest_noise(
     recording: Recording, samples: FloatArray, frequency_hz: FloatArray
 ) -> tuple[FloatArray, float] | None:
-    """White density (lines, channels) with the power of the median line above the driven band, and its degrees of
-    freedom; None without such a band. The median excludes the lines of harmonics."""
-    instrument = instrument_signal(recording)
+    """Estimate the noise at rest: density (lines, channels) at `frequency_hz`, and its degrees of freedom. None without
+    a rest of a quarter of a second, or where a reading is constant at rest, because an encoder's steps then hide its
+    noise."""
+    window_samples = round(_WINDOW_S * recording.sample_rate_hz)
+    if window_samples < _LEAST_WINDOW_SAMPLES:
+        return None
+    window_powers = compute_rest_powers(recording, samples, window_samples)
+    if not window_powers:
+        return None
+    lines_hz: FloatArray = np.arange(1.0, window_samples // 2) * (recording.sample_rate_hz / window_samples)
+    mean_power = np.mean(window_powers, axis=0)
+    if not mean_power.any(axis=0).all():
+        return None
+    density = interpolate_rest_density(mean_power, lines_hz, frequency_hz)
+    # Windows overlap by half, and a Hann window correlates neighbouring lines: about half of all lines are independent.
+    return density, float(len(window_powers) * window_samples / 2)
+
+
+def estimate_quiet_band_noise(
+    recording: Recording, samples: FloatArray, frequency_hz: FloatArray
+) -> tuple[FloatArray, float] | None:
+    """Estimate a white density (lines, channels) with the power of the median line above the driven band, and its
+    degrees of freedom; None without such a band. The median excludes the lines of harmonics."""
+    instrument = select_instrument_signal(recording)
     start, stop = _find_longest_run(np.hstack([samples, instrument]))
     samples, command = samples[start:stop], instrument[start:stop]
     if len(samples) < 2 * _LEAST_LINES:
@@ -95,18 +98,18 @@ def quiet_band_noise(
     # A Hann window has a mean square of 3/8.
     window = np.sqrt(8 / 3) * hann(n)
     lines_hz: FloatArray = np.arange(1.0, n // 2) * (recording.sample_rate_hz / n)
-    driven = np.abs(np.fft.rfft((command - command.mean(axis=0)) * window[:, None], axis=0)[1 : n // 2]) ** 2
-    smooth = smooth_over_lines(driven.sum(axis=1, keepdims=True), max(9, n // 500))[:, 0]
-    if smooth.max() == 0:
+    command_power = np.abs(np.fft.rfft((command - command.mean(axis=0)) * window[:, None], axis=0)[1 : n // 2]) ** 2
+    smoothed_power = smooth_over_lines(command_power.sum(axis=1, keepdims=True), max(9, n // 500))[:, 0]
+    if smoothed_power.max() == 0:
         return None
-    highest_hz = float(lines_hz[np.flatnonzero(smooth > _UNDRIVEN_SHARE * smooth.max())[-1]])
-    quiet_lines = np.flatnonzero(lines_hz > _LEAKAGE_RATIO * highest_hz)
+    highest_driven_hz = float(lines_hz[np.flatnonzero(smoothed_power > _UNDRIVEN_SHARE * smoothed_power.max())[-1]])
+    quiet_lines = np.flatnonzero(lines_hz > _LEAKAGE_RATIO * highest_driven_hz)
     if len(quiet_lines) < _LEAST_LINES:
         return None
     power = np.abs(np.fft.rfft((samples - samples.mean(axis=0)) * window[:, None], axis=0)[1 : n // 2]) ** 2 / n
     # The power of a line is exponentially distributed, with a median of ln 2 times its mean.
-    level = np.median(power[quiet_lines], axis=0) / np.log(2)
-    return np.tile(level, (len(frequency_hz), 1)), float(len(quiet_lines))
+    noise_density = np.median(power[quiet_lines], axis=0) / np.log(2)
+    return np.tile(noise_density, (len(frequency_hz), 1)), float(len(quiet_lines))
 
 
 def _find_longest_run(samples: FloatArray) -> tuple[int, int]:

@@ -11,10 +11,10 @@ from scipy.special import fdtri
 
 from analysis.diagnosis.noise.channel_noise import ChannelNoise, SegmentNoise
 from analysis.diagnosis.noise.periods import Periods, compute_period_spectra, stack_periods
-from analysis.diagnosis.noise.quiet_noise import fast_noise_at_rest
-from analysis.diagnosis.noise.rounding import rounding_step, undo_rounding
+from analysis.diagnosis.noise.quiet_noise import estimate_fast_rest_noise
+from analysis.diagnosis.noise.rounding import find_rounding_step, undo_rounding
 from analysis.diagnosis.types import Mask
-from equalizer.identification.frequency_response.noise_floor import period_variance, smooth_over_lines
+from equalizer.identification.frequency_response.noise_floor import compute_period_variance, smooth_over_lines
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
@@ -73,7 +73,7 @@ def add_repeating_rounding(density: FloatArray, samples: FloatArray) -> tuple[Fl
     """The density (lines, channels) plus the part of the rounding error that repeats in each period, and that part
     alone, (channels,)."""
     parts = [
-        undo_rounding(float(variance), rounding_step(channel)).repeating if np.isfinite(variance) else 0.0
+        undo_rounding(float(variance), find_rounding_step(channel)).repeating if np.isfinite(variance) else 0.0
         for variance, channel in zip(density.mean(axis=0), samples.T, strict=True)
     ]
     rounding: FloatArray = np.array(parts)
@@ -98,7 +98,7 @@ def count_equal_lines(density: FloatArray) -> FloatArray:
 def _estimate_spread(
     recording: Recording, samples: FloatArray, periods: Periods, lines_hz: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    density = period_variance(compute_period_spectra(samples, periods)) * periods.length
+    density = compute_period_variance(compute_period_spectra(samples, periods)) * periods.length
     freedom = 2 * (periods.count - 1) * count_equal_lines(smooth_over_lines(density, _SMOOTHED_LINES))
     period_lines_hz = periods.compute_line_frequencies(recording.sample_rate_hz)
     if len(period_lines_hz) != len(lines_hz):
@@ -108,7 +108,7 @@ def _estimate_spread(
 
 def _find_moving_channels(samples: FloatArray, periods: Sequence[Periods]) -> Mask:
     """(segments, channels): whether a channel moves over its rounding steps; True for all where it never does."""
-    steps = np.array([rounding_step(channel) for channel in samples.T])
+    steps = np.array([find_rounding_step(channel) for channel in samples.T])
     is_moving = np.array(
         [stack_periods(samples, period).std(axis=(0, 1)) >= _LEAST_STEPS * steps for period in periods]
     )
@@ -121,7 +121,7 @@ def _limit_to_rest_noise(
     """The density, limited to the noise at rest in channels that varied and exceed it, and the mask of these channels.
     Lines at which the given density is significantly lower keep it. density: smoothed over lines."""
     unchanged = np.zeros(len(varied), dtype=np.bool_)
-    fast_noise = fast_noise_at_rest(recording, samples)
+    fast_noise = estimate_fast_rest_noise(recording, samples)
     if fast_noise is None or not varied.any():
         return density, unchanged
     at_rest = mask_quietest(fast_noise.variance, fast_noise.freedom)

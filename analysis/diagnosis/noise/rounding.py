@@ -5,7 +5,8 @@ The part of it that repeats is a saw tooth blurred by the noise; with the power 
 
     repeating = sum over k >= 1 of exp(-4 pi² k² v) / (2 pi² k²),        between repeats = v + 1/12 - repeating
 
-(Widrow and Kollar, Quantization Noise, 2008). `undo_rounding` solves this for v, and so finds the total noise.
+(Widrow and Kollar, Quantization Noise, 2008). `undo_rounding` solves this for v, and so finds the total noise; called
+by `repeat_noise`. The checks of recordings and the choice of the error measure use `find_rounding_step` alone.
 """
 
 from dataclasses import dataclass
@@ -14,10 +15,10 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 
-_TERMS = np.arange(1, 200)
+_FOURIER_TERMS = np.arange(1, 200)
 """Terms k of the Fourier series."""
-_EXAMINED, _HALVES = 20_000, 40
-"""Largest number of samples in which a step is looked for; number of bisections."""
+_MAX_EXAMINED_SAMPLES, _BISECTIONS = 20_000, 40
+"""Number of samples, from the first on, in which a step is searched for; number of bisections."""
 _TOLERANCE = 1e-3
 """Largest deviation from multiples of a step, relative to the step: float32 storage leaves no exact multiples."""
 
@@ -31,10 +32,11 @@ class RoundedNoise:
     """Part of the total that is the same in each repeat."""
 
 
-def rounding_step(samples: FloatArray) -> float:
-    """The step of which all values of a channel are multiples, apart from an offset; 0 where there is none, or for
-    fewer than three values. samples: (n,)"""
-    finite_samples = samples[np.isfinite(samples)][:_EXAMINED]
+def find_rounding_step(samples: FloatArray) -> float:
+    """Find the step of which all values of a channel are multiples, apart from an offset. 0 where there is none, for
+    fewer than three values, and where the distinct values number half of the samples or more. samples: (n,), in any
+    unit."""
+    finite_samples = samples[np.isfinite(samples)][:_MAX_EXAMINED_SAMPLES]
     values = np.unique(finite_samples)
     if len(values) < 3:
         return 0.0
@@ -42,32 +44,35 @@ def rounding_step(samples: FloatArray) -> float:
     # Values that should be equal differ by rounding in storage.
     gaps = gaps[gaps > 1e-3 * np.median(gaps)]
     step = float(np.median(gaps[gaps <= 1.5 * gaps.min()]))
-    steps = np.round((values - values[0]) / step)
+    step_numbers = np.round((values - values[0]) / step)
     tolerance = max(_TOLERANCE * step, float(np.spacing(np.float32(np.abs(values).max()))))
-    regular = bool(np.max(np.abs(values - values[0] - step * steps)) < 0.1 * step + tolerance)
+    is_regular = bool(np.max(np.abs(values - values[0] - step * step_numbers)) < 0.1 * step + tolerance)
     # A fine-grained float also has a smallest gap, but a rounded channel returns to each of its values.
-    return step if regular and len(values) < 0.5 * len(finite_samples) else 0.0
+    return step if is_regular and len(values) < 0.5 * len(finite_samples) else 0.0
 
 
 def undo_rounding(between_repeats: float, step: float) -> RoundedNoise:
-    """Total noise, rounding included. between_repeats: variance between repeats of a motion over many steps. step: 0 =
-    not rounded. Variances above step² are not corrected, because noise then blurs the saw tooth completely."""
+    """Compute the total noise, rounding included. between_repeats: variance between repeats of a motion over many
+    steps. step: 0 = not rounded. Variances above step² are not corrected, because noise then blurs the saw tooth
+    completely."""
     if step == 0:
         return RoundedNoise(between_repeats, 0.0)
     scaled_variance = between_repeats / step**2
     if scaled_variance > 1.0:
         return RoundedNoise(between_repeats, 0.0)
-    repeating = _compute_repeating_variance(_variance_before_rounding(scaled_variance)) * step**2
+    repeating = _compute_repeating_variance(_solve_variance_before_rounding(scaled_variance)) * step**2
     return RoundedNoise(between_repeats + repeating, repeating)
 
 
-def _variance_before_rounding(between_repeats: float) -> float:
-    """v from the variance between repeats, both for steps of 1: bisection, as one grows with the other."""
+def _solve_variance_before_rounding(between_repeats: float) -> float:
+    """Solve for v from the variance between repeats, both for steps of 1: bisection, as one grows with the other."""
     low, high = 0.0, 1.0 if between_repeats > 0 else 0.0
-    for _ in range(_HALVES):
-        middle = (low + high) / 2
+    for _ in range(_BISECTIONS):
+        midpoint = (low + high) / 2
         low, high = (
-            (middle, high) if middle + 1 / 12 - _compute_repeating_variance(middle) < between_repeats else (low, middle)
+            (midpoint, high)
+            if midpoint + 1 / 12 - _compute_repeating_variance(midpoint) < between_repeats
+            else (low, midpoint)
         )
     return high
 
@@ -75,6 +80,6 @@ def _variance_before_rounding(between_repeats: float) -> float:
 def _compute_repeating_variance(variance: float) -> float:
     """Variance of the repeating part for steps of 1, see above. variance: v. Without noise, the sum of all further
     terms is added."""
-    blurred = np.exp(-4 * np.pi**2 * _TERMS**2 * variance) / _TERMS**2
-    remainder = 0.0 if variance > 0 else np.pi**2 / 6 - float(np.sum(1 / _TERMS**2))
+    blurred = np.exp(-4 * np.pi**2 * _FOURIER_TERMS**2 * variance) / _FOURIER_TERMS**2
+    remainder = 0.0 if variance > 0 else np.pi**2 / 6 - float(np.sum(1 / _FOURIER_TERMS**2))
     return float((np.sum(blurred) + remainder) / (2 * np.pi**2))

@@ -112,9 +112,12 @@ class DrawnExcerpt:
     unit: str
     start_s: float
     step_s: float
+    """Time between samples, s."""
     measured: tuple[float, ...]
     retuned: tuple[float, ...]
+    """Prediction of the re-tuned model."""
     after: tuple[float, ...]
+    """Prediction of the model with the named effects."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -133,7 +136,9 @@ class RealAnswer:
     error: str
     """Error measure, as in `diagnosis.json`; empty where the recording was refused."""
     fitted: Errors | None
+    """Errors on the samples fitted to; None where the recording was refused."""
     held_out: Errors | None
+    """Errors on held-out samples; None where the recording was refused."""
     black_box: float | None
     """Held-out error of the black box; None = not computed."""
     where: tuple[str, ...]
@@ -150,10 +155,12 @@ class RealAnswer:
     stretches: tuple[HeldOutStretch, ...]
     excerpt: DrawnExcerpt | None
     further: tuple[FurtherTest, ...]
+    """Predictions of other recordings of the same device."""
     pair: PairOutcome | None
+    """Comparison before and after a change of the device; None where none was made."""
     objections: tuple[str, ...]
     seconds: float
-    """Duration of the diagnosis."""
+    """Duration of the diagnosis, s."""
     candidates: tuple[Candidate, ...] = ()
     """Best candidates that were not confirmed, in descending order."""
     not_confirmed: tuple[str, ...] = ()

@@ -139,7 +139,7 @@ def _learn_spectrum(floor: CleanFloor, fits: Sequence[_RetunedFit], map_: Mapper
         )
         for fit in fits
     ]
-    return LearnedError(floor, whitening, share, ReferenceRecordings(tuple(references), floor.beyond))
+    return LearnedError(floor, whitening, share, ReferenceRecordings(tuple(references), floor.margin_factor))
 
 
 def _compute_signal_level(measure: ErrorMeasure, residuals: Sequence[FloatArray]) -> FloatArray:

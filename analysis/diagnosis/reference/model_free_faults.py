@@ -13,7 +13,7 @@ from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, Spread, make
 from analysis.diagnosis.settings import READINGS_DEVIATIONS, READINGS_FACTOR, READINGS_LEAST, STEP_FACTOR
 from analysis.diagnosis.types import Mask
 from equalizer.effects.effect import Effect, Values
-from equalizer.effects.starts.lattice import confirm_lattice_step, lattice_step
+from equalizer.effects.starts.lattice import confirm_lattice_step, find_lattice_step
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
@@ -74,7 +74,7 @@ def _find_quantization(readings: FloatArray, references: Sequence[FloatArray]) -
     reference."""
     steps = {}
     for channel in range(readings.shape[1]):
-        step = lattice_step(readings[:, channel])
+        step = find_lattice_step(readings[:, channel])
         if step is not None and all(
             step > STEP_FACTOR * confirm_lattice_step(reference[:, channel], step) for reference in references
         ):

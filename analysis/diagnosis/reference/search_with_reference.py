@@ -43,7 +43,11 @@ def search_with_reference(
     whitened_result = _withdraw_shared_effects(
         _search_whitened_residual(context, learned, catalogue, progress, time_left), learned
     )
-    if context.certain or whitened_result.found.after.score.worst_channel <= learned.floor.beyond or not time_left():
+    if (
+        context.certain
+        or whitened_result.found.after.score.worst_channel <= learned.floor.margin_factor
+        or not time_left()
+    ):
         return whitened_result
     plain_result = _withdraw_shared_effects(
         _search_plain_residual(context, learned, catalogue, progress, time_left), learned
@@ -72,7 +76,7 @@ def _withdraw_shared_effects(result: SearchResult, learned: LearnedError) -> Sea
     if not unconfirmed:
         return result
     judgement = _judge_with_floor(
-        result.context.full_measure, explanation, bool(explanation.steps), learned.floor.beyond
+        result.context.full_measure, explanation, bool(explanation.steps), learned.floor.margin_factor
     )
     return replace(result, found=explanation, judgement=judgement, unconfirmed=(*result.unconfirmed, *unconfirmed))
 
@@ -93,7 +97,7 @@ def _search_plain_residual(
 ) -> SearchResult:
     """Search on the plain residual, with the model error on clean recordings, raised by its factor, as white noise."""
     raised_floor = replace(
-        learned.floor, channels=tuple(learned.floor.beyond * channel for channel in learned.floor.channels)
+        learned.floor, channels=tuple(learned.floor.margin_factor * channel for channel in learned.floor.channels)
     )
     noise_measure = add_learned_noise(context.full_measure, raised_floor)
     search_context = replace(
@@ -135,7 +139,7 @@ def _search_whitened_residual(
             result,
             context=final_context,
             found=explanation,
-            judgement=_judge_with_floor(plain_measure, explanation, True, learned.floor.beyond),
+            judgement=_judge_with_floor(plain_measure, explanation, True, learned.floor.margin_factor),
             remarks=(),
         )
     is_named = result.judgement.named and not is_without_prediction(plain_measure, explanation.after)
@@ -143,7 +147,7 @@ def _search_whitened_residual(
         result,
         context=final_context,
         found=explanation,
-        judgement=_judge_with_floor(plain_measure, explanation, is_named, learned.floor.beyond),
+        judgement=_judge_with_floor(plain_measure, explanation, is_named, learned.floor.margin_factor),
     )
 
 

@@ -17,7 +17,7 @@ from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.error_measure_rule import IN_SAMPLES
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.localisation.clean_floor import CleanFloor, clean_floor_sentence
+from analysis.diagnosis.localisation.clean_floor import CleanFloor, describe_clean_floor
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_maps import Maps, build_mismatch_maps, summarise_worst_channel
 from analysis.diagnosis.localisation.mismatch_rows import list_mismatch_rows
@@ -33,7 +33,7 @@ from analysis.diagnosis.search.identifiability import compute_final_errors, comp
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import Judgement, SearchResult
 from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE, INTERVAL_FACTOR
-from equalizer.effects.placing import axis_letter, model_effects
+from equalizer.effects.placing import shorten_axis_name, to_model_effects
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, find_runs
@@ -73,13 +73,13 @@ def assemble_findings(
         signatures=examination.signatures,
         black_box=examination.black_box,
         remarks=_collect_remarks(
-            (_describe_rest(measure), clean_floor_sentence(learned, channels), in_samples), time_series, tuning, floors
+            (_describe_rest(measure), describe_clean_floor(learned, channels), in_samples), time_series, tuning, floors
         ),
         maps=maps.cells,
         localisation=examination.local,
         floor=floors[0],
         tuning=tuning,
-        axes=tuple(axis_letter(name, labels.inputs) for name in labels.inputs),
+        axes=tuple(shorten_axis_name(name, labels.inputs) for name in labels.inputs),
         proposal=proposal,
         split_s=_measure_split_s(measure),
         own_errors=errors[: len(tuning.names)] * tuning.deviation,
@@ -92,7 +92,7 @@ def _build_models(result: SearchResult, recording: Recording) -> tuple[Mechanica
     fitted, labels = explanation.after.fitted, make_labels(recording, tuning.model)
     effects = (
         *tuning.model.effects,
-        *model_effects(fitted.hypothesis.list_placed_effects(), labels.inputs, labels.outputs),
+        *to_model_effects(fitted.hypothesis.list_placed_effects(), labels.inputs, labels.outputs),
     )
     completed = replace(tuning.tune(fitted.deviations), effects=effects)
     return as_recorded(completed, recording), as_recorded(tuning.tune(explanation.retuned.fitted.deviations), recording)

@@ -19,7 +19,7 @@ from analysis.diagnosis.result.findings import BalanceErrors
 from analysis.diagnosis.settings import FURTHER_LAW_GAIN, LAW_OF_CEILING
 from analysis.wording import conjoin
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.placing import axis_letter
+from equalizer.effects.placing import shorten_axis_name
 
 if TYPE_CHECKING:
     from analysis.diagnosis.balance.judge_laws import Balance
@@ -56,7 +56,7 @@ def add_balances_with_given_model(
     """Add classes and candidates to the diagnosis of a search, for a model that the user gave. unconfirmed: effects
     that the search by simulation found and did not name."""
     equivalents = {
-        (law.law.effect, axis_letter(channels[axis], channels)): law.equivalents
+        (law.law.effect, shorten_axis_name(channels[axis], channels)): law.equivalents
         for axis, balance in enumerate(balances)
         for law in balance.laws
     }
@@ -66,7 +66,7 @@ def add_balances_with_given_model(
     )
     named_keys = {(name, effect.axis) for effect in effects for name in (effect.effect, *effect.class_)}
     judged_laws = [
-        (axis_letter(channels[axis], channels), law)
+        (shorten_axis_name(channels[axis], channels), law)
         for axis, balance in enumerate(balances)
         for law in (*balance.laws, *balance.further_laws)
     ]
@@ -102,7 +102,7 @@ def add_balances_with_fitted_model(
     if not balances:
         return diagnosis
     judged_laws = [
-        (law, axis_letter(channels[axis], channels), _compute_explained_share(balance, law))
+        (law, shorten_axis_name(channels[axis], channels), _compute_explained_share(balance, law))
         for axis, balance in enumerate(balances)
         for law in balance.laws
     ]
@@ -118,10 +118,10 @@ def add_balances_with_fitted_model(
     )
     named_keys = {(name, effect.axis) for effect in effects for name in _list_covered_names(effect)}
     ranked = [
-        (_rank_law(law), _make_candidate(law, axis_letter(channels[axis], channels), effects))
+        (_rank_law(law), _make_candidate(law, shorten_axis_name(channels[axis], channels), effects))
         for axis, balance in enumerate(balances)
         for law in (*balance.laws, *balance.further_laws)
-        if law.formula is None or (law.simulated_as, axis_letter(channels[axis], channels)) not in named_keys
+        if law.formula is None or (law.simulated_as, shorten_axis_name(channels[axis], channels)) not in named_keys
     ]
     ranked += [(1, candidate) for candidate in unconfirmed]
     listed = [c for _, c in sorted(ranked, key=lambda entry: entry[0]) if (c.effect, c.axis) not in named_keys]
@@ -201,10 +201,10 @@ def collect_balance_errors(
     """Errors of each axis's balance on held-out data, with the laws that the diagnosis names."""
     errors = []
     for axis, balance in enumerate(balances):
-        letter = axis_letter(channels[axis], channels)
+        letter = shorten_axis_name(channels[axis], channels)
         names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
         laws = [law.place for law in balance.laws if law.simulated_as in names]
-        named_error = balance.error_of(laws) if laws else balance.linear
+        named_error = balance.compute_error(laws) if laws else balance.linear
         has_prior = balance.search.regression.prior is not None
         errors.append(
             BalanceErrors(letter, balance.linear, named_error, balance.ceiling, bool(laws), balance.tested, has_prior)

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
-from analysis.diagnosis.contrast.decide import T_BOUND, Decision
+from analysis.diagnosis.contrast.decide import T_QUANTILE, Decision
 from analysis.diagnosis.contrast.fault import Fault
 from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, NamedEffect, Rival, Verdict
 from analysis.diagnosis.effect_words import get_parameter_unit
@@ -19,7 +19,7 @@ from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from analysis.diagnosis.settings import CONTRAST_BLOCKS, SETS_AS_ONE
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.placing import axis_letter
+from equalizer.effects.placing import shorten_axis_name
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME, Place
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
@@ -138,7 +138,7 @@ def _name_fault(judged_fault: JudgedFault, decision: Decision, recording: Record
 def _find_axis_letter(judged_fault: JudgedFault, recording: Recording) -> str | None:
     """Letter of the fault's axis or channel; None where it concerns all."""
     channels = recording.response.channels if judged_fault.fault.place == "sensor" else recording.command.channels
-    return axis_letter(judged_fault.fault.axis, channels) if judged_fault.fault.axis in channels else None
+    return shorten_axis_name(judged_fault.fault.axis, channels) if judged_fault.fault.axis in channels else None
 
 
 def _make_estimates(judged_fault: JudgedFault, recording: Recording, system: UnitSystem) -> dict[str, Estimate]:
@@ -148,7 +148,7 @@ def _make_estimates(judged_fault: JudgedFault, recording: Recording, system: Uni
         name: Estimate(
             value,
             units.get(name, "1"),
-            (value - T_BOUND * standard_error, value + T_BOUND * standard_error) if standard_error else None,
+            (value - T_QUANTILE * standard_error, value + T_QUANTILE * standard_error) if standard_error else None,
         )
         for (name, value), standard_error in zip(judged_fault.values.items(), judged_fault.spread.values(), strict=True)
     }
@@ -210,7 +210,7 @@ def _find_directly_shown_fault(contrast: Contrast, recording: Recording) -> Name
         else {parameter.name: parameter.find_unit(LINEAR, unit) for parameter in effect.parameters}
     )
     estimates = {key: Estimate(value, units[key]) for key, value in values.items() if key in units}
-    axis = axis_letter(channels[sites[0]], channels) if len(sites) < len(channels) or len(channels) == 1 else None
+    axis = shorten_axis_name(channels[sites[0]], channels) if len(sites) < len(channels) or len(channels) == 1 else None
     return NamedEffect(name, place, axis, 1.0, 1.0, estimates)
 
 

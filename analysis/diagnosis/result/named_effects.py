@@ -25,9 +25,9 @@ from analysis.diagnosis.settings import (
     NO_CANDIDATE_STEEPNESS,
     PROBABILITY_SCALE,
 )
-from equalizer.effects.discovered_law import Channels, law_units, law_with_values
+from equalizer.effects.discovered_law import Channels, derive_law_units, with_law_values
 from equalizer.effects.effect import Effect, Values
-from equalizer.effects.placing import axis_letter, place_of_effect
+from equalizer.effects.placing import find_place, shorten_axis_name
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
@@ -78,7 +78,7 @@ def make_named_effects(explanation: Explanation, errors: FloatArray, labels: Lab
         effects.append(
             NamedEffect(
                 effect=claim.effect.name,
-                place=place_of_effect(claim.effect),
+                place=find_place(claim.effect),
                 axis=find_axis_letter(claim, labels),
                 share=shares[claim_index],
                 probability=probability,
@@ -97,9 +97,9 @@ def find_axis_letter(claim: Claim, labels: Labels) -> str | None:
     """The axis letter of an effect's site; None where all axes share the effect."""
     if claim.spread != "one" or (claim.effect.sites and "one" not in claim.effect.sites):
         return None
-    is_sensor_effect = place_of_effect(claim.effect) == "sensor"
+    is_sensor_effect = find_place(claim.effect) == "sensor"
     channels = labels.outputs if is_sensor_effect else labels.inputs
-    return axis_letter(channels[claim.sites[0]], channels)
+    return shorten_axis_name(channels[claim.sites[0]], channels)
 
 
 def _list_rivals(explanation: Explanation, number: int, labels: Labels) -> tuple[tuple[Rival, ...], float]:
@@ -193,8 +193,8 @@ def _make_estimates(
 def _find_units(effect: Effect, values: Values, labels: Labels) -> dict[str, str]:
     """Units by parameter, in the model's unit system: of a discovered law by its dimensions, else of the vocabulary."""
     if effect.law is not None:
-        law = law_with_values(effect.law, values)
-        units = law_units(law, Channels(labels.inputs, labels.outputs, labels.quantity), labels.system)
+        law = with_law_values(effect.law, values)
+        units = derive_law_units(law, Channels(labels.inputs, labels.outputs, labels.quantity), labels.system)
         return dict(zip(values, units, strict=True))
     return {p.name: p.find_unit(labels.system, labels.response_unit) for p in EFFECTS_BY_NAME[effect.name].parameters}
 
@@ -205,7 +205,7 @@ def extract_law(hypothesis: Hypothesis, number: int, axis: str | None) -> FoundL
     law = hypothesis.claims[number].effect.law
     if law is None:
         return None
-    fitted_law = law_with_values(law, _list_group_values(hypothesis, number, hypothesis.point)[0])
+    fitted_law = with_law_values(law, _list_group_values(hypothesis, number, hypothesis.point)[0])
     return make_found_law(replace(fitted_law, axis=axis or fitted_law.axis))
 
 

@@ -26,7 +26,7 @@ from analysis.diagnosis.search.guard import WorkPart
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.verdict import SearchResult
 from equalizer.effects.effect import Values
-from equalizer.effects.placing import axis_letter
+from equalizer.effects.placing import shorten_axis_name
 from equalizer.effects.starts.evidence import Evidence
 
 LOCALISATION_NAME = "the localisation"
@@ -101,7 +101,7 @@ def _compute_signatures(context: SearchContext, explanation: Explanation) -> tup
     recording = measure.records[record_index].recording
     labels, signatures = make_labels(recording, tuning.model), []
     names = Names(
-        tuple(axis_letter(name, labels.inputs) for name in labels.inputs),
+        tuple(shorten_axis_name(name, labels.inputs) for name in labels.inputs),
         labels.outputs,
         labels.response_unit,
         labels.system,

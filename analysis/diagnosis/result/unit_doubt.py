@@ -66,7 +66,7 @@ def describe_unknown_units(model: MechanicalModel) -> str:
     """Describe, in a sentence, the unit of forces, masses, damping and stiffness where commands have no known
     conversion to force or torque; empty for a known unit system."""
     system = model.system
-    if system.known:
+    if system.has_force_unit:
         return ""
     command_unit_text = "has no unit" if system.force == "1" else f"is in {system.force}"
     force_name_and_unit = {"m": ("force", "N"), "rad": ("torque", "N m")}.get(system.length)

@@ -26,7 +26,7 @@ from analysis.diagnosis.errors.output_error import (
     stack_fit_residuals,
 )
 from analysis.diagnosis.search.search_context import FITTING, FittedCandidate, SearchContext, compute_sensitivity
-from analysis.diagnosis.search.short_recordings import coarsen, shorten_recordings
+from analysis.diagnosis.search.short_recordings import coarsen_steps, shorten_recordings
 from analysis.diagnosis.search.time_budget import OutOfTimeError
 from analysis.diagnosis.settings import (
     MOST_REFINED,
@@ -167,9 +167,9 @@ def refine_with_sensitivity(
 ) -> tuple[Fitted, Sensitivity]:
     """The refined fit and its sensitivity. Where a drive repeats, the fit is first made on one period of each segment,
     and its sensitivity serves for all periods; else, with forces that depend on the motion, first with longer
-    simulation steps (`coarsen`). jacobian: sensitivity of a law that moves the device nearly alike."""
+    simulation steps (`coarsen_steps`). jacobian: sensitivity of a law that moves the device nearly alike."""
     short_form = shorten_recordings(context, fitted)
-    coarse_measure = coarsen(context.measure)
+    coarse_measure = coarsen_steps(context.measure)
     if short_form is None and (coarse_measure is context.measure or not has_motion_forces(fitted.hypothesis)):
         return _refine_from_both_starts(context, fitted, jacobian)
     short_context = replace(context, measure=coarse_measure) if short_form is None else short_form.context

@@ -36,7 +36,7 @@ from analysis.diagnosis.search.search_context import (
     FittedCandidate,
     SearchContext,
 )
-from analysis.diagnosis.search.time_budget import OutOfTimeError, limit_map, unlimited_time
+from analysis.diagnosis.search.time_budget import OutOfTimeError, grant_time, limit_map
 from analysis.diagnosis.settings import (
     ADDED_GAIN,
     ADDED_SHARE,
@@ -111,7 +111,7 @@ def explain(
     context: SearchContext,
     catalogue: Sequence[Effect],
     progress: Progress,
-    time_left: TimeBudget = unlimited_time,
+    time_left: TimeBudget = grant_time,
     previous_steps: Sequence[Sequence[FittedCandidate]] = (),
 ) -> Explanation:
     """Re-tunes the model and adds effects one by one. time_left: called before each piece of the search; when it
@@ -145,7 +145,7 @@ def add_effects(
     catalogue: Sequence[Effect],
     selected: Explanation,
     progress: Progress,
-    time_left: TimeBudget = unlimited_time,
+    time_left: TimeBudget = grant_time,
     max_effects: int = MOST_EFFECTS,
 ) -> Explanation:
     """The explanation with further effects, up to `max_effects` in total. A last round of `selected` in which no

@@ -28,7 +28,7 @@ from analysis.diagnosis.search.parsimony import is_equal_rival
 from analysis.diagnosis.search.revise_selection import remove_effect
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.short_recordings import shorten_recordings
-from analysis.diagnosis.search.time_budget import unlimited_time
+from analysis.diagnosis.search.time_budget import grant_time
 from analysis.diagnosis.settings import (
     INTERVAL_FACTOR,
     MOST_BETWEEN_SEGMENTS,
@@ -259,7 +259,7 @@ def _compute_interval_and_distance(free: FreeParameter, coordinate: float, error
 
 
 def compute_null_distance(
-    context: SearchContext, explanation: Explanation, effect: int, time_left: TimeBudget = unlimited_time
+    context: SearchContext, explanation: Explanation, effect: int, time_left: TimeBudget = grant_time
 ) -> float:
     """Distance of an effect's only parameter from no effect, in half widths of its profile interval; above 1, the
     interval excludes no effect. effect: its index."""

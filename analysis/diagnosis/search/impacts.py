@@ -51,7 +51,7 @@ from analysis.diagnosis.search.second_effect_with_play import (
     SecondEffects,
     search_second_effects,
 )
-from analysis.diagnosis.search.time_budget import unlimited_time
+from analysis.diagnosis.search.time_budget import grant_time
 from analysis.diagnosis.settings import EXPLAINED_BY_CHANCE, PEAKED_KURTOSIS, VARIES_ERROR
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import Effect, Values
@@ -68,7 +68,7 @@ def explain_impacts(
     explanation: Explanation,
     floors: Sequence[NoiseFloor],
     catalogue: Sequence[Effect],
-    time_left: TimeBudget = unlimited_time,
+    time_left: TimeBudget = grant_time,
 ) -> Explanation | None:
     """The explanation by play, alone or with a second effect. None where the response is regular, where play does not
     explain it, where the time ends before that is known, or where the error measure is no free simulation.
@@ -151,7 +151,7 @@ def _needs_gap(comparison: BandPowerComparison, problem: BandPowerProblem, best_
     # Without a time limit: a comparison with an unfinished fit of the alternative would favour play.
     gapless_start = evaluate_hypothesis(problem, best_fit.deviations, hypothesis)
     gapless_fit = refine_band_power(
-        weight_by_chance_variation(problem, gapless_start), gapless_start, time_left=unlimited_time
+        weight_by_chance_variation(problem, gapless_start), gapless_start, time_left=grant_time
     )
     if not np.isfinite(gapless_fit.cost):
         return False

@@ -13,7 +13,7 @@ from analysis.diagnosis.errors.output_error import Fitted
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.settings import NO_PREDICTION_ERROR, NO_PREDICTION_SHARE
 from analysis.diagnosis.types import Mask
-from equalizer.effects.placing import place_of_effect
+from equalizer.effects.placing import find_place
 from equalizer.signals.signal import FloatArray
 
 _LEAST_RMS = 1e-300
@@ -35,7 +35,7 @@ def is_newest_without_prediction(measure: ErrorMeasure, base: Fitted, fitted: Fi
     base_rms, fitted_rms = _compute_residual_rms(measure, base), _compute_residual_rms(measure, fitted)
     main_channel = int(np.argmax(np.log(np.maximum(base_rms, _LEAST_RMS)) - np.log(np.maximum(fitted_rms, _LEAST_RMS))))
     claim = fitted.hypothesis.claims[-1]
-    sensor_sites = claim.sites if place_of_effect(claim.effect) == "sensor" else ()
+    sensor_sites = claim.sites if find_place(claim.effect) == "sensor" else ()
     is_unpredicted = fitted_rms >= np.maximum(
         NO_PREDICTION_SHARE * _compute_signal_rms(measure), NO_PREDICTION_ERROR * measure.noise
     )

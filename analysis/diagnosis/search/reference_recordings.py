@@ -102,7 +102,7 @@ class ReferenceRecordings:
     """Gains computed so far, by `Hypothesis.key`."""
 
     def compute_clean_gain(self, hypothesis: Hypothesis) -> FloatArray:
-        """(c,): the gain that is counted against the hypothesis, `beyond` times the largest gain on the clean
+        """(c,): the gain that is counted against the hypothesis, `gain_factor` times the largest gain on the clean
         recordings (at least 0); (1,) zero for a model without effects."""
         if not hypothesis.claims:
             return np.zeros(1)

@@ -50,7 +50,7 @@ from analysis.diagnosis.search.search_context import (
     SearchContext,
     shows_only_held_out,
 )
-from analysis.diagnosis.search.time_budget import OUT_OF_TIME, OutOfTimeError, unlimited_time
+from analysis.diagnosis.search.time_budget import OUT_OF_TIME, OutOfTimeError, grant_time
 from analysis.diagnosis.search.verdict import (
     MILDER_TEST_USED,
     MODEL_MOVED,
@@ -102,7 +102,7 @@ def search_effects(
     context: SearchContext,
     catalogue: Sequence[Effect],
     progress: Progress,
-    time_left: TimeBudget = unlimited_time,
+    time_left: TimeBudget = grant_time,
     further: FurtherSearches = FurtherSearches(),
 ) -> SearchResult:
     """Steps 1 to 5: the search for effects and its verdict, the model's own parameters being within `Tuning.bound`."""
@@ -129,7 +129,7 @@ def move_model_further(
     result: SearchResult,
     catalogue: Sequence[Effect],
     progress: Progress,
-    time_left: TimeBudget = unlimited_time,
+    time_left: TimeBudget = grant_time,
 ) -> SearchResult:
     """Step 6: the search repeated with a wider bound of the model's own parameters, where the result leaves a mismatch
     or needs three effects, and a parameter is at its bound; the result unchanged where the wider bound does not make it

@@ -40,13 +40,13 @@ from equalizer.signals.signal import FloatArray
 
 Indices = npt.NDArray[np.int64]
 
-COARSER = 2
+COARSE_STEP_FACTOR = 2
 """Factor on the simulation step for ranking: its integration error is far below that of the linearised gains."""
 
 
-def coarsen(measure: ErrorMeasure) -> ErrorMeasure:
-    """The measure with `COARSER` times the simulation step, if it simulates freely; else the measure itself."""
-    return replace(measure, step_factor=COARSER) if isinstance(measure, FreeSimulation) else measure
+def coarsen_steps(measure: ErrorMeasure) -> ErrorMeasure:
+    """The measure with `COARSE_STEP_FACTOR` times the simulation step, if it simulates freely; else unchanged."""
+    return replace(measure, step_factor=COARSE_STEP_FACTOR) if isinstance(measure, FreeSimulation) else measure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -97,6 +97,7 @@ class ShortRecordings:
 
     @property
     def _kept_sample_count(self) -> int:
+        """Number of kept samples to fit, over all records."""
         return sum(int(record.fit.sum()) for record in self.context.measure.records)
 
     def restrict_evidence(self, evidence: Evidence) -> Evidence:
@@ -117,8 +118,8 @@ class ShortRecordings:
 
 
 def shorten_recordings(context: SearchContext, base_fit: Fitted) -> ShortRecordings | None:
-    """The shortened recordings; None where little would be saved, where effects depend on time within it, or where the
-    first record, which gives the evidence, has no samples to fit. base_fit: on all samples.
+    """The shortened recordings; None for windows, with references, with effects that depend on time, where the run-in
+    never suffices or saves little, and where the first record has no samples to fit. base_fit: on all samples.
 
     A force with memory (dry friction, play) may depend on earlier samples for longer than the linear model's transients
     last. Each piece therefore begins with the positions and velocities of the simulation of all samples (states of the
@@ -133,17 +134,17 @@ def shorten_recordings(context: SearchContext, base_fit: Fitted) -> ShortRecordi
     has_memory = any(
         isinstance(effect.effect.action, (AxisForce, JointForce)) for effect in (*measure.model_effects, *effects)
     )
-    before_s, after_s = _run_in_s(measure, context.tuning.model)
-    periods, kept = [_last_periods(record) for record in measure.records], -1
-    while (short := _keep_periods(context, measure, periods, (before_s, after_s))) is not None:
+    before_s, after_s = _compute_run_in_s(measure, context.tuning.model)
+    periods, kept_count = [_select_last_periods(record) for record in measure.records], -1
+    while (shortened := _keep_periods(context, measure, periods, (before_s, after_s))) is not None:
         if has_memory and isinstance(measure, FreeSimulation):
-            short = _continue_from(short, measure, base_fit)
-        if not has_memory or short.has_same_errors(base_fit):
-            return short
+            shortened = _restart_pieces(shortened, measure, base_fit)
+        if not has_memory or shortened.has_same_errors(base_fit):
+            return shortened
         # A diverged simulation never agrees; the loop ends when a longer run-in adds no samples.
-        if (count := sum(map(len, short.kept))) == kept:
+        if (new_count := sum(map(len, shortened.kept))) == kept_count:
             return None
-        kept, before_s, after_s = count, 2 * before_s, 2 * after_s
+        kept_count, before_s, after_s = new_count, 2 * before_s, 2 * after_s
     return None
 
 
@@ -153,44 +154,44 @@ def _keep_periods(
     periods: Sequence[tuple[Mask, Indices]],
     around_s: tuple[float, float],
 ) -> ShortRecordings | None:
-    """The recordings shortened to the given periods; None where more than `SHORT_SHARE` of the samples would be kept.
-    around_s: as for `_add_run_in`."""
-    cut = [_add_run_in(record, part, around_s) for record, part in zip(measure.records, periods, strict=True)]
-    total = sum(len(record.command) for record in measure.records)
-    if not len(cut[0].kept) or sum(len(part.kept) for part in cut) > SHORT_SHARE * total:
+    """The recordings shortened to the given periods; None where more than `SHORT_SHARE` of the samples would be kept,
+    the first record would keep none, or `_split_pieces` returns None. around_s: as for `_add_run_in`."""
+    cuts = [_add_run_in(record, cut, around_s) for record, cut in zip(measure.records, periods, strict=True)]
+    total_samples = sum(len(record.command) for record in measure.records)
+    if not len(cuts[0].kept) or sum(len(cut.kept) for cut in cuts) > SHORT_SHARE * total_samples:
         return None
-    short = _split_pieces(measure, cut) if isinstance(measure, PredictedForce) else _join_pieces(measure, cut)
-    if short is None:
+    cut_measure = _split_pieces(measure, cuts) if isinstance(measure, PredictedForce) else _join_pieces(measure, cuts)
+    if cut_measure is None:
         return None
-    fitted = np.concatenate([part.fit[record.fit] for record, part in zip(measure.records, cut, strict=True)])
-    kept = tuple(part.kept for part in cut if len(part.kept))
+    fitted = np.concatenate([cut.fit[record.fit] for record, cut in zip(measure.records, cuts, strict=True)])
+    kept = tuple(cut.kept for cut in cuts if len(cut.kept))
     return ShortRecordings(
-        replace(context, measure=short), kept, _index_fitted(measure, cut), np.flatnonzero(fitted), measure
+        replace(context, measure=cut_measure), kept, _index_repeats(measure, cuts), np.flatnonzero(fitted), measure
     )
 
 
-def _continue_from(short: ShortRecordings, measure: FreeSimulation, base_fit: Fitted) -> ShortRecordings:
+def _restart_pieces(shortened: ShortRecordings, measure: FreeSimulation, base_fit: Fitted) -> ShortRecordings:
     """The shortened recordings, each piece started from the state that the simulation of all samples has there."""
     records = [record for record in measure.records if record.fit.any()]
-    model, effects = short.context.tuning.tune(base_fit.deviations), base_fit.hypothesis.list_placed_effects()
+    model, effects = shortened.context.tuning.tune(base_fit.deviations), base_fit.hypothesis.list_placed_effects()
     restarts = []
-    for record, kept in zip(records, short.kept, strict=True):
+    for record, kept in zip(records, shortened.kept, strict=True):
         starts = np.flatnonzero(np.diff(kept, prepend=-2) > 1)
         restarts.append(Restarts(starts, measure.simulate_states_before(model, effects, record, kept[starts])))
-    continued = replace(short.context.measure, restarts=tuple(restarts))  # type: ignore[type-var]
-    return replace(short, context=replace(short.context, measure=continued))
+    restarted_measure = replace(shortened.context.measure, restarts=tuple(restarts))  # type: ignore[type-var]
+    return replace(shortened, context=replace(shortened.context, measure=restarted_measure))
 
 
-def _index_fitted(measure: ErrorMeasure, cut: Sequence[_KeptSamples]) -> Indices:
+def _index_repeats(measure: ErrorMeasure, cuts: Sequence[_KeptSamples]) -> Indices:
     """`ShortRecordings.fitted_sample`: indices over the kept samples to fit of all records."""
     indices, offset = [], 0
-    for record, part in zip(measure.records, cut, strict=True):
-        indices.append(offset + (np.cumsum(part.fit) - 1)[part.repeat_of[record.fit]])
-        offset += int(part.fit.sum())
+    for record, cut in zip(measure.records, cuts, strict=True):
+        indices.append(offset + (np.cumsum(cut.fit) - 1)[cut.repeat_of[record.fit]])
+        offset += int(cut.fit.sum())
     return np.concatenate(indices)
 
 
-def _run_in_s(measure: FreeSimulation | PredictedForce, model: MechanicalModel) -> tuple[float, float]:
+def _compute_run_in_s(measure: FreeSimulation | PredictedForce, model: MechanicalModel) -> tuple[float, float]:
     """Seconds before and after a stretch on which its errors depend: `RUN_IN_CONSTANTS` time constants of the model for
     a simulation; for a predicted force, which depends on earlier and later motion, of the model's inverse (its zeros)
     and of the band limit."""
@@ -201,7 +202,7 @@ def _run_in_s(measure: FreeSimulation | PredictedForce, model: MechanicalModel) 
     return (settling_s + RUN_IN_CONSTANTS / measure.band_hz,) * 2
 
 
-def _last_periods(record: Observed) -> tuple[Mask, Indices]:
+def _select_last_periods(record: Observed) -> tuple[Mask, Indices]:
     """`fit` and `repeat_of` of `_KeptSamples`: in each settled segment, only the last period is fitted."""
     fit, repeat_of = record.fit.copy(), np.arange(len(record.fit))
     for periods in find_settled_periods(record.recording):
@@ -217,30 +218,28 @@ def _last_periods(record: Observed) -> tuple[Mask, Indices]:
 def _add_run_in(record: Observed, periods: tuple[Mask, Indices], around_s: tuple[float, float]) -> _KeptSamples:
     """The samples to fit with their run-in. around_s: seconds kept before and after each stretch to fit."""
     fit, repeat_of = periods
-    before, after = (int(np.ceil(min(s * record.recording.sample_rate_hz, len(fit)))) for s in around_s)
+    samples_before, samples_after = (int(np.ceil(min(s * record.recording.sample_rate_hz, len(fit)))) for s in around_s)
     is_kept, edges = fit.copy(), np.diff(np.concatenate([[0], fit.astype(np.int8), [0]]))
     for start, stop in zip(np.flatnonzero(edges > 0).tolist(), np.flatnonzero(edges < 0).tolist(), strict=True):
-        is_kept[max(start - before, 0) : stop + after] = True
+        is_kept[max(start - samples_before, 0) : stop + samples_after] = True
     return _KeptSamples(np.flatnonzero(is_kept), fit, repeat_of)
 
 
-def _join_pieces(measure: FreeSimulation, cut: Sequence[_KeptSamples]) -> FreeSimulation:
+def _join_pieces(measure: FreeSimulation, cuts: Sequence[_KeptSamples]) -> FreeSimulation:
     """The measure on the kept samples, joined end to end."""
-    pairs = zip(measure.records, cut, strict=True)
-    return measure.with_records(
-        tuple(_cut_record(record, part.kept, part.fit) for record, part in pairs if len(part.kept))
-    )
+    pairs = zip(measure.records, cuts, strict=True)
+    return measure.with_records(tuple(_cut_record(record, cut.kept, cut.fit) for record, cut in pairs if len(cut.kept)))
 
 
-def _split_pieces(measure: PredictedForce, cut: Sequence[_KeptSamples]) -> PredictedForce | None:
+def _split_pieces(measure: PredictedForce, cuts: Sequence[_KeptSamples]) -> PredictedForce | None:
     """The measure with each kept stretch as a separate record; None where a stretch does not drive an axis that the
     whole record drives, because errors are relative to the command."""
     records, motions = [], []
-    for record, motion, part in zip(measure.records, measure.motions, cut, strict=True):
-        driven = np.abs(record.command).max(axis=0) > 0
-        for kept in np.split(part.kept, np.flatnonzero(np.diff(part.kept) > 1) + 1):
-            piece = _cut_record(record, kept, part.fit)
-            if not len(kept) or (driven & (np.abs(piece.command).max(axis=0) == 0)).any():
+    for record, motion, cut in zip(measure.records, measure.motions, cuts, strict=True):
+        is_driven = np.abs(record.command).max(axis=0) > 0
+        for kept in np.split(cut.kept, np.flatnonzero(np.diff(cut.kept) > 1) + 1):
+            piece = _cut_record(record, kept, cut.fit)
+            if not len(kept) or (is_driven & (np.abs(piece.command).max(axis=0) == 0)).any():
                 return None
             records.append(piece)
             motions.append(compute_band_motion(motion.position[kept], motion.sample_rate_hz, measure.band_hz))
@@ -249,8 +248,8 @@ def _split_pieces(measure: PredictedForce, cut: Sequence[_KeptSamples]) -> Predi
 
 def _cut_record(record: Observed, kept: Indices, fit: Mask) -> Observed:
     """A record of the kept samples alone. Samples to fit are those to choose by; none is held out."""
-    held_out = np.zeros(len(kept), dtype=np.bool_)
-    return Observed(record.recording, record.command[kept], record.measured[kept], fit[kept], fit[kept], held_out)
+    is_held_out = np.zeros(len(kept), dtype=np.bool_)
+    return Observed(record.recording, record.command[kept], record.measured[kept], fit[kept], fit[kept], is_held_out)
 
 
 def fit_on_short_recordings(
@@ -263,7 +262,7 @@ def fit_on_short_recordings(
     """First fits on all samples, the best first, of hypotheses that were screened on short recordings. varying:
     hypotheses that depend on sampling times, which short recordings cannot judge; fitted only where their predicted
     reduction of the cost is not far below that of the time-invariant hypotheses (`_keep_promising`)."""
-    short, guard = replace(short_form.context, measure=coarsen(short_form.context.measure)), context.guard
+    short, guard = replace(short_form.context, measure=coarsen_steps(short_form.context.measure)), context.guard
     short_base = evaluate_fit(short.measure, short.tuning, base.deviations, base.hypothesis)
     jacobian = compute_sensitivity(short, base.deviations, base.hypothesis, with_forces=True)
     screened = screen(short.measure, short.tuning, short_base, jacobian, invariant, guard.wrap(short.map_, SCREENING))
@@ -279,7 +278,7 @@ def fit_on_short_recordings(
     guarded_map, short_fits = (guard.wrap(context.map_, FITTING), fit_first(short, short_base, jacobian, screened))
     fits: list[Fitted] = list(guarded_map(fit_to_all, short_fits))  # type: ignore[arg-type]
     if varying:
-        coarse = replace(context, measure=coarsen(context.measure))
+        coarse = replace(context, measure=coarsen_steps(context.measure))
         coarse_base = evaluate_fit(coarse.measure, context.tuning, base.deviations, base.hypothesis)
         screened = screen(
             coarse.measure, context.tuning, coarse_base, full_jacobian, varying, guard.wrap(context.map_, SCREENING)

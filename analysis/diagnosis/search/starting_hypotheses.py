@@ -15,7 +15,7 @@ from analysis.diagnosis.settings import CLOCK_LEAST_SHARE, CLOCK_TRIALS_PER_PERI
 from analysis.diagnosis.types import Mapper
 from equalizer.effects.clock_drift import LARGEST_PPM
 from equalizer.effects.effect import ALL_SITES, Effect, Values
-from equalizer.effects.placing import place_of_effect
+from equalizer.effects.placing import find_place
 from equalizer.effects.simulation.interpolated_response import resample_response
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
@@ -34,7 +34,7 @@ def list_candidates(catalogue: Sequence[Effect], evidence: Evidence, map_: Mappe
     out."""
 
     def list_effect_hypotheses(effect: Effect) -> list[Hypothesis]:
-        is_sensor_effect = place_of_effect(effect) == "sensor"
+        is_sensor_effect = find_place(effect) == "sensor"
         sites = range(evidence.model.outputs if is_sensor_effect else evidence.model.inputs)
         starts = [effect.starts(evidence, site)[:STARTS_PER_CLAIM] for site in sites]
         hypotheses: list[Hypothesis] = []

@@ -1,4 +1,7 @@
-"""Time limits of a search (`TimeBudget`). A search that reaches its limit returns its result so far."""
+"""Time limits of a search (`TimeBudget`). A search that reaches its limit returns its result so far.
+
+Used by the searches of `analysis.diagnosis.search` and `discovery`.
+"""
 
 from collections.abc import Callable, Iterable
 from functools import wraps
@@ -9,14 +12,15 @@ from analysis.diagnosis.types import Mapper, TimeBudget
 OUT_OF_TIME = (
     "The time limit of the search was reached: a further effect, or a better fit of the last one, was not searched for."
 )
+"""Remark in a result whose search reached its limit."""
 
 
 class OutOfTimeError(Exception):
     """Raised and caught within a search, where its time limit is reached."""
 
 
-def unlimited_time() -> bool:
-    """A `TimeBudget` without a limit."""
+def grant_time() -> bool:
+    """Return True: a `TimeBudget` without a limit."""
     return True
 
 
@@ -28,39 +32,40 @@ class CountedBudget:
         self._limit, self._call_counter = limit, count()
 
     def __call__(self) -> bool:
+        """Count the call; True for the first `limit` calls."""
         return next(self._call_counter) < self._limit
 
 
 def limit_map(map_: Mapper, time_left: TimeBudget) -> Mapper:
     """The map with a time limit; it raises OutOfTimeError before a call that would begin after the limit.
 
-    The calls may run in other processes, which have copies of the budget. How often they asked the budget is returned
-    with the results, and a `CountedBudget` is asked as often again here, so that each time counts once. A clock is not
-    asked again: results of calls that began in time are kept, however late these end.
+    The calls may run in other processes, which have copies of the budget. The number of their calls of the budget is
+    returned with the results, and a `CountedBudget` is called as often again here, so that each call counts once. A
+    clock is not called again: results of calls that began in time are kept, however late these end.
     """
-    calls = [0]
+    call_counter = [0]
 
     def check_time() -> None:
-        calls[0] += 1
+        call_counter[0] += 1
         if not time_left():
             raise OutOfTimeError
 
-    def timed_map(function: Callable[..., object], *items: Iterable[object]) -> Iterable[object]:
-        calls_at_start = calls[0]
+    def map_in_time(function: Callable[..., object], *items: Iterable[object]) -> Iterable[object]:
+        calls_at_start = call_counter[0]
 
         @wraps(function)
         def call_in_time(*arguments: object) -> tuple[object, int]:
-            calls_before = calls[0]
+            calls_before = call_counter[0]
             check_time()
-            return function(*arguments), calls[0] - calls_before
+            return function(*arguments), call_counter[0] - calls_before
 
         outcomes: list[tuple[object, int]] = list(map_(call_in_time, *items))  # type: ignore[arg-type]
-        other_calls = sum(call_count for _, call_count in outcomes) - (calls[0] - calls_at_start)
+        other_calls = sum(call_count for _, call_count in outcomes) - (call_counter[0] - calls_at_start)
         if isinstance(time_left, CountedBudget):
             for _ in range(other_calls):
                 check_time()
         else:
-            calls[0] += other_calls
+            call_counter[0] += other_calls
         return [result for result, _ in outcomes]
 
-    return timed_map
+    return map_in_time

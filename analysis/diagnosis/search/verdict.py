@@ -181,7 +181,7 @@ def may_move_further(result: SearchResult) -> bool:
 
 def is_plainer(repeated: SearchResult, result: SearchResult) -> bool:
     """Whether a search with a wider bound explains the recordings, by effects or by parameters alone, and the first
-    does not or needs more effects; with a physically possible model (`Tuning.is_possible`) inside the wider bound."""
+    does not or needs more effects; with a physically possible model (`Tuning.is_physical`) inside the wider bound."""
     explanation, tuning = repeated.found, repeated.context.tuning
     if result.judgement.verdict == "explained" and len(explanation.steps) >= len(result.found.steps):
         return False
@@ -191,4 +191,4 @@ def is_plainer(repeated: SearchResult, result: SearchResult) -> bool:
     if not by_effects and not by_parameters:
         return False
     deviations = (explanation.after if by_effects else explanation.retuned).fitted.deviations
-    return tuning.is_possible(deviations) and not tuning.is_at_bound(deviations)
+    return tuning.is_physical(deviations) and not tuning.is_at_bound(deviations)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.evaluation.reproduction.document import FigureFindings, Finding
-from analysis.evaluation.reproduction.played_response import PlayedResponse, describe_played
+from analysis.evaluation.reproduction.played_response import PlayedResponse, make_played_row
 from analysis.wording import format_number
 from equalizer.signals.signal import ComplexArray, FloatArray
 
@@ -133,7 +133,7 @@ def _find_peak_reduction(rows: EqualizedRows) -> Finding:
 
 
 def _find_worst_coupling(title: str, unequalized: PlayedResponse, equalized: PlayedResponse) -> Finding:
-    plain_db, equalized_db = describe_played(unequalized).coupling_db, describe_played(equalized).coupling_db
+    plain_db, equalized_db = make_played_row(unequalized).coupling_db, make_played_row(equalized).coupling_db
     return Finding(
         what=title,
         published="",
@@ -146,12 +146,12 @@ def _find_worst_coupling(title: str, unequalized: PlayedResponse, equalized: Pla
 
 def _find_edge_flatness(rows: EqualizedRows) -> Finding:
     """Whether the model of the centre at least halves the deviation from flatness (dB) near the edge."""
-    plain_db, equalized_db = describe_played(rows.edge_unequalized).flatness_db, describe_played(rows.edge).flatness_db
+    plain_db, equalized_db = make_played_row(rows.edge_unequalized).flatness_db, make_played_row(rows.edge).flatness_db
     return Finding(
         what="Flatness at the edge, model of the centre",
         published="remains fairly flat",
         here=f"{format_number(plain_db, 1)} dB without, {format_number(equalized_db, 1)} dB with the equalizer "
-        f"(centre: {format_number(describe_played(rows.equalized).flatness_db, 1)} dB)",
+        f"(centre: {format_number(make_played_row(rows.equalized).flatness_db, 1)} dB)",
         value=equalized_db,
         unit="dB",
         as_published=equalized_db <= plain_db / 2,
@@ -161,8 +161,8 @@ def _find_edge_flatness(rows: EqualizedRows) -> Finding:
 
 def _find_edge_coupling(rows: EqualizedRows) -> Finding:
     """Whether the reduction of coupling near the edge is positive, and less than half of that at the centre, in dB."""
-    plain_db, equalized_db = describe_played(rows.edge_unequalized).coupling_db, describe_played(rows.edge).coupling_db
-    centre_reduction_db = describe_played(rows.unequalized).coupling_db - describe_played(rows.equalized).coupling_db
+    plain_db, equalized_db = make_played_row(rows.edge_unequalized).coupling_db, make_played_row(rows.edge).coupling_db
+    centre_reduction_db = make_played_row(rows.unequalized).coupling_db - make_played_row(rows.equalized).coupling_db
     return Finding(
         what="Coupling at the edge, model of the centre",
         published="still a minor improvement",
@@ -176,7 +176,7 @@ def _find_edge_coupling(rows: EqualizedRows) -> Finding:
 
 
 def _find_blended_forces(rows: EqualizedRows) -> Finding:
-    blended = describe_played(rows.edge_blended)
+    blended = make_played_row(rows.edge_blended)
     return Finding(
         what="The same place, forces blended between models of other places (ours)",
         published="named as a possibility, not tried",
@@ -189,7 +189,7 @@ def _find_blended_forces(rows: EqualizedRows) -> Finding:
 
 
 def _find_friction_cost(rows: EqualizedRows) -> Finding:
-    with_friction, frictionless = describe_played(rows.multisine), describe_played(rows.frictionless)
+    with_friction, frictionless = make_played_row(rows.multisine), make_played_row(rows.frictionless)
     return Finding(
         what="What friction costs, all frequencies at once (ours)",
         published="",

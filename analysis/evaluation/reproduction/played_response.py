@@ -1,8 +1,8 @@
-"""Frequency response of a device from wanted to delivered acceleration, for the reproduction of the published figure 5.
+"""Frequency response of a device from target to delivered acceleration, for the reproduction of the published figure 5.
 
-T(f) is the ratio of the spectra of one steady period, line by line; column i belongs to a signal wanted along axis i.
-T is the identity matrix for a perfect equalizer. `equalizer.tracking.feedforward.quality` defines flatness, coupling
-and axis error.
+T(f) is the ratio of the spectra of one steady period, line by line; column i belongs to a target along axis i. T is the
+identity matrix for a perfect equalizer. `study.evaluation.reproduction` measures it.
+`equalizer.tracking.feedforward.quality` defines flatness, coupling and axis error.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ SignalKind = Literal["sweep", "multisine"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlayedResponse:
-    """Measured response from wanted to delivered acceleration, with the conditions of its measurement."""
+    """Measured response from target to delivered acceleration, with the conditions of its measurement."""
 
     name: str
     device: str
@@ -34,9 +34,9 @@ class PlayedResponse:
     frequency_hz: FloatArray
     """(lines,)"""
     response: ComplexArray
-    """(lines, axes, axes): T, delivered over wanted; the last index is the wanted axis."""
+    """(lines, axes, axes): T, delivered over target; the last index is the axis of the target."""
     peak_force_n: float
-    """Largest magnitude of the commanded force vector."""
+    """Largest magnitude of the commanded force vector, N."""
     clipped_ticks: int
     """Number of ticks of the device loop at which a cap cut the force."""
     multiply_adds: int | None = None
@@ -44,26 +44,27 @@ class PlayedResponse:
 
 
 def make_target_wave(
-    kind: SignalKind, band_hz: tuple[float, float], period: int, sample_rate_hz: float, seed: int
+    signal_kind: SignalKind, band_hz: tuple[float, float], period: int, sample_rate_hz: float, seed: int
 ) -> FloatArray:
-    """One period (period,) of the wanted signal, with a peak of 1 and without power outside the band. kind: logarithmic
-    sweep or multisine. seed: of the multisine's phases."""
+    """Make one period (period,) of the target signal, with a peak of 1 and without power outside the band. period:
+    samples. signal_kind: logarithmic sweep or multisine. seed: of the multisine's phases; a sweep has none."""
     low, high = band_hz
-    if kind == "multisine":
+    if signal_kind == "multisine":
         lines = list_lines_between(low, high, period, sample_rate_hz, odd_only=False)
         return make_multisines(lines, period, 1.0, 1, 1, seed)[0][:, 0]
     # Slightly wider than the band, so that the ends of the band lie inside the sweep, not at its jump back.
     spectrum = np.fft.rfft(log_sweep(0.9 * low, 1.06 * high, 1.0, period, sample_rate_hz))
-    spectrum[~lines_of_band(band_hz, period, sample_rate_hz)] = 0
+    spectrum[~mask_lines_in_band(band_hz, period, sample_rate_hz)] = 0
     wave = np.fft.irfft(spectrum, period)
     normalised: FloatArray = wave / np.abs(wave).max()
     return normalised
 
 
-def lines_of_band(
+def mask_lines_in_band(
     band_hz: tuple[float, float], period: int, sample_rate_hz: float
 ) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """(period // 2 + 1,): whether each line of the real FFT of a period lies within the band."""
+    """(period // 2 + 1,): mask of the lines of the real FFT of a period (samples) that lie within the band, ends
+    included."""
     frequency_hz = np.fft.rfftfreq(period, 1 / sample_rate_hz)
     return np.asarray((frequency_hz >= band_hz[0] - 1e-9) & (frequency_hz <= band_hz[1] + 1e-9))
 
@@ -71,10 +72,10 @@ def lines_of_band(
 def estimate_response(
     target: FloatArray, delivered: Sequence[FloatArray], band_hz: tuple[float, float], sample_rate_hz: float
 ) -> tuple[FloatArray, ComplexArray]:
-    """Frequencies in Hz (lines,) and response (lines, axes, axes), delivered over wanted. target: (axes, period), the
+    """Frequencies in Hz (lines,) and response (lines, axes, axes), delivered over target. target: (axes, period), the
     signal of each axis, played one axis at a time. delivered: for each of these, one steady period (period, axes)."""
     period = target.shape[1]
-    in_band = lines_of_band(band_hz, period, sample_rate_hz)
+    in_band = mask_lines_in_band(band_hz, period, sample_rate_hz)
     columns = [
         np.fft.rfft(period_samples, axis=0)[in_band] / np.fft.rfft(wave)[in_band][:, None]
         for wave, period_samples in zip(target, delivered, strict=True)
@@ -91,21 +92,21 @@ def normalise_gain(response: ComplexArray) -> ComplexArray:
     return normalised
 
 
-def coupling_db(response: ComplexArray) -> FloatArray:
-    """(lines,): largest ratio |T_ji| / |T_ii| with j != i in dB, of the worst wanted axis i; at least -240 dB."""
+def compute_coupling_db(response: ComplexArray) -> FloatArray:
+    """(lines,): largest ratio |T_ji| / |T_ii| with j != i in dB, of the worst target axis i; at least -240 dB."""
     diagonal = np.abs(np.einsum("lii->li", response))
     off_diagonal = np.abs(response) * (1 - np.eye(response.shape[1]))
     ratio: FloatArray = 20 * np.log10(np.maximum((off_diagonal.max(axis=1) / diagonal).max(axis=1), 1e-12))
     return ratio
 
 
-def describe_played(playback: PlayedResponse) -> PlayedRow:
-    """The response's figures of merit as a row of the document. Its `error` is the rms over lines of the Frobenius norm
-    of T - I, divided by the root of the number of axes."""
+def make_played_row(playback: PlayedResponse) -> PlayedRow:
+    """Make a row of the document from the response's figures of merit. Its `error` is the rms over lines of the
+    Frobenius norm of T - I, divided by the root of the number of axes."""
     quality = measure_quality(playback.response)
-    axes = playback.response.shape[1]
-    error = np.sqrt((np.abs(playback.response - np.eye(axes)) ** 2).sum() / (axes * len(playback.response)))
-    x, y, z = (1000 * metres for metres in playback.place_m)
+    axis_count = playback.response.shape[1]
+    error = np.sqrt((np.abs(playback.response - np.eye(axis_count)) ** 2).sum() / (axis_count * len(playback.response)))
+    x, y, z = (1000 * coordinate_m for coordinate_m in playback.place_m)
     return PlayedRow(
         name=playback.name,
         device=playback.device,
@@ -114,7 +115,7 @@ def describe_played(playback: PlayedResponse) -> PlayedRow:
         signal=playback.signal,
         flatness_db=quality.flatness_db,
         coupling_db=max(quality.coupling_db, -240.0),
-        median_coupling_db=float(np.median(coupling_db(playback.response))),
+        median_coupling_db=float(np.median(compute_coupling_db(playback.response))),
         axis_error_deg=quality.axis_error_deg,
         error=float(error),
         peak_force_n=playback.peak_force_n,

@@ -11,7 +11,7 @@ from analysis.diagnosis.result.residual_spectrum import compute_remainder_spectr
 from analysis.diagnosis.search.guard import Guard, WorkPart
 from analysis.figures.diagnosis.held_out import held_out_picture
 from analysis.figures.diagnosis.mismatch_map import make_mismatch_map_picture, rank_driving_inputs
-from analysis.figures.diagnosis.remainder import remainder_picture
+from analysis.figures.diagnosis.remainder import make_remainder_picture
 from analysis.figures.diagnosis.rivals import make_rivals_pictures
 from analysis.figures.diagnosis.signature import make_signature_pictures
 from analysis.figures.diagnosis.state_maps import make_state_map_pictures
@@ -60,4 +60,4 @@ def _draw_with_time_labels(draw: Callable[[], Sequence[Picture]], is_timed: bool
 def _make_remainder_pictures(findings: Findings) -> list[Picture]:
     """Make the picture of the residual spectra; none where no samples were held out."""
     spectra = compute_remainder_spectra(findings.time_series, findings.floor)
-    return [remainder_picture(spectra)] if spectra else []
+    return [make_remainder_picture(spectra)] if spectra else []

@@ -1,4 +1,8 @@
-"""Figure of the mismatch map: residual by channel and octave, per input and level, for the three predictions."""
+"""Figure of the mismatch map: residual by channel and octave, per input and level, for each stage of the model.
+
+Stages are those of `stage_style`: given, re-tuned, and completed with the named effects. Called by
+`diagnosis_pictures`.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,17 +22,19 @@ from equalizer.signals.signal import FloatArray
 _LEAST_COLOUR_LIMIT = 300.0
 """Smallest upper end of the colour scale, in units of the noise."""
 _WHITE_TEXT_FROM = 0.62
-"""Share of the colour scale from which numbers are white."""
-_LETTER_IN = 0.075
-"""Width of a letter beside the map, inches."""
-_ROW_IN, _PANEL_GAP_IN = 0.25, 0.2
+"""Share of the logarithmic colour scale from which numbers are white."""
+_LETTER_WIDTH_IN = 0.075
+"""Mean width of a letter of the labels beside the map, inches."""
+_ROW_HEIGHT_IN, _PANEL_GAP_IN = 0.25, 0.2
 """Height of a row of cells, and between panels, inches."""
 _MOST_LEVELS = 4
-"""Most levels drawn separately; more are grouped."""
+"""Largest number of rows of panels; more levels are drawn in as many groups."""
 _MIN_NUMBERED_RATIO = 1.15
 """Residual over noise below which a cell has no number."""
-_SQUARE = ((-0.46, -0.46), (0.46, -0.46), (0.46, 0.46), (-0.46, 0.46), (-0.46, -0.46))
-_UNIT = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+_FRAME_OUTLINE = ((-0.46, -0.46), (0.46, -0.46), (0.46, 0.46), (-0.46, 0.46), (-0.46, -0.46))
+"""Outline of a significant cell about its centre, in cells."""
+_UNIT_SQUARE = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+"""Corners of a panel, relative to its size."""
 _WIDTH_IN = 8.8
 """Width of the figure, inches."""
 _POINTS_PER_CELL, _GAP_CELLS = 4, 0.25
@@ -37,6 +43,7 @@ _MOST_NUMBERED_COLUMNS = 10
 """Columns of a panel up to which a number can be read in each cell."""
 
 Maps = Mapping[str, tuple[MismatchCell, ...]]
+"""Cells of each stage, by the name of the stage."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,8 +55,8 @@ class _Layout:
     bands: tuple[tuple[float, float], ...]
     channels: tuple[tuple[str, str], ...]
 
-    def corner(self, row: int, column: int) -> FloatArray:
-        """(2,): x and y of a panel's first cell, in cells."""
+    def find_corner(self, row: int, column: int) -> FloatArray:
+        """(2,): x and y of the centre of a panel's first cell, in cells. row, column: of panels."""
         return np.array([column * (len(self.bands) + _GAP_CELLS), row * (len(self.channels) + _GAP_CELLS)])
 
 
@@ -59,79 +66,88 @@ def rank_driving_inputs(maps: Maps) -> tuple[str, ...]:
     return tuple(sorted(inputs, key=lambda name: (-_find_worst_mismatch(maps, name), name)))
 
 
-def make_mismatch_map_picture(maps: Maps, number: int, unit: str) -> Picture:
-    """Mismatch map of one driving input. number: of the driving input in `rank_driving_inputs`; all but the first are
-    folded. unit: of the command."""
-    input_ = rank_driving_inputs(maps)[number]
+def make_mismatch_map_picture(maps: Maps, input_index: int, unit: str) -> Picture:
+    """Make the mismatch map of one driving input. input_index: of the driving input in `rank_driving_inputs`; all but
+    the first are folded. unit: of the command."""
+    input_ = rank_driving_inputs(maps)[input_index]
     return Picture(
-        name=f"mismatch-map-{number + 1}",
+        name=f"mismatch-map-{input_index + 1}",
         title=f"Where model and device disagree, driven by {input_}",
         caption="Residual relative to that of noise alone: 1 is noise. Framed: significantly larger than the noise "
         "and the model's error elsewhere, at a false discovery rate of 1 %. Rows: measured channels; columns: "
         f"octaves, by their lower edge{_describe_levels(maps, input_, unit)}; grey: not driven there; without a number"
         f": below {_MIN_NUMBERED_RATIO:g}." + _describe_groups(maps, input_),
         figure=draw_mismatch_map(maps, input_, unit),
-        folded=number > 0,
-        bitmap=number == 0,
+        folded=input_index > 0,
+        bitmap=input_index == 0,
         alternative=_write_alternative_text(maps, input_),
     )
 
 
 def draw_mismatch_map(maps: Maps, input_: str, unit: str) -> Figure:
-    """A row of panels per level, a column per stage; all in a single Axes object, because one per panel takes
-    seconds."""
+    """Draw a row of panels per level and a column per stage, all in a single Axes object, because one per panel takes
+    seconds; a note where no stage has cells in units of the noise."""
     layout = _make_layout(maps, input_)
     if not layout.stages or not layout.bands:
         return draw_no_data_note(create_figure(8.6, 1.6), "The noise is not known, so there is no map in its units.")
-    figure = create_figure(_WIDTH_IN, 0.9 + len(layout.levels) * (_PANEL_GAP_IN + _ROW_IN * len(layout.channels)))
+    figure = create_figure(
+        _WIDTH_IN, 0.9 + len(layout.levels) * (_PANEL_GAP_IN + _ROW_HEIGHT_IN * len(layout.channels))
+    )
     axes, colour_bar_axes = _add_axes(figure, layout)
     table, frames = _fill_table(maps, input_, layout)
-    panels = [layout.corner(row, column) for row, column in np.ndindex(len(layout.levels), len(layout.stages))]
-    size = np.array([len(layout.bands), len(layout.channels)])
-    corners = [(panel - 0.5) + _UNIT * size for panel in panels]
+    panel_corners = [
+        layout.find_corner(row, column) for row, column in np.ndindex(len(layout.levels), len(layout.stages))
+    ]
+    panel_size = np.array([len(layout.bands), len(layout.channels)])
+    panel_outlines = [(panel_corner - 0.5) + _UNIT_SQUARE * panel_size for panel_corner in panel_corners]
     for zorder, face, edge in ((0, "#F2F2F2", "none"), (2, "none", GREY)):
-        axes.add_collection(PolyCollection(corners, facecolors=face, edgecolors=edge, linewidths=0.5, zorder=zorder))
+        axes.add_collection(
+            PolyCollection(panel_outlines, facecolors=face, edgecolors=edge, linewidths=0.5, zorder=zorder)
+        )
     height, width = table.shape
     extent = (-0.5, width / _POINTS_PER_CELL - 0.5, height / _POINTS_PER_CELL - 0.5, -0.5)
-    largest = _choose_colour_limit(table)
-    image = axes.imshow(np.maximum(table, 1.0), cmap="YlOrBr", norm=LogNorm(1.0, largest), aspect="auto",
+    colour_limit = _choose_colour_limit(table)
+    image = axes.imshow(np.maximum(table, 1.0), cmap="YlOrBr", norm=LogNorm(1.0, colour_limit), aspect="auto",
                         interpolation="nearest", extent=extent)  # fmt: skip
     axes.add_collection(LineCollection(frames, colors=BLACK, linewidths=0.9, zorder=3), autolim=False)
     if len(layout.bands) <= _MOST_NUMBERED_COLUMNS:
-        _write_numbers(axes, table, panels, layout)
+        _write_numbers(axes, table, panel_corners, layout)
     _label_axes(axes, layout, unit)
     bar = figure.colorbar(image, cax=colour_bar_axes)
-    set_ratio_ticks(bar.ax.yaxis, 1.0, largest)
+    set_ratio_ticks(bar.ax.yaxis, 1.0, colour_limit)
     bar.set_label("residual / noise", fontsize=9)
     colour_bar_axes.tick_params(labelsize=8)
     return figure
 
 
 def _choose_colour_limit(table: FloatArray) -> float:
-    """Upper end of the colour scale, above all cells, so that the worst differs from the next."""
+    """Upper end of the colour scale: `_LEAST_COLOUR_LIMIT`, or the next power of ten above the largest residual."""
     largest = float(np.nanmax(table, initial=1.0))
     return _LEAST_COLOUR_LIMIT if largest <= _LEAST_COLOUR_LIMIT else float(10 ** np.ceil(np.log10(largest)))
 
 
-def _fits_upright(layout: _Layout) -> bool:
-    """Whether levels fit upright along the panels' sides; else they are written behind the channels."""
-    longest = max((len(f"at {level:.3g} N m") for level in layout.levels), default=0)
-    return _LETTER_IN * (longest - 2) <= _PANEL_GAP_IN + _ROW_IN * len(layout.channels)
+def _can_write_levels_upright(layout: _Layout) -> bool:
+    """Whether levels can be written vertically along the panels' sides; else they follow the channels' names."""
+    longest_label = max((len(f"at {level:.3g} N m") for level in layout.levels), default=0)
+    return _LETTER_WIDTH_IN * (longest_label - 2) <= _PANEL_GAP_IN + _ROW_HEIGHT_IN * len(layout.channels)
 
 
 def _format_row_label(channel: tuple[str, str], level: float, layout: _Layout) -> str:
+    """Label of a row of cells: its channel, and its level where that is not written along the panel's side."""
     label = _format_channel_label(channel, layout)
-    return label if _fits_upright(layout) or not level else f"{label} at {level:.3g}"
+    return label if _can_write_levels_upright(layout) or not level else f"{label} at {level:.3g}"
 
 
 def _add_axes(figure: Figure, layout: _Layout) -> tuple[Axes, Axes]:
     """Axes of the map and of its colour bar, laid out by computed sizes instead of a layout engine."""
     figure.set_layout_engine("none")
     width, height = figure.get_size_inches()
-    longest = max(
+    longest_label = max(
         len(_format_row_label(channel, level, layout)) for channel in layout.channels for level in layout.levels
     )
-    left_in = (0.33 if any(layout.levels) and _fits_upright(layout) else 0.1) + _LETTER_IN * longest
+    left_in = (
+        0.33 if any(layout.levels) and _can_write_levels_upright(layout) else 0.1
+    ) + _LETTER_WIDTH_IN * longest_label
     bottom, top, right_edge = 0.5 / height, 1 - 0.26 / height, 1 - 1.15 / width
     axes = figure.add_axes((left_in / width, bottom, right_edge - left_in / width, top - bottom))
     colour_bar_axes = figure.add_axes(
@@ -144,55 +160,58 @@ def _fill_table(maps: Maps, input_: str, layout: _Layout) -> tuple[FloatArray, l
     """Residual over noise with `_POINTS_PER_CELL` squared points per cell, NaN between panels and where nothing was
     driven; and the outlines of the significant cells."""
     rows, columns = len(layout.levels), len(layout.stages)
-    last = layout.corner(rows - 1, columns - 1)
-    size = last[1] + len(layout.channels), last[0] + len(layout.bands)
-    table = np.full([round(_POINTS_PER_CELL * cells) for cells in size], np.nan)
+    last_corner = layout.find_corner(rows - 1, columns - 1)
+    table_cells = last_corner[1] + len(layout.channels), last_corner[0] + len(layout.bands)
+    table = np.full([round(_POINTS_PER_CELL * cells) for cells in table_cells], np.nan)
     frames: list[FloatArray] = []
     for column, stage in enumerate(layout.stages):
         for cell in (map_cell for map_cell in maps[stage.name] if map_cell.input == input_):
-            corner = layout.corner(_find_level_group(layout, cell), column)
+            corner = layout.find_corner(_find_level_group(layout, cell), column)
             offset = layout.bands.index(cell.band_hz), layout.channels.index((cell.output, cell.quantity))
             x, y = (round(_POINTS_PER_CELL * coordinate) for coordinate in corner + offset)
-            part = table[y : y + _POINTS_PER_CELL, x : x + _POINTS_PER_CELL]
-            part[:] = np.fmax(part, cell.in_noise)
+            cell_points = table[y : y + _POINTS_PER_CELL, x : x + _POINTS_PER_CELL]
+            cell_points[:] = np.fmax(cell_points, cell.in_noise)
             if cell.significant:
-                frames.append(np.array(_SQUARE) + corner + offset)
+                frames.append(np.array(_FRAME_OUTLINE) + corner + offset)
     return table, frames
 
 
-def _write_numbers(axes: Axes, table: FloatArray, panels: Sequence[FloatArray], layout: _Layout) -> None:
-    for corner in panels:
+def _write_numbers(axes: Axes, table: FloatArray, panel_corners: Sequence[FloatArray], layout: _Layout) -> None:
+    """Write residual over noise into each cell from `_MIN_NUMBERED_RATIO` on; white on dark colours."""
+    for corner in panel_corners:
         for row, column in np.ndindex(len(layout.channels), len(layout.bands)):
             x, y = float(corner[0]) + column, float(corner[1]) + row
             value = table[round(_POINTS_PER_CELL * y), round(_POINTS_PER_CELL * x)]
             if value >= _MIN_NUMBERED_RATIO:
                 colour = "white" if np.log(value) > _WHITE_TEXT_FROM * np.log(_choose_colour_limit(table)) else BLACK
-                axes.text(x, y, _format_short(value), ha="center", va="center", fontsize=6.2, color=colour)
+                axes.text(x, y, _format_ratio(value), ha="center", va="center", fontsize=6.2, color=colour)
 
 
 def _label_axes(axes: Axes, layout: _Layout, unit: str) -> None:
+    """Label octaves (x), channels (y), stages (above the panels) and levels (left, where they fit). unit: of levels."""
     stages, levels = range(len(layout.stages)), range(len(layout.levels))
-    xs = [layout.corner(0, column)[0] + band for column in stages for band in range(len(layout.bands))]
-    ys = [layout.corner(row, 0)[1] + channel for row in levels for channel in range(len(layout.channels))]
-    axes.set_xticks(xs, [f"{low:g}" for low, _ in layout.bands] * len(stages), fontsize=7.5)
-    rows = [_format_row_label(channel, level, layout) for level in layout.levels for channel in layout.channels]
-    axes.set_yticks(ys, rows, fontsize=8.5)
+    x_ticks = [layout.find_corner(0, column)[0] + band for column in stages for band in range(len(layout.bands))]
+    y_ticks = [layout.find_corner(row, 0)[1] + channel for row in levels for channel in range(len(layout.channels))]
+    axes.set_xticks(x_ticks, [f"{low:g}" for low, _ in layout.bands] * len(stages), fontsize=7.5)
+    row_labels = [_format_row_label(channel, level, layout) for level in layout.levels for channel in layout.channels]
+    axes.set_yticks(y_ticks, row_labels, fontsize=8.5)
     axes.tick_params(length=0)
     axes.spines[:].set_visible(False)
     axes.set_xlabel("Octave from (Hz)", fontsize=9.5)
     for column in stages:
-        axes.annotate(layout.stages[column].label, (float(layout.corner(0, column)[0]) - 0.5, -0.5), xytext=(0, 4),
+        axes.annotate(layout.stages[column].label, (float(layout.find_corner(0, column)[0]) - 0.5, -0.5), xytext=(0, 4),
                       textcoords="offset points", fontsize=10)  # fmt: skip
-    middle = (len(layout.channels) - 1) / 2
+    middle_row = (len(layout.channels) - 1) / 2
     for row in levels:
-        if layout.levels[row] and _fits_upright(layout):
+        if layout.levels[row] and _can_write_levels_upright(layout):
             axes.annotate(
-                f"at {layout.levels[row]:.3g} {unit}".rstrip(), (0.02, layout.corner(row, 0)[1] + middle),
+                f"at {layout.levels[row]:.3g} {unit}".rstrip(), (0.02, layout.find_corner(row, 0)[1] + middle_row),
                 xycoords=("figure fraction", "data"), rotation="vertical", ha="center", va="center", fontsize=10,
             )  # fmt: skip
 
 
 def _make_layout(maps: Maps, input_: str) -> _Layout:
+    """Layout of the cells of one input; levels are grouped where there are more than `_MOST_LEVELS`."""
     cells = [map_cell for stage_cells in maps.values() for map_cell in stage_cells if map_cell.input == input_]
     levels = sorted({cell.amplitude for cell in cells})
     groups = [group for group in np.array_split(levels, min(_MOST_LEVELS, len(levels))) if len(group)] if levels else []
@@ -210,26 +229,31 @@ def _find_level_group(layout: _Layout, cell: MismatchCell) -> int:
 
 
 def _format_channel_label(channel: tuple[str, str], layout: _Layout) -> str:
+    """Name of a channel, with its quantity where channels share the name. channel: name and quantity."""
     name, quantity = channel
     return f"{name} ({quantity})" if [other_name for other_name, _ in layout.channels].count(name) > 1 else name
 
 
-def _format_short(value: float) -> str:
+def _format_ratio(value: float) -> str:
+    """Residual over noise in at most four characters: 1.2, 12, 1.2k, at most 999k."""
     if value >= 999.5:
         return f"{value / 1e3:.1f}k" if value < 9950 else f"{min(value / 1e3, 999):.0f}k"
     return f"{value:.1f}".removesuffix(".0") if value < 9.95 else f"{value:.0f}"
 
 
 def _find_worst_mismatch(maps: Maps, input_: str) -> float:
+    """Largest residual over noise of one input, over all stages; 0 without cells."""
     return max((cell.in_noise for cells in maps.values() for cell in cells if cell.input == input_), default=0.0)
 
 
 def _describe_levels(maps: Maps, input_: str, unit: str) -> str:
+    """Clause of the caption about the levels; empty where no level is known."""
     levels = {cell.amplitude for cells in maps.values() for cell in cells if cell.input == input_}
     return f", at levels of the excitation{f' in {unit}' if unit else ''}" if any(levels) else ""
 
 
 def _describe_groups(maps: Maps, input_: str) -> str:
+    """Sentence of the caption about groups of levels; empty where each level has its own row."""
     levels = {cell.amplitude for cells in maps.values() for cell in cells if cell.input == input_}
     if len(levels) <= _MOST_LEVELS:
         return ""
@@ -239,6 +263,7 @@ def _describe_groups(maps: Maps, input_: str) -> str:
 
 
 def _write_alternative_text(maps: Maps, input_: str) -> str:
+    """Text for screen readers: per stage, the number of significant cells and the worst cell."""
     sentences = []
     for stage in STAGES:
         cells = [map_cell for map_cell in maps.get(stage.name, ()) if map_cell.input == input_]

@@ -1,6 +1,7 @@
 """Figure of the residual spectra on held-out data, compared with the spectra of the signal and the noise.
 
 Where the residual of the completed model equals the noise, nothing is left to explain at that frequency.
+Called by `diagnosis_pictures`.
 """
 
 from collections.abc import Sequence
@@ -17,21 +18,21 @@ from analysis.figures.diagnosis.stage_style import COMPLETED_STAGE, RETUNED_STAG
 from analysis.figures.picture import Picture
 from analysis.figures.style import GREY, create_figure, draw_no_data_note, format_power_of_ten, style_axes
 
-_COLUMNS = 3
+_MAX_COLUMNS = 3
 """Largest number of panels in a row."""
-_SIGNAL = Line2D([], [], color=GREY, linewidth=0.9, label="measured")
-_NOISE = Line2D([], [], color=GREY, linewidth=4, alpha=0.4, label="noise")
+_SIGNAL_HANDLE = Line2D([], [], color=GREY, linewidth=0.9, label="measured")
+_NOISE_HANDLE = Line2D([], [], color=GREY, linewidth=4, alpha=0.4, label="noise")
 
 
-def remainder_picture(spectra: Sequence[RemainderSpectrum]) -> Picture:
-    """Picture of the residual spectra, with its caption and its text for screen readers."""
+def make_remainder_picture(spectra: Sequence[RemainderSpectrum]) -> Picture:
+    """Make the picture of the residual spectra, with its caption and its text for screen readers."""
     return Picture(
         name="remainder",
         title="Residual on held-out data",
         caption="Amplitude densities in sixths of an octave. Where the solid line lies on the grey band, the "
         "residual is noise; where it lies above, a mismatch remains.",
         figure=draw_remainder(spectra),
-        alternative=" ".join(_alternative_text(spectrum) for spectrum in spectra),
+        alternative=" ".join(_write_alternative_text(spectrum) for spectrum in spectra),
     )
 
 
@@ -40,7 +41,7 @@ def draw_remainder(spectra: Sequence[RemainderSpectrum]) -> Figure:
     model, and of the noise; a note where there are no spectra."""
     if not spectra:
         return draw_no_data_note(create_figure(8.6, 1.6), "There are no held-out data to draw.")
-    columns = min(_COLUMNS, len(spectra))
+    columns = min(_MAX_COLUMNS, len(spectra))
     rows = -(-len(spectra) // columns)
     figure = create_figure(8.8, 0.9 + (2.1 if columns > 1 else 2.6) * rows)
     grid = figure.subplots(rows, columns, sharex=True, squeeze=False)
@@ -49,7 +50,7 @@ def draw_remainder(spectra: Sequence[RemainderSpectrum]) -> Figure:
     for axes, spectrum in zip(grid.ravel(), spectra, strict=False):
         _draw_panel(axes, spectrum)
     figure.supxlabel("Frequency (Hz)", fontsize=9.5)
-    handles = [_SIGNAL, RETUNED_STAGE.handle, COMPLETED_STAGE.handle, _NOISE]
+    handles = [_SIGNAL_HANDLE, RETUNED_STAGE.handle, COMPLETED_STAGE.handle, _NOISE_HANDLE]
     figure.legend(handles=handles, loc="outside upper center", ncols=4, fontsize=9, frameon=False)
     return figure
 
@@ -72,8 +73,8 @@ def _draw_panel(axes: Axes, spectrum: RemainderSpectrum) -> None:
     axes.tick_params(labelsize=8)
 
 
-def _alternative_text(spectrum: RemainderSpectrum) -> str:
-    """Largest ratio of the completed model's residual to the noise, and its frequency, in words."""
+def _write_alternative_text(spectrum: RemainderSpectrum) -> str:
+    """Write the largest ratio of the completed model's residual to the noise, and its frequency, in words."""
     ratio = spectrum.after / spectrum.noise
     if not np.isfinite(ratio).any():
         return f"{spectrum.channel}: the noise is not known."

@@ -7,12 +7,12 @@ counts; a report shows the sentence with the interval it belongs to, docs/statis
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from analysis.psychophysics.catch_trials import wilson_interval
+from analysis.psychophysics.catch_trials import compute_wilson_interval
 from analysis.wording import format_number, format_signed
 
-CASES_HZ = {25.0: "0.85 N", 35.0: "3 N, the cap", 45.0: "4 N, above the cap"}
+THRESHOLDS_BY_HZ = {25.0: "0.85 N", 35.0: "3 N, the cap", 45.0: "4 N, above the cap"}
 """Reported frequencies (Hz) of the simulated studies, and the true median threshold at each; at 5 Hz it is 0.35 N."""
-NAMES = {
+TITLES = {
     "model": "difference to 5 Hz by the model of all answers, dB",
     "means": "difference to 5 Hz by reversal means, paired, dB",
     "tobit": "difference to 5 Hz by reversal means, Tobit, dB",
@@ -21,18 +21,19 @@ NAMES = {
     "single": "single threshold by likelihood, one participant alone",
     "one-way": "type-1 error of the one-way analysis at equal medians of 2.2 N",
 }
-"""Name of each analysis, and the text for its interval."""
-ONLY_BELOW = ("run", "single")
+"""Key of each analysis, and the text for its interval."""
+BELOW_CAP_ONLY = ("run", "single")
 """Analyses that give an estimate only where it is below the cap. Near the cap their mean error is due to this
 selection, so sentences leave it out."""
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredCoverage:
-    """Coverage of an interval in simulated studies of ten people (single: one), published staircase, cap of 3 N."""
+    """Coverage of an interval in simulated studies of ten people (analysis "single": of one), with the published
+    staircase and a cap of 3 N."""
 
     analysis: str
-    """A name of `NAMES`."""
+    """A key of `TITLES`."""
     frequency_hz: float
     """0 where all frequencies are tested together."""
     bias_db: float | None
@@ -45,42 +46,42 @@ class MeasuredCoverage:
     @property
     def percent(self) -> str:
         """Share of `covered` in per cent with Wilson's 95 % interval, such as: 94.0 % (92.4 to 95.3)."""
-        lower, upper = wilson_interval(self.covered, self.intervals)
+        lower, upper = compute_wilson_interval(self.covered, self.intervals)
         share = 100 * self.covered / self.intervals
         return f"{format_number(share, 1)} % ({format_number(100 * lower, 1)} to {format_number(100 * upper, 1)})"
 
 
-def coverage_lines(rows: Sequence[MeasuredCoverage]) -> list[str]:
-    """The table in Markdown, one line per row, ordered as `NAMES`."""
+def format_coverage_table(rows: Sequence[MeasuredCoverage]) -> list[str]:
+    """Format the table in Markdown, one line per row, ordered as `TITLES`."""
     lines = [
         "| interval | median threshold | bias of the estimates (dB) | contains the true value |",
         "|---|---|---|---|",
     ]
-    for name, title in NAMES.items():
+    for name, title in TITLES.items():
         for row in rows:
             if row.analysis == name:
                 bias = "" if row.bias_db is None else format_signed(row.bias_db)
-                lines.append(f"| {title} | {CASES_HZ.get(row.frequency_hz, '')} | {bias} | {row.percent} |")
+                lines.append(f"| {title} | {THRESHOLDS_BY_HZ.get(row.frequency_hz, '')} | {bias} | {row.percent} |")
     return lines
 
 
-def coverage_sentence(rows: Sequence[MeasuredCoverage], analysis: str) -> str:
-    """Sentence on the coverage and bias of one analysis (a name of `NAMES`) at each median threshold; empty where
-    nothing was measured."""
+def describe_coverage(rows: Sequence[MeasuredCoverage], analysis: str) -> str:
+    """Describe the coverage and bias of one analysis (a key of `TITLES`) at each median threshold; empty
+    where nothing was measured."""
     texts = []
     for row in rows:
         if row.analysis == analysis and row.frequency_hz:
-            has_bias = row.bias_db is not None and analysis not in ONLY_BELOW
+            has_bias = row.bias_db is not None and analysis not in BELOW_CAP_ONLY
             bias = f" (bias {format_signed(row.bias_db or 0.0, 1)} dB)" if has_bias else ""
             texts.append(
-                f"{format_number(100 * row.covered / row.intervals, 0)} % at {CASES_HZ[row.frequency_hz]}{bias}"
+                f"{format_number(100 * row.covered / row.intervals, 0)} % at {THRESHOLDS_BY_HZ[row.frequency_hz]}{bias}"
             )
         elif row.analysis == analysis:
-            return f"{_SIMULATED}: the {NAMES[analysis]} is {row.percent}, nominally 5 %."
+            return f"{_SENTENCE_START}: the {TITLES[analysis]} is {row.percent}, nominally 5 %."
     if not texts:
         return ""
-    return f"{_SIMULATED}: the 95 % interval ({NAMES[analysis]}) contains the true value in {'; '.join(texts)}."
+    return f"{_SENTENCE_START}: the 95 % interval ({TITLES[analysis]}) contains the true value in {'; '.join(texts)}."
 
 
-_SIMULATED = "Measured near the cap in simulated studies with the published staircase"
+_SENTENCE_START = "Measured near the cap in simulated studies with the published staircase"
 """Beginning of every sentence."""

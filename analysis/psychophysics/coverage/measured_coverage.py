@@ -1,6 +1,6 @@
 """Measured coverage near the force cap: how many intervals of a study report hold the true value.
 
-Reports print these counts beside each interval (`coverage_words`). Each row: analysis (`coverage_words.NAMES`),
+Reports print these counts beside each interval (`coverage_words`). Each row: analysis (`coverage_words.TITLES`),
 frequency (Hz; 0 where all frequencies are judged together), mean error (dB; None where the analysis gives no size in
 dB), intervals of 95 % that held the truth (one-way: studies in which a difference was found that was not there), and
 all intervals.

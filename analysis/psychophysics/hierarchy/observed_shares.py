@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.psychophysics.catch_trials import wilson_interval
+from analysis.psychophysics.catch_trials import compute_wilson_interval
 from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import (
     NEPER_PER_DB,
@@ -114,6 +114,8 @@ def _bin_shares(answers: Answers, selected: NDArray[np.bool_], level_db: FloatAr
         answer_count, correct_count = int(trials[in_bin].sum()), int(correct[in_bin].sum())
         mean_level_db = float(np.average(level[in_bin], weights=trials[in_bin]))
         shares.append(
-            ObservedShare(mean_level_db, answer_count, correct_count, *wilson_interval(correct_count, answer_count))
+            ObservedShare(
+                mean_level_db, answer_count, correct_count, *compute_wilson_interval(correct_count, answer_count)
+            )
         )
     return tuple(shares)

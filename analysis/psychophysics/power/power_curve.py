@@ -16,7 +16,7 @@ import numpy as np
 from scipy.stats import studentized_range
 
 from analysis.psychophysics.anova import compute_one_way_anova
-from analysis.psychophysics.catch_trials import wilson_interval
+from analysis.psychophysics.catch_trials import compute_wilson_interval
 from analysis.psychophysics.group_contrasts import compute_pair_contrast
 from analysis.psychophysics.hierarchy.fit import fit_hierarchy
 from analysis.psychophysics.hierarchy.inference import compute_pseudo_thresholds
@@ -154,5 +154,5 @@ def summarise_power(verdicts: Sequence[StudyVerdict]) -> PowerPoint:
 
 def _compute_wilson_share(outcomes: Sequence[bool]) -> Share:
     """Compute the share of true values, with Wilson's 95 % interval."""
-    lower, upper = wilson_interval(sum(outcomes), len(outcomes))
+    lower, upper = compute_wilson_interval(sum(outcomes), len(outcomes))
     return Share(sum(outcomes) / len(outcomes), lower, upper)

@@ -22,7 +22,13 @@ from numba import njit
 from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, SimulatedRun, Track, give_answer
 from equalizer.signals.signal import FloatArray
 from protocols.definition.staircase_rule import StaircaseRule
-from protocols.procedure.psi import ENTROPY_TOLERANCE_NATS, SLOPES, levels_db, share_right, thresholds_db
+from protocols.procedure.psi import (
+    ENTROPY_TOLERANCE_NATS,
+    SLOPES,
+    compute_share_right,
+    list_levels_db,
+    list_thresholds_db,
+)
 from protocols.procedure.staircase import to_db
 
 
@@ -52,11 +58,11 @@ class PackedPsi(NamedTuple):
 def pack_psi(rule: StaircaseRule) -> PackedPsi:
     """Compute the grid and the tables of a rule whose levels the Psi method chooses."""
     cap_db = to_db(rule.cap_n)
-    all_levels_db = np.array([to_db(rule.start_n), *levels_db(cap_db)])
-    p_correct = share_right(all_levels_db, cap_db).reshape(len(all_levels_db), -1)
+    all_levels_db = np.array([to_db(rule.start_n), *list_levels_db(cap_db)])
+    p_correct = compute_share_right(all_levels_db, cap_db).reshape(len(all_levels_db), -1)
     log_p_answer = np.log(np.array([1.0 - p_correct, p_correct]))
     negative_entropy = p_correct * log_p_answer[1] + (1.0 - p_correct) * log_p_answer[0]
-    cells_db = np.repeat(thresholds_db(cap_db), len(SLOPES))
+    cells_db = np.repeat(list_thresholds_db(cap_db), len(SLOPES))
     return PackedPsi(
         all_levels_db,
         cells_db,

@@ -1,8 +1,9 @@
 """Bodies of a model with its effects: the changed linear structure, the forces on it, and its simulated motion.
 
 A port is a direction in the structure's coordinates along which a force acts and motion is output: each driven axis,
-and each joint that an effect adds. Sizes: n samples (n coordinates in `ports` and states), m commands, r ports,
-p responses.
+and each joint that an effect adds. Sizes: n samples (n coordinates in `ports` and states), m commands, r ports, p
+responses. Called by `simulator`, `forces_along_motion`, `analysis.diagnosis`, and the effects that simulate an excerpt
+for their starting values.
 """
 
 from collections.abc import Iterator, Sequence
@@ -13,7 +14,7 @@ import numpy.typing as npt
 
 from equalizer.effects.effect import AxisForce, JointForce, PlacedEffect, Structure
 from equalizer.effects.simulation.command_path import ActuatorForce
-from equalizer.effects.simulation.mechanism_kernel import MAX_LAWS, law_address, no_force
+from equalizer.effects.simulation.mechanism_kernel import MAX_LAWS, compute_zero_force, wrap_law
 from equalizer.effects.simulation.stepping import Forces, Stepping, step_with_forces, step_without_forces
 from equalizer.plant.linear_simulation import DiscreteModel, compute_driven_axes, discretise_model
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -25,13 +26,14 @@ class Bodies:
     """The linear structure with the effects' joints, and the forces that act on it."""
 
     structure: MechanicalModel
+    """The model with the coordinates that effects add."""
     axes: int
     """Number of driven axes."""
     ports: FloatArray
     """(n, r): the directions along which forces act; the driven axes first, then joints."""
     actions: tuple[AxisForce | JointForce, ...]
     """Action (law and its settings) of each force."""
-    port: tuple[int, ...]
+    force_ports: tuple[int, ...]
     """Index of the port at which each force acts."""
     parameters: tuple[FloatArray, ...]
     """Parameters of each force's law."""
@@ -39,33 +41,37 @@ class Bodies:
     @property
     def reads_all_axes(self) -> bool:
         """Whether any law reads the motion of all axes and the commands."""
-        return any(isinstance(act, AxisForce) and act.reads_all_axes for act in self.actions)
+        return any(isinstance(action, AxisForce) and action.reads_all_axes for action in self.actions)
 
 
 def build_bodies(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bodies:
-    """Bodies of a model with those of the effects that change the structure or add a motion-dependent force. Raises
-    ValueError for an axis that is not there."""
+    """Build the bodies of a model with those of the effects that change the structure or add a motion-dependent force;
+    other effects are ignored. Raises ValueError for an axis that is not there."""
     structure = model
-    for placed in effects:
-        for site in placed.sites if isinstance(placed.effect.action, (Structure, AxisForce, JointForce)) else ():
+    for placed_effect in effects:
+        for site in (
+            placed_effect.sites if isinstance(placed_effect.effect.action, (Structure, AxisForce, JointForce)) else ()
+        ):
             if not 0 <= site < model.inputs:
-                raise ValueError(f"{placed.effect.name} is placed at axis {site + 1}; the model has {model.inputs}")
-        if isinstance(placed.effect.action, Structure):
-            for site in placed.sites:
-                structure = placed.effect.action.change(structure, site, placed.values)
+                raise ValueError(
+                    f"{placed_effect.effect.name} is placed at axis {site + 1}; the model has {model.inputs}"
+                )
+        if isinstance(placed_effect.effect.action, Structure):
+            for site in placed_effect.sites:
+                structure = placed_effect.effect.action.change(structure, site, placed_effect.values)
     ports = list(compute_driven_axes(structure).T)
     actions: list[AxisForce | JointForce] = []
     port_indices: list[int] = []
     parameters: list[FloatArray] = []
     # Joints first: the parameters of forces at an axis are then packed for the structure with joints.
-    for placed in sorted(effects, key=lambda effect: isinstance(effect.effect.action, AxisForce)):
-        action = placed.effect.action
-        for site in placed.sites if isinstance(action, (AxisForce, JointForce)) else ():
+    for placed_effect in sorted(effects, key=lambda effect: isinstance(effect.effect.action, AxisForce)):
+        action = placed_effect.effect.action
+        for site in placed_effect.sites if isinstance(action, (AxisForce, JointForce)) else ():
             assert isinstance(action, (AxisForce, JointForce))
-            parameters.append(np.asarray(action.pack(structure, site, placed.values), dtype=np.float64))
+            parameters.append(np.asarray(action.pack(structure, site, placed_effect.values), dtype=np.float64))
             actions.append(action)
             if isinstance(action, JointForce):
-                structure, direction = action.change(structure, site, placed.values)
+                structure, direction = action.change(structure, site, placed_effect.values)
                 ports.append(direction)
             port_indices.append(len(ports) - 1 if isinstance(action, JointForce) else site)
     # Ports that were found before a joint added coordinates are padded with zeros.
@@ -79,66 +85,76 @@ def build_bodies(model: MechanicalModel, effects: Sequence[PlacedEffect]) -> Bod
 class Restarts:
     """Restarts of a simulation from given states (multiple shooting)."""
 
-    at: npt.NDArray[np.int64]
+    sample_indices: npt.NDArray[np.int64]
     """(k,): indices of samples, ascending; the simulation is from rest up to the first of them."""
     states: FloatArray
     """(k, 2n): positions, then velocities, of the coordinates of the model without effects."""
 
 
 def simulate_bodies(
-    bodies: Bodies, driven: ActuatorForce, size: tuple[int, int], step_s: float, motion: bool = True,
+    bodies: Bodies, actuator_force: ActuatorForce, counts: tuple[int, int], step_s: float, with_motion: bool = True,
     restarts: Restarts | None = None,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Simulate the bodies, from rest or from the states of `restarts`.
 
     Returns two arrays: (n, 3 r + 2 p), the positions, velocities and accelerations of the ports, the response, and the
-    positions of the response's rows; and (n, r), the forces at the ports. Without `motion` (n, 2 p) and (n, 0). driven:
-    one row per sample, or per step. size: number of samples n, and steps per sample. step_s: length of a step.
+    positions of the response's rows; and (n, r), the forces at the ports. Without `with_motion` (n, 2 p) and (n, 0).
+    actuator_force: one row per sample, or per step. counts: number of samples n, and of steps per sample. step_s:
+    length of a step.
     """
-    linear, stepping, ports = _prepare_steps(bodies, driven, size, step_s)
-    stride = len(driven.mean) // size[0]
-    output = _output_matrix(linear, stepping.outward, ports, motion)
-    motion_rows, added = (
-        np.empty((size[0], output.shape[1])),
-        np.zeros((size[0], bodies.ports.shape[1] if motion else 0)),
+    linear, stepping, ports = _prepare_steps(bodies, actuator_force, counts, step_s)
+    stride = len(actuator_force.mean) // counts[0]
+    output_matrix = _assemble_output_matrix(linear, stepping.outward, ports, with_motion)
+    motion_rows, port_forces = (
+        np.empty((counts[0], output_matrix.shape[1])),
+        np.zeros((counts[0], bodies.ports.shape[1] if with_motion else 0)),
     )
-    force_columns, rows = len(output) - driven.end.shape[1], stepping.rows
-    drive, end_force = driven.mean.reshape(size[0] * rows, -1), driven.end[stride - 1 :: stride]
-    buffer = np.zeros((min(stepping.block, size[0]) * rows, len(output)))
+    force_columns, rows = len(output_matrix) - actuator_force.end.shape[1], stepping.rows
+    mean_force, end_force = (
+        actuator_force.mean.reshape(counts[0] * rows, -1),
+        actuator_force.end[stride - 1 :: stride],
+    )
+    buffer = np.zeros((min(stepping.block, counts[0]) * rows, len(output_matrix)))
     # Overflow is no error: a fit may try an unstable model.
     with np.errstate(over="ignore", invalid="ignore"):
-        for first, end in _blocks(size[0], stepping.block, restarts):
-            if restarts is not None and first in restarts.at:
-                state = restarts.states[np.searchsorted(restarts.at, first)]
+        for first, stop in _iterate_blocks(counts[0], stepping.block, restarts):
+            if restarts is not None and first in restarts.sample_indices:
+                state = restarts.states[np.searchsorted(restarts.sample_indices, first)]
                 stepping.set_state(extend_state(bodies.structure, state, bodies.ports[:, bodies.axes :]))
-            rows_of_block = buffer[: (end - first) * rows]
-            np.matmul(drive[first * rows : end * rows], stepping.input_matrix, out=rows_of_block[:, :force_columns])
+            rows_of_block = buffer[: (stop - first) * rows]
+            np.matmul(
+                mean_force[first * rows : stop * rows], stepping.input_matrix, out=rows_of_block[:, :force_columns]
+            )
             stepping.run(rows_of_block, first)
             inputs = rows_of_block[::rows]
             # An acceleration depends on the actuator force at the instant itself, not on the mean over the last step.
             inputs[0, force_columns:], inputs[1:, force_columns:] = (
                 end_force[first - 1] if first else 0.0,
-                end_force[first : end - 1],
+                end_force[first : stop - 1],
             )
-            np.matmul(inputs, output, out=motion_rows[first:end])
-            if motion:
-                added[first:end, list(ports)] = inputs[:, len(stepping.outward) : force_columns]
-    return motion_rows, added
+            np.matmul(inputs, output_matrix, out=motion_rows[first:stop])
+            if with_motion:
+                port_forces[first:stop, list(ports)] = inputs[:, len(stepping.outward) : force_columns]
+    return motion_rows, port_forces
 
 
 def simulate_states(
-    bodies: Bodies, driven: ActuatorForce, size: tuple[int, int], step_s: float, sample_indices: npt.NDArray[np.int64]
+    bodies: Bodies,
+    actuator_force: ActuatorForce,
+    counts: tuple[int, int],
+    step_s: float,
+    sample_indices: npt.NDArray[np.int64],
 ) -> FloatArray:
-    """(k, 2n): positions and velocities of the structure's coordinates just before the samples `sample_indices` (k,),
-    simulated from rest. Other arguments as for `simulate_bodies`."""
-    _, stepping, _ = _prepare_steps(bodies, driven, size, step_s)
+    """Simulate, from rest, the positions and velocities (k, 2n) of the structure's coordinates just before the samples
+    `sample_indices` (k,). Other arguments as for `simulate_bodies`."""
+    _, stepping, _ = _prepare_steps(bodies, actuator_force, counts, step_s)
     states, rows = np.zeros((len(sample_indices), len(stepping.outward))), stepping.rows
-    drive = driven.mean.reshape(size[0] * rows, -1)
+    mean_force = actuator_force.mean.reshape(counts[0] * rows, -1)
     with np.errstate(over="ignore", invalid="ignore"):
-        for first, end in _blocks(size[0], stepping.block, None):
-            rows_of_block = np.ascontiguousarray(drive[first * rows : end * rows] @ stepping.input_matrix)
+        for first, stop in _iterate_blocks(counts[0], stepping.block, None):
+            rows_of_block = np.ascontiguousarray(mean_force[first * rows : stop * rows] @ stepping.input_matrix)
             stepping.run(rows_of_block, first)
-            in_block = (sample_indices >= first) & (sample_indices < end)
+            in_block = (sample_indices >= first) & (sample_indices < stop)
             states[in_block] = (
                 rows_of_block[(sample_indices[in_block] - first) * rows, : len(stepping.outward)] @ stepping.outward.T
             )
@@ -146,29 +162,34 @@ def simulate_states(
 
 
 def _prepare_steps(
-    bodies: Bodies, driven: ActuatorForce, size: tuple[int, int], step_s: float
+    bodies: Bodies, actuator_force: ActuatorForce, counts: tuple[int, int], step_s: float
 ) -> tuple[DiscreteModel, Stepping, tuple[int, ...]]:
-    """Matrices of a linear step, the stepping function, and the ports at which forces act or are read."""
+    """Prepare a simulation: matrices of a linear step, stepping function, and ports at which forces act or motion is
+    read."""
     linear = discretise_model(bodies.structure, step_s, bodies.ports)
-    ports = tuple(sorted({*bodies.port, *range(bodies.axes if bodies.reads_all_axes else 0)}))
-    steps, stride = size[1], len(driven.mean) // size[0]
+    ports = tuple(sorted({*bodies.force_ports, *range(bodies.axes if bodies.reads_all_axes else 0)}))
+    steps, stride = (counts[1], len(actuator_force.mean) // counts[0])
     if not ports:
         return linear, step_without_forces(linear, steps, stride), ports
-    commands = driven.mean if driven.commanded is None else driven.commanded
-    return linear, step_with_forces(linear, kernel_forces(bodies, ports), steps, stride, commands), ports
+    commands = actuator_force.mean if actuator_force.commanded is None else actuator_force.commanded
+    return (linear, step_with_forces(linear, pack_kernel_forces(bodies, ports), steps, stride, commands), ports)
 
 
-def _blocks(n: int, longest: int, restarts: Restarts | None) -> Iterator[tuple[int, int]]:
-    """Ranges (first, end) of samples of at most `longest`, in order; a block begins at each restart."""
-    edges = sorted({0, *restarts.at[restarts.at < n].tolist()}) if restarts is not None else [0]
-    for start, stop in zip(edges, (*edges[1:], n), strict=True):
-        for first in range(start, stop, longest):
-            yield first, min(first + longest, stop)
+def _iterate_blocks(sample_count: int, max_length: int, restarts: Restarts | None) -> Iterator[tuple[int, int]]:
+    """Iterate over ranges (first, end) of at most `max_length` samples, in order; a block begins at each restart."""
+    block_starts = (
+        sorted({0, *restarts.sample_indices[restarts.sample_indices < sample_count].tolist()})
+        if restarts is not None
+        else [0]
+    )
+    for start, stop in zip(block_starts, (*block_starts[1:], sample_count), strict=True):
+        for first in range(start, stop, max_length):
+            yield first, min(first + max_length, stop)
 
 
 def extend_state(structure: MechanicalModel, state: FloatArray, joints: FloatArray) -> FloatArray:
-    """State (2n,) of a structure to which effects have added bodies, its last coordinates. state: that of the model
-    without them. joints: (n, j), directions of the joints.
+    """Extend a state of the model without effects to that (2n,) of the structure, whose last coordinates effects have
+    added. joints: (n, j), directions of the joints.
 
     The added coordinates take the static equilibrium with zero travel of the joints, in the sense of least squares
     (minimum norm where it is not unique), and move with it.
@@ -176,34 +197,37 @@ def extend_state(structure: MechanicalModel, state: FloatArray, joints: FloatArr
     model_coordinates, n = len(state) // 2, structure.coordinates
     if n == model_coordinates:
         return state
-    rows = np.vstack([structure.stiffness[model_coordinates:], joints.T])
-    added_stiffness, coupling = rows[:, model_coordinates:], rows[:, :model_coordinates]
+    equilibrium_rows = np.vstack([structure.stiffness[model_coordinates:], joints.T])
+    added_stiffness, coupling = equilibrium_rows[:, model_coordinates:], equilibrium_rows[:, :model_coordinates]
     added_per_model = -np.linalg.lstsq(added_stiffness, coupling, rcond=None)[0]
     positions, velocities = state[:model_coordinates], state[model_coordinates:]
     return np.concatenate([positions, added_per_model @ positions, velocities, added_per_model @ velocities])
 
 
-def _output_matrix(linear: DiscreteModel, outward: FloatArray, ports: tuple[int, ...], motion: bool) -> FloatArray:
-    """(s + f + m, rows): from state, forces at the f ports and commands at an instant to the rows that
-    `simulate_bodies` returns."""
+def _assemble_output_matrix(
+    linear: DiscreteModel, outward: FloatArray, ports: tuple[int, ...], with_motion: bool
+) -> FloatArray:
+    """Assemble the matrix (s + f + m, rows) from state, forces at the f ports and commands at an instant to the rows
+    that `simulate_bodies` returns."""
     p, (m, r) = len(linear.position), (linear.by_command.shape[1], linear.by_axis_force.shape[1])
-    first_row = 0 if motion else 3 * r
-    of_state = np.vstack((linear.motion, linear.response, linear.position))[first_row:]
-    of_force = np.vstack((linear.motion_by_axis_force, linear.response_by_axis_force, np.zeros((p, r))))[first_row:]
-    of_command = np.vstack((linear.motion_by_command, linear.response_by_command, np.zeros((p, m))))[first_row:]
-    return np.vstack([(of_state @ outward).T, of_force.T[list(ports)], of_command.T])
+    first_row = 0 if with_motion else 3 * r
+    from_state = np.vstack((linear.motion, linear.response, linear.position))[first_row:]
+    from_force = np.vstack((linear.motion_by_axis_force, linear.response_by_axis_force, np.zeros((p, r))))[first_row:]
+    from_command = np.vstack((linear.motion_by_command, linear.response_by_command, np.zeros((p, m))))[first_row:]
+    return np.vstack([(from_state @ outward).T, from_force.T[list(ports)], from_command.T])
 
 
-def kernel_forces(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
-    """The forces in the form of the compiled kernel: each distinct law once, and for every force the indices of its law
-    and port and the ranges of its parameters and memory. Raises ValueError for more than `MAX_LAWS` distinct laws."""
+def pack_kernel_forces(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
+    """Pack the forces in the form of the compiled kernel: each distinct law once, and for every force the indices of
+    its law and port and the ranges of its parameters and memory. Raises ValueError for more than `MAX_LAWS` distinct
+    laws."""
     laws: list[object] = []
-    force_rows: list[tuple[int, ...]] = []
+    force_indices: list[tuple[int, ...]] = []
     parameter_count = memory_count = 0
-    for action, port, parameters in zip(bodies.actions, bodies.port, bodies.parameters, strict=True):
+    for action, port, parameters in zip(bodies.actions, bodies.force_ports, bodies.parameters, strict=True):
         if action.law not in laws:
             laws.append(action.law)
-        force_rows.append(
+        force_indices.append(
             (
                 laws.index(action.law),
                 ports.index(port),
@@ -218,8 +242,8 @@ def kernel_forces(bodies: Bodies, ports: tuple[int, ...]) -> Forces:
         raise ValueError(f"{len(laws)} different force laws act at once; simulate at most {MAX_LAWS}")
     return Forces(
         ports,
-        tuple(law_address(law) for law in (*laws, *(no_force,) * (MAX_LAWS - len(laws)))),
-        np.array(force_rows, dtype=np.int64).reshape(-1, 6),
+        tuple(wrap_law(law) for law in (*laws, *(compute_zero_force,) * (MAX_LAWS - len(laws)))),
+        np.array(force_indices, dtype=np.int64).reshape(-1, 6),
         np.concatenate([*bodies.parameters, [0.0]]),
         np.zeros(memory_count + 1),
         any(action.acceleration for action in bodies.actions),

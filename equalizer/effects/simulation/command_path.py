@@ -2,7 +2,8 @@
 
 Two values are computed per integration step: the mean over the step, which determines the motion (masses integrate the
 force), and the value at the step's end, which an acceleration sampled there contains directly. First-order lag T and
-step h: F_end = d F_start + (1 - d) u, with d = exp(-h / T); mean = u + (F_start - u) (1 - d) T / h.
+step h: F_end = d F_start + (1 - d) u, with d = exp(-h / T); mean = u + (F_start - u) (1 - d) T / h. Called by
+`simulator` and `forces_along_motion`; sizes: n samples, m commands.
 """
 
 from collections.abc import Sequence
@@ -29,17 +30,22 @@ class ActuatorForce:
     """(n * steps, m): the commands before effects and actuator; None: the same as `mean`."""
 
 
-def moves_between_samples(model: MechanicalModel, effects: Sequence[PlacedEffect], hold: Hold) -> bool:
-    """Whether the actuator force changes between two samples, so that several steps per sample are needed."""
-    fine = any(isinstance(placed.effect.action, OnCommand) and placed.effect.action.fine for placed in effects)
-    return fine or hold is not Hold.ZERO_ORDER or model.actuator.delay_s > 0 or model.actuator.bandwidth_hz > 0
+def has_intersample_changes(model: MechanicalModel, effects: Sequence[PlacedEffect], hold: Hold) -> bool:
+    """Whether the actuator force changes between two samples, so that several steps per sample are needed: by an effect
+    that declares it (`OnCommand.fine`), a hold other than zero-order, or the model's own delay or bandwidth."""
+    has_fine_effect = any(
+        isinstance(placed.effect.action, OnCommand) and placed.effect.action.fine for placed in effects
+    )
+    return (
+        has_fine_effect or hold is not Hold.ZERO_ORDER or model.actuator.delay_s > 0 or model.actuator.bandwidth_hz > 0
+    )
 
 
 def drive_actuators(
     model: MechanicalModel, commands: ActuatorForce, step_s: float, effects: Sequence[PlacedEffect]
 ) -> ActuatorForce:
-    """Force of the actuators: first the effects in their order, then the model's own bandwidth, delay and limit.
-    step_s: length of the steps of `commands` in s.
+    """Compute the force of the actuators: first the effects on the command in their order, then the model's own
+    bandwidth, delay and limit. step_s: length of the steps of `commands` in s. Other effects are ignored.
 
     Raises ValueError where an effect acts on a channel that is not there.
     """
@@ -48,65 +54,71 @@ def drive_actuators(
         mean, end = mean.copy(), end.copy()
     for placed in effects:
         action, values = placed.effect.action, placed.values
-        unchanged = mean.copy() if isinstance(action, OnCommand) and action.of_all is not None else mean
+        original_mean = mean.copy() if isinstance(action, OnCommand) and action.of_all is not None else mean
         for site in placed.sites if isinstance(action, OnCommand) else ():
             assert isinstance(action, OnCommand)
             if not 0 <= site < mean.shape[1]:
                 raise ValueError(f"{placed.effect.name} is placed at axis {site + 1}; there are {mean.shape[1]}")
             if action.of_all is not None:
-                mean[:, site], end[:, site] = action.of_all(unchanged, site, step_s, values)
+                mean[:, site], end[:, site] = action.of_all(original_mean, site, step_s, values)
                 continue
-            at_end = action.change if action.at_end is None else action.at_end
-            end_force = at_end(end[:, site] if action.at_end is None else mean[:, site], step_s, values)
+            compute_end = action.change if action.at_end is None else action.at_end
+            end_force = compute_end(end[:, site] if action.at_end is None else mean[:, site], step_s, values)
             mean[:, site], end[:, site] = action.change(mean[:, site], step_s, values), end_force
     actuator = model.actuator
     if actuator.bandwidth_hz > 0:
         time_constant_s = 1 / (2 * np.pi * actuator.bandwidth_hz)
-        mean, end = lag_mean(mean, step_s, time_constant_s), lag_at_end(mean, step_s, time_constant_s)
+        mean, end = (
+            compute_lagged_mean(mean, step_s, time_constant_s),
+            compute_lagged_end(mean, step_s, time_constant_s),
+        )
     if actuator.delay_s > 0:
         # After a lag, the force is not held over a step: within one, it is interpolated between the ends.
-        delay_end = delay_mean if actuator.bandwidth_hz > 0 else delay_at_end
-        mean, end = delay_mean(mean, step_s, actuator.delay_s), delay_end(end, step_s, actuator.delay_s)
+        delay_end = compute_delayed_mean if actuator.bandwidth_hz > 0 else compute_delayed_end
+        mean, end = compute_delayed_mean(mean, step_s, actuator.delay_s), delay_end(end, step_s, actuator.delay_s)
     if actuator.limit > 0:
         mean, end = np.clip(mean, -actuator.limit, actuator.limit), np.clip(end, -actuator.limit, actuator.limit)
     return ActuatorForce(mean, end, commands.mean)
 
 
 def subdivide_commands(commands: FloatArray, steps: int, hold: Hold) -> ActuatorForce:
-    """Commands (n, m) divided into `steps` per sample, with the course between samples that `hold` states."""
+    """Divide commands (n, m) into `steps` per sample, with the course between samples that `hold` states: constant,
+    linear, or band-limited (polyphase interpolation). A single step is always constant."""
     if steps == 1 or hold is Hold.ZERO_ORDER:
         commands = np.asarray(commands, dtype=np.float64)
         held_commands = np.repeat(commands, steps, axis=0) if steps > 1 else commands
         return ActuatorForce(held_commands, held_commands)
     if hold is Hold.LINEAR:
-        change = np.diff(commands, axis=0, append=commands[-1:])
-        step_positions = (np.arange(steps) + 0.5) / steps, (np.arange(steps) + 1.0) / steps
+        sample_change = np.diff(commands, axis=0, append=commands[-1:])
+        step_fractions = (np.arange(steps) + 0.5) / steps, (np.arange(steps) + 1.0) / steps
         mean, end = (
-            (commands[:, None] + step_position[:, None] * change[:, None]).reshape(-1, commands.shape[1])
-            for step_position in step_positions
+            (commands[:, None] + step_fraction[:, None] * sample_change[:, None]).reshape(-1, commands.shape[1])
+            for step_fraction in step_fractions
         )
         return ActuatorForce(mean, end)
     # Imported here: SciPy takes longer to import than a diagnosis that does not need it.
     from scipy.signal import resample_poly
 
-    samples = resample_poly(commands, 2 * steps, 1, axis=0)
+    half_steps = resample_poly(commands, 2 * steps, 1, axis=0)
     # On the grid of half steps, odd points are in the middle of a step (taken as its mean), even points at step ends.
-    return ActuatorForce(samples[1::2], np.vstack([samples[2::2], samples[-1:]]))
+    return ActuatorForce(half_steps[1::2], np.vstack([half_steps[2::2], half_steps[-1:]]))
 
 
-def lag_mean(commands: FloatArray, step_s: float, time_constant_s: float) -> FloatArray:
-    """First-order lag, mean over each step, from zero; exact for commands (n, …) that are held over a step."""
+def compute_lagged_mean(commands: FloatArray, step_s: float, time_constant_s: float) -> FloatArray:
+    """First-order lag, mean over each step, from zero; exact for commands (n, …) that are held over a step. Unchanged
+    commands for a time constant of zero or less."""
     if time_constant_s <= 0:
         return commands
     decay = float(np.exp(-step_s / time_constant_s))
-    at_end = _filter_one_pole(commands, decay)
-    start_force = np.concatenate([np.zeros_like(at_end[:1]), at_end[:-1]])
+    end_force = _filter_one_pole(commands, decay)
+    start_force = np.concatenate([np.zeros_like(end_force[:1]), end_force[:-1]])
     transient_share = (1 - decay) * time_constant_s / step_s
     return np.asarray(commands + (start_force - commands) * transient_share)
 
 
-def lag_at_end(commands: FloatArray, step_s: float, time_constant_s: float) -> FloatArray:
-    """First-order lag, value at each step's end, from zero; exact for commands (n, …) that are held over a step."""
+def compute_lagged_end(commands: FloatArray, step_s: float, time_constant_s: float) -> FloatArray:
+    """First-order lag, value at each step's end, from zero; exact for commands (n, …) that are held over a step.
+    Unchanged commands for a time constant of zero or less."""
     if time_constant_s <= 0:
         return commands
     decay = float(np.exp(-step_s / time_constant_s))
@@ -114,7 +126,7 @@ def lag_at_end(commands: FloatArray, step_s: float, time_constant_s: float) -> F
 
 
 def _filter_one_pole(commands: FloatArray, decay: float) -> FloatArray:
-    """Commands (n, …) through a first-order low pass with the pole `decay`."""
+    """Filter commands (n, …) along the first axis with a first-order low pass with the pole `decay`, from zero."""
     filtered = np.empty(commands.shape)
     filter_one_pole(
         np.asarray(commands, dtype=np.float64).reshape(len(commands), -1), decay, filtered.reshape(len(filtered), -1)
@@ -122,8 +134,9 @@ def _filter_one_pole(commands: FloatArray, decay: float) -> FloatArray:
     return filtered
 
 
-def delay_mean(commands: FloatArray, step_s: float, delay_s: float) -> FloatArray:
-    """Held commands (n, …) delayed by delay_s, mean over each step; zero before the first."""
+def compute_delayed_mean(commands: FloatArray, step_s: float, delay_s: float) -> FloatArray:
+    """Held commands (n, …) delayed by delay_s, mean over each step; zero before the first. A negative delay counts as
+    0."""
     whole_steps, step_fraction = divmod(max(delay_s, 0.0) / step_s, 1.0)
     delayed = np.zeros((len(commands) + 1, *commands.shape[1:]))
     shift = min(int(whole_steps) + 1, len(delayed))
@@ -131,6 +144,6 @@ def delay_mean(commands: FloatArray, step_s: float, delay_s: float) -> FloatArra
     return np.asarray((1 - step_fraction) * delayed[1:] + step_fraction * delayed[:-1])
 
 
-def delay_at_end(commands: FloatArray, step_s: float, delay_s: float) -> FloatArray:
+def compute_delayed_end(commands: FloatArray, step_s: float, delay_s: float) -> FloatArray:
     """Held commands (n, …) delayed by delay_s, at each step's end: only whole steps of the delay matter there."""
-    return delay_mean(commands, step_s, np.floor(max(delay_s, 0.0) / step_s) * step_s)
+    return compute_delayed_mean(commands, step_s, np.floor(max(delay_s, 0.0) / step_s) * step_s)

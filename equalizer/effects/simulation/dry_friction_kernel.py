@@ -18,17 +18,17 @@ from equalizer.effects.simulation.instant import F_END, STEP_S, V_FREE, V_PER_N,
 from equalizer.laws.kernel import NO_REFERENCE_COUNTS
 from equalizer.signals.signal import FloatArray
 
-LONGEST_M = 50e-9
+SLIP_DEFLECTION_M = 50e-9
 """z_max (m): deflection at which the bristle slips."""
 BRISTLE_DAMPING = 0.5
 """Damping of the bristle over sqrt(stiffness * mass), with the mass that it holds: twice the damping ratio."""
-PARTS = 12
-"""Maximum number of parts into which a step is divided while the bristle is deflected."""
+MAX_PARTS = 12
+"""Maximum number of parts into which a step is divided unless the bristle slips throughout."""
 TRAVEL_PER_PART = 0.3
 """Intended travel per part, in units of z_max: sets the number of parts."""
 SLIDING_SHARE = 1 - 1e-6
 """Share of the full deflection above which the bristle counts as sliding."""
-ITERATIONS = 12
+MAX_ITERATIONS = 12
 """Maximum number of Newton iterations for the travel of one part."""
 TRAVEL_TOLERANCE = 3e-3
 """Residual of the travel equation, in units of z_max, at which the iteration ends: the last linear correction reduces
@@ -37,33 +37,43 @@ _VECTOR = types.float64[::1]
 
 
 @njit(inline="always")
-def _deflect(
-    bend: float, free: float, compliance: float, damping: float, full: tuple[float, float]
+def _solve_bristle_deflection(
+    start_deflection: float,
+    free_travel: float,
+    compliance: float,
+    damping: float,
+    sliding_deflections: tuple[float, float],
 ) -> tuple[float, float]:
-    """Deflection at the end of a part of a step, and the mean bristle force over it, opposed to the motion.
+    """Solve for the deflection at the end of a part of a step; also returns the mean bristle force over the part,
+    opposed to the motion.
 
-    Lengths are in units of z_max, forces in units of the level. bend: deflection at the start; free: travel without the
-    bristle's force; compliance: travel per force; damping: force per travel; full: deflections in sliding forwards and
-    backwards, >= 0.
+    Lengths are in units of z_max, forces in units of the level. free_travel: travel without the bristle's force;
+    compliance: travel per force; damping: force per deflection; sliding_deflections: in sliding forwards and backwards,
+    >= 0.
     """
-    # Newton's method for off(travel) = travel - free + compliance * mean force = 0; rate: d ahead / d travel.
-    travel = free / (1.0 + compliance * (1.0 + damping))
-    end_deflection, rate, residual = bend, 0.0, 0.0
-    for _ in range(ITERATIONS):
-        full_deflection = full[0] if travel > 0.0 else -full[1]
-        if full_deflection == 0.0:
-            end_deflection, rate = 0.0, 0.0
+    # Newton's method for residual(travel) = travel - free_travel + compliance * mean force = 0; deflection_rate:
+    # derivative of the end's deflection with respect to the travel.
+    travel = free_travel / (1.0 + compliance * (1.0 + damping))
+    end_deflection, deflection_rate, residual = start_deflection, 0.0, 0.0
+    for _ in range(MAX_ITERATIONS):
+        sliding_deflection = sliding_deflections[0] if travel > 0.0 else -sliding_deflections[1]
+        if sliding_deflection == 0.0:
+            end_deflection, deflection_rate = 0.0, 0.0
         else:
-            slip = np.exp(-travel / full_deflection)
-            end_deflection = full_deflection + (bend - full_deflection) * slip
-            rate = max(slip * (1.0 - bend / full_deflection), 0.0)
-        residual = travel - free + compliance * (0.5 * (bend + end_deflection) + damping * (end_deflection - bend))
-        correction = residual / (1.0 + compliance * (0.5 + damping) * rate)
+            decay = np.exp(-travel / sliding_deflection)
+            end_deflection = sliding_deflection + (start_deflection - sliding_deflection) * decay
+            deflection_rate = max(decay * (1.0 - start_deflection / sliding_deflection), 0.0)
+        residual = (
+            travel
+            - free_travel
+            + compliance * (0.5 * (start_deflection + end_deflection) + damping * (end_deflection - start_deflection))
+        )
+        correction = residual / (1.0 + compliance * (0.5 + damping) * deflection_rate)
         travel -= correction
         if abs(residual) < TRAVEL_TOLERANCE:
-            end_deflection -= rate * correction
+            end_deflection -= deflection_rate * correction
             break
-    return end_deflection, 0.5 * (bend + end_deflection) + damping * (end_deflection - bend)
+    return end_deflection, 0.5 * (start_deflection + end_deflection) + damping * (end_deflection - start_deflection)
 
 
 @njit(
@@ -72,56 +82,66 @@ def _deflect(
     error_model="numpy",
     **NO_REFERENCE_COUNTS,
 )
-def friction_force(forward: float, backward: float, start: float, memory: FloatArray, at: FloatArray) -> float:
-    """Mean friction force (N) over a step, with the level (N) `forward` where v > 0 and `backward` where v < 0.
+def compute_friction_force(
+    forward_level: float, backward_level: float, start_z: float, memory: FloatArray, step_motion: FloatArray
+) -> float:
+    """Mean friction force (N) over a step, with the level (N) `forward_level` where v > 0 and `backward_level` where
+    v < 0; called by the laws of all effects with dry friction but presliding hysteresis.
 
-    start: deflection over z_max at the start of the step. at: see `instant`. Writes the deflection at the end to
-    `memory[0]` and the force (N) at the end to `at[F_END]`.
+    start_z: deflection over z_max at the start of the step; step_motion: see `instant`. Writes the deflection at the
+    end, over z_max, to `memory[0]` and the force (N) at the end to `step_motion[F_END]`.
     """
-    level, speed, per_newton = max(forward, backward), at[V], at[V_PER_N]
+    level, start_v, per_newton = max(forward_level, backward_level), step_motion[V], step_motion[V_PER_N]
     if level <= 0:
-        at[F_END] = 0.0
+        step_motion[F_END] = 0.0
         return 0.0
-    sliding = -forward if speed > 0 else backward
+    sliding_force = -forward_level if start_v > 0 else backward_level
     # The velocity does not reverse within the step and the bristle slips already: the force is constant.
-    full = -sliding / level
-    if speed * (at[V_FREE] + per_newton * sliding) > 0 and start * full > SLIDING_SHARE * full * full:
-        memory[0], at[F_END] = full, sliding
-        return sliding
-    # From here on: lengths in units of z_max, times of the step, forces of the level. give: stiffness step² / mass.
-    step_s = at[STEP_S]
-    v, free_change, relative_compliance = (
-        speed * step_s / LONGEST_M,
-        (at[V_FREE] - speed) * step_s / LONGEST_M,
-        per_newton * level * step_s / LONGEST_M,
+    sliding_z = -sliding_force / level
+    if (
+        start_v * (step_motion[V_FREE] + per_newton * sliding_force) > 0
+        and start_z * sliding_z > SLIDING_SHARE * sliding_z * sliding_z
+    ):
+        memory[0], step_motion[F_END] = sliding_z, sliding_force
+        return sliding_force
+    # From here on: lengths in units of z_max, times of the step, forces of the level; dv_per_force is then
+    # stiffness step² / mass.
+    step_s = step_motion[STEP_S]
+    v, free_dv, dv_per_force = (
+        start_v * step_s / SLIP_DEFLECTION_M,
+        (step_motion[V_FREE] - start_v) * step_s / SLIP_DEFLECTION_M,
+        per_newton * level * step_s / SLIP_DEFLECTION_M,
     )
-    damping = BRISTLE_DAMPING / np.sqrt(relative_compliance)
-    travel_estimate = abs(v) + 0.5 * abs(free_change - relative_compliance * start)
-    parts = min(PARTS, 1 + int(min(travel_estimate / TRAVEL_PER_PART, PARTS)))
-    share = 1.0 / parts
-    free, compliance = 0.5 * free_change * share**2, 0.5 * relative_compliance * share**2
-    bend, impulse = start, 0.0
-    full_deflections = (forward / level, backward / level)
+    damping = BRISTLE_DAMPING / np.sqrt(dv_per_force)
+    travel = abs(v) + 0.5 * abs(free_dv - dv_per_force * start_z)
+    parts = min(MAX_PARTS, 1 + int(min(travel / TRAVEL_PER_PART, MAX_PARTS)))
+    fraction = 1.0 / parts
+    free_travel, compliance = 0.5 * free_dv * fraction**2, 0.5 * dv_per_force * fraction**2
+    z, impulse = start_z, 0.0
+    sliding_z_limits = (forward_level / level, backward_level / level)
     for _ in range(parts):
-        bend, force = _deflect(bend, v * share + free, compliance, damping * parts, full_deflections)
-        v += (free_change - relative_compliance * force) * share
+        z, force = _solve_bristle_deflection(
+            z, v * fraction + free_travel, compliance, damping * parts, sliding_z_limits
+        )
+        v += (free_dv - dv_per_force * force) * fraction
         impulse += force
-    end_full = full_deflections[0] if v > 0 else full_deflections[1]
-    memory[0], at[F_END] = bend, -level * (bend + (damping * (v - abs(v) * bend / end_full) if end_full > 0 else 0.0))
-    return -level * impulse * share
+    z_limit = sliding_z_limits[0] if v > 0 else sliding_z_limits[1]
+    memory[0], step_motion[F_END] = z, -level * (z + (damping * (v - abs(v) * z / z_limit) if z_limit > 0 else 0.0))
+    return -level * impulse * fraction
 
 
-_PATH = types.Array(types.float64, 1, "A", readonly=True)
+_READ_ONLY_VECTOR = types.Array(types.float64, 1, "A", readonly=True)
 """A vector of any stride that is only read."""
 
 
-@njit(types.float64[::1](_PATH, types.float64), cache=True)
-def bristle_bend(position: FloatArray, longest: float) -> FloatArray:
-    """(n,): deflection over `longest`, the deflection at which the bristle slips, by Dahl's equation dz/dx = 1 - sgn(v)
-    z along a position (n,) in the unit of `longest`; from 0 at the first sample."""
-    bend = np.zeros(position.shape[0])
+@njit(types.float64[::1](_READ_ONLY_VECTOR, types.float64), cache=True)
+def compute_bristle_deflection(position: FloatArray, slip_deflection: float) -> FloatArray:
+    """(n,): deflection over `slip_deflection`, at which the bristle slips, by Dahl's equation dz/dx = 1 - sgn(v) z
+    along a position (n,) in the unit of `slip_deflection`; from 0 at the first sample. For regressions on a measured
+    position, not for a simulation."""
+    deflection = np.zeros(position.shape[0])
     for k in range(1, position.shape[0]):
-        travel = (position[k] - position[k - 1]) / longest
-        full = np.sign(travel)
-        bend[k] = full + (bend[k - 1] - full) * np.exp(-abs(travel))
-    return bend
+        travel = (position[k] - position[k - 1]) / slip_deflection
+        sliding_deflection = np.sign(travel)
+        deflection[k] = sliding_deflection + (deflection[k - 1] - sliding_deflection) * np.exp(-abs(travel))
+    return deflection

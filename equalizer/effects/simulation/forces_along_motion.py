@@ -1,7 +1,8 @@
 """Forces along a measured motion: the actuators' force, and the motion-dependent forces of effects.
 
 Nothing is simulated: the laws are evaluated at the measured positions, velocities and accelerations, for a balance of
-forces. Sizes: n samples, m driven axes. Forces are in N (a rotation: N m).
+forces. Sizes: n samples, m driven axes. Forces are in N (a rotation: N m). Called by `analysis.diagnosis`: predicted
+and missing forces, and the balance with a model.
 """
 
 from collections.abc import Sequence
@@ -9,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from equalizer.effects.effect import STEPS, AxisForce, PlacedEffect
-from equalizer.effects.simulation.bodies import build_bodies, kernel_forces
-from equalizer.effects.simulation.command_path import drive_actuators, moves_between_samples, subdivide_commands
+from equalizer.effects.simulation.bodies import build_bodies, pack_kernel_forces
+from equalizer.effects.simulation.command_path import drive_actuators, has_intersample_changes, subdivide_commands
 from equalizer.effects.simulation.forces_along_motion_kernel import evaluate_laws_along_motion
 from equalizer.plant.linear_simulation import discretise_model
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -24,62 +25,67 @@ Motion = tuple[FloatArray, FloatArray, FloatArray]
 """Positions, velocities and accelerations of the driven axes, (n, m) each."""
 
 
-def actuator_force(
+def compute_actuator_force(
     model: MechanicalModel, commands: FloatArray, sample_rate_hz: float, effects: Sequence[PlacedEffect], hold: Hold
 ) -> FloatArray:
-    """(n, m): force of the actuators for commands (n, m), mean over each sample period."""
-    fine = STEPS if moves_between_samples(model, effects, hold) else 1
-    driven = drive_actuators(model, subdivide_commands(commands, fine, hold), 1 / (sample_rate_hz * fine), effects)
-    return np.asarray(driven.mean.reshape(len(commands), fine, -1).mean(axis=1))
+    """Compute the force (n, m) of the actuators for commands (n, m), mean over each sample period."""
+    steps_per_sample = STEPS if has_intersample_changes(model, effects, hold) else 1
+    subdivided_force = drive_actuators(
+        model, subdivide_commands(commands, steps_per_sample, hold), 1 / (sample_rate_hz * steps_per_sample), effects
+    )
+    return np.asarray(subdivided_force.mean.reshape(len(commands), steps_per_sample, -1).mean(axis=1))
 
 
-def effect_forces_along_motion(
+def compute_effect_forces_along_motion(
     model: MechanicalModel, effects: Sequence[PlacedEffect], motion: Motion, forces: tuple[FloatArray, FloatArray],
     sample_rate_hz: float,
 ) -> FloatArray:  # fmt: skip
-    """(n, m): sum of the effects' forces at the driven axes along the motion. forces: (n, m) each, the commands, and
-    the unbalanced force: actuator force minus the force that the linear model needs for the motion, mean over each
-    step. Friction at rest balances it. Raises ValueError for an axis that is not there or too many laws."""
+    """Compute the sum of the effects' forces (n, m) at the driven axes along the motion; effects that are no
+    `AxisForce` add nothing. forces: (n, m) each, the commands, and the unbalanced force: actuator force minus the force
+    that the linear model needs for the motion, mean over each step. Friction at rest balances it. Raises ValueError for
+    an axis that is not there or too many laws."""
     commands, unbalanced_force = forces
     bodies = build_bodies(model, [effect for effect in effects if isinstance(effect.effect.action, AxisForce)])
     if not bodies.actions:
         return np.zeros_like(unbalanced_force)
     axes = tuple(range(model.inputs))
-    table = kernel_forces(bodies, axes)
-    steps = discretise_model(model, 1 / sample_rate_hz)
+    packed = pack_kernel_forces(bodies, axes)
+    discrete_model = discretise_model(model, 1 / sample_rate_hz)
     per_newton = np.vstack(
         [
-            _own_axis_rows(steps.motion[: 2 * len(axes)] @ steps.by_axis_force),
-            _own_axis_rows(steps.motion_by_axis_force[2 * len(axes) :]),
+            _select_own_axis_effects(discrete_model.motion[: 2 * len(axes)] @ discrete_model.by_axis_force),
+            _select_own_axis_effects(discrete_model.motion_by_axis_force[2 * len(axes) :]),
         ]
     )
-    _hold_light_axes(per_newton, motion[1], commands, 1 / sample_rate_hz)
+    _limit_light_axis_response(per_newton, motion[1], commands, 1 / sample_rate_hz)
     force = np.array(unbalanced_force, dtype=np.float64, order="C")
     position, velocity, acceleration = (np.ascontiguousarray(signal) for signal in motion)
     evaluate_laws_along_motion(
-        table.laws, table.places, table.parameters, table.memory, (position, velocity, acceleration),
-        np.ascontiguousarray(commands, dtype=np.float64) if table.reads_all_axes else np.empty((0, 0)),
+        packed.laws, packed.places, packed.parameters, packed.memory, (position, velocity, acceleration),
+        np.ascontiguousarray(commands, dtype=np.float64) if packed.reads_all_axes else np.empty((0, 0)),
         per_newton, force, 1 / sample_rate_hz,
     )  # fmt: skip
     return force
 
 
-def _hold_light_axes(per_newton: FloatArray, velocity: FloatArray, commands: FloatArray, step_s: float) -> None:
-    """Reduce in place, for axes with negligible mass, per_newton (3, m): what 1 N over a step adds to position,
-    velocity and acceleration.
+def _limit_light_axis_response(
+    per_newton: FloatArray, velocity: FloatArray, commands: FloatArray, step_s: float
+) -> None:
+    """Limit, for axes with negligible mass, what 1 N over a step adds to position, velocity and acceleration:
+    per_newton (3, m) is changed in place.
 
     The mass of an axis is negligible where the rms command would change its velocity within a step by more than the rms
     velocity: the mass is at a fit's lower bound, or the recording has no time axis. Friction would then be at rest at
     all times and would balance the whole missing force. With per_newton reduced, friction is at rest only where the
     measured velocity is below about `REST_SPEED_SHARE` of its rms.
     """
-    force, speed = (np.sqrt(np.mean(signal**2, axis=0)) for signal in (commands, velocity))
-    is_light = (per_newton[2] * step_s * force > speed) & (speed > 0)
-    motion_per_newton = REST_SPEED_SHARE * speed[is_light] / force[is_light]
+    rms_command, rms_speed = (np.sqrt(np.mean(signal**2, axis=0)) for signal in (commands, velocity))
+    is_light = (per_newton[2] * step_s * rms_command > rms_speed) & (rms_speed > 0)
+    motion_per_newton = REST_SPEED_SHARE * rms_speed[is_light] / rms_command[is_light]
     per_newton[:, is_light] = motion_per_newton * np.array([[step_s / 2], [1.0], [1 / step_s]])
 
 
-def _own_axis_rows(per_newton: FloatArray) -> FloatArray:
-    """(k, m): effect of each axis's force on its own motion, from the effects on all axes (k m, m)."""
+def _select_own_axis_effects(per_newton: FloatArray) -> FloatArray:
+    """Select the effect (k, m) of each axis's force on its own motion, from the effects on all axes (k m, m)."""
     m = per_newton.shape[1]
     return np.asarray(np.diagonal(per_newton.reshape(-1, m, m), axis1=1, axis2=2))

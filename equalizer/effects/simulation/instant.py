@@ -1,4 +1,4 @@
-"""Layout of the array `at` from which a compiled force law reads the motion in each step; SI units.
+"""Layout of the array `step_motion` from which a compiled force law reads the motion in each step; SI units.
 
 Names with FREE denote the motion without the law's own force. A force is held over one step; steep laws (friction,
 stops) therefore solve for the force that is consistent with the motion at the step's end, which is stable at any step
@@ -21,7 +21,7 @@ F_END = 10
 """Written by the law: its force at the step's end, which determines the acceleration there. Where it stays NaN, the
 mean over the step is used."""
 LENGTH = 11
-"""Length of `at` without the block below."""
+"""Length of `step_motion` without the blocks below."""
 AXIS_X, AXIS_V, AXIS_X_END, AXIS_V_END, AXIS_X_PER_N, AXIS_V_PER_N, AXIS_A, AXIS_A_PER_N, AXIS_COMMAND = range(9)
 """Indices within the block of a driven axis, for effects that declare that their law reads all axes
 (`AxisForce.reads_all_axes`): position and velocity at the start and, without this force, at the end of the step; change

@@ -3,7 +3,7 @@
 The force F that is held over the step solves F = (1 - w) F_start + w F_end(F), because the motion at the step's end
 depends on F. The weight w is 1/2 (trapezoidal rule) for a force that hardly depends on the motion, and grows with the
 steepness of that dependence up to 1 (backward Euler), where the mean would oscillate (dry friction, stops): the motion
-can then stick. A law that reads an acceleration has w = 1.
+can then stick. A law that reads an acceleration has w = 1. `discovered_law` binds laws to this kernel.
 """
 
 from numba import njit
@@ -29,89 +29,99 @@ from equalizer.laws.kernel import END, START, STARTED, commit_step, run
 from equalizer.laws.program import STACK_SIZE
 from equalizer.signals.signal import FloatArray
 
-AXES, ACCELERATION, CONDITIONS, SAMPLES, RATE_HZ, TABLE = range(6)
-"""Indices in `parameters`: number of driven axes; whether the law reads an acceleration; number of recorded
-conditions, number of their samples, and their rate (Hz); first value of the conditions, which are stored sample by
-sample. The law's program follows them."""
-PER_AXIS = 4
+AXIS_COUNT, READS_ACCELERATION, CONDITION_COUNT, SAMPLE_COUNT, CONDITION_RATE_HZ, CONDITION_VALUES = range(6)
+"""Indices in `parameters`: number of driven axes; whether the law reads an acceleration; number of recorded conditions,
+number of their samples, and their rate (Hz); first value of the conditions, which are stored sample by sample. The
+law's program follows them."""
+SIGNALS_PER_AXIS = 4
 """Signals per driven axis: position, velocity, acceleration, command. The time precedes those of all axes, the
 conditions follow them."""
 FORCE_TOLERANCE = 1e-7
 """Tolerance of the implicit equation, relative to the forces of its first evaluations."""
-TRIES = 60
-"""Most iterations of the root search (regula falsi and bisection in turn) for a law's force at the end of a step."""
+MAX_ITERATIONS = 60
+"""Largest number of iterations of the root search: secant steps and, every second one, bisection where the root is
+bracketed."""
 
 
 @njit(inline="always")
-def _law_value(
-    parameters: FloatArray, memory: FloatArray, at: FloatArray, phase: int, force: float, extrapolate: float
+def _evaluate(
+    parameters: FloatArray, memory: FloatArray, step_motion: FloatArray, phase: int, force: float, extrapolate: float
 ) -> float:
-    """The law's force (N) at the step's start or end (`phase`), if `force` acted over the step. Accelerations are means
-    over the step; with extrapolate = 1 they are extrapolated linearly to its end."""
-    axes, conditions, step_s = int(parameters[AXES]), int(parameters[CONDITIONS]), at[STEP_S]
-    count = 1 + PER_AXIS * axes + conditions
-    signals = memory[STACK_SIZE : STACK_SIZE + count]
-    time_s = at[TIME_S] + (step_s if phase == END else 0.0)
+    """Evaluate the law: its force (N) at the step's start or end (`phase`), if `force` (N) acted over the step.
+    Accelerations are means over the step; with extrapolate = 1 they are extrapolated linearly to its end."""
+    axes, conditions, step_s = (int(parameters[AXIS_COUNT]), int(parameters[CONDITION_COUNT]), step_motion[STEP_S])
+    signal_count = 1 + SIGNALS_PER_AXIS * axes + conditions
+    signals = memory[STACK_SIZE : STACK_SIZE + signal_count]
+    time_s = step_motion[TIME_S] + (step_s if phase == END else 0.0)
     signals[0] = time_s
     for axis in range(axes):
-        block, target = LENGTH + BLOCK_SIZE * axis, 1 + PER_AXIS * axis
-        v, v_end = at[block + AXIS_V], at[block + AXIS_V_END] + at[block + AXIS_V_PER_N] * force
-        signals[target], signals[target + 1], signals[target + 2] = at[block + AXIS_X], v, (v_end - v) / step_s
+        block, first = LENGTH + BLOCK_SIZE * axis, 1 + SIGNALS_PER_AXIS * axis
+        v, v_end = (
+            step_motion[block + AXIS_V],
+            step_motion[block + AXIS_V_END] + step_motion[block + AXIS_V_PER_N] * force,
+        )
+        signals[first], signals[first + 1], signals[first + 2] = (step_motion[block + AXIS_X], v, (v_end - v) / step_s)
         if phase == END:
-            signals[target] = at[block + AXIS_X_END] + at[block + AXIS_X_PER_N] * force
-            signals[target + 1] = v_end
+            signals[first] = step_motion[block + AXIS_X_END] + step_motion[block + AXIS_X_PER_N] * force
+            signals[first + 1] = v_end
         if extrapolate != 0.0:
-            signals[target + 2] += signals[target + 2] - at[block + AXIS_A] - at[block + AXIS_A_PER_N] * force
-        signals[target + 3] = at[block + AXIS_COMMAND]
-    samples = int(parameters[SAMPLES])
+            signals[first + 2] += (
+                signals[first + 2] - step_motion[block + AXIS_A] - step_motion[block + AXIS_A_PER_N] * force
+            )
+        signals[first + 3] = step_motion[block + AXIS_COMMAND]
+    sample_count = int(parameters[SAMPLE_COUNT])
     if conditions > 0:
         # Sampled at the middle of the step, which lies in the right sample even when the ends are rounded.
-        sample = max(min(int((at[TIME_S] + 0.5 * step_s) * parameters[RATE_HZ]), samples - 1), 0)
-        for k in range(conditions):
-            signals[count - conditions + k] = parameters[TABLE + sample * conditions + k]
-    program = parameters[TABLE + samples * conditions :]
-    return float(run(program, signals, memory[STACK_SIZE + count :], memory[:STACK_SIZE], phase, time_s, step_s))
+        sample = max(
+            min(int((step_motion[TIME_S] + 0.5 * step_s) * parameters[CONDITION_RATE_HZ]), sample_count - 1), 0
+        )
+        for condition in range(conditions):
+            signals[signal_count - conditions + condition] = parameters[
+                CONDITION_VALUES + sample * conditions + condition
+            ]
+    program = parameters[CONDITION_VALUES + sample_count * conditions :]
+    return float(run(program, signals, memory[STACK_SIZE + signal_count :], memory[:STACK_SIZE], phase, time_s, step_s))
 
 
 @njit(inline="always")
-def _end_share(start: float, first: float, second: float) -> float:
-    """Weight w of the step's end: (1 + s) / 2, limited to 1/2 to 1, with the slope s = -dF_end/dF as a difference
-    quotient. first: the end's force if that of the start acted; second: the end's force if `first` acted."""
-    change = first - start
-    slope = (first - second) / change if change != 0.0 else 0.0
+def _compute_end_weight(start: float, first_end: float, second_end: float) -> float:
+    """Compute the weight w of the step's end: (1 + s) / 2, limited to 1/2 to 1, with the slope s = -dF_end/dF as a
+    difference quotient. first_end: force at the end if `start`, that at the start, acted; second_end: if `first_end`
+    acted."""
+    change = first_end - start
+    slope = (first_end - second_end) / change if change != 0.0 else 0.0
     return min(0.5 * (1.0 + max(slope, 0.0)), 1.0)
 
 
 @compile_law
-def law_force(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Force (N) of a discovered law over a step, solved for, because the motion at the step's end depends on it.
+def compute_law_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
+    """Compute the force (N) of a discovered law over a step by root search, because the motion at the step's end
+    depends on it.
 
-    parameters: in the order of `AXES` to `TABLE`, then the conditions' samples and the program. memory: stack, signals,
-    and the operators' memory, which is advanced to the step's end. at: see `instant`; F_END is written.
+    parameters: in the order of `AXIS_COUNT` to `CONDITION_VALUES`, then the conditions' samples and the program.
+    memory: stack, signals, and the operators' memory, which is advanced to the step's end. step_motion: see `instant`;
+    F_END is written. In the code, w is the weight of the step's end, and an inertial law reads an acceleration.
     """
-    reads_acceleration = parameters[ACCELERATION] != 0.0
-    start = low = _law_value(parameters, memory, at, START, 0.0, 0.0)
-    conditions = int(parameters[CONDITIONS])
-    operator_memory = memory[STACK_SIZE + 1 + PER_AXIS * int(parameters[AXES]) + conditions :]
+    is_inertial = parameters[READS_ACCELERATION] != 0.0
+    start = low = _evaluate(parameters, memory, step_motion, START, 0.0, 0.0)
+    conditions = int(parameters[CONDITION_COUNT])
+    operator_memory = memory[STACK_SIZE + 1 + SIGNALS_PER_AXIS * int(parameters[AXIS_COUNT]) + conditions :]
     operator_memory[0] = STARTED
-    end = first = high = _law_value(parameters, memory, at, END, low, 0.0)
-    second = _law_value(parameters, memory, at, END, high, 0.0)
-    end_weight = 1.0 if reads_acceleration else _end_share(start, first, second)
-    low_residual, high_residual = (
-        low - (1 - end_weight) * start - end_weight * first,
-        high - (1 - end_weight) * start - end_weight * second,
-    )
-    tolerance, force = FORCE_TOLERANCE * (abs(start) + abs(first) + abs(second)), high
+    end = first_end = high = _evaluate(parameters, memory, step_motion, END, low, 0.0)
+    second_end = _evaluate(parameters, memory, step_motion, END, high, 0.0)
+    w = 1.0 if is_inertial else _compute_end_weight(start, first_end, second_end)
+    low_residual, high_residual = low - (1 - w) * start - w * first_end, high - (1 - w) * start - w * second_end
+    tolerance, force = FORCE_TOLERANCE * (abs(start) + abs(first_end) + abs(second_end)), high
     # Every second step bisects if the root is bracketed; the others are secant steps.
-    for iteration in range(TRIES):
+    for iteration in range(MAX_ITERATIONS):
         residual_change = high_residual - low_residual
         is_bracketed = (low_residual < 0) != (high_residual < 0)
         if iteration % 2 == 1 and is_bracketed:
             force = 0.5 * (low + high)
         else:
             force = high - high_residual * (high - low) / residual_change if residual_change != 0.0 else high
-        end = _law_value(parameters, memory, at, END, force, 0.0)
-        residual = force - (1 - end_weight) * start - end_weight * end
+        end = _evaluate(parameters, memory, step_motion, END, force, 0.0)
+        residual = force - (1 - w) * start - w * end
         if not abs(residual) > tolerance or abs(high - low) <= 1e-2 * tolerance:
             break
         if is_bracketed and (residual < 0) == (low_residual < 0):
@@ -121,10 +131,12 @@ def law_force(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> flo
                 low, low_residual = high, high_residual
             high, high_residual = force, residual
     # While sticking, the end's force lies between those of the two sliding directions: solved for, not evaluated.
-    at[F_END] = (
-        _law_value(parameters, memory, at, END, force, 1.0)
-        if reads_acceleration
-        else (force - (1 - end_weight) * start) / end_weight
+    step_motion[F_END] = (
+        _evaluate(parameters, memory, step_motion, END, force, 1.0) if is_inertial else (force - (1 - w) * start) / w
     )
-    commit_step(parameters[TABLE + int(parameters[SAMPLES]) * conditions :], operator_memory, at[TIME_S] + at[STEP_S])
+    commit_step(
+        parameters[CONDITION_VALUES + int(parameters[SAMPLE_COUNT]) * conditions :],
+        operator_memory,
+        step_motion[TIME_S] + step_motion[STEP_S],
+    )
     return float(force)

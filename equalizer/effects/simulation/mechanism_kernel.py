@@ -1,10 +1,8 @@
 """Compiled time stepping of a linear structure under commands and motion-dependent forces; called by `stepping`.
 
-The linear part is exact (matrix exponential, see `stepping`). A motion-dependent force is held over a step and solved
-for implicitly by its law, from the motion at the step's end; several forces by Gauss-Seidel sweeps. A law reads its
-parameters, its memory (state variables), and `at`, the array of the motion during the step (layout: `instant`).
-Sizes: n samples, m commands, s states, r ports (points where forces act).
-"""
+The linear part is exact (matrix exponential). A motion-dependent force is held over a step and solved for implicitly by
+its law, from the motion at the step's end; several forces by Gauss-Seidel sweeps. A law reads its parameters, memory
+(state variables) and `step_motion` (layout: `instant`). n samples, m commands, s states, r ports (where forces act)."""
 
 import warnings
 from collections.abc import Callable
@@ -51,15 +49,14 @@ warnings.filterwarnings("ignore", category=NumbaExperimentalFeatureWarning)
 MAX_LAWS = 6
 """Largest number of different laws that can act at once."""
 MAX_SWEEPS = 12
-"""Largest number of Gauss-Seidel sweeps per step over several forces: each is solved again with the newest values of
-the others."""
+"""Largest number of Gauss-Seidel sweeps per step over several forces, each with the newest values of the others."""
 FORCE_TOLERANCE = 1e-7
 """Tolerance of the sweeps: relative change of a force below which the others are not solved again. The motion then
 differs by at most 1e-6 (relative) from the converged motion, for a joint with friction and an axis with friction."""
 FORCE_ROWS = 4
-"""Rows of the array `forces`, in N: mean over the step, mean over the step before, force at the step's end; and whether
-the force is to be solved again because another force has changed (1 or 0)."""
-_MEAN, _MEAN_BEFORE, _END, _STALE = range(FORCE_ROWS)
+"""Rows of the array `forces`, in N: mean over the step, mean over the previous step, force at the step's end; and
+whether the force is to be solved again because another force has changed (1 or 0)."""
+_MEAN, _PREVIOUS_MEAN, _END, _STALE = range(FORCE_ROWS)
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
 READ_ONLY_MATRIX = types.Array(types.float64, 2, "C", readonly=True)
@@ -103,8 +100,8 @@ class LawAddress(types.WrapperAddressProtocol):
 
 
 @cache
-def law_address(law: Any) -> LawAddress:
-    """Wrap a law that `compile_law` compiled; each law is looked up once per process."""
+def wrap_law(law: Any) -> LawAddress:
+    """Wrap a law that `compile_law` compiled, as argument of a kernel; each law is looked up once per process."""
     return LawAddress(law)
 
 
@@ -165,40 +162,40 @@ def _add_force(per_newton: FloatArray, port: int, mean: float, end: float, ports
 
 
 @njit(inline="always")
-def _write_axis_blocks(per_newton: FloatArray, port: int, ports: FloatArray, at: FloatArray) -> None:
-    """Write the motion of all ports into `at`, for the force at one of them."""
-    port_count = ports.shape[1]
-    for axis in range(port_count):
+def _write_axis_blocks(per_newton: FloatArray, port: int, ports: FloatArray, step_motion: FloatArray) -> None:
+    """Write the motion of all ports into `step_motion`, for the force at one of them."""
+    r = ports.shape[1]
+    for axis in range(r):
         block = LENGTH + BLOCK_SIZE * axis
-        at[block + AXIS_X], at[block + AXIS_V] = ports[_NOW_X, axis], ports[_NOW_V, axis]
-        at[block + AXIS_X_END], at[block + AXIS_V_END] = ports[_NEXT_X, axis], ports[_NEXT_V, axis]
-        at[block + AXIS_X_PER_N] = per_newton[port, axis]
-        at[block + AXIS_V_PER_N] = per_newton[port, port_count + axis]
-        at[block + AXIS_A], at[block + AXIS_A_PER_N] = ports[_A, axis], per_newton[port, 2 * port_count + axis]
+        step_motion[block + AXIS_X], step_motion[block + AXIS_V] = ports[_NOW_X, axis], ports[_NOW_V, axis]
+        step_motion[block + AXIS_X_END], step_motion[block + AXIS_V_END] = ports[_NEXT_X, axis], ports[_NEXT_V, axis]
+        step_motion[block + AXIS_X_PER_N] = per_newton[port, axis]
+        step_motion[block + AXIS_V_PER_N] = per_newton[port, r + axis]
+        step_motion[block + AXIS_A], step_motion[block + AXIS_A_PER_N] = ports[_A, axis], per_newton[port, 2 * r + axis]
 
 
 @compile_law
-def no_force(parameters: FloatArray, memory: FloatArray, at: FloatArray) -> float:
-    """Law of no force (0 N), for the unused of the kernel's `MAX_LAWS` arguments."""
+def compute_zero_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
+    """Return 0 N: the law that fills the unused of the kernel's `MAX_LAWS` arguments."""
     return 0.0
 
 
 @njit(inline="always")
 def _solve_force(  # noqa: PLR0913 - a kernel takes flat arrays
     law: Any, parameters: FloatArray, memory: FloatArray, port: int, per_newton: FloatArray, ports: FloatArray,
-    at: FloatArray,
+    step_motion: FloatArray,
 ) -> tuple[float, float]:  # fmt: skip
     """Solve for one force with all others held, and add it to the ports. Returns its step mean and end value (N)."""
     port_count = ports.shape[1]
-    at[X], at[V] = ports[_NOW_X, port], ports[_NOW_V, port]
-    at[X_FREE], at[V_FREE] = ports[_NEXT_X, port], ports[_NEXT_V, port]
-    at[X_PER_N], at[V_PER_N] = per_newton[port, port], per_newton[port, port_count + port]
-    at[A_FREE], at[A_PER_N] = ports[_A, port], per_newton[port, 2 * port_count + port]
-    at[F_END] = np.nan
-    if at.shape[0] > LENGTH:
-        _write_axis_blocks(per_newton, port, ports, at)
-    mean = law(parameters, memory, at)
-    end = mean if np.isnan(at[F_END]) else at[F_END]
+    step_motion[X], step_motion[V] = ports[_NOW_X, port], ports[_NOW_V, port]
+    step_motion[X_FREE], step_motion[V_FREE] = ports[_NEXT_X, port], ports[_NEXT_V, port]
+    step_motion[X_PER_N], step_motion[V_PER_N] = per_newton[port, port], per_newton[port, port_count + port]
+    step_motion[A_FREE], step_motion[A_PER_N] = ports[_A, port], per_newton[port, 2 * port_count + port]
+    step_motion[F_END] = np.nan
+    if step_motion.shape[0] > LENGTH:
+        _write_axis_blocks(per_newton, port, ports, step_motion)
+    mean = law(parameters, memory, step_motion)
+    end = mean if np.isnan(step_motion[F_END]) else step_motion[F_END]
     _add_force(per_newton, port, mean, end, ports)
     return mean, end
 
@@ -209,7 +206,7 @@ def _solve_force(  # noqa: PLR0913 - a kernel takes flat arrays
 )  # fmt: skip
 def _solve_forces(  # noqa: PLR0913 - a kernel takes flat arrays
     laws: Any, table: Integers, parameters: FloatArray, memory: FloatArray, per_newton: FloatArray, ports: FloatArray,
-    forces: FloatArray, at: FloatArray, start_memory: FloatArray,
+    forces: FloatArray, step_motion: FloatArray, start_memory: FloatArray,
 ) -> None:  # fmt: skip
     """Solve for several forces in turn (Gauss-Seidel), starting from linear extrapolation over the last two steps. A
     force is solved again only if another has changed. Arguments: see `step_mechanism`."""
@@ -217,8 +214,8 @@ def _solve_forces(  # noqa: PLR0913 - a kernel takes flat arrays
         start_memory[i] = memory[i]
     for row in range(table.shape[0]):
         mean = forces[_MEAN, row]
-        forces[_MEAN, row] += mean - forces[_MEAN_BEFORE, row]
-        forces[_MEAN_BEFORE, row], forces[_END, row], forces[_STALE, row] = mean, 0.0, 1.0
+        forces[_MEAN, row] += mean - forces[_PREVIOUS_MEAN, row]
+        forces[_PREVIOUS_MEAN, row], forces[_END, row], forces[_STALE, row] = mean, 0.0, 1.0
         _add_force(per_newton, table[row, 1], forces[_MEAN, row], 0.0, ports)
     for sweep in range(MAX_SWEEPS):
         for row in range(table.shape[0]):
@@ -237,7 +234,7 @@ def _solve_forces(  # noqa: PLR0913 - a kernel takes flat arrays
                 port,
                 per_newton,
                 ports,
-                at,
+                step_motion,
             )
             if not abs(forces[_MEAN, row] - mean) <= FORCE_TOLERANCE * abs(mean):
                 for other_row in range(table.shape[0]):
@@ -255,7 +252,7 @@ def _solve_forces(  # noqa: PLR0913 - a kernel takes flat arrays
 def step_mechanism(  # noqa: PLR0913 - a kernel takes flat arrays
     laws: Any, table: Integers, parameters: FloatArray, memory: FloatArray, step: StepMatrices, rows: FloatArray,
     commands: FloatArray, ports: FloatArray, state: FloatArray, counts: tuple[int, int, int], step_s: float,
-    contribution: FloatArray, at: FloatArray, forces: FloatArray, start_memory: FloatArray,
+    contribution: FloatArray, step_motion: FloatArray, forces: FloatArray, start_memory: FloatArray,
 ) -> None:  # fmt: skip
     """Simulate n samples under commands and motion-dependent forces, in place.
 
@@ -268,33 +265,33 @@ def step_mechanism(  # noqa: PLR0913 - a kernel takes flat arrays
     accelerations (3 r, s) where a law reads them; effect of the forces on the state (r, s); and `per_newton`.
     counts: steps per sample; stride (1 where commands are held over all steps, else the number of steps); number of
     the first sample.
-    contribution (s + r,), at (LENGTH or more,), start_memory (as memory): work space; forces (FORCE_ROWS, number of
-    forces): kept by the caller from block to block.
+    contribution (s + r,), step_motion (LENGTH or more,), start_memory (as memory): work space; forces (FORCE_ROWS,
+    number of forces): kept by the caller from block to block.
     """
     advance, output, force_effects, per_newton = step
     steps, stride, first_sample = counts
     state_count, port_count = state.shape[0], ports.shape[1]
     law = laws[table[0, 0]]
     law_parameters, law_memory = parameters[table[0, 2] : table[0, 3]], memory[table[0, 4] : table[0, 5]]
-    at[STEP_S] = step_s
+    step_motion[STEP_S] = step_s
     for port in range(port_count):
         ports[_A, port] = np.nan
     for sample in range(rows.shape[0] // stride):
-        for step_index in range(steps):
-            if step_index == 0 or stride > 1:
+        for substep in range(steps):
+            if substep == 0 or stride > 1:
                 for i in range(state_count + port_count):
-                    contribution[i] = rows[sample * stride + step_index, i]
+                    contribution[i] = rows[sample * stride + substep, i]
                 for axis in range(commands.shape[1]):
-                    at[LENGTH + BLOCK_SIZE * axis + AXIS_COMMAND] = commands[sample * stride + step_index, axis]
-            if step_index == 0:
+                    step_motion[LENGTH + BLOCK_SIZE * axis + AXIS_COMMAND] = commands[sample * stride + substep, axis]
+            if substep == 0:
                 _store_row(state, ports, rows[sample * stride])
             if output.shape[0] > 2 * port_count:
                 _predict_accelerations(output, contribution, state, ports)
             advance_state(advance, contribution, state)
             _predict_ports(output, state, ports)
-            at[TIME_S] = ((first_sample + sample) * steps + step_index) * step_s
+            step_motion[TIME_S] = ((first_sample + sample) * steps + substep) * step_s
             if table.shape[0] == 1:
-                _solve_force(law, law_parameters, law_memory, table[0, 1], per_newton, ports, at)
+                _solve_force(law, law_parameters, law_memory, table[0, 1], per_newton, ports, step_motion)
             else:
-                _solve_forces(laws, table, parameters, memory, per_newton, ports, forces, at, start_memory)
+                _solve_forces(laws, table, parameters, memory, per_newton, ports, forces, step_motion, start_memory)
             _apply_forces(force_effects, state, ports)

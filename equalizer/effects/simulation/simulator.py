@@ -2,7 +2,7 @@
 
 Main function: `simulate_mechanism`. Variants: `simulate_response` without the motion of the axes, faster;
 `simulate_windows` with restarts from given states, for multiple shooting; `simulate_states_before` for these states.
-Sizes: n samples, m driven axes, p response channels (n also the model's coordinates in states)."""
+Sizes: n samples, m driven axes, p response channels; c coordinates of the model, k instants."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from equalizer.effects.simulation.bodies import Bodies, Restarts, build_bodies, 
 from equalizer.effects.simulation.command_path import (
     ActuatorForce,
     drive_actuators,
-    moves_between_samples,
+    has_intersample_changes,
     subdivide_commands,
 )
 from equalizer.effects.simulation.sensor_path import clip_to_range, low_pass
@@ -62,9 +62,9 @@ def simulate_mechanism(
     hold: Hold = Hold.ZERO_ORDER,
     measurement: Measurement | None = None,
 ) -> SimulationResult:
-    """Response and motion from rest. commands: (n, m), SI. Only `effects` are simulated, not `model.effects`, which
-    `equalizer.effects.placing` converts. measurement: random effects are conditioned on it; without one they are drawn
-    at random.
+    """Simulate response and motion from rest. commands: (n, m), SI. Only `effects` are simulated, not `model.effects`,
+    which `equalizer.effects.placing` converts. measurement: random effects are conditioned on it; without one they are
+    drawn at random.
 
     Raises ValueError where an effect acts on an axis that is not there, and for too many different force laws.
     """
@@ -82,51 +82,58 @@ def simulate_response(
     measurement: Measurement | None = None,
 ) -> SimulationResult:
     """Simulate the response as `simulate_mechanism` does, faster: without the driven axes, whose arrays are (n, 0)."""
-    motion = _simulate_motion(model, commands, (sample_rate_hz, hold), effects, axes=False)
+    motion = _simulate_motion(model, commands, (sample_rate_hz, hold), effects, with_axes=False)
     return _apply_sensor(model, motion, sample_rate_hz, effects, measurement)
 
 
 def simulate_windows(
     model: MechanicalModel,
     commands: FloatArray,
-    sampled: tuple[float, Hold],
+    sampling: tuple[float, Hold],
     effects: Sequence[PlacedEffect],
     measurement: Measurement | None,
     restarts: Restarts,
 ) -> SimulationResult:
-    """Simulate like `simulate_mechanism`, but restarted from given states. sampled: sample rate in Hz, and course of
+    """Simulate like `simulate_mechanism`, but restarted from given states. sampling: sample rate in Hz, and course of
     the commands between samples."""
     return _apply_sensor(
-        model, _simulate_motion(model, commands, sampled, effects, restarts=restarts), sampled[0], effects, measurement
+        model,
+        _simulate_motion(model, commands, sampling, effects, restarts=restarts),
+        sampling[0],
+        effects,
+        measurement,
     )
 
 
 def simulate_states_before(
     model: MechanicalModel,
     commands: FloatArray,
-    sampled: tuple[float, Hold],
+    sampling: tuple[float, Hold],
     effects: Sequence[PlacedEffect],
     sample_indices: npt.NDArray[np.int64],
 ) -> FloatArray:
-    """(k, 2n): positions, then velocities, of the model's own coordinates just before the samples `sample_indices`
-    (k,), simulated from rest; coordinates that effects add are left out."""
-    bodies, driven, steps = _drive_bodies(model, commands, sampled, effects)
-    states = simulate_states(bodies, driven, (len(commands), steps), 1 / (sampled[0] * steps), sample_indices)
+    """(k, 2 c): positions, then velocities, of the model's own c coordinates just before the samples `sample_indices`
+    (k,), simulated from rest; coordinates that effects add are left out. sampling: as in `simulate_windows`."""
+    bodies, actuator_force, steps = _prepare_simulation(model, commands, sampling, effects)
+    states = simulate_states(bodies, actuator_force, (len(commands), steps), 1 / (sampling[0] * steps), sample_indices)
     n, model_coordinates = bodies.structure.coordinates, model.coordinates
     return np.hstack([states[:, :model_coordinates], states[:, n : n + model_coordinates]])
 
 
-def _drive_bodies(
-    model: MechanicalModel, commands: FloatArray, sampled: tuple[float, Hold], effects: Sequence[PlacedEffect]
+def _prepare_simulation(
+    model: MechanicalModel, commands: FloatArray, sampling: tuple[float, Hold], effects: Sequence[PlacedEffect]
 ) -> tuple[Bodies, ActuatorForce, int]:
-    """The bodies, the actuator force that drives them, and the number of integration steps per sample."""
-    bodies, (rate_hz, hold) = build_bodies(model, effects), sampled
-    moves = moves_between_samples(model, effects, hold)
-    steps = max((action.steps for action in bodies.actions), default=STEPS if moves else 1)
-    fine = steps if moves else 1
+    """The bodies, the actuator force that drives them, and the number of integration steps per sample: the most that a
+    motion-dependent effect asks for, else `STEPS` where the force changes between samples, else 1."""
+    bodies, (rate_hz, hold) = build_bodies(model, effects), sampling
+    is_changing_between_samples = has_intersample_changes(model, effects, hold)
+    steps = max((action.steps for action in bodies.actions), default=STEPS if is_changing_between_samples else 1)
+    command_steps = steps if is_changing_between_samples else 1
     return (
         bodies,
-        drive_actuators(model, subdivide_commands(commands, fine, hold), 1 / (rate_hz * fine), effects),
+        drive_actuators(
+            model, subdivide_commands(commands, command_steps, hold), 1 / (rate_hz * command_steps), effects
+        ),
         steps,
     )
 
@@ -134,17 +141,26 @@ def _drive_bodies(
 def _simulate_motion(
     model: MechanicalModel,
     commands: FloatArray,
-    sampled: tuple[float, Hold],
+    sampling: tuple[float, Hold],
     effects: Sequence[PlacedEffect],
-    axes: bool = True,
+    with_axes: bool = True,
     restarts: Restarts | None = None,
 ) -> SimulationResult:
-    """The simulated motion, with the true response before the sensor. axes: whether to output the driven axes."""
-    bodies, driven, steps = _drive_bodies(model, commands, sampled, effects)
-    motion, added = simulate_bodies(bodies, driven, (len(commands), steps), 1 / (sampled[0] * steps), axes, restarts)
-    m, p, ports = bodies.axes if axes else 0, bodies.structure.outputs, bodies.ports.shape[1]
-    rows = motion[:, 3 * ports if axes else 0 :]
-    return SimulationResult(rows[:, :p], rows[:, p:], motion[:, :m], motion[:, ports : ports + m], added[:, :m])
+    """Simulate the motion, with the true response before the sensor. with_axes: whether to output the driven axes,
+    whose arrays are else (n, 0)."""
+    bodies, actuator_force, steps = _prepare_simulation(model, commands, sampling, effects)
+    port_and_response_rows, port_forces = simulate_bodies(
+        bodies, actuator_force, (len(commands), steps), 1 / (sampling[0] * steps), with_axes, restarts
+    )
+    m, p, ports = bodies.axes if with_axes else 0, bodies.structure.outputs, bodies.ports.shape[1]
+    response_rows = port_and_response_rows[:, 3 * ports if with_axes else 0 :]
+    return SimulationResult(
+        response_rows[:, :p],
+        response_rows[:, p:],
+        port_and_response_rows[:, :m],
+        port_and_response_rows[:, ports : ports + m],
+        port_forces[:, :m],
+    )
 
 
 def _apply_sensor(
@@ -154,11 +170,12 @@ def _apply_sensor(
     effects: Sequence[PlacedEffect],
     measurement: Measurement | None,
 ) -> SimulationResult:
-    """The result as the sensor reads it: low pass of each channel, effects in the order of their stages, range."""
+    """Apply the sensor: low pass of each channel, effects in the order of their stages, limits of the range. Positions
+    change only by effects on the clock and by lost samples."""
     on_response = [(placed.effect.action, placed) for placed in effects if isinstance(placed.effect.action, OnResponse)]
     on_response.sort(key=lambda item: item[0].stage)
-    bandwidths = _bandwidths(model, motion.response.shape[1], on_response)
-    response, position = _low_pass_channels(motion.response, sample_rate_hz, bandwidths), motion.position
+    bandwidths_hz = _list_bandwidths_hz(model, motion.response.shape[1], on_response)
+    response, position = _filter_channels(motion.response, sample_rate_hz, bandwidths_hz), motion.position
     for action, placed in on_response:
         previous_response = response
         if measurement is not None and action.conditioned is not None:
@@ -193,7 +210,7 @@ def _change_response(
     return action.change(full_response, sample_rate_hz, placed.sites, placed.values)[: len(response)]
 
 
-def _low_pass_channels(response: FloatArray, sample_rate_hz: float, bandwidths_hz: Sequence[float]) -> FloatArray:
+def _filter_channels(response: FloatArray, sample_rate_hz: float, bandwidths_hz: Sequence[float]) -> FloatArray:
     """The response (n, p) through the low pass of each channel."""
     if len(set(bandwidths_hz)) == 1:
         return low_pass(response, sample_rate_hz, bandwidths_hz[0])
@@ -203,7 +220,7 @@ def _low_pass_channels(response: FloatArray, sample_rate_hz: float, bandwidths_h
     return np.stack(filtered, axis=1)
 
 
-def _bandwidths(
+def _list_bandwidths_hz(
     model: MechanicalModel, channels: int, on_response: Sequence[tuple[OnResponse, PlacedEffect]]
 ) -> list[float]:
     """Bandwidth in Hz of each channel's low pass: that of the model, replaced by effects; 0 = no low pass."""

@@ -2,7 +2,8 @@
 
 Without noise after rounding, the step follows from the differences between distinct values, refined by a straight line
 through value over lattice index. With noise after rounding, the histogram of the values has a ripple whose period is
-the step; it is found in the spectrum of the histogram.
+the step; it is found in the spectrum of the histogram. Called by the effect `quantization` and by `analysis.diagnosis`
+(faults of a signal). Steps and offsets have the unit of the values.
 """
 
 import numpy as np
@@ -11,83 +12,88 @@ from equalizer.signals.signal import FloatArray
 
 LATTICE_TOLERANCE = 0.02
 """Largest deviation of a value from the lattice, in steps. Rounding to single precision causes less."""
-NEARLY_ALL = 0.999
-"""Share of the values that must exceed this for a lattice."""
-LEAST_VALUES, MOST_VALUES = 3, 0.2
-"""Least number of occupied lattice points, and the largest, as a share of the number of samples."""
-PEAK_RATIO = 12.0
+LEAST_LATTICE_SHARE = 0.999
+"""Share of the values above which they count as lying on a lattice."""
+LEAST_POINTS, LARGEST_POINT_RATIO = 3, 0.2
+"""Least number of occupied lattice points, and the largest, relative to the number of samples."""
+LEAST_PEAK_RATIO = 12.0
 """Least ratio of a peak in the histogram's spectrum to the median around it."""
-BIN_SHARE = 0.2
+BIN_NOISE_RATIO = 0.2
 """Width of a bin of the histogram, relative to the rms noise."""
 
 
-def lattice_offset(values: FloatArray, step: float) -> float | None:
-    """Offset of the lattice of this step, between minus and plus half a step, from the mean phase of the values; None
-    where the values do not lie on such a lattice."""
+def find_lattice_offset(values: FloatArray, step: float) -> float | None:
+    """Find the offset of the lattice of a given step, between minus and plus half a step, from the mean phase of the
+    values (n,). None where the values do not lie on such a lattice, or the step is not positive."""
     if step <= 0:
         return None
     phasors = np.exp(2j * np.pi * values / step)
     offset = float(np.angle(phasors.mean()) / (2 * np.pi) * step)
-    distances = np.abs((values - offset) / step - np.round((values - offset) / step))
-    return offset if float(np.mean(distances < LATTICE_TOLERANCE)) > NEARLY_ALL else None
+    lattice_distances = np.abs((values - offset) / step - np.round((values - offset) / step))
+    return offset if float(np.mean(lattice_distances < LATTICE_TOLERANCE)) > LEAST_LATTICE_SHARE else None
 
 
-def lattice_step(values: FloatArray) -> float | None:
-    """The widest step whose lattice holds nearly all values; None without a lattice."""
-    different = np.unique(values)
-    if len(different) < LEAST_VALUES:
+def find_lattice_step(values: FloatArray) -> float | None:
+    """Find the step of the lattice that holds nearly all values (n,): the median of the smallest gaps between distinct
+    values, refined; None without a lattice."""
+    distinct_values = np.unique(values)
+    if len(distinct_values) < LEAST_POINTS:
         return None
     # In single precision several neighbouring values stand for one lattice point.
-    gaps = np.diff(different)
-    gaps = gaps[gaps > 1e-5 * float(np.ptp(different)) / max(len(different), 1)]
+    gaps = np.diff(distinct_values)
+    gaps = gaps[gaps > 1e-5 * float(np.ptp(distinct_values)) / max(len(distinct_values), 1)]
     if not len(gaps):
         return None
     step = float(np.median(gaps[gaps < 1.5 * gaps.min()]))
-    points = np.unique(np.round((different - different[0]) / step))
-    if not LEAST_VALUES <= len(points) <= MOST_VALUES * len(values):
+    lattice_points = np.unique(np.round((distinct_values - distinct_values[0]) / step))
+    if not LEAST_POINTS <= len(lattice_points) <= LARGEST_POINT_RATIO * len(values):
         return None
     # The error of the step accumulates over the range, so that it is refined over the whole range.
-    numbers = np.round((different - different[0]) / step)
+    lattice_indices = np.round((distinct_values - distinct_values[0]) / step)
     for _ in range(2):
-        step = float(np.polyfit(numbers, different, 1)[0])
-        numbers = np.round((different - different[0]) / step)
-    return step if lattice_offset(values, step) is not None else None
+        step = float(np.polyfit(lattice_indices, distinct_values, 1)[0])
+        lattice_indices = np.round((distinct_values - distinct_values[0]) / step)
+    return step if find_lattice_offset(values, step) is not None else None
 
 
 def confirm_lattice_step(values: FloatArray, candidate_step: float) -> float:
-    """The step of the lattice on which values (n,) lie; 0 = no lattice. candidate_step: a step to test where no lattice
-    is found from the values alone, for instance because there are too many different values."""
-    detected_step = lattice_step(values)
+    """Find the step of the lattice on which values (n,) lie; 0 = no lattice. candidate_step: a step to test where no
+    lattice is found from the values alone, for instance because there are too many different values."""
+    detected_step = find_lattice_step(values)
     return (
         detected_step
         if detected_step is not None
         else candidate_step
-        if lattice_offset(values, candidate_step) is not None
+        if find_lattice_offset(values, candidate_step) is not None
         else 0.0
     )
 
 
-def staircase_step(values: FloatArray, noise: float) -> float | None:
-    """The quantization step under noise, from the ripple in the histogram of values (n,); None without one."""
-    span = float(np.ptp(values))
-    bins = int(span / (BIN_SHARE * noise)) if noise > 0 else 0
+def find_step_under_noise(values: FloatArray, noise: float) -> float | None:
+    """Find the quantization step under noise, from the ripple in the histogram of values (n,); None without one, or
+    where the noise is 0 or the range too narrow or too wide for the histogram. noise: rms, in the unit of the
+    values."""
+    value_range = float(np.ptp(values))
+    bin_count = int(value_range / (BIN_NOISE_RATIO * noise)) if noise > 0 else 0
     # Too few bins hold no ripple; too many need too much memory.
-    if not 64 <= bins <= 4_000_000:
+    if not 64 <= bin_count <= 4_000_000:
         return None
-    counts, edges = np.histogram(values, bins=bins)
-    width = float(edges[1] - edges[0])
-    padded = 8 * len(counts)
-    spectrum = np.abs(np.fft.rfft(counts, padded)) / np.sqrt(len(values))
-    per_unit = np.fft.rfftfreq(padded, width)
+    counts, edges = np.histogram(values, bins=bin_count)
+    bin_width = float(edges[1] - edges[0])
+    padded_length = 8 * len(counts)
+    spectrum = np.abs(np.fft.rfft(counts, padded_length)) / np.sqrt(len(values))
+    ripple_frequency = np.fft.rfftfreq(padded_length, bin_width)
     # Slow components belong to the distribution of the response; noise smooths ripples shorter than about 3 times its
     # rms.
-    in_band = (per_unit > 10 / span) & (per_unit < 0.3 / noise)
+    in_band = (ripple_frequency > 10 / value_range) & (ripple_frequency < 0.3 / noise)
     if not in_band.any():
         return None
-    peak = int(np.flatnonzero(in_band)[np.argmax(spectrum[in_band])])
-    neighbours = (
-        (np.abs(per_unit - per_unit[peak]) < 20 / span) & in_band & (np.abs(per_unit - per_unit[peak]) > 2 / span)
+    peak_line = int(np.flatnonzero(in_band)[np.argmax(spectrum[in_band])])
+    is_neighbour = (
+        (np.abs(ripple_frequency - ripple_frequency[peak_line]) < 20 / value_range)
+        & in_band
+        & (np.abs(ripple_frequency - ripple_frequency[peak_line]) > 2 / value_range)
     )
-    if not neighbours.any() or spectrum[peak] < PEAK_RATIO * float(np.median(spectrum[neighbours])):
+    if not is_neighbour.any() or spectrum[peak_line] < LEAST_PEAK_RATIO * float(np.median(spectrum[is_neighbour])):
         return None
-    return float(1 / per_unit[peak])
+    return float(1 / ripple_frequency[peak_line])

@@ -2,7 +2,7 @@
 
 An experiment is an excitation that is repeated over one or more periods. Spectra are rfft / length without the lines at
 zero and at half the sample rate, so that white noise of variance s² has the expected power s² / length at each line;
-windows are scaled to a mean square of 1 for the same reason.
+windows are scaled to a mean square of 1 for the same reason. Called by `transfer_estimate` and `identify_recordings`.
 """
 
 from collections.abc import Sequence
@@ -15,10 +15,12 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.signals.spectral_density import compute_line_spectra, hann
 
 BROADBAND_KINDS = ("sweep", "multisine", "noise", "binary")
+"""Kinds of segments whose periods are used as experiments."""
 TRANSIENT_S = 5.0
 """Assumed length of a transient (s): ten time constants of 0.5 s, the ordinary decay bound of a state-space model
 (`ORDINARY_DECAY_S`), after which e^-10 of it remains."""
 _DRIVEN_KINDS = (*BROADBAND_KINDS, "sine", "slow", "step", "impact")
+"""Kinds of segments over which windows are averaged where nothing is periodic."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +35,7 @@ class Experiment:
     """(periods, lines, outputs)"""
     instrument: ComplexArray
     """(periods, lines, inputs): the excitation, where it was recorded, else the command."""
-    borrowed: float = 0.0
+    replaced_share: float = 0.0
     """Share of the last period's samples that were replaced by the mean of the other periods."""
 
     @property
@@ -44,36 +46,38 @@ class Experiment:
     @property
     def effective_periods(self) -> float:
         """Effective number of periods: independent periods whose mean would have the same variance."""
-        if not self.borrowed:
+        if not self.replaced_share:
             return float(self.periods)
-        return 1 / ((1 - self.borrowed) / self.periods + self.borrowed / (self.periods - 1))
+        return 1 / ((1 - self.replaced_share) / self.periods + self.replaced_share / (self.periods - 1))
 
     @property
     def observed_noise_share(self) -> float:
         """Share of the noise power that differs between periods."""
-        if not self.borrowed:
+        if not self.replaced_share:
             return 1.0
-        return 1 - self.borrowed / (self.periods - 1)
+        return 1 - self.replaced_share / (self.periods - 1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExperimentSet:
-    """All experiments of some recordings, with remarks on data that were left out."""
+    """All experiments of some recordings."""
 
     experiments: tuple[Experiment, ...]
     remarks: tuple[str, ...]
+    """Sentences for the user on periods that were left out, transients that were kept, and windows."""
     periodic: bool
+    """Whether the experiments are whole periods (True) or windows (False)."""
 
 
-def instrument_signal(recording: Recording) -> FloatArray:
+def select_instrument_signal(recording: Recording) -> FloatArray:
     """(n, inputs): the instrument of the estimate, which is the excitation where it was recorded, else the command."""
     return (recording.command if recording.excitation is None else recording.excitation).samples
 
 
-def periodic_experiments(recordings: Sequence[Recording]) -> ExperimentSet:
+def collect_periodic_experiments(recordings: Sequence[Recording]) -> ExperimentSet:
     """Whole periods of every periodic broadband segment without the role "test". The first period counts only if there
-    is no other, or, where a period lasts at least twice `TRANSIENT_S`, with its transient replaced (`borrowed`).
-    Periods with missing samples are dropped."""
+    is no other, or, where a period lasts at least twice `TRANSIENT_S`, with its transient replaced
+    (`replaced_share`). Periods with missing samples and periods of less than four samples are left out."""
     experiments: list[Experiment] = []
     single_period_segments, missing_periods = 0, 0
     for recording in recordings:
@@ -101,22 +105,22 @@ def periodic_experiments(recordings: Sequence[Recording]) -> ExperimentSet:
     remarks = []
     if single_period_segments:
         remarks.append(
-            f"{_count_segments(single_period_segments)} had one usable period only: it was kept, with its transient."
+            f"{_format_segments(single_period_segments)} had one usable period only: it was kept, with its transient."
         )
     if missing_periods:
-        remarks.append(f"{_count_periods(missing_periods)} left out, because samples are missing in it.")
+        remarks.append(f"{_format_periods(missing_periods)} left out, because samples are missing in it.")
     return ExperimentSet(tuple(experiments), tuple(remarks), periodic=True)
 
 
-def window_experiments(recordings: Sequence[Recording], window_s: float) -> ExperimentSet:
-    """Hann windows of window_s seconds, overlapping by half, over all driven segments without the role "test" or,
-    without segments, the whole recording."""
+def collect_window_experiments(recordings: Sequence[Recording], window_s: float) -> ExperimentSet:
+    """Hann windows of window_s seconds (at least 8 samples), overlapping by half, over all driven segments without the
+    role "test" or, without segments, the whole recording. Windows with missing samples are left out."""
     experiments: list[Experiment] = []
     for recording in recordings:
         length = max(8, round(window_s * recording.sample_rate_hz))
         window = hann(length)
         window = window / np.sqrt(np.mean(window**2))
-        for segment in _driven_segments(recording):
+        for segment in _select_driven_segments(recording):
             starts = range(segment.start, segment.stop - length + 1, length // 2)
             complete_starts = [start for start in starts if _has_all_samples(recording, start, length)]
             # Windows, unlike periods, do not contain the same excitation: each is an experiment of its own.
@@ -125,42 +129,45 @@ def window_experiments(recordings: Sequence[Recording], window_s: float) -> Expe
     return ExperimentSet(tuple(experiments), (remark,), periodic=False)
 
 
-def _driven_segments(recording: Recording) -> list[Segment]:
+def _select_driven_segments(recording: Recording) -> list[Segment]:
+    """Driven segments without the role "test"; the whole recording as one segment where none are stated."""
     if not recording.segments:
         return [Segment(0, len(recording), "noise")]
     return [segment for segment in recording.segments if segment.kind in _DRIVEN_KINDS and segment.role != "test"]
 
 
 def _has_all_samples(recording: Recording, start: int, length: int) -> bool:
-    rows = slice(start, start + length)
-    signals = (recording.command.samples, recording.response.samples, instrument_signal(recording))
-    return all(bool(np.isfinite(samples[rows]).all()) for samples in signals)
+    """Whether no sample of command, response and excitation is missing (NaN) from `start` on, for `length` samples."""
+    sample_range = slice(start, start + length)
+    signals = (recording.command.samples, recording.response.samples, select_instrument_signal(recording))
+    return all(bool(np.isfinite(samples[sample_range]).all()) for samples in signals)
 
 
 def _make_experiment(recording: Recording, starts: Sequence[int], length: int, window: FloatArray) -> Experiment:
-    """Spectra of the periods that begin at `starts`, without their mean. window: (length,), mean square 1."""
+    """Compute the spectra of the periods that begin at `starts`, without their mean. window: (length,), mean square
+    1."""
 
-    def spectra(samples: FloatArray) -> ComplexArray:
+    def compute_spectra(samples: FloatArray) -> ComplexArray:
         periods = np.stack([samples[start : start + length] for start in starts])
         return compute_line_spectra((periods - periods.mean(axis=1, keepdims=True)) * window[:, None])
 
     return Experiment(
         length,
-        spectra(recording.command.samples),
-        spectra(recording.response.samples),
-        spectra(instrument_signal(recording)),
+        compute_spectra(recording.command.samples),
+        compute_spectra(recording.response.samples),
+        compute_spectra(select_instrument_signal(recording)),
     )
 
 
 def _add_first_period(
-    recording: Recording, experiment: Experiment, period_starts: Sequence[int], first: int, transient_samples: int
+    recording: Recording, experiment: Experiment, period_starts: Sequence[int], first_start: int, transient_samples: int
 ) -> Experiment:
     """Add the first period, its first `transient_samples` samples (the transient) replaced by the mean of the other
-    periods: for a linear plant, command and response are then those of the steady state throughout. first: index of its
-    start; period_starts: starts of the other periods."""
+    periods: for a linear plant, command and response are then those of the steady state throughout. first_start: index
+    of its start; period_starts: starts of the other periods."""
 
-    def spectra(samples: FloatArray) -> ComplexArray:
-        period = samples[first : first + experiment.length].copy()
+    def compute_spectra(samples: FloatArray) -> ComplexArray:
+        period = samples[first_start : first_start + experiment.length].copy()
         period[:transient_samples] = np.mean(
             [samples[start : start + transient_samples] for start in period_starts], axis=0
         )
@@ -171,16 +178,18 @@ def _add_first_period(
 
     return Experiment(
         experiment.length,
-        np.concatenate([experiment.command, spectra(recording.command.samples)]),
-        np.concatenate([experiment.response, spectra(recording.response.samples)]),
-        np.concatenate([experiment.instrument, spectra(instrument_signal(recording))]),
-        borrowed=transient_samples / experiment.length,
+        np.concatenate([experiment.command, compute_spectra(recording.command.samples)]),
+        np.concatenate([experiment.response, compute_spectra(recording.response.samples)]),
+        np.concatenate([experiment.instrument, compute_spectra(select_instrument_signal(recording))]),
+        replaced_share=transient_samples / experiment.length,
     )
 
 
-def _count_segments(count: int) -> str:
+def _format_segments(count: int) -> str:
+    """Format a number of segments as the beginning of a remark."""
     return "One segment" if count == 1 else f"{count} segments"
 
 
-def _count_periods(count: int) -> str:
+def _format_periods(count: int) -> str:
+    """Format a number of periods, with its verb, as the beginning of a remark."""
     return "One period was" if count == 1 else f"{count} periods were"

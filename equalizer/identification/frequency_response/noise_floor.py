@@ -2,13 +2,14 @@
 spectrum of the response at rest, or, where neither exists, the scatter between neighbouring lines.
 
 Spectra are rfft / length; a noise density s is the power per line times that length, so that it does not depend on it.
+Called by `transfer_estimate`, `shared_lines`, the fit of mechanical models and the diagnosis (`analysis.diagnosis`).
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from equalizer.identification.frequency_response.experiments import instrument_signal
+from equalizer.identification.frequency_response.experiments import select_instrument_signal
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import ComplexArray, FloatArray, find_runs
 from equalizer.signals.spectral_density import hann
@@ -21,7 +22,7 @@ _THIRD_DIFFERENCE_GAIN = 20.0
 """Variance of a third difference over that of a line: 1² + 3² + 3² + 1², from its coefficients 1, -3, 3, -1."""
 
 
-def period_variance(residuals: ComplexArray) -> FloatArray:
+def compute_period_variance(residuals: ComplexArray) -> FloatArray:
     """Noise power of a single period, (lines, outputs): the sample variance over periods. residuals: (periods, lines,
     outputs), at least two periods."""
     deviations = residuals - residuals.mean(axis=0)
@@ -29,7 +30,7 @@ def period_variance(residuals: ComplexArray) -> FloatArray:
     return power
 
 
-def line_scatter(response: ComplexArray) -> FloatArray:
+def estimate_line_scatter(response: ComplexArray) -> FloatArray:
     """Expected |error|² of each entry, from third differences between neighbouring lines, which are small for a smooth
     curve. response: (lines, ...). NaN everywhere for fewer than five lines.
 
@@ -38,9 +39,9 @@ def line_scatter(response: ComplexArray) -> FloatArray:
     """
     if len(response) < 5:
         return np.full(response.shape, np.nan)
-    third = np.abs(np.diff(response, n=3, axis=0)) ** 2 / _THIRD_DIFFERENCE_GAIN
+    error_power = np.abs(np.diff(response, n=3, axis=0)) ** 2 / _THIRD_DIFFERENCE_GAIN
     padding = [(1, 2)] + [(0, 0)] * (response.ndim - 1)
-    padded: FloatArray = np.pad(third, padding, mode="edge")
+    padded: FloatArray = np.pad(error_power, padding, mode="edge")
     return padded
 
 
@@ -51,49 +52,50 @@ def smooth_over_lines(power: FloatArray, lines: int) -> FloatArray:
     # Imported here, because importing SciPy's ndimage takes longer than many estimates.
     from scipy.ndimage import uniform_filter1d
 
-    smooth: FloatArray = uniform_filter1d(power, max(1, min(lines, len(power))), axis=0, mode="nearest")
+    smoothed: FloatArray = uniform_filter1d(power, max(1, min(lines, len(power))), axis=0, mode="nearest")
     # A running sum keeps rounding errors of strong lines after these have left the window, and may become negative.
-    return np.asarray(np.maximum(smooth, 0.0))
+    return np.asarray(np.maximum(smoothed, 0.0))
 
 
-def rest_floor(recordings: Sequence[Recording], frequency_hz: FloatArray) -> FloatArray | None:
+def estimate_rest_density(recordings: Sequence[Recording], frequency_hz: FloatArray) -> FloatArray | None:
     """Noise power density s(f) of the response at rest, (lines, outputs), such that s / length is the noise power per
     line of a period of that length; None without a rest of sufficient length. All recordings have the same rate."""
-    powers, lines_hz = [], np.empty(0)
+    window_powers, lines_hz = [], np.empty(0)
     for recording in recordings:
         length = round(_REST_WINDOW_S * recording.sample_rate_hz)
         lines_hz = np.arange(1, length // 2) * recording.sample_rate_hz / length
-        powers += rest_powers(recording, recording.response.samples, length)
-    return interpolate_rest(np.mean(powers, axis=0), lines_hz, frequency_hz) if powers else None
+        window_powers += compute_rest_powers(recording, recording.response.samples, length)
+    return interpolate_rest_density(np.mean(window_powers, axis=0), lines_hz, frequency_hz) if window_powers else None
 
 
-def rest_powers(recording: Recording, samples: FloatArray, length: int) -> list[FloatArray]:
+def compute_rest_powers(recording: Recording, samples: FloatArray, length: int) -> list[FloatArray]:
     """Power density (length // 2 - 1, channels) of each Hann window of samples (n, channels) at rest; windows overlap
     by half, and those with missing samples are left out."""
     # The mean square of a Hann window is 3/8: scaled to 1, so that the window does not change the noise power.
     window = np.sqrt(8 / 3) * hann(length)[:, None]
     powers = []
-    for start, stop in rest_intervals(recording, SETTLING_S):
+    for start, stop in find_rest_intervals(recording, SETTLING_S):
         for window_start in range(start, stop - length + 1, length // 2):
-            part = samples[window_start : window_start + length]
-            if np.isfinite(part).all():
-                spectrum = np.fft.rfft((part - part.mean(axis=0)) * window, axis=0)[1 : length // 2]
+            window_samples = samples[window_start : window_start + length]
+            if np.isfinite(window_samples).all():
+                spectrum = np.fft.rfft((window_samples - window_samples.mean(axis=0)) * window, axis=0)[1 : length // 2]
                 powers.append(np.abs(spectrum) ** 2 / length)
     return powers
 
 
-def interpolate_rest(mean: FloatArray, lines_hz: FloatArray, frequency_hz: FloatArray) -> FloatArray:
-    """Smooth the mean of `rest_powers` over lines and interpolate it at frequency_hz: (lines, channels). The two lowest
-    lines of `mean` are overwritten in place."""
+def interpolate_rest_density(mean_power: FloatArray, lines_hz: FloatArray, frequency_hz: FloatArray) -> FloatArray:
+    """Smooth the mean of `compute_rest_powers` over lines and interpolate it at frequency_hz: (lines, channels). The
+    two lowest lines of `mean_power` are overwritten in place."""
     # Subtracting the mean of a window removes part of the noise of the lowest lines: replaced by the next line's.
-    mean[:2] = mean[2:3]
-    smooth = smooth_over_lines(mean, 9)
-    return np.stack([np.interp(frequency_hz, lines_hz, channel) for channel in smooth.T], axis=1)
+    mean_power[:2] = mean_power[2:3]
+    smoothed_power = smooth_over_lines(mean_power, 9)
+    return np.stack([np.interp(frequency_hz, lines_hz, channel) for channel in smoothed_power.T], axis=1)
 
 
-def rest_intervals(recording: Recording, settling_s: float) -> list[tuple[int, int]]:
+def find_rest_intervals(recording: Recording, settling_s: float) -> list[tuple[int, int]]:
     """Intervals (start, stop) of samples without excitation, after settling_s seconds; an interval at the very start
-    counts from sample 0, because recordings begin at rest."""
-    idle_runs = find_runs((instrument_signal(recording) == 0).all(axis=1))
-    settling = round(settling_s * recording.sample_rate_hz)
-    return [(start + (settling if start else 0), stop) for start, stop in idle_runs]
+    counts from sample 0, because recordings begin at rest. Where a pause is no longer than settling_s, start >=
+    stop."""
+    idle_runs = find_runs((select_instrument_signal(recording) == 0).all(axis=1))
+    settling_samples = round(settling_s * recording.sample_rate_hz)
+    return [(start + (settling_samples if start else 0), stop) for start, stop in idle_runs]

@@ -14,8 +14,8 @@ import numpy as np
 from equalizer.identification.frequency_response.experiments import Experiment
 from equalizer.identification.frequency_response.frequency_response import BoolArray
 from equalizer.identification.frequency_response.noise_floor import (
-    line_scatter,
-    period_variance,
+    compute_period_variance,
+    estimate_line_scatter,
     smooth_over_lines,
 )
 from equalizer.signals.signal import ComplexArray, FloatArray
@@ -34,7 +34,8 @@ class SharedLines:
     noise_variance: FloatArray
     """(lines, outputs, inputs): expected |error|² of each entry of `response`."""
     coherence: FloatArray
-    """(lines, outputs): share of the response's power that the commands explain, 0 to 1."""
+    """(lines, outputs): share of the response's power that the commands explain, 0 to 1; NaN for an output that is
+    always zero."""
     excitation: ComplexArray
     """(lines, inputs, experiments): mean spectra, times the root of the effective number of samples."""
 
@@ -47,7 +48,9 @@ class _Columns:
     command: ComplexArray
     """(lines, inputs, experiments)"""
     response: ComplexArray
+    """(lines, outputs, experiments)"""
     instrument: ComplexArray
+    """(lines, inputs, experiments)"""
     power: FloatArray
     """(lines, outputs): power of single periods, summed over the experiments."""
 
@@ -58,9 +61,10 @@ def solve_shared_lines(
     rest_density: FloatArray | None,
     noise_lines: int,
 ) -> SharedLines:
-    """Estimate at the given lines. experiments: all with exactly these lines. rest_density: (lines, outputs), by
-    `rest_floor`, a lower bound where the noise is estimated from the scatter of lines. noise_lines: lines over which
-    noise is averaged. Lines at which the experiments are not independent are left out."""
+    """Estimate the response at the given lines. experiments: all with exactly these lines. rest_density: (lines,
+    outputs), by `estimate_rest_density`, a lower bound where the noise is estimated from the scatter of lines.
+    noise_lines: number of lines over which noise is averaged. Lines at which excitations or commands do not have full
+    rank are left out."""
     all_columns = _stack_columns(experiments)
     is_solvable = _has_full_rank(all_columns)
     columns = _Columns(
@@ -72,21 +76,21 @@ def solve_shared_lines(
     adjoint = np.conj(columns.instrument.swapaxes(1, 2))
     solution = adjoint @ np.linalg.inv(columns.command @ adjoint)
     response = columns.response @ solution
-    density = _density_from_periods(experiments, is_solvable, response)
+    density = _estimate_density_from_periods(experiments, is_solvable, response)
     if density is None:
-        density = _density_from_residuals(columns, response)
+        density = _estimate_density_from_residuals(columns, response)
     if density is not None:
         density = smooth_over_lines(density, noise_lines)
         variance: FloatArray = np.einsum("lpe,lem->lpm", density, np.abs(solution) ** 2)
-        noise = density.sum(axis=2)
+        noise_power = density.sum(axis=2)
     else:
-        variance = smooth_over_lines(line_scatter(response), noise_lines)
+        variance = smooth_over_lines(estimate_line_scatter(response), noise_lines)
         if rest_density is not None:
             gain = np.sum(np.abs(solution) ** 2, axis=1)
             variance = np.fmax(variance, rest_density[is_solvable][:, :, None] * gain[:, None, :])
-        noise = np.einsum("lpm,lme->lp", variance, np.abs(columns.command) ** 2)
+        noise_power = np.einsum("lpm,lme->lp", variance, np.abs(columns.command) ** 2)
     with np.errstate(invalid="ignore", divide="ignore"):  # NaN for an output that is always zero
-        coherence = np.clip(1 - noise / smooth_over_lines(columns.power, noise_lines), 0.0, 1.0)
+        coherence = np.clip(1 - noise_power / smooth_over_lines(columns.power, noise_lines), 0.0, 1.0)
     return SharedLines(frequency_hz[is_solvable], response, variance, coherence, columns.instrument)
 
 
@@ -109,13 +113,13 @@ def _has_full_rank(columns: _Columns) -> BoolArray:
     inputs, experiments = columns.command.shape[1:]
     has_full_rank = np.full(len(columns.command), experiments >= inputs)
     if experiments >= inputs and len(has_full_rank):
-        for stack in (columns.instrument, columns.command):
-            strengths = np.linalg.svd(stack, compute_uv=False)
-            has_full_rank &= strengths[:, -1] > _RANK_TOLERANCE * strengths.max()
+        for matrices in (columns.instrument, columns.command):
+            singular_values = np.linalg.svd(matrices, compute_uv=False)
+            has_full_rank &= singular_values[:, -1] > _RANK_TOLERANCE * singular_values.max()
     return has_full_rank
 
 
-def _density_from_periods(
+def _estimate_density_from_periods(
     experiments: Sequence[Experiment], is_solvable: BoolArray, response: ComplexArray
 ) -> FloatArray | None:
     """Noise density (lines, outputs, experiments) from the variance of the residuals Y - G U between periods. An
@@ -126,23 +130,23 @@ def _density_from_periods(
             "lpm,klm->klp", response, experiment.command[:, is_solvable]
         )
         densities.append(
-            experiment.length * period_variance(residuals) / experiment.observed_noise_share
+            experiment.length * compute_period_variance(residuals) / experiment.observed_noise_share
             if experiment.periods > 1
             else None
         )
-    estimated = [density for density in densities if density is not None]
-    if not estimated:
+    known_densities = [density for density in densities if density is not None]
+    if not known_densities:
         return None
-    mean = np.mean(estimated, axis=0)
-    return np.stack([mean if density is None else density for density in densities], axis=2)
+    mean_density = np.mean(known_densities, axis=0)
+    return np.stack([mean_density if density is None else density for density in densities], axis=2)
 
 
-def _density_from_residuals(columns: _Columns, response: ComplexArray) -> FloatArray | None:
+def _estimate_density_from_residuals(columns: _Columns, response: ComplexArray) -> FloatArray | None:
     """Noise density (lines, outputs, experiments) from the residual power over all experiments per degree of freedom,
     the same for each; None for fewer than inputs + 2 experiments."""
     inputs, experiments = columns.command.shape[1:]
     if experiments < inputs + 2:
         return None
-    residuals = np.abs(columns.response - response @ columns.command) ** 2
-    density = residuals.sum(axis=2, keepdims=True) / (experiments - inputs)
-    return np.broadcast_to(density, residuals.shape).copy()
+    residual_power = np.abs(columns.response - response @ columns.command) ** 2
+    density = residual_power.sum(axis=2, keepdims=True) / (experiments - inputs)
+    return np.broadcast_to(density, residual_power.shape).copy()

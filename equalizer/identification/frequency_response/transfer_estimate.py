@@ -14,11 +14,11 @@ import numpy as np
 from equalizer.identification.frequency_response.experiments import (
     Experiment,
     ExperimentSet,
-    periodic_experiments,
-    window_experiments,
+    collect_periodic_experiments,
+    collect_window_experiments,
 )
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
-from equalizer.identification.frequency_response.noise_floor import rest_floor
+from equalizer.identification.frequency_response.noise_floor import estimate_rest_density
 from equalizer.identification.frequency_response.reliable_lines import (
     ReliabilityRules,
     find_excited_lines,
@@ -62,16 +62,16 @@ def estimate_transfer(recordings: Sequence[Recording], settings: EstimateSetting
     rate_hz = recordings[0].sample_rate_hz
     parts = []
     for frequency_hz, experiments in _group_by_lines(experiment_set.experiments, rate_hz):
-        rest_density = rest_floor(recordings, frequency_hz)
+        rest_density = estimate_rest_density(recordings, frequency_hz)
         parts.append(solve_shared_lines(experiments, frequency_hz, rest_density, settings.noise_lines))
     return _join_parts([part for part in parts if len(part.frequency_hz)], recordings, experiment_set, settings)
 
 
 def _collect_experiments(recordings: Sequence[Recording], settings: EstimateSettings) -> ExperimentSet:
     """Periodic experiments or, where there are none, windows, with remarks on the quality of the estimate."""
-    experiment_set = periodic_experiments(recordings)
+    experiment_set = collect_periodic_experiments(recordings)
     if not experiment_set.experiments:
-        experiment_set = window_experiments(recordings, settings.window_s)
+        experiment_set = collect_window_experiments(recordings, settings.window_s)
     remarks = list(experiment_set.remarks)
     if (
         experiment_set.experiments
@@ -119,7 +119,7 @@ def _select_lines(experiment: Experiment, lines: np.ndarray[tuple[int], np.dtype
         experiment.command[:, lines],
         experiment.response[:, lines],
         experiment.instrument[:, lines],
-        experiment.borrowed,
+        experiment.replaced_share,
     )
 
 

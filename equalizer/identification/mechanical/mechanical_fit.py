@@ -24,7 +24,7 @@ from equalizer.identification.mechanical.mechanical_fit_result import (
     MechanicalFitSettings,
     OrderCandidate,
 )
-from equalizer.identification.mechanical.mechanical_free_simulation import simulation_errors
+from equalizer.identification.mechanical.mechanical_free_simulation import compute_simulation_errors
 from equalizer.identification.mechanical.mechanical_lines import (
     SegmentLines,
     compute_segment_lines,
@@ -178,9 +178,9 @@ def _compute_channel_errors(
 ) -> tuple[ChannelError, ...]:
     """Errors per channel; the last entry is over all channels. Raises MechanicalFitRefused where nothing is
     explained."""
-    error, noise = simulation_errors(model, fitted, band)
+    error, noise = compute_simulation_errors(model, fitted, band)
     refuse_noise(error, channels)
-    test_error = simulation_errors(model, tested, band)[0] if tested else None
+    test_error = compute_simulation_errors(model, tested, band)[0] if tested else None
     return tuple(
         ChannelError(
             channel,
@@ -252,7 +252,7 @@ def _refit(
 ) -> RefinedFit[Structure] | RefinedFit[ModalStructure]:
     """The chosen structure fitted to all lines, from the parameters of the search."""
     if isinstance(best.structure, ModalStructure):
-        return balance_fit(refine_unknowns(groups, best.structure, best.unknowns, band, most_steps=6))
+        return balance_fit(refine_unknowns(groups, best.structure, best.unknowns, band, max_evaluations=6))
     return refine_unknowns(groups, best.structure, best.unknowns, band)
 
 

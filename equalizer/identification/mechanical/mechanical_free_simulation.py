@@ -14,48 +14,60 @@ from equalizer.identification.mechanical.mechanical_response import compute_free
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-_STATE_LINES = 3000
+_MAX_FITTED_LINES = 3000
 """Approximate number of lines to which the initial state is fitted; more are thinned out to limit computing time."""
 
 
-def simulation_errors(
+def compute_simulation_errors(
     model: MechanicalModel, segments: Sequence[SegmentLines], band_hz: tuple[float, float]
 ) -> tuple[FloatArray, FloatArray]:
-    """Two arrays (p + 1,): rms error, and rms noise (NaN where not known), of each channel relative to the rms of its
-    response; the last entry is the root mean square over the channels. band_hz: ends included."""
+    """Compute two arrays (p + 1,): rms error, and rms noise (NaN where not known), of each channel relative to the rms
+    of its response; the last entry is the root mean square over the channels. band_hz: ends included."""
     p = model.outputs
-    error, power, noise = np.zeros(p), np.zeros(p), np.zeros(p)
+    error_power, response_power, noise_power = np.zeros(p), np.zeros(p), np.zeros(p)
     for segment in segments:
         in_band = (segment.frequency_hz >= band_hz[0]) & (segment.frequency_hz <= band_hz[1])
-        misfit = simulation_misfit(model, segment)[in_band]
-        error += (np.abs(misfit) ** 2).sum(axis=0)
-        power += (np.abs(segment.response[in_band]) ** 2).sum(axis=0)
-        noise += segment.noise[in_band].sum(axis=0)
-    shares, floor = error / np.maximum(power, 1e-300), noise / np.maximum(power, 1e-300)
+        misfit = compute_simulation_misfit(model, segment)[in_band]
+        error_power += (np.abs(misfit) ** 2).sum(axis=0)
+        response_power += (np.abs(segment.response[in_band]) ** 2).sum(axis=0)
+        noise_power += segment.noise[in_band].sum(axis=0)
+    error_shares, noise_shares = (
+        error_power / np.maximum(response_power, 1e-300),
+        noise_power / np.maximum(response_power, 1e-300),
+    )
     return (
-        np.sqrt(np.append(shares, shares.mean())),
-        np.sqrt(np.append(floor, floor.mean())),
+        np.sqrt(np.append(error_shares, error_shares.mean())),
+        np.sqrt(np.append(noise_shares, noise_shares.mean())),
     )
 
 
-def simulation_misfit(model: MechanicalModel, segment_lines: SegmentLines) -> ComplexArray:
+def compute_simulation_misfit(model: MechanicalModel, segment_lines: SegmentLines) -> ComplexArray:
     """(lines, p): measured minus simulated spectrum, in the response's unit, with the best-fitting initial state where
     the segment has a transient."""
-    response = compute_sampled_response(model, segment_lines.frequency_hz, segment_lines.rate_hz, segment_lines.hold)
-    misfit = segment_lines.response - np.einsum("lpm,lm->lp", response, segment_lines.command)
+    frequency_response = compute_sampled_response(
+        model, segment_lines.frequency_hz, segment_lines.rate_hz, segment_lines.hold
+    )
+    misfit = segment_lines.response - np.einsum("lpm,lm->lp", frequency_response, segment_lines.command)
     if not segment_lines.transient:
         return np.asarray(misfit)
-    free = compute_free_response(model, segment_lines.frequency_hz, segment_lines.rate_hz)
+    free_response = compute_free_response(model, segment_lines.frequency_hz, segment_lines.rate_hz)
     if model.quantity == "acceleration":  # the last command before the segment acts directly on the first response
-        feedthrough = np.broadcast_to(np.eye(model.outputs), (len(free), model.outputs, model.outputs))
-        free = np.concatenate([free, feedthrough], axis=2)
-    stride = max(1, len(free) // _STATE_LINES)
+        feedthrough = np.broadcast_to(np.eye(model.outputs), (len(free_response), model.outputs, model.outputs))
+        free_response = np.concatenate([free_response, feedthrough], axis=2)
+    stride = max(1, len(free_response) // _MAX_FITTED_LINES)
     # The initial state contributes mostly at low frequencies: the first 200 lines are all kept, the others thinned out.
-    fitted_lines = np.unique(np.concatenate([np.arange(min(200, len(free))), np.arange(0, len(free), stride)]))
-    size = np.linalg.norm(segment_lines.response, axis=0)[:, None] + 1e-300
-    columns = (free[fitted_lines] / size).reshape(-1, free.shape[2])
-    target = (misfit[fitted_lines] / size[:, 0]).ravel()
-    real = np.concatenate([columns.real, columns.imag])
-    scale = np.maximum(np.linalg.norm(real, axis=0), 1e-300)
-    state = np.linalg.lstsq(real / scale, np.concatenate([target.real, target.imag]), rcond=1e-10)[0] / scale
-    return np.asarray(misfit - free @ state)
+    fitted_lines = np.unique(
+        np.concatenate([np.arange(min(200, len(free_response))), np.arange(0, len(free_response), stride)])
+    )
+    response_norm = np.linalg.norm(segment_lines.response, axis=0)[:, None] + 1e-300
+    weighted_response = (free_response[fitted_lines] / response_norm).reshape(-1, free_response.shape[2])
+    weighted_misfit = (misfit[fitted_lines] / response_norm[:, 0]).ravel()
+    real_matrix = np.concatenate([weighted_response.real, weighted_response.imag])
+    column_norms = np.maximum(np.linalg.norm(real_matrix, axis=0), 1e-300)
+    initial_state = (
+        np.linalg.lstsq(
+            real_matrix / column_norms, np.concatenate([weighted_misfit.real, weighted_misfit.imag]), rcond=1e-10
+        )[0]
+        / column_norms
+    )
+    return np.asarray(misfit - free_response @ initial_state)

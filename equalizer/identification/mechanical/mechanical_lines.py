@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from equalizer.identification.frequency_response.frequency_response import BoolArray
-from equalizer.identification.frequency_response.noise_floor import period_variance, smooth_over_lines
+from equalizer.identification.frequency_response.noise_floor import compute_period_variance, smooth_over_lines
 from equalizer.signals.recording import Hold, Recording, Segment
 from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.signals.spectral_density import compute_line_spectra
@@ -102,7 +102,7 @@ def compute_segment_lines(recording: Recording, segment: Segment) -> SegmentLine
         return None
     command, response = (spectrum.mean(axis=0) for spectrum in spectra)
     if len(starts) > 1:
-        noise = smooth_over_lines(period_variance(spectra[1]), _SMOOTHED_LINES) / len(starts)
+        noise = smooth_over_lines(compute_period_variance(spectra[1]), _SMOOTHED_LINES) / len(starts)
     else:
         noise = estimate_local_noise(command, response)
     if transient:  # a line without power between excited lines counts as excited too

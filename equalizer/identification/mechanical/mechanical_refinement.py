@@ -37,7 +37,7 @@ class RefinedFit(Generic[S]):
     """Sum of squares of the held-out lines' misfits."""
     held_out_count: int
     """Number of misfits in that sum."""
-    slope: FloatArray
+    jacobian: FloatArray
     """Jacobian at the solution, (2 n, parameters): real, then imaginary parts of the n complex misfits."""
 
     @property
@@ -51,20 +51,21 @@ def refine_unknowns(
     structure: S,
     start: FloatArray,
     band_hz: tuple[float, float],
-    most_steps: int = 40,
+    max_evaluations: int = 40,
 ) -> RefinedFit[S]:
-    """Refine unknowns from a start (parameters,). band_hz: fitted band, which sets the bounds. most_steps: maximum
-    number of evaluations. Raises MechanicalModelError where the start is not a valid model."""
+    """Refine unknowns from a start (parameters,), which is first moved within the bounds. band_hz: fitted band, which
+    sets the bounds. max_evaluations: of the residuals, without those for the Jacobian. Raises MechanicalModelError
+    where the start is not a valid model."""
     # Imported here: a diagnosis that fits no model does not need SciPy's optimiser.
     from scipy.optimize import least_squares
 
     fitted = [group.exclude_held_out() for group in groups]
-    low, high = structure.compute_bounds(band_hz)
+    lower_bounds, upper_bounds = structure.compute_bounds(band_hz)
 
-    start = np.clip(start, low + 1e-9, high - 1e-9)
+    start = np.clip(start, lower_bounds + 1e-9, upper_bounds - 1e-9)
     start_residuals = stack_real(compute_misfits(fitted, structure.build_model(start)))
 
-    def residuals(unknowns: FloatArray) -> FloatArray:
+    def compute_residuals(unknowns: FloatArray) -> FloatArray:
         try:
             stacked = stack_real(compute_misfits(fitted, structure.build_model(unknowns)))
         except (np.linalg.LinAlgError, MechanicalModelError):
@@ -72,22 +73,24 @@ def refine_unknowns(
         return stacked if np.isfinite(stacked).all() else np.full_like(start_residuals, 1e6)
 
     solution = least_squares(
-        residuals,
+        compute_residuals,
         start,
-        jac=lambda unknowns: compute_numerical_jacobian(residuals, unknowns, residuals(unknowns), high),
-        bounds=(low, high),
+        jac=lambda unknowns: compute_numerical_jacobian(
+            compute_residuals, unknowns, compute_residuals(unknowns), upper_bounds
+        ),
+        bounds=(lower_bounds, upper_bounds),
         method="trf",
         x_scale="jac",
-        max_nfev=most_steps,
+        max_nfev=max_evaluations,
         ftol=1e-6,
         xtol=1e-7,
     )
-    held_out, count = _held_out_squares(groups, structure.build_model(solution.x))
-    return RefinedFit(structure, solution.x, 2 * float(solution.cost), held_out, count, solution.jac)
+    held_out_squares, count = _sum_held_out_squares(groups, structure.build_model(solution.x))
+    return RefinedFit(structure, solution.x, 2 * float(solution.cost), held_out_squares, count, solution.jac)
 
 
-def _held_out_squares(groups: Sequence[LineGroup], model: MechanicalModel) -> tuple[float, int]:
+def _sum_held_out_squares(groups: Sequence[LineGroup], model: MechanicalModel) -> tuple[float, int]:
     """Sum of squares of the held-out lines' misfits, and number of misfits in it."""
-    pairs = list(zip(groups, compute_misfits(groups, model), strict=True))
-    squares = sum(np.sum(np.abs(misfit[group.held_out]) ** 2) for group, misfit in pairs)
+    group_misfits = list(zip(groups, compute_misfits(groups, model), strict=True))
+    squares = sum(np.sum(np.abs(misfit[group.held_out]) ** 2) for group, misfit in group_misfits)
     return float(squares), int(sum(group.count[group.held_out].sum() for group in groups))

@@ -58,7 +58,7 @@ def choose_modes(
         if delayed.held_out_squares < (DELAY_RATIO if has_fewer_modes else 1 - LEAST_GAIN) * best.held_out_squares:
             best, reason = delayed, delayed_reason
     modal, unknowns = _split_into_rank_one_modes(best, structure)
-    return balance_fit(refine_unknowns(groups, modal, unknowns, band_hz, most_steps=10)), tuple(trials), reason
+    return balance_fit(refine_unknowns(groups, modal, unknowns, band_hz, max_evaluations=10)), tuple(trials), reason
 
 
 def _add_modes(
@@ -90,7 +90,7 @@ def _compute_held_out_error(estimate: ModeEstimate) -> float:
 def balance_fit(fit: RefinedFit[ModalStructure]) -> RefinedFit[ModalStructure]:
     """The same fit with the factors of `find_balancing_factors` on its unknowns; every response is unchanged."""
     factors = find_balancing_factors(fit.structure, fit.unknowns)
-    return replace(fit, unknowns=fit.unknowns * factors, slope=fit.slope / factors)
+    return replace(fit, unknowns=fit.unknowns * factors, jacobian=fit.jacobian / factors)
 
 
 def _split_into_rank_one_modes(modes: ModeEstimate, structure: Structure) -> tuple[ModalStructure, FloatArray]:

@@ -78,7 +78,7 @@ def _list_axis_values(structure: Structure, unknowns: FloatArray) -> FloatArray:
 def _compute_covariance(fit: AnyFit) -> FloatArray:
     """Covariance of the unknowns (parameters, parameters). Columns of the Jacobian are scaled to length 1; the
     pseudo-inverse truncates directions that the data do not determine (singular values of J'J below 1e-10)."""
-    jacobian = fit.slope
+    jacobian = fit.jacobian
     column_norms = np.maximum(np.linalg.norm(jacobian, axis=0), 1e-300)
     inverse = np.linalg.pinv((jacobian / column_norms).T @ (jacobian / column_norms), rcond=1e-10)
     residual_variance = fit.squares / max(len(jacobian) - jacobian.shape[1], 1)

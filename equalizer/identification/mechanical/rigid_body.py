@@ -11,6 +11,7 @@ stronger level and d2 at the weaker, and r > 1 the ratio of the commands, the da
     c = (d2 - d1) / (r - 1)
 
 Reference: Gelb and Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design (1968), chapter 2.
+Called by `study.workflows.diagnosis.write_twin`.
 """
 
 from collections.abc import Sequence
@@ -28,7 +29,7 @@ from equalizer.signals.signal import FloatArray
 RIGID_OCTAVES = 3.0
 """Width in octaves of the lowest part of the band, in which the device moves as a rigid body and friction matters
 most. Chosen by hand."""
-LEAST_MASS, LEAST_DAMPING = 0.02, 0.05
+LEAST_MASS_TOLERANCE, LEAST_DAMPING_TOLERANCE = 0.02, 0.05
 """Smallest tolerances of mass and damping, relative to the largest value of all axes. Chosen by hand: about as well as
 a laboratory knows them."""
 FRICTION_TOLERANCE = 0.2
@@ -36,7 +37,7 @@ FRICTION_TOLERANCE = 0.2
 by hand."""
 LARGEST_REMOVED_SHARE = 0.8
 """Largest share of the fitted damping that is subtracted, so that a damping above zero remains. Chosen by hand."""
-LEAST_STIFFNESS = 0.03
+LEAST_STIFFNESS_TOLERANCE = 0.03
 """Smallest tolerance of the stiffness, relative to the inertial force per displacement, m (2 pi f)², at the lower end f
 of the band: a weaker spring does not show in the fit. Chosen by hand."""
 
@@ -51,7 +52,7 @@ class RigidBody:
     """kg"""
     damping: FloatArray
     """N s/m, as fitted: it contains the equivalent damping of friction."""
-    of_friction: FloatArray
+    friction_damping: FloatArray
     """N s/m, equivalent damping c of friction at the stronger level, to be subtracted from `damping`."""
     tolerance: Tolerance
     """Tolerance of the whole model without the equivalent damping."""
@@ -60,49 +61,54 @@ class RigidBody:
 def fit_rigid_body(
     fit: MechanicalFit, stronger: Recording, weaker: Recording, settings: MechanicalFitSettings
 ) -> RigidBody:
-    """Rigid fits of two recordings of the same device, at a stronger and a weaker level of the excitation. fit: that of
-    the whole band, whose tolerances are kept where they are wider. settings: of `fit`. Raises MechanicalFitRefused
-    where a recording does not determine a rigid body."""
-    low, high = fit.band_hz
-    up_to_hz = min(high, low * 2**RIGID_OCTAVES)
-    rigid = replace(
-        settings, band_hz=(low, up_to_hz), most_modes=0, joint=False, fit_delay=False, sensors_elsewhere=False
+    """Fit a rigid body to two recordings of the same device, at a stronger and a weaker level of the excitation, and
+    compute the equivalent damping of friction from their difference (limited to 0 to `LARGEST_REMOVED_SHARE` of the
+    damping). fit: that of the whole band, whose tolerances are kept where they are wider. settings: of `fit`. Raises
+    MechanicalFitRefused where a recording does not determine a rigid body."""
+    low_hz, high_hz = fit.band_hz
+    up_to_hz = min(high_hz, low_hz * 2**RIGID_OCTAVES)
+    rigid_settings = replace(
+        settings, band_hz=(low_hz, up_to_hz), most_modes=0, joint=False, fit_delay=False, sensors_elsewhere=False
     )
-    ratio = _amplitude(stronger) / _amplitude(weaker)
-    at_strong, at_weaker = (
-        _axis_values(fit_mechanical_model([recording], rigid).model) for recording in (stronger, weaker)
+    level_ratio = _find_largest_amplitude(stronger) / _find_largest_amplitude(weaker)
+    stronger_values, weaker_values = (
+        _extract_axis_parameters(fit_mechanical_model([recording], rigid_settings).model)
+        for recording in (stronger, weaker)
     )
-    mass, damping, _ = at_strong
-    of_friction = np.clip((at_weaker[1] - damping) / max(ratio - 1, 1e-3), 0.0, LARGEST_REMOVED_SHARE * damping)
+    mass, damping, _ = stronger_values
+    friction_damping = np.clip(
+        (weaker_values[1] - damping) / max(level_ratio - 1, 1e-3), 0.0, LARGEST_REMOVED_SHARE * damping
+    )
     fitted_tolerance = fit.model.tolerance or Tolerance()
-    heaviest = float(mass.max())
+    largest_mass = float(mass.max())
     tolerance = Tolerance(
-        mass_kg=max(LEAST_MASS * heaviest, fitted_tolerance.mass_kg or 0.0),
+        mass_kg=max(LEAST_MASS_TOLERANCE * largest_mass, fitted_tolerance.mass_kg or 0.0),
         damping_n_s_per_m=max(
-            FRICTION_TOLERANCE * float(of_friction.max()),
-            LEAST_DAMPING * float(damping.max()),
+            FRICTION_TOLERANCE * float(friction_damping.max()),
+            LEAST_DAMPING_TOLERANCE * float(damping.max()),
             fitted_tolerance.damping_n_s_per_m or 0.0,
         ),
         stiffness_n_per_m=max(
-            LEAST_STIFFNESS * heaviest * (2 * np.pi * low) ** 2, fitted_tolerance.stiffness_n_per_m or 0.0
+            LEAST_STIFFNESS_TOLERANCE * largest_mass * (2 * np.pi * low_hz) ** 2,
+            fitted_tolerance.stiffness_n_per_m or 0.0,
         ),
         modes=fitted_tolerance.modes,
     )
-    return RigidBody(up_to_hz, mass, damping, of_friction, tolerance)
+    return RigidBody(up_to_hz, mass, damping, friction_damping, tolerance)
 
 
-def remove_friction_damping(model: MechanicalModel, of_friction: FloatArray) -> MechanicalModel:
-    """The model without friction's equivalent damping. of_friction: (m,), N s/m at each driven axis."""
+def remove_friction_damping(model: MechanicalModel, friction_damping: FloatArray) -> MechanicalModel:
+    """The model without friction's equivalent damping. friction_damping: (m,), N s/m at each driven axis."""
     axes = compute_driven_axes(model)
-    return replace(model, damping=model.damping - (axes * of_friction) @ axes.T)
+    return replace(model, damping=model.damping - (axes * friction_damping) @ axes.T)
 
 
-def _axis_values(model: MechanicalModel) -> FloatArray:
+def _extract_axis_parameters(model: MechanicalModel) -> FloatArray:
     """(3, m): mass, damping and stiffness at each driven axis, which are the first m coordinates of a fitted model."""
-    parts: Sequence[FloatArray] = (model.mass, model.damping, model.stiffness)
-    return np.array([np.diag(part)[: model.inputs] for part in parts])
+    matrices: Sequence[FloatArray] = (model.mass, model.damping, model.stiffness)
+    return np.array([np.diag(matrix)[: model.inputs] for matrix in matrices])
 
 
-def _amplitude(recording: Recording) -> float:
-    """Largest amplitude of a recording's excitation, in the command's unit."""
+def _find_largest_amplitude(recording: Recording) -> float:
+    """Largest amplitude of a recording's segments, in the command's unit. Raises ValueError without segments."""
     return max(segment.amplitude for segment in recording.segments)

@@ -1,7 +1,7 @@
 """Uncertainty of an identified model by a parametric bootstrap: the model is refitted to its own response plus random
 noise with the lines' standard errors, once for each draw.
 
-Reference: Efron and Tibshirani, An Introduction to the Bootstrap (1993), chapter 6.
+Reference: Efron and Tibshirani, An Introduction to the Bootstrap (1993), chapter 6. Called by `identify`.
 """
 
 from dataclasses import replace
@@ -18,13 +18,13 @@ from equalizer.signals.signal import FloatArray
 
 BAND_POINTS = 200
 """Number of equally spaced frequencies of the integral over the band."""
-WIDTHS = np.sinh(np.linspace(-4, 4, 41))
+PEAK_OFFSETS = np.sinh(np.linspace(-4, 4, 41))
 """Distances of frequencies from a slow pole, in half-widths of its peak: dense at the peak, up to 27."""
-STEPS = 3
+REFIT_STEPS = 3
 """Levenberg-Marquardt steps of each refit: a draw of the noise moves the minimum little."""
 
 
-def parameter_draws(
+def draw_bootstrap_parameters(
     fitted: FittedForm, lines: WeightedLines, radius: Radius, noise_factor: float, draws: int, seed: int
 ) -> FloatArray:
     """Parametric bootstrap (draws, k), in the order of `IdentifiedModel.parameters`; each row is a fit to another draw
@@ -35,37 +35,45 @@ def parameter_draws(
     on some directions of the parameters only beyond first order, and normally distributed draws would be unstable
     models. Refitting keeps every draw within the decay bound.
     """
-    random = np.random.default_rng(seed)
+    generator = np.random.default_rng(seed)
     modelled = fitted.compute_response(lines.z)
-    deviation = noise_factor / lines.weight / np.sqrt(2)
-    rows = []
+    noise_deviation = noise_factor / lines.weight / np.sqrt(2)
+    refitted_parameters = []
     for _ in range(draws):
-        real, imaginary = random.standard_normal((2, *modelled.shape))
-        noisy = replace(lines, response=modelled + deviation * (real + 1j * imaginary))
-        refit = refine(fitted.form, noisy, radius, STEPS)
-        parts = (refit.form.state_matrix, refit.B, refit.form.C, refit.D)
-        rows.append(np.concatenate([part.ravel() for part in parts]))
-    return np.array(rows)
+        real, imaginary = generator.standard_normal((2, *modelled.shape))
+        noisy_lines = replace(lines, response=modelled + noise_deviation * (real + 1j * imaginary))
+        refit = refine(fitted.form, noisy_lines, radius, REFIT_STEPS)
+        matrices = (refit.form.state_matrix, refit.B, refit.form.C, refit.D)
+        refitted_parameters.append(np.concatenate([matrix.ravel() for matrix in matrices]))
+    return np.array(refitted_parameters)
 
 
-def response_deviation(model: IdentifiedModel, frequency_hz: FloatArray) -> FloatArray:
+def estimate_response_deviation(model: IdentifiedModel, frequency_hz: FloatArray) -> FloatArray:
     """Standard error of each entry of the response, (lines, p, m): rms deviation of the model's samples from the model.
     Raises ValueError for a model without samples."""
     if model.samples is None:
         raise ValueError("the model contains no samples of its uncertainty; identify it again with draws > 0")
-    middle = model_response(model, frequency_hz)
-    squares = [np.abs(model_response(model.with_parameters(row), frequency_hz) - middle) ** 2 for row in model.samples]
-    return np.asarray(np.sqrt(np.mean(squares, axis=0)), dtype=np.float64)
+    nominal_response = model_response(model, frequency_hz)
+    squared_deviations = [
+        np.abs(model_response(model.with_parameters(parameters), frequency_hz) - nominal_response) ** 2
+        for parameters in model.samples
+    ]
+    return np.asarray(np.sqrt(np.mean(squared_deviations, axis=0)), dtype=np.float64)
 
 
-def scatter_of_draws(model: IdentifiedModel, frequency_hz: FloatArray, slow: tuple[SlowPole, ...]) -> float | None:
-    """Rms standard error of the response over the band, relative to the response's rms; None without samples. The grid
-    is finer about slow poles, because a narrow resonance may have its peak between two lines."""
+def compute_relative_deviation(
+    model: IdentifiedModel, frequency_hz: FloatArray, slow_poles: tuple[SlowPole, ...]
+) -> float | None:
+    """Rms standard error of the response over the band, relative to the response's rms; None without samples or with
+    fewer than two lines. frequency_hz: (lines,), rising; the band is from the first to the last. The grid is finer
+    about slow poles, because a narrow resonance may have its peak between two lines."""
     if model.samples is None or len(frequency_hz) < 2:
         return None
-    low, high = frequency_hz[0], frequency_hz[-1]
-    peaks = [pole.frequency_hz + WIDTHS / (2 * np.pi * pole.decay_s) for pole in slow]
-    grid = np.unique(np.clip(np.concatenate([np.linspace(low, high, BAND_POINTS), *peaks]), low, high))
-    spacing_hz = np.gradient(grid)[:, None, None]
-    size = np.sqrt((spacing_hz * np.abs(model_response(model, grid)) ** 2).sum())
-    return float(np.sqrt((spacing_hz * response_deviation(model, grid) ** 2).sum()) / size)
+    low_hz, high_hz = frequency_hz[0], frequency_hz[-1]
+    peak_frequencies_hz = [pole.frequency_hz + PEAK_OFFSETS / (2 * np.pi * pole.decay_s) for pole in slow_poles]
+    grid_hz = np.unique(
+        np.clip(np.concatenate([np.linspace(low_hz, high_hz, BAND_POINTS), *peak_frequencies_hz]), low_hz, high_hz)
+    )
+    spacing_hz = np.gradient(grid_hz)[:, None, None]
+    response_norm = np.sqrt((spacing_hz * np.abs(model_response(model, grid_hz)) ** 2).sum())
+    return float(np.sqrt((spacing_hz * estimate_response_deviation(model, grid_hz) ** 2).sum()) / response_norm)

@@ -22,7 +22,11 @@ from equalizer.identification.state_space.modal_form import ModalForm
 from equalizer.identification.state_space.refinement import FittedForm, complete_form, refine
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.identification.state_space.stable_poles import Radius, compute_pole_radius
-from equalizer.identification.state_space.warped_subspace import default_horizon, estimate_subspace, poles_and_shapes
+from equalizer.identification.state_space.warped_subspace import (
+    choose_horizon,
+    estimate_subspace,
+    extract_poles_and_shapes,
+)
 from equalizer.identification.state_space.weighted_lines import (
     WeightedLines,
     average_bins,
@@ -84,9 +88,9 @@ def estimate_subspace_start(lines: WeightedLines, settings: IdentificationSettin
     """Starting model by frequency-domain subspace identification with a warped frequency axis. extra_rows: block rows
     beyond the shortest useful horizon."""
     radius = compute_pole_radius(settings.decay_s, lines.sample_rate_hz)
-    horizon = default_horizon(settings.order, lines.response.shape[1]) + extra_rows
+    horizon = choose_horizon(settings.order, lines.response.shape[1]) + extra_rows
     subspace = estimate_subspace(lines, horizon, settings.centre_hz)
-    return Start(f"warped subspace, horizon {horizon}", poles_and_shapes(subspace, settings.order, radius))
+    return Start(f"warped subspace, horizon {horizon}", extract_poles_and_shapes(subspace, settings.order, radius))
 
 
 def estimate_record_starts(

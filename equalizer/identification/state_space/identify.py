@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
-from equalizer.identification.state_space.bootstrap import parameter_draws, scatter_of_draws
+from equalizer.identification.state_space.bootstrap import compute_relative_deviation, draw_bootstrap_parameters
 from equalizer.identification.state_space.candidates import (
     Candidate,
     Start,
@@ -36,8 +36,8 @@ from equalizer.identification.state_space.candidates import (
     estimate_subspace_starts,
     refine_start,
 )
-from equalizer.identification.state_space.misfit import Misfit, count_unknowns, misfit_of
-from equalizer.identification.state_space.misfit_causes import UNEXPLAINED, fit_remarks
+from equalizer.identification.state_space.misfit import Misfit, compute_misfit, count_unknowns
+from equalizer.identification.state_space.misfit_causes import UNEXPLAINED_COST, describe_misfit_causes
 from equalizer.identification.state_space.refusals import IdentificationRefused, require_lines
 from equalizer.identification.state_space.relaxed_poles import (
     RelaxedFit,
@@ -180,7 +180,7 @@ def _search_spare_horizons(
     noise."""
     candidates: list[Candidate] = []
     for extra_rows in settings.spare_horizons if settings.wide else ():
-        if choose_best([best_so_far, *candidates]).cost <= UNEXPLAINED:
+        if choose_best([best_so_far, *candidates]).cost <= UNEXPLAINED_COST:
             break
         candidates.append(refine_start(estimate_subspace_start(lines, settings, extra_rows), lines, settings))
     return candidates
@@ -203,14 +203,14 @@ def _assess_model(
     modelled = chosen.fitted.compute_response(lines.z)
     relative_error = lines.compute_relative_error(modelled)[in_band]
     relaxed_poles = () if settings.longest_decay_s else list_slow_poles(chosen, settings.decay_s, lines.sample_rate_hz)
-    misfit = misfit_of(lines, modelled, in_band, unknowns)
+    misfit = compute_misfit(lines, modelled, in_band, unknowns)
     model = _make_model(chosen, lines, cost, response, settings, relaxed_poles)
     return Identified(
         model=model,
         cost=cost,
         rms_relative_error=float(np.sqrt((relative_error**2).mean())),
         worst_relative_error=float(relative_error.max()),
-        scatter=(scatter := scatter_of_draws(model, lines.frequency_hz[in_band], relaxed_poles)),
+        scatter=(scatter := compute_relative_deviation(model, lines.frequency_hz[in_band], relaxed_poles)),
         misfit=misfit,
         expected_error=None if scatter is None else float(np.hypot(scatter, misfit.upper_bound)),
         lines=int(in_band.sum()),
@@ -219,7 +219,7 @@ def _assess_model(
         relaxed=relaxed_poles,
         bound_costs=relaxed_fit.bound_costs,
         remarks=(
-            *fit_remarks(cost, misfit, relaxed_poles, relaxed_fit.bound_costs, settings),
+            *describe_misfit_causes(cost, misfit, relaxed_poles, relaxed_fit.bound_costs, settings),
             *write_outside_gain_remark(chosen),
         ),
     )
@@ -262,7 +262,7 @@ def _make_model(
     if settings.draws:
         noise_factor = float(np.sqrt(max(cost, 1.0)))
         bins = average_about_model(fitted, lines, settings)
-        samples = parameter_draws(fitted, bins, chosen.radius, noise_factor, settings.draws, settings.seed)
+        samples = draw_bootstrap_parameters(fitted, bins, chosen.radius, noise_factor, settings.draws, settings.seed)
     return IdentifiedModel(
         A=fitted.form.state_matrix,
         B=fitted.B,

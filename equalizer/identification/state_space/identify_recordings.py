@@ -4,13 +4,13 @@ scatter more than their noise."""
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from equalizer.identification.frequency_response.experiments import periodic_experiments
+from equalizer.identification.frequency_response.experiments import collect_periodic_experiments
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.local_polynomial import smooth_response
 from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
 from equalizer.identification.state_space.identify import Identified, identify, write_outside_gain_remark
-from equalizer.identification.state_space.misfit import misfit_of_estimate
-from equalizer.identification.state_space.misfit_causes import UNEXPLAINED, fit_remarks
+from equalizer.identification.state_space.misfit import compute_estimate_misfit
+from equalizer.identification.state_space.misfit_causes import UNEXPLAINED_COST, describe_misfit_causes
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.identification.state_space.settled_recordings import slow_part, subtract_free_decay
 from equalizer.identification.state_space.stable_poles import compute_pole_radius
@@ -74,7 +74,7 @@ def _fit_estimate(
         return _fit_smoothed(estimate, recordings, settings, None, report)
     identified = identify(estimate, settings, recordings, lambda share: report(share / 2))
     estimate, identified = _remove_transients(estimate, identified, recordings, settings)
-    if smooth is False or (smooth is None and identified.cost <= UNEXPLAINED):
+    if smooth is False or (smooth is None and identified.cost <= UNEXPLAINED_COST):
         report(1.0)
         return IdentifiedRecordings(estimate, estimate, identified)
     return _fit_smoothed(estimate, recordings, settings, identified, lambda share: report(0.5 + share / 2))
@@ -86,10 +86,10 @@ def _add_causes(
     """Add the causes of the misfit, judged on the lines themselves: residuals of local averages are always smooth,
     because neighbours share their lines."""
     identified, averaged = result.identified, result.fitted is not result.estimate
-    misfit = misfit_of_estimate(identified.model, result.estimate) if averaged else identified.misfit
+    misfit = compute_estimate_misfit(identified.model, result.estimate) if averaged else identified.misfit
     misfit = misfit if has_repeats else replace(misfit, smooth=None)
     cost = misfit.cost if averaged else identified.cost
-    causes = fit_remarks(cost, misfit, identified.relaxed, identified.bound_costs, settings)
+    causes = describe_misfit_causes(cost, misfit, identified.relaxed, identified.bound_costs, settings)
     remarks = (*([SMOOTHED] if averaged else []), *causes, *write_outside_gain_remark(identified.chosen))
     return replace(result, identified=replace(identified, misfit=misfit, remarks=remarks))
 
@@ -101,7 +101,7 @@ def _has_repeats(recordings: Sequence[Recording]) -> bool:
     relaxed on their evidence. Noise estimated from the scatter of the lines does not reveal the cause of a misfit
     either.
     """
-    experiment_set = periodic_experiments(recordings)
+    experiment_set = collect_periodic_experiments(recordings)
     return bool(experiment_set.experiments) and all(experiment.periods > 1 for experiment in experiment_set.experiments)
 
 

@@ -14,12 +14,12 @@ from equalizer.identification.frequency_response.frequency_response import Frequ
 from equalizer.identification.state_space.candidates import choose_best, estimate_subspace_starts, refine_start
 from equalizer.identification.state_space.refusals import require_lines
 from equalizer.identification.state_space.settings import IdentificationSettings
-from equalizer.identification.state_space.warped_subspace import default_horizon, estimate_subspace
+from equalizer.identification.state_space.warped_subspace import choose_horizon, estimate_subspace
 from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.signals.signal import FloatArray
 
-VISIBLE = 2.0
-"""Ratio to the noise above which a singular value counts as a state. By hand."""
+VISIBLE_RATIO = 2.0
+"""Ratio to the noise above which a singular value counts as a state. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,8 @@ class OrderRow:
     held_out_cost: float
     """Squared error over noise variance on held-out lines: 1 plus the contribution of the model error."""
     held_out_error: float
-    """Rms error on held-out lines relative to the rms response (`WeightedLines.relative_error`); noise included."""
+    """Rms error on held-out lines relative to the rms response (`WeightedLines.compute_relative_error`); noise
+    included."""
     multiply_adds_per_tick: int
     """Multiplications for one step of the state and one output, with poles in blocks of two."""
     dense_multiply_adds_per_tick: int
@@ -39,12 +40,12 @@ class OrderRow:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OrderReport:
-    """Comparison of model orders, as made by `compare_orders`."""
+    """Comparison of model orders; result of `compare_orders`."""
 
     singular_values: FloatArray
     """Singular values of the whitened data, largest first: about 1 where there is only noise."""
     visible_order: int
-    """Number of singular values above `VISIBLE`."""
+    """Number of singular values above `VISIBLE_RATIO`."""
     rows: tuple[OrderRow, ...]
     """Orders tried, rising."""
     held_out_noise: float
@@ -59,68 +60,71 @@ def compare_orders(
     orders: Sequence[int] = (10, 14, 16, 20, 26),
     on_progress: Callable[[float], None] | None = None,
 ) -> OrderReport:
-    """Fit every order to every second line and test it on the others. Raises IdentificationRefused where there are too
-    few lines for the highest order."""
+    """Fit every order to every second line and test it on the others. on_progress: called with the share done, 0 to 1.
+    Raises IdentificationRefused where there are too few lines for the highest order."""
     settings = settings or IdentificationSettings()
-    report = on_progress or (lambda _: None)
+    report_progress = on_progress or (lambda _: None)
     responses = (response,) if isinstance(response, FrequencyResponse) else tuple(response)
-    highest = replace(settings, order=max(orders))
+    top_settings = replace(settings, order=max(orders))
     fit, test = (
-        require_lines([estimate.select_lines(_alternate_lines(estimate, k)) for estimate in responses], highest)
+        require_lines([estimate.select_lines(_mask_lines(estimate, k)) for estimate in responses], top_settings)
         for k in (0, 1)
     )
-    per_line = []
+    line_costs = []
     rows = []
-    for number, order in enumerate(sorted(orders)):
-        report(number / len(orders))
-        at_order = replace(settings, order=order)
-        best = choose_best([refine_start(start, fit, at_order) for start in estimate_subspace_starts(fit, at_order)])
+    for index, order in enumerate(sorted(orders)):
+        report_progress(index / len(orders))
+        trial = replace(settings, order=order)
+        best = choose_best([refine_start(start, fit, trial) for start in estimate_subspace_starts(fit, trial)])
         modelled = best.fitted.compute_response(test.z)
-        squared = (np.abs(test.weight * (modelled - test.response)) ** 2).mean(axis=(1, 2))
-        per_line.append(squared)
+        costs = (np.abs(test.weight * (modelled - test.response)) ** 2).mean(axis=(1, 2))
+        line_costs.append(costs)
         error = float(np.sqrt((test.compute_relative_error(modelled) ** 2).mean()))
         p, m = test.response.shape[1:]
         rows.append(
-            OrderRow(order, float(squared.mean()), error, multiply_adds(order, p, m), dense_multiply_adds(order, p, m))
+            OrderRow(order, float(costs.mean()), error, count_products(order, p, m), count_dense_products(order, p, m))
         )
-    report(1.0)
-    all_lines = require_lines(responses, highest)
-    subspace = estimate_subspace(
-        all_lines, default_horizon(max(orders), all_lines.response.shape[1]), settings.centre_hz
-    )
-    values = subspace.singular_values
+    report_progress(1.0)
+    lines = require_lines(responses, top_settings)
+    subspace = estimate_subspace(lines, choose_horizon(max(orders), lines.response.shape[1]), settings.centre_hz)
+    singular_values = subspace.singular_values
     return OrderReport(
-        values, int((values > VISIBLE).sum()), tuple(rows), _relative_noise(test), rows[_suggest_order(per_line)].order
+        singular_values,
+        int((singular_values > VISIBLE_RATIO).sum()),
+        tuple(rows),
+        _compute_relative_noise(test),
+        rows[_suggest_order(line_costs)].order,
     )
 
 
-def multiply_adds(order: int, outputs: int, inputs: int) -> int:
+def count_products(order: int, outputs: int, inputs: int) -> int:
     """Multiplications per tick with poles in blocks of two, as `modal_form` makes them: three per block for A, and all
     of B, C and D."""
     return 3 * order // 2 + order * (outputs + inputs) + outputs * inputs
 
 
-def dense_multiply_adds(order: int, outputs: int, inputs: int) -> int:
+def count_dense_products(order: int, outputs: int, inputs: int) -> int:
     """Multiplications per tick with full matrices A, B, C and D."""
     return order**2 + order * (outputs + inputs) + outputs * inputs
 
 
-def _alternate_lines(response: FrequencyResponse, first: int) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _mask_lines(response: FrequencyResponse, first: int) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Mask (lines,) of every second line, from the line `first` (0 or 1) on."""
     return np.asarray(np.arange(len(response)) % 2 == first)
 
 
-def _relative_noise(lines: WeightedLines) -> float:
-    """Noise of the lines, relative as `WeightedLines.relative_error`."""
+def _compute_relative_noise(lines: WeightedLines) -> float:
+    """Rms noise of the lines relative to the rms response, as in `WeightedLines.compute_relative_error`."""
     return float(np.sqrt((1 / lines.weight**2).sum() / (np.abs(lines.response) ** 2).sum()))
 
 
-def _suggest_order(per_line: Sequence[FloatArray]) -> int:
-    """Index of the order by the one-standard-error rule. per_line: of each order, rising, the squared error (lines,)
-    over the noise variance; differences are taken line by line, so that noise common to both orders cancels."""
-    lowest = int(np.argmin([cost.mean() for cost in per_line]))
-    for number, cost in enumerate(per_line):
-        worse = cost - per_line[lowest]
-        if worse.mean() <= worse.std() / np.sqrt(len(worse)):
-            return number
-    return lowest
+def _suggest_order(line_costs: Sequence[FloatArray]) -> int:
+    """Index of the order by the one-standard-error rule. line_costs: of each order, rising, the squared error (lines,)
+    over the noise variance; differences are taken line by line, so that noise common to both orders cancels. The
+    standard error is that of their mean over the lines."""
+    best_index = int(np.argmin([costs.mean() for costs in line_costs]))
+    for index, costs in enumerate(line_costs):
+        cost_increase = costs - line_costs[best_index]
+        if cost_increase.mean() <= cost_increase.std() / np.sqrt(len(cost_increase)):
+            return index
+    return best_index

@@ -11,7 +11,7 @@ import numpy as np
 
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.state_space.settings import IdentificationSettings
-from equalizer.identification.state_space.warped_subspace import default_horizon
+from equalizer.identification.state_space.warped_subspace import choose_horizon
 from equalizer.identification.state_space.weighted_lines import WeightedLines, weight_lines
 
 LEAST_SIGNAL_TO_NOISE = 2.0
@@ -132,7 +132,7 @@ def _refuse_too_high_an_order(lines: WeightedLines, settings: IdentificationSett
     p, m = lines.response.shape[1:]
     n = settings.order
     unknowns = n * (p + m) + p * m
-    rows = default_horizon(n, p) + max(settings.longer_horizons)
+    rows = choose_horizon(n, p) + max(settings.longer_horizons)
     minimum = max(-(-unknowns // (p * m)), -(-rows * (p + m) // (2 * m)))
     if len(lines) < minimum:
         spacing = (lines.frequency_hz[-1] - lines.frequency_hz[0]) / max(len(lines) - 1, 1)

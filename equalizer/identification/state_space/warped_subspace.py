@@ -5,7 +5,7 @@ bilinear (all-pass) map zeta = (z - c) / (1 - c z) warps the frequency axis, so 
 quarter turn of the unit circle; and block rows are whitened before their singular values are compared. With p outputs
 and powers zeta^q, q < horizon, the rows zeta^q G are projected onto the complement of the input's rows; the left
 singular vectors of the result span the extended observability matrix, whose shift structure gives the poles. The
-horizon is short, because the noise of a long horizon hides the order.
+horizon is short, because the noise of a long horizon hides the order. Called by `candidates` and `order_report`.
 """
 
 from dataclasses import dataclass
@@ -33,55 +33,58 @@ class Subspace:
     """c of the bilinear map."""
 
 
-def default_horizon(order: int, outputs: int) -> int:
+def choose_horizon(order: int, outputs: int) -> int:
     """Number of block rows: as many as the order needs, and three more to average noise."""
     return -(-order // outputs) + 3
 
 
-def warp_coefficient(centre_hz: float, sample_rate_hz: float) -> float:
+def compute_warp_coefficient(centre_hz: float, sample_rate_hz: float) -> float:
     """c of the map zeta = (z - c) / (1 - c z) that puts centre_hz at a quarter turn of the unit circle."""
-    half = np.pi * centre_hz / sample_rate_hz
-    return float((1 - np.tan(half)) / (1 + np.tan(half)))
+    half_angle = np.pi * centre_hz / sample_rate_hz
+    return float((1 - np.tan(half_angle)) / (1 + np.tan(half_angle)))
 
 
 def estimate_subspace(lines: WeightedLines, horizon: int, centre_hz: float) -> Subspace:
-    """Subspace of a measured response, warped about centre_hz. horizon: number of block rows."""
-    c = warp_coefficient(centre_hz, lines.sample_rate_hz)
+    """Estimate the extended observability matrix of a measured response, warped about centre_hz. horizon: number of
+    block rows."""
+    c = compute_warp_coefficient(centre_hz, lines.sample_rate_hz)
     zeta = (lines.z - c) / (1 - c * lines.z)
     powers = zeta[:, None] ** np.arange(horizon)
     p, m = lines.response.shape[1:]
     # The noise is modelled as a factor per output times a factor per line and input, so that dividing by both gives
     # all entries equal noise.
     deviation = 1 / lines.weight
-    of_output = np.exp(np.log(deviation).mean(axis=(0, 2)))
-    of_column = np.exp(np.log(deviation / of_output[:, None]).mean(axis=1))
-    scaled = lines.response / of_output[:, None] / of_column[:, None, :]
-    input_rows = np.einsum("lq,lj,jk->qklj", powers, 1 / of_column, np.eye(m)).reshape(horizon * m, -1)
-    output_rows = np.einsum("lq,lij->qilj", powers, scaled).reshape(horizon * p, -1)
-    unexplained = _project_out_inputs(input_rows, output_rows)
-    noise = np.kron(np.linalg.cholesky((powers.T @ powers.conj()).real / len(zeta)), np.eye(p))
-    vectors, values, _ = np.linalg.svd(np.linalg.solve(noise, unexplained))
-    coloured = np.tile(of_output, horizon)[:, None] * (noise @ vectors)
-    return Subspace(coloured, values / np.sqrt(len(zeta) * m), p, c)
+    output_deviation = np.exp(np.log(deviation).mean(axis=(0, 2)))
+    column_deviation = np.exp(np.log(deviation / output_deviation[:, None]).mean(axis=1))
+    scaled_response = lines.response / output_deviation[:, None] / column_deviation[:, None, :]
+    input_rows = np.einsum("lq,lj,jk->qklj", powers, 1 / column_deviation, np.eye(m)).reshape(horizon * m, -1)
+    output_rows = np.einsum("lq,lij->qilj", powers, scaled_response).reshape(horizon * p, -1)
+    residual_rows = _project_out_inputs(input_rows, output_rows)
+    noise_factor = np.kron(np.linalg.cholesky((powers.T @ powers.conj()).real / len(zeta)), np.eye(p))
+    left_vectors, singular_values, _ = np.linalg.svd(np.linalg.solve(noise_factor, residual_rows))
+    directions = np.tile(output_deviation, horizon)[:, None] * (noise_factor @ left_vectors)
+    return Subspace(directions, singular_values / np.sqrt(len(zeta) * m), p, c)
 
 
 def _project_out_inputs(input_rows: ComplexArray, output_rows: ComplexArray) -> FloatArray:
     """(horizon p, horizon p): the outputs' rows with the span of the inputs' rows projected out, compressed by an LQ
     decomposition of real and imaginary parts."""
-    stacked = np.concatenate([input_rows, output_rows])
-    real = np.concatenate([stacked.real, stacked.imag], axis=1)
-    upper = np.asarray(np.linalg.qr(real.T, mode="r"))
-    return np.asarray(upper[len(input_rows) :, len(input_rows) :].T, dtype=np.float64)
+    rows = np.concatenate([input_rows, output_rows])
+    real_rows = np.concatenate([rows.real, rows.imag], axis=1)
+    triangular = np.asarray(np.linalg.qr(real_rows.T, mode="r"))
+    return np.asarray(triangular[len(input_rows) :, len(input_rows) :].T, dtype=np.float64)
 
 
-def poles_and_shapes(subspace: Subspace, order: int, radius: float) -> ModalForm:
+def extract_poles_and_shapes(subspace: Subspace, order: int, radius: float) -> ModalForm:
     """Poles in the z plane (all within the radius) and output shapes of a model of this order, from the strongest
     directions: least-squares solution of the shift equation, then the inverse map z = (zeta + c) / (1 + c zeta)."""
-    observed = subspace.directions[:, :order]
+    observability = subspace.directions[:, :order]
     p, c = subspace.outputs, subspace.warp
-    size = np.linalg.norm(observed.reshape(-1, p, order), axis=(0, 2))
-    normalised = observed / np.tile(size, len(observed) // p)[:, None]
-    shifted = np.linalg.lstsq(normalised[:-p], normalised[p:], rcond=None)[0]
-    values, vectors = np.linalg.eig(shifted)
+    output_norms = np.linalg.norm(observability.reshape(-1, p, order), axis=(0, 2))
+    normalised_observability = observability / np.tile(output_norms, len(observability) // p)[:, None]
+    shift_matrix = np.linalg.lstsq(normalised_observability[:-p], normalised_observability[p:], rcond=None)[0]
+    eigenvalues, eigenvectors = np.linalg.eig(shift_matrix)
     # The map also changes B and D, which are fitted afterwards; C is kept.
-    return from_poles(stabilise_poles((values + c) / (1 + c * values), radius), observed[:p] @ vectors)
+    return from_poles(
+        stabilise_poles((eigenvalues + c) / (1 + c * eigenvalues), radius), observability[:p] @ eigenvectors
+    )

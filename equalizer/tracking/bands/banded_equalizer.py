@@ -24,14 +24,20 @@ from equalizer.tracking.bands.high_band import (
     project_to_one_dof,
     reduce_to_one_dof,
 )
-from equalizer.tracking.bands.low_band import CORNER_HZ, SlowMotion, low_band_forces, plan_motion, plan_motion_causally
+from equalizer.tracking.bands.low_band import (
+    CORNER_HZ,
+    SlowMotion,
+    compute_low_band_forces,
+    plan_motion,
+    plan_motion_causally,
+)
 from equalizer.tracking.bands.rigid_model import RigidModel
 from equalizer.tracking.bands.stylus import StylusActuator, StylusShare, share_with_stylus
 from equalizer.tracking.feedforward.band_split import CausalSplit, LinearPhaseSplit
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 from equalizer.tracking.lqr.constrained import track_under_cap
 from equalizer.tracking.lqr.limits import require_under_cap
-from equalizer.tracking.lqr.lqr import stored_gains, track
+from equalizer.tracking.lqr.lqr import compute_stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 
 LEAST_PADDING_S = 0.3
@@ -135,7 +141,7 @@ class BandedEqualizer:
         bands = self.split.split(self._pad(reference))
         low, motion = self._compute_low_forces(bands.low)
         problem = make_tracking_problem(self.middle, self.weights)
-        middle_track = track(stored_gains(problem, len(low)), bands.middle)
+        middle_track = track(compute_stored_gains(problem, len(low)), bands.middle)
         middle, middle_response, loss = middle_track.forces, middle_track.predicted, None
         high, stylus_share = self._compute_high_forces(bands.high, low + middle)
         other_forces = low if high is None else low + high.forces
@@ -191,7 +197,7 @@ class BandedEqualizer:
         if self.low is None:
             return np.zeros((len(reference), self.middle.B.shape[1])), None
         motion = self._plan_motion(reference, self.low.corner_hz)
-        return low_band_forces(motion, self.low.rigid, self._rate_hz), motion
+        return compute_low_band_forces(motion, self.low.rigid, self._rate_hz), motion
 
     def _compute_high_forces(
         self, reference: FloatArray, other_forces: FloatArray

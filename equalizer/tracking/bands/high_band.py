@@ -4,7 +4,7 @@ Above the limit of direction perception a person perceives the strength of a vib
 reference acceleration is therefore reduced to a single signal of the same spectral energy and played along a single
 direction d of force. With g the norm of the device's response G d at a spectral line and w the force weight, the
 magnitude of the force is that of the reduced reference times g / (g² + w). The direction is free: of those tried, that
-of the smallest peak force is chosen. Called by `banded_equalizer`.
+of the smallest peak force is chosen. Called by `banded_equalizer`; sizes: N samples, m forces, p responses.
 """
 
 from dataclasses import dataclass
@@ -124,13 +124,13 @@ def compute_high_band_forces(
     added_forces: FloatArray | None = None,
     settings: HighBandSettings | None = None,
 ) -> HighBandForces:
-    """Forces along the direction of the smallest peak. reference: (N,), m/s², one degree of freedom; unless causal, at
-    rest at both ends, because the two-sided inverse is circular. added_forces: (N, m), N, further forces, which count
-    in the peak."""
+    """Compute the forces along the direction of the smallest peak. reference: (N,), m/s², one degree of freedom; unless
+    causal, at rest at both ends, because the two-sided inverse is circular. added_forces: (N, m), N, further forces,
+    which count in the peak."""
     settings = settings or HighBandSettings()
     n = 2 * len(reference) if settings.causal else len(reference)
     response = source.at(compute_lines_hz(n, sample_rate_hz))
-    other_forces = (
+    other_forces_n = (
         np.zeros((len(reference), response.shape[2]))
         if added_forces is None
         else np.asarray(added_forces, dtype=np.float64)
@@ -144,7 +144,9 @@ def compute_high_band_forces(
         for signal, unit_vector in zip(force_signals, candidates, strict=True)
         for sign in (1.0, -1.0)
     ]
-    peaks_n = np.array([np.linalg.norm(forces + other_forces, axis=1).max(initial=0.0) for forces in candidate_forces])
+    peaks_n = np.array(
+        [np.linalg.norm(forces + other_forces_n, axis=1).max(initial=0.0) for forces in candidate_forces]
+    )
     best_index = int(peaks_n.argmin())
     peak_by_axis_n = peaks_n.reshape(-1, 2).min(axis=1)[: response.shape[2]]
     return HighBandForces(
@@ -168,14 +170,14 @@ def compute_lines_hz(samples: int, sample_rate_hz: float) -> FloatArray:
 def _invert_along(spectrum: ComplexArray, n: int, response: ComplexArray, settings: HighBandSettings) -> FloatArray:
     """Force along a direction, (N,), N. spectrum: reduced reference, n samples; response: (lines, p), response to a
     unit force along the direction, m/s² per N."""
-    magnitude = np.linalg.norm(response, axis=1)
-    inverse = (magnitude / (magnitude**2 + settings.weight)).astype(np.complex128)
+    gain = np.linalg.norm(response, axis=1)
+    inverse = (gain / (gain**2 + settings.weight)).astype(np.complex128)
     if settings.causal:
         # At twice the length, so that the filter's decay does not wrap around to the start.
         return np.asarray(np.fft.irfft(spectrum * compute_minimum_phase(inverse.real), n)[: n // 2])
-    strongest_response = np.take_along_axis(response, np.abs(response).argmax(axis=1)[:, None], axis=1)[:, 0]
+    strongest_channel = np.take_along_axis(response, np.abs(response).argmax(axis=1)[:, None], axis=1)[:, 0]
     # The strongest axis is in phase with the reduced reference.
-    return np.asarray(np.fft.irfft(spectrum * inverse * np.exp(-1j * np.angle(strongest_response)), n))
+    return np.asarray(np.fft.irfft(spectrum * inverse * np.exp(-1j * np.angle(strongest_channel)), n))
 
 
 def compute_minimum_phase(gain: FloatArray) -> ComplexArray:

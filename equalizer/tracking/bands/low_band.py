@@ -1,12 +1,13 @@
 """Low band of a tracked acceleration: plan a slow motion, then compute its forces by inverse dynamics.
 
-Integrating a wanted acceleration twice would let the handle drift out of its workspace. A high-pass filter of corner w
-(rad/s) limits the travel. The filtered position x, velocity and acceleration are consistent, and give the force
+Integrating the reference acceleration twice would let the handle drift out of its workspace. A high-pass filter of
+corner w (rad/s) limits the travel. The filtered position x, velocity and acceleration are consistent, and give the
+force
 
     F = M x'' + D x' + K x        of a rigid model (`rigid_model`)
 
 The filter is s² / (s² - w²), without phase error, where the whole acceleration is known beforehand; otherwise it is
-the causal s² / (s + w)².
+the causal s² / (s + w)². Called by `banded_equalizer`.
 """
 
 from dataclasses import dataclass
@@ -28,7 +29,7 @@ class SlowMotion:
     position_m: FloatArray
     velocity_m_s: FloatArray
     acceleration: FloatArray
-    """m/s²: the wanted acceleration after the high-pass filter."""
+    """m/s²: the reference acceleration after the high-pass filter."""
 
     @property
     def travel_m(self) -> float:
@@ -40,39 +41,40 @@ def plan_motion(reference: FloatArray, sample_rate_hz: float, corner_hz: float =
     """Plan the slow motion of the low band by a zero-phase filter. reference: (N, m), m/s², known beforehand and zero
     at both ends. Raises ValueError for a corner that is not between zero and half the sample rate.
 
-    x = a / (s² - w²), a convolution with a two-sided exponential kernel. The filter from wanted to planned acceleration
-    is real, f² / (f² + corner²), so that there is no phase error.
+    x = a / (s² - w²), a convolution with a two-sided exponential kernel. The filter from the reference to the planned
+    acceleration is real, f² / (f² + corner²), so that there is no phase error.
     """
-    a, corner = np.asarray(reference, dtype=np.float64), _corner_rad_per_s(corner_hz, sample_rate_hz)
+    a, corner_rad_s = np.asarray(reference, dtype=np.float64), _convert_corner_to_rad_per_s(corner_hz, sample_rate_hz)
     # Zeros over eight time constants, so that the kernel does not wrap around the ends.
-    padding_rows = int(np.ceil(8 * sample_rate_hz / corner))
-    padded = np.pad(a, ((padding_rows, padding_rows), (0, 0)))
-    s = 2j * np.pi * np.fft.rfftfreq(len(padded), 1 / sample_rate_hz)[:, None]
-    position = np.fft.rfft(padded, axis=0) / (s**2 - corner**2)
+    padding_rows = int(np.ceil(8 * sample_rate_hz / corner_rad_s))
+    padded_acceleration = np.pad(a, ((padding_rows, padding_rows), (0, 0)))
+    s = 2j * np.pi * np.fft.rfftfreq(len(padded_acceleration), 1 / sample_rate_hz)[:, None]
+    position = np.fft.rfft(padded_acceleration, axis=0) / (s**2 - corner_rad_s**2)
     signals = [
-        np.fft.irfft(spectrum, len(padded), axis=0)[padding_rows:][: len(a)] for spectrum in (position, s * position)
+        np.fft.irfft(spectrum, len(padded_acceleration), axis=0)[padding_rows:][: len(a)]
+        for spectrum in (position, s * position)
     ]
-    return SlowMotion(signals[0], signals[1], a + corner**2 * signals[0])
+    return SlowMotion(signals[0], signals[1], a + corner_rad_s**2 * signals[0])
 
 
 def plan_motion_causally(reference: FloatArray, sample_rate_hz: float, corner_hz: float = CORNER_HZ) -> SlowMotion:
     """Plan the slow motion of the low band by a causal filter. reference: (N, m), m/s², from rest at the first row, as
-    after a contact. x = a / (s + w)²: the planned acceleration leads the wanted by 2 atan(corner / f). Raises
+    after a contact. x = a / (s + w)²: the planned acceleration leads the reference by 2 atan(corner / f). Raises
     ValueError for a corner that is not between zero and half the sample rate."""
-    a, corner = np.asarray(reference, dtype=np.float64), _corner_rad_per_s(corner_hz, sample_rate_hz)
+    a, corner_rad_s = np.asarray(reference, dtype=np.float64), _convert_corner_to_rad_per_s(corner_hz, sample_rate_hz)
     # 1 / (s + w) by the bilinear transform, s = c (1 - z^-1) / (1 + z^-1).
     c = 2 * sample_rate_hz
-    integral = np.array([1.0, 1.0]) / (c + corner), np.array([1.0, (corner - c) / (c + corner)])
-    velocity_like = lfilter(*integral, a, axis=0)
-    position = lfilter(*integral, velocity_like, axis=0)
+    low_pass = np.array([1.0, 1.0]) / (c + corner_rad_s), np.array([1.0, (corner_rad_s - c) / (c + corner_rad_s)])
+    once_filtered = lfilter(*low_pass, a, axis=0)
+    position = lfilter(*low_pass, once_filtered, axis=0)
     # s / (s + w) = 1 - w / (s + w), applied once for the velocity and twice for the acceleration: all three signals are
     # derivatives of each other to rounding.
-    velocity = velocity_like - corner * position
-    return SlowMotion(position, velocity, a - 2 * corner * velocity_like + corner**2 * position)
+    velocity = once_filtered - corner_rad_s * position
+    return SlowMotion(position, velocity, a - 2 * corner_rad_s * once_filtered + corner_rad_s**2 * position)
 
 
-def low_band_forces(motion: SlowMotion, rigid: RigidModel, sample_rate_hz: float) -> FloatArray:
-    """Forces (N, m) in N by inverse dynamics along the motion, advanced by the rigid model's delay and the half
+def compute_low_band_forces(motion: SlowMotion, rigid: RigidModel, sample_rate_hz: float) -> FloatArray:
+    """Compute forces (N, m) in N by inverse dynamics along the motion, advanced by the rigid model's delay and the half
     sample of the hold, to first order (Taylor), which is enough for a slow band."""
     lead_s = rigid.delay_s + 0.5 / sample_rate_hz
     x, v, a = motion.position_m, motion.velocity_m_s, motion.acceleration
@@ -86,8 +88,8 @@ def low_band_forces(motion: SlowMotion, rigid: RigidModel, sample_rate_hz: float
     return force
 
 
-def _corner_rad_per_s(corner_hz: float, sample_rate_hz: float) -> float:
-    """The corner in rad/s. Raises ValueError where it is not between zero and half the sample rate."""
+def _convert_corner_to_rad_per_s(corner_hz: float, sample_rate_hz: float) -> float:
+    """Convert the corner from Hz to rad/s. Raises ValueError where it is not between zero and half the sample rate."""
     if not 0 < corner_hz < sample_rate_hz / 2:
         raise ValueError(f"corner_hz is {corner_hz}; it must be above zero and below half the sample rate")
     return 2 * np.pi * corner_hz

@@ -18,7 +18,7 @@ from equalizer.tracking.bands.high_band import ModelledResponse, predict_acceler
 from equalizer.tracking.bands.rigid_model import RigidModel, fit_rigid_model
 from equalizer.tracking.feedforward.band_split import BandEdges, LinearPhaseSplit
 from equalizer.tracking.feedforward.feedforward import (
-    EDGE_ROOM_HZ,
+    BAND_MARGIN_HZ,
     LEAKAGE_SHARE,
     Feedforward,
     FeedforwardSettings,
@@ -27,7 +27,7 @@ from equalizer.tracking.feedforward.feedforward import (
 )
 from equalizer.tracking.feedforward.periodic_inverse import check_reference
 from equalizer.tracking.lqr.limits import require_under_cap
-from equalizer.tracking.lqr.padding import band_error, simulate_from_rest
+from equalizer.tracking.lqr.padding import compute_band_error, simulate_from_rest
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
 
 RIGID_OCTAVES = 0.6
@@ -51,11 +51,11 @@ class TwoModels:
 
     def __post_init__(self) -> None:
         (low, high), (lowest, highest) = self.narrow.band_hz, self.wide.band_hz
-        if not (lowest <= high and highest >= LEAST_REACH * high and low > 2 * EDGE_ROOM_HZ):
+        if not (lowest <= high and highest >= LEAST_REACH * high and low > 2 * BAND_MARGIN_HZ):
             raise ValueError(
                 f"bands of {low:g} to {high:g} Hz and {lowest:g} to {highest:g} Hz cannot be combined: the wider one "
                 f"must begin at {high:g} Hz or below and reach {LEAST_REACH * high:g} Hz or more, the narrower one "
-                f"begin above {2 * EDGE_ROOM_HZ:g} Hz"
+                f"begin above {2 * BAND_MARGIN_HZ:g} Hz"
             )
         origins = [[model.provenance.get(key) for key in ("hand", "input")] for model in (self.narrow, self.wide)]
         if origins[0] != origins[1] and None not in origins[0] + origins[1]:
@@ -119,7 +119,7 @@ def solve_banded_feedforward(models: TwoModels, reference: Signal, settings: Fee
         forces=Signal(forces, rate_hz, "force", "N", models.narrow.input_channels),
         reference=total_reference,
         predicted=predicted,
-        error=band_error(in_band_reference, predicted, rate_hz, models.narrow.band_hz),
+        error=compute_band_error(in_band_reference, predicted, rate_hz, models.narrow.band_hz),
         out_of_band_share=float(
             np.linalg.norm(reference.samples - total_reference) / np.linalg.norm(reference.samples)
         ),
@@ -130,10 +130,10 @@ def solve_banded_feedforward(models: TwoModels, reference: Signal, settings: Fee
 
 
 def make_banded_equalizer(models: TwoModels, weight: float) -> BandedEqualizer:
-    """Equalizer in three bands, split by linear-phase filters EDGE_ROOM_HZ beyond the narrow model's band on either
+    """Equalizer in three bands, split by linear-phase filters BAND_MARGIN_HZ beyond the narrow model's band on either
     side. weight: R = weight I, of |u|². Raises ValueError for a weight outside 1e-3 to 1e-2."""
     low, high = models.narrow.band_hz
-    edges = BandEdges(low - EDGE_ROOM_HZ, high + EDGE_ROOM_HZ)
+    edges = BandEdges(low - BAND_MARGIN_HZ, high + BAND_MARGIN_HZ)
     return BandedEqualizer(
         models.narrow,
         LinearPhaseSplit(edges, models.narrow.sample_rate_hz),
@@ -173,8 +173,8 @@ def level_error(
 
 def _remove_above_band(reference: FloatArray, wide: IdentifiedModel) -> FloatArray:
     """The wanted acceleration without frequencies above the wide band."""
-    edge_hz = wide.band_hz[1] + EDGE_ROOM_HZ
-    if edge_hz + EDGE_ROOM_HZ >= wide.sample_rate_hz / 2:
+    edge_hz = wide.band_hz[1] + BAND_MARGIN_HZ
+    if edge_hz + BAND_MARGIN_HZ >= wide.sample_rate_hz / 2:
         return reference
     bands = LinearPhaseSplit(BandEdges(None, edge_hz), wide.sample_rate_hz).split(reference)
     return bands.middle[bands.latency_samples : bands.latency_samples + len(reference)]
@@ -195,12 +195,12 @@ def _collect_facts(
         simulate_from_rest(problem, banded_forces.entering)[rows],
         simulate_from_rest(problem, banded_forces.entering[rows]),
     )
-    upper_hz = band_hz[1] + 2 * EDGE_ROOM_HZ, models.wide.band_hz[1]
+    upper_hz = band_hz[1] + 2 * BAND_MARGIN_HZ, models.wide.band_hz[1]
     high_response = predict_acceleration(forces, rate_hz, ModelledResponse(models.wide))
     return BandFacts(
         edges_hz=(edges.low_hz or 0.0, edges.high_hz or 0.0),
-        cut_error=band_error(reference, cut_response, rate_hz, band_hz),
-        whole_error=band_error(reference, full_response, rate_hz, band_hz),
+        cut_error=compute_band_error(reference, cut_response, rate_hz, band_hz),
+        whole_error=compute_band_error(reference, full_response, rate_hz, band_hz),
         level_error=level_error(reference, high_response, rate_hz, upper_hz),
         direction=()
         if banded_forces.high is None

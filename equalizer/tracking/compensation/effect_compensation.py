@@ -12,14 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.effects.discovered_law import axis_names
+from equalizer.effects.discovered_law import derive_axis_letters
 from equalizer.laws.law import Law as FoundLaw
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.compensation.effect_roles import lead_s, reason_not_compensated
+from equalizer.tracking.compensation.effect_roles import compute_lead_s, explain_not_compensated
 from equalizer.tracking.compensation.known_forces import LAWS, Law, compute_deadband_share, compute_equivalent_impedance
 from equalizer.tracking.compensation.law_compensation import (
     compute_compensating_force,
@@ -27,9 +27,9 @@ from equalizer.tracking.compensation.law_compensation import (
     invert_command_map,
     make_single_axis_law,
 )
-from equalizer.tracking.feedforward.band_part import band_share, find_padded_length
+from equalizer.tracking.feedforward.band_pass import compute_band_gain, find_padded_length
 from equalizer.tracking.feedforward.planned_motion import PlannedMotion, integrate_motion
-from equalizer.tracking.learning.iteration import largest_share
+from equalizer.tracking.learning.iteration import find_largest_share
 
 SLIP_SHARE = 0.05
 """Velocity below which a friction force changes sign smoothly, relative to the axis's rms velocity. With a smaller
@@ -75,9 +75,9 @@ def compensate(
         raise ValueError(f"identified_with_n is {identified_with_n}; it must be a force above zero")
     rate_hz = model.sample_rate_hz
     motion = convert_motion_to_axes(
-        integrate_motion(reference, rate_hz, model.band_hz, lead_s(physics, rate_hz)), physics
+        integrate_motion(reference, rate_hz, model.band_hz, compute_lead_s(physics, rate_hz)), physics
     )
-    effect_reasons = [(effect, reason_not_compensated(effect, model.input_channels)) for effect in physics.effects]
+    effect_reasons = [(effect, explain_not_compensated(effect, model.input_channels)) for effect in physics.effects]
     used = tuple(effect for effect, reason in effect_reasons if not reason)
     gain = compute_axis_gains(physics, model.input_channels, model.output_channels)
     scaled_forces, compensating = forces.copy(), np.zeros_like(forces)
@@ -92,7 +92,7 @@ def compensate(
         elif effect.law is not None and not _is_force(effect):
             _compensate_command_map(effect.law, scaled_forces, compensating, axis, identified_with_n)
     added_forces = scaled_forces + compensating - forces
-    scale = 1.0 if cap_n is None else largest_share(forces, added_forces, cap_n)
+    scale = 1.0 if cap_n is None else find_largest_share(forces, added_forces, cap_n)
     not_used = tuple((effect, reason) for effect, reason in effect_reasons if reason)
     return Compensation(forces + scale * added_forces, used, not_used, scale)
 
@@ -160,7 +160,7 @@ def _compute_force_beyond_model(
         return force
     length = find_padded_length(len(v), model.sample_rate_hz)
     lines_hz = np.asarray(np.fft.rfftfreq(length, 1 / model.sample_rate_hz), dtype=np.float64)
-    in_band = np.flatnonzero(band_share(lines_hz, model.band_hz) > 0)
+    in_band = np.flatnonzero(compute_band_gain(lines_hz, model.band_hz) > 0)
     direct_gain = np.abs(model_response(model, lines_hz[in_band])[:, axis, axis])
     speed = np.maximum(direct_gain * identified_with_n / (2 * np.pi * lines_hz[in_band]), LEAST_SPEED_M_S)
     equivalent = np.zeros(len(lines_hz), dtype=np.complex128)
@@ -179,7 +179,7 @@ def evaluate_force_law(
     command_channels_and_rate: channels of the commands, and the sample rate (Hz). slip_m_s: speed below which a change
     of sign is smoothed, m/s."""
     if effect.law is not None:
-        letters = axis_names(command_channels_and_rate[0])
+        letters = derive_axis_letters(command_channels_and_rate[0])
         force = compute_compensating_force(effect.law, letters, motion, command_channels_and_rate[1], slip_m_s)
         return make_single_axis_law(effect.law, letters, axis), force
     law, v = LAWS[effect.kind], motion.velocity[:, axis]

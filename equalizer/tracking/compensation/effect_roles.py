@@ -1,30 +1,31 @@
 """Role of each effect in a feedforward: compensated by a force, used for scaling or timing, or not compensated.
 
-The texts are shown to the user as the reason why an effect is not compensated.
+The texts are shown to the user as the reason why an effect is not compensated. Called by `effect_compensation` and
+`subtract_effects`, and by `study.workflows.equalizer.recordings_without_effects`.
 """
 
 import numpy as np
 
-from equalizer.effects.discovered_law import axis_names
+from equalizer.effects.discovered_law import derive_axis_letters
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.tracking.compensation.known_forces import LAWS
 from equalizer.tracking.compensation.law_compensation import explain_law_not_compensated
 
-IN_MODEL = "it is linear, so the identified model has it; compensating it again would count it twice"
+IN_MODEL_REASON = "it is linear, so the identified model has it; compensating it again would count it twice"
 """Reason for linear effects."""
 
-NOT_COMPENSATED = {
-    "viscous_damping": IN_MODEL,
-    "added_mass": IN_MODEL,
-    "extra_mode": IN_MODEL,
-    "hand_impedance": IN_MODEL,
+REASONS_NOT_COMPENSATED = {
+    "viscous_damping": IN_MODEL_REASON,
+    "added_mass": IN_MODEL_REASON,
+    "extra_mode": IN_MODEL_REASON,
+    "hand_impedance": IN_MODEL_REASON,
     "constant_force": "the virtual spring balances it before playback, and a constant force has no content in the band",
     "gravity_torque": "for a small motion it acts as a spring, which the identified model contains",
     "cogging": "amplitude and pitch do not determine its sign at a position",
     "backlash": "a force cannot act across a gap",
     "loose_joint": "a force cannot act across a gap",
-    "body_on_actuator": IN_MODEL,
+    "body_on_actuator": IN_MODEL_REASON,
     "end_stop": "a motion that reaches a stop should be made smaller",
     "pose_dependent_inertia": "use a model identified at that place; the inertia is constant during a small vibration",
     "time_varying_grip": "the grip is not known in advance",
@@ -39,32 +40,34 @@ SENSOR_REASON = (
 """Reason for all effects of the sensor but its lag."""
 SCALING_REASON = "in the identified model as far as it is linear; used to scale what is added"
 TIMING_REASON = "in the identified model; used to send what is added ahead of time"
-"""Reasons for the effects of `SCALING` and of `TIMING`."""
+"""Reasons for the effects of `SCALING_EFFECTS` and of `TIMING_EFFECTS`."""
 
-SCALING, TIMING = ("force_gain",), ("amplifier_lag", "transport_delay", "sensor_lag")
-"""Effects that scale the added forces, and effects that determine by how much they are advanced (`lead_s`)."""
+SCALING_EFFECTS, TIMING_EFFECTS = ("force_gain",), ("amplifier_lag", "transport_delay", "sensor_lag")
+"""Effects that scale the added forces, and effects that determine by how much they are advanced (`compute_lead_s`)."""
 
 
-def reason_not_compensated(effect: ModelEffect, inputs: tuple[str, ...] = ("fx", "fy", "fz")) -> str:
-    """Why an effect is not compensated; empty for an effect that is. inputs: channels of the commands."""
+def explain_not_compensated(effect: ModelEffect, inputs: tuple[str, ...] = ("fx", "fy", "fz")) -> str:
+    """The reason why an effect is not compensated, as a clause for the user; empty for an effect that is. inputs:
+    channels of the commands, by which a discovered law names the axes."""
     kind = effect.kind
     if effect.law is not None:
-        return explain_law_not_compensated(effect.law, axis_names(inputs))
+        return explain_law_not_compensated(effect.law, derive_axis_letters(inputs))
     if kind in LAWS or kind == "force_deadband":
         return ""
-    if kind in SCALING:
+    if kind in SCALING_EFFECTS:
         return SCALING_REASON
-    if kind in TIMING:
+    if kind in TIMING_EFFECTS:
         return TIMING_REASON
     if EFFECTS_BY_NAME[kind].place == "sensor":
         return SENSOR_REASON
-    return NOT_COMPENSATED[kind]
+    return REASONS_NOT_COMPENSATED[kind]
 
 
-def lead_s(physics: MechanicalModel, sample_rate_hz: float) -> float:
+def compute_lead_s(physics: MechanicalModel, sample_rate_hz: float) -> float:
     """Delay (s) from a commanded force to its measured effect: half a sample of the hold, delays, and the time constant
-    1 / (2 pi f) of each first-order low pass of actuator and sensor, exact well below its corner f. The identified
-    model includes this delay; forces that are added to the model's forces must be advanced by it."""
+    1 / (2 pi f) of each first-order low pass of actuator and sensor, exact well below its corner f; an effect
+    `sensor_lag` replaces the sensor's corner. The identified model includes this delay; forces that are added to the
+    model's forces must be advanced by it."""
     corners_hz = [physics.actuator.bandwidth_hz, physics.sensor.bandwidth_hz]
     delay_s = 0.5 / sample_rate_hz + physics.actuator.delay_s
     for effect in physics.effects:

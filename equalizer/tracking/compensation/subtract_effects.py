@@ -20,7 +20,7 @@ from equalizer.tracking.compensation.effect_compensation import (
     evaluate_force_law,
     find_effect_axes,
 )
-from equalizer.tracking.compensation.effect_roles import lead_s, reason_not_compensated
+from equalizer.tracking.compensation.effect_roles import compute_lead_s, explain_not_compensated
 from equalizer.tracking.compensation.known_forces import apply_deadband
 from equalizer.tracking.feedforward.planned_motion import integrate_motion
 
@@ -52,7 +52,7 @@ def subtract_effects(recording: Recording, physics: MechanicalModel, excited_hz:
         raise ValueError("the recording has missing samples; a motion cannot be integrated across them")
     rate_hz = recording.sample_rate_hz
     band_hz = (LOWEST_SHARE * excited_hz[0], min(HIGHEST_SHARE * excited_hz[1], NYQUIST_SHARE * rate_hz))
-    planned = integrate_motion(recording.response.samples, rate_hz, band_hz, lead_s(physics, rate_hz))
+    planned = integrate_motion(recording.response.samples, rate_hz, band_hz, compute_lead_s(physics, rate_hz))
     motion = convert_motion_to_axes(planned, physics)
     gain, commands = compute_axis_gains(physics, inputs, outputs), recording.command.samples.copy()
     for effect in physics.effects:
@@ -60,14 +60,14 @@ def subtract_effects(recording: Recording, physics: MechanicalModel, excited_hz:
             if (
                 effect.law is not None
                 and effect.law.acts_on == "command"
-                and not reason_not_compensated(effect, inputs)
+                and not explain_not_compensated(effect, inputs)
             ):
                 commands[:, axis] = evaluate(effect.law, {effect.law.variables[0]: commands[:, axis]}, rate_hz)
             if effect.kind == "force_deadband":
                 commands[:, axis] = apply_deadband(effect.parameters, commands[:, axis])
     for effect in physics.effects:
         law_place = "force" if effect.law is None else effect.law.acts_on
-        if law_place == "force" and effect.kind != "force_deadband" and not reason_not_compensated(effect, inputs):
+        if law_place == "force" and effect.kind != "force_deadband" and not explain_not_compensated(effect, inputs):
             for axis in find_effect_axes(effect, inputs, outputs):
                 slip = max(compute_slip_speed(motion.velocity[:, axis]), np.finfo(np.float64).tiny)
                 commands[:, axis] -= evaluate_force_law(effect, axis, motion, (inputs, rate_hz), slip)[1] / gain[axis]

@@ -2,6 +2,6 @@
 
 `trajectory` (CSV table) -> `band_split` -> `feedforward` (a finite record, by the tracker) or `periodic_inverse` (a
 periodic signal) -> `quality` (of the delivered acceleration). `model_equalizer` implements the interface of
-`equalizer` for the stimuli of a study. Tools: `band_part`, `planned_motion`, `virtual_spring`. `baselines` has simpler
+`equalizer` for the stimuli of a study. Tools: `band_pass`, `planned_motion`, `virtual_spring`. `baselines` has simpler
 methods for comparison. Begin at `feedforward.py`.
 """

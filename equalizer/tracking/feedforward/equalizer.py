@@ -1,7 +1,8 @@
 """Interface of an equalizer, and the identity as its trivial form.
 
-An equalizer computes the commands (forces) that produce a wanted signal at the handle. A study plays every stimulus
-through an equalizer, so that the same protocol runs with a commanded force or with a wanted acceleration.
+An equalizer computes the commands (forces) that produce a reference signal at the handle.
+`study.session.stimulus.stimulus` passes every stimulus through an equalizer, so that the same protocol runs with a
+commanded force or with a reference acceleration. The other implementation is `model_equalizer.ModelEqualizer`.
 """
 
 from typing import Protocol
@@ -10,7 +11,7 @@ from equalizer.signals.signal import FloatArray, Signal
 
 
 class Equalizer(Protocol):
-    """Computes commands from the signal that is wanted at the handle."""
+    """Computes commands (forces, N) from the reference signal, which the handle is to follow."""
 
     @property
     def name(self) -> str:
@@ -19,32 +20,32 @@ class Equalizer(Protocol):
 
     @property
     def takes(self) -> str:
-        """The quantity that `periodic` expects: "force" or "acceleration"."""
+        """Quantity of the reference signal that the two methods expect: "force" or "acceleration"."""
         ...
 
-    def periodic(self, wanted: Signal) -> Signal:
-        """One loop (N, channels) of the command for one loop of the wanted signal. Both loops are a whole number of
-        periods long and are repeated."""
+    def compute_loop_commands(self, reference: Signal) -> Signal:
+        """One loop (N, channels) of the command for one loop (N, channels) of the reference signal. Both loops are a
+        whole number of periods long and are repeated."""
         ...
 
-    def onset(self, wanted: Signal, envelope: FloatArray) -> Signal | None:
-        """The command (ticks, channels) from rest into the loop, while the wanted signal (one loop) is multiplied by
+    def compute_onset_commands(self, reference: Signal, envelope: FloatArray) -> Signal | None:
+        """The command (ticks, channels) from rest into the loop, while the reference signal (one loop) is multiplied by
         `envelope` (ticks,), which rises from 0 to 1. None: the loop's command times the envelope is to be used."""
         ...
 
 
 class Identity:
-    """No equalizer: the wanted force is the commanded force, as in the published study."""
+    """No equalizer: the reference force is the commanded force, as in the published study."""
 
     name = "none (commanded force)"
     takes = "force"
 
-    def periodic(self, wanted: Signal) -> Signal:
-        """The wanted force itself. Raises ValueError for another quantity than force."""
-        if wanted.quantity != "force":
-            raise ValueError(f"without an equalizer only a force can be played, not {wanted.quantity}; give a model")
-        return wanted
+    def compute_loop_commands(self, reference: Signal) -> Signal:
+        """The reference force itself. Raises ValueError for another quantity than force."""
+        if reference.quantity != "force":
+            raise ValueError(f"without an equalizer only a force can be played, not {reference.quantity}; give a model")
+        return reference
 
-    def onset(self, wanted: Signal, envelope: FloatArray) -> None:
-        # The command is the wanted force times the envelope.
+    def compute_onset_commands(self, reference: Signal, envelope: FloatArray) -> None:
+        # The command is the reference force times the envelope.
         return None

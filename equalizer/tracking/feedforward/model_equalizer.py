@@ -1,7 +1,8 @@
-"""Equalizer by inversion of an identified linear model: forces that produce a wanted acceleration at the handle.
+"""Equalizer by inversion of an identified linear model: forces that produce a reference acceleration at the handle.
 
 A repeated stimulus is inverted line by line in the frequency domain (`periodic_inverse`); its onset from rest is the
-solution of a finite-horizon linear-quadratic tracking problem (`lqr`) that ends in the state of the loop.
+solution of a finite-horizon linear-quadratic tracking problem (`lqr`) that ends in the state of the loop. A session
+uses it in place of `equalizer.Identity` when a model is given.
 """
 
 from dataclasses import dataclass
@@ -11,21 +12,28 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, periodic_command
+from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, compute_periodic_command
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
-from equalizer.tracking.lqr.lqr import StoredGains, free_decay_weight, periodic_state, stored_gains, track
+from equalizer.tracking.lqr.lqr import (
+    StoredGains,
+    compute_free_decay_weight,
+    compute_periodic_state,
+    compute_stored_gains,
+    track,
+)
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelEqualizer:
-    """Equalizer with one identified model. Raises ValueError for an unstable model."""
+    """Equalizer with one identified model, an implementation of `equalizer.Equalizer`. Raises ValueError for an
+    unstable model."""
 
     model: IdentifiedModel
     spring: VirtualSpring = NO_SPRING
-    """Virtual spring whose force the device adds to the commands; it is subtracted from them."""
+    """Virtual spring whose force the device's loop adds to the commands; it is subtracted from them."""
     weight: float = WEIGHT
-    """Weight of |force|² against |acceleration error|²."""
+    """Weight of |force|² against |acceleration error|², (m/s² per N)²."""
 
     def __post_init__(self) -> None:
         if self.model.spectral_radius >= 1:
@@ -34,48 +42,53 @@ class ModelEqualizer:
     @property
     def name(self) -> str:
         """Kind, order and band of the model, for a session's log."""
-        low, high = self.model.band_hz
-        return f"identified model, order {self.model.order}, {low:g} to {high:g} Hz"
+        low_hz, high_hz = self.model.band_hz
+        return f"identified model, order {self.model.order}, {low_hz:g} to {high_hz:g} Hz"
 
     @property
     def takes(self) -> str:
-        """The wanted quantity."""
+        """Quantity of the reference signal."""
         return "acceleration"
 
-    def periodic(self, wanted: Signal) -> Signal:
-        """Forces (N) of one loop in the periodic steady state. Raises OutsideBandError for a wanted signal with content
-        outside the model's band, ValueError for another sample rate or unit."""
-        return periodic_command(self.model, wanted, self.weight, self.spring)
+    def compute_loop_commands(self, reference: Signal) -> Signal:
+        """Forces (N), (N, inputs), of one loop in the periodic steady state. reference: one loop, (N, p), m/s². Raises
+        OutsideBandError for a reference with content outside the model's band, ValueError for another sample rate or
+        unit."""
+        return compute_periodic_command(self.model, reference, self.weight, self.spring)
 
-    def onset(self, wanted: Signal, envelope: FloatArray) -> Signal:
-        """Forces (N) from rest into the loop with almost no transient afterwards: the deviation of the final state from
-        the loop's is weighted by the observability Gramian. Raises as `periodic`."""
-        T, n = len(envelope), len(wanted)
-        gains = _onset_gains(self.model, self.weight, T)
-        loop = periodic_command(self.model, wanted, self.weight)
-        # The loop as it continues after the onset of T samples, and the model's state at that moment.
-        continued_loop = np.roll(loop.samples, -T, axis=0)
-        loop_state = periodic_state(gains.problem, continued_loop)
-        faded_reference = envelope[:, None] * wanted.samples[np.arange(T) % n]
+    def compute_onset_commands(self, reference: Signal, envelope: FloatArray) -> Signal:
+        """Forces (N), (ticks, inputs), from rest into the loop with almost no transient afterwards: the deviation of
+        the final state from the loop's is weighted by the observability Gramian. envelope: (ticks,), factor on the
+        reference. Raises as `compute_loop_commands`."""
+        onset_ticks, loop_ticks = len(envelope), len(reference)
+        gains = _compute_onset_gains(self.model, self.weight, onset_ticks)
+        loop = compute_periodic_command(self.model, reference, self.weight)
+        # The loop as it continues after the onset, and the state of the model at that moment.
+        continued_loop = np.roll(loop.samples, -onset_ticks, axis=0)
+        loop_state = compute_periodic_state(gains.problem, continued_loop)
+        faded_reference = envelope[:, None] * reference.samples[np.arange(onset_ticks) % loop_ticks]
         forces = track(gains, faded_reference, final_state=loop_state).forces
-        return Signal(forces - self._spring_during_onset(wanted, loop, envelope), *_force_properties(loop))
+        return Signal(
+            forces - self._compute_onset_spring_force(reference, loop, envelope), *_list_force_properties(loop)
+        )
 
-    def _spring_during_onset(self, wanted: Signal, loop: Signal, envelope: FloatArray) -> FloatArray:
-        """Force of the virtual spring (N), (ticks, inputs), approximated as the loop's spring force times the
-        envelope."""
-        spring_force = loop.samples - self.periodic(wanted).samples
-        ticks = np.arange(len(envelope)) % len(wanted)
+    def _compute_onset_spring_force(self, reference: Signal, loop: Signal, envelope: FloatArray) -> FloatArray:
+        """Spring force (N), (ticks, inputs), to subtract during the onset, approximated as its value in the loop times
+        the envelope. loop: forces of one loop without the spring."""
+        spring_force = loop.samples - self.compute_loop_commands(reference).samples
+        ticks = np.arange(len(envelope)) % len(reference)
         faded_force: FloatArray = envelope[:, None] * spring_force[ticks]
         return faded_force
 
 
-def _force_properties(loop: Signal) -> tuple[float, str | tuple[str, ...], str | tuple[str, ...], tuple[str, ...]]:
-    """Sample rate, quantity, unit and channels of a force signal."""
+def _list_force_properties(loop: Signal) -> tuple[float, str | tuple[str, ...], str | tuple[str, ...], tuple[str, ...]]:
+    """Sample rate, quantity, unit and channels of a force signal, in the order of the fields of `Signal`."""
     return loop.sample_rate_hz, loop.quantity, loop.unit, loop.channels
 
 
 @lru_cache(maxsize=8)
-def _onset_gains(model: IdentifiedModel, weight: float, samples: int) -> StoredGains:
-    """Gains of the tracking problem over `samples` steps; kept, because they take longest to compute."""
+def _compute_onset_gains(model: IdentifiedModel, weight: float, samples: int) -> StoredGains:
+    """Gains of the tracking problem over `samples` steps; cached, because they take longer to compute than everything
+    else of an onset."""
     problem = make_tracking_problem(model, TrackingWeights(weight))
-    return stored_gains(problem, samples, free_decay_weight(problem))
+    return compute_stored_gains(problem, samples, compute_free_decay_weight(problem))

@@ -1,7 +1,8 @@
 """Commands for periodic outputs: the regularised (Tikhonov) inverse of a model's frequency response, line by line.
 
 In the steady state every spectral line is independent: with the response G from forces to outputs and the weight w, the
-forces H y with H = (G* G + w I)^-1 G* minimise |G f - y|² + w |f|² for the wanted output y.
+forces H y with H = (G* G + w I)^-1 G* minimise |G f - y|² + w |f|² for the reference output y. Called by
+`model_equalizer`, `baselines` and `workspace.models_at_place`.
 """
 
 import numpy as np
@@ -20,14 +21,14 @@ ROUNDING_SHARE = 1e-9
 
 
 class OutsideBandError(ValueError):
-    """The wanted signal has content outside the model's band."""
+    """The reference signal has content outside the model's band."""
 
 
-def inverse_response(
+def compute_regularised_inverse(
     model: IdentifiedModel, frequency_hz: FloatArray, weight: float = WEIGHT, spring: VirtualSpring = NO_SPRING
 ) -> ComplexArray:
-    """Commands per wanted output, (lines, m, p), N per unit of the output. `weight` acts on the total force that enters
-    the plant, H of the module docstring; the part of it that the virtual spring supplies is subtracted."""
+    """Commands per reference output, (lines, m, p), N per unit of the output. `weight` acts on the total force that
+    enters the plant, H of the module docstring; the part of it that the virtual spring supplies is subtracted."""
     G = model_response(model, frequency_hz)
     H = invert_regularised(G, weight)
     if spring == NO_SPRING:
@@ -42,47 +43,47 @@ def invert_regularised(G: ComplexArray, weight: float) -> ComplexArray:
     return np.asarray(np.linalg.solve(adjoint @ G + weight * np.eye(G.shape[2]), adjoint))
 
 
-def periodic_command(
+def compute_periodic_command(
     model: IdentifiedModel, reference: Signal, weight: float = WEIGHT, spring: VirtualSpring = NO_SPRING
 ) -> Signal:
-    """One period of forces (N, m) for one period of wanted outputs (N, p).
+    """Compute one period of forces (N, m) for one period of reference outputs (N, p).
 
-    Raises OutsideBandError where something is wanted outside the model's band, ValueError for a rate, a number of
+    Raises OutsideBandError where the reference has content outside the model's band, ValueError for a rate, a number of
     channels or units other than the model's.
     """
     check_reference(model, reference)
     n = len(reference)
-    lines = np.fft.rfft(reference.samples, axis=0)
+    spectrum = np.fft.rfft(reference.samples, axis=0)
     frequency_hz = np.fft.rfftfreq(n, 1.0 / reference.sample_rate_hz)
-    magnitude = np.abs(lines).max(axis=1)
-    used = magnitude > ROUNDING_SHARE * magnitude.max()
-    check_band(model, frequency_hz[used])
-    forces = np.zeros((len(lines), model.B.shape[1]), dtype=np.complex128)
-    if used.any():
-        H = inverse_response(model, frequency_hz[used], weight, spring)
-        forces[used] = np.einsum("lmp,lp->lm", H, lines[used])
-    samples = np.fft.irfft(forces, n, axis=0)
+    magnitude = np.abs(spectrum).max(axis=1)
+    is_used = magnitude > ROUNDING_SHARE * magnitude.max()
+    check_band(model, frequency_hz[is_used])
+    force_spectrum = np.zeros((len(spectrum), model.B.shape[1]), dtype=np.complex128)
+    if is_used.any():
+        H = compute_regularised_inverse(model, frequency_hz[is_used], weight, spring)
+        force_spectrum[is_used] = np.einsum("lmp,lp->lm", H, spectrum[is_used])
+    samples = np.fft.irfft(force_spectrum, n, axis=0)
     return Signal(samples, reference.sample_rate_hz, "force", "N", model.input_channels)
 
 
 def check_band(model: IdentifiedModel, frequency_hz: FloatArray) -> None:
     """Check that a model covers the frequencies of a signal. Raises OutsideBandError for frequencies that the model
     does not cover."""
-    low, high = model.band_hz
-    outside = [
-        line_hz for line_hz in np.atleast_1d(frequency_hz) if not low * (1 - 1e-9) <= line_hz <= high * (1 + 1e-9)
+    low_hz, high_hz = model.band_hz
+    outside_hz = [
+        line_hz for line_hz in np.atleast_1d(frequency_hz) if not low_hz * (1 - 1e-9) <= line_hz <= high_hz * (1 + 1e-9)
     ]
-    if outside:
-        listed = ", ".join(f"{line_hz:g}" for line_hz in outside[:5]) + (" ..." if len(outside) > 5 else "")
+    if outside_hz:
+        listed = ", ".join(f"{line_hz:g}" for line_hz in outside_hz[:5]) + (" ..." if len(outside_hz) > 5 else "")
         raise OutsideBandError(
-            f"the model was made for {low:g} to {high:g} Hz, but {listed} Hz is wanted; identify a model of a wider "
-            "band (hapteq identify --band)"
+            f"the model was made for {low_hz:g} to {high_hz:g} Hz, but {listed} Hz is wanted; identify a model of a "
+            "wider band (hapteq identify --band)"
         )
 
 
 def check_reference(model: IdentifiedModel, reference: Signal) -> None:
-    """Check a wanted signal against the model. Raises ValueError for a signal whose rate, channels or units are not the
-    model's."""
+    """Check a reference signal against the model. Raises ValueError for a signal whose rate, channels or units are not
+    the model's."""
     if reference.sample_rate_hz != model.sample_rate_hz:
         raise ValueError(
             f"the model runs at {model.sample_rate_hz:g} Hz, not at {reference.sample_rate_hz:g} Hz; "

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.feedforward.band_part import band_share, find_padded_length
+from equalizer.tracking.feedforward.band_pass import compute_band_gain, find_padded_length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +32,7 @@ def integrate_motion(
     length = find_padded_length(len(acceleration), sample_rate_hz)
     lines_hz = np.asarray(np.fft.rfftfreq(length, 1 / sample_rate_hz), dtype=np.float64)
     s = 2j * np.pi * lines_hz
-    share = band_share(lines_hz, band_hz) * np.exp(s * lead_s)
+    share = compute_band_gain(lines_hz, band_hz) * np.exp(s * lead_s)
     s[0] = 1.0  # any finite value: the band has no gain there
     spectrum = np.fft.rfft(acceleration, length, axis=0) * share[:, np.newaxis]
 

@@ -6,6 +6,7 @@ spectral line is the worst-case share of the error that remains. Where it is bel
 error decreases monotonically.
 
 Reference: Bristow, Tharayil and Alleyne, A Survey of Iterative Learning Control, IEEE Control Systems 26 (2006), 96.
+Called by `workspace.convergence_at_place`.
 """
 
 from dataclasses import dataclass
@@ -42,17 +43,17 @@ class Convergence:
         return float(self.frequency_hz[self.surviving.argmax()])
 
 
-def convergence(
+def predict_convergence(
     inverse: ComplexArray,
     device: ComplexArray,
     frequency_hz: FloatArray,
     band_hz: tuple[float, float],
     beta: float = 1.0,
 ) -> Convergence:
-    """Convergence of learning with the operator L = `inverse`, (lines, p, p), N per m/s², on a device with the response
-    `device`, (lines, p, p) or (draws, lines, p, p), m/s² per N: a second measurement, or draws from the model's
-    uncertainty. L may be singular: in one direction nothing is then corrected, and no gain converges. Raises ValueError
-    for other shapes, and where no line is in the band.
+    """Predict the convergence of learning with the operator L = `inverse`, (lines, p, p), N per m/s², on a device with
+    the response `device`, (lines, p, p) or (draws, lines, p, p), m/s² per N: a second measurement, or draws from the
+    model's uncertainty. L may be singular: in one direction nothing is then corrected, and no gain converges. Raises
+    ValueError for other shapes, and where no line is in the band.
     """
     device = np.asarray(device)[np.newaxis] if np.ndim(device) == 3 else np.asarray(device)
     if inverse.ndim != 3 or inverse.shape[1] != inverse.shape[2] or device.shape[1:] != inverse.shape:
@@ -64,11 +65,11 @@ def convergence(
     if not in_band.any():
         raise ValueError(f"no line lies in the band of {band_hz[0]:g} to {band_hz[1]:g} Hz")
     loop_response = np.asarray(device[:, in_band] @ inverse[in_band], dtype=np.complex128)
-    survivors = np.linalg.svd(np.eye(inverse.shape[1]) - beta * loop_response, compute_uv=False)[..., 0]
-    return Convergence(frequency_hz[in_band], survivors.max(axis=0), beta, _safe_beta(loop_response))
+    surviving_shares = np.linalg.svd(np.eye(inverse.shape[1]) - beta * loop_response, compute_uv=False)[..., 0]
+    return Convergence(frequency_hz[in_band], surviving_shares.max(axis=0), beta, _compute_safe_beta(loop_response))
 
 
-def _safe_beta(loop_response: ComplexArray) -> float:
+def _compute_safe_beta(loop_response: ComplexArray) -> float:
     """Upper bound, 0 to 2, of the gains with |I - beta T| < 1 for all T of `loop_response`, (..., lines, p, p). As
     matrix inequalities the condition is T + T* > beta T* T, hence T⁻¹ + T⁻* > beta I: the smallest eigenvalue is the
     bound. 0 where a T is singular to rounding: in one direction the device then never moves, or nothing is corrected,
@@ -76,5 +77,5 @@ def _safe_beta(loop_response: ComplexArray) -> float:
     if np.any(np.linalg.cond(loop_response) > 1 / np.finfo(float).eps):
         return 0.0
     inverse = np.linalg.inv(loop_response)
-    lowest = np.linalg.eigvalsh(inverse + inverse.conj().swapaxes(-1, -2))[..., 0].min()
-    return float(np.clip(lowest, 0.0, 2.0))
+    smallest_eigenvalue = np.linalg.eigvalsh(inverse + inverse.conj().swapaxes(-1, -2))[..., 0].min()
+    return float(np.clip(smallest_eigenvalue, 0.0, 2.0))

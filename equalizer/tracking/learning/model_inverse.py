@@ -1,7 +1,8 @@
 """The inverse of a model as a linear operator on records of a fixed length, for iterative learning control.
 
-The operator maps wanted accelerations (N, p), m/s², to forces (N, m), N, by finite-horizon LQR tracking (`lqr`). The
-gains depend on the length only, so that they are computed once.
+The operator maps reference accelerations (N, p), m/s², to forces (N, m), N, by finite-horizon LQR tracking (`lqr`). The
+gains depend on the length only, so that they are computed once. `workspace.feedforward_at_place` combines the operators
+of several models; `compensate_spring` is also used by `study.workflows.equalizer`.
 """
 
 from collections.abc import Callable
@@ -13,37 +14,38 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.planned_motion import integrate_motion
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from equalizer.tracking.learning.iteration import Invert
-from equalizer.tracking.lqr.lqr import stored_gains, track
+from equalizer.tracking.lqr.lqr import compute_stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 
 InverseOfLength = Callable[[int], Invert]
 """Function from a number of rows to the inverse operator for records of that length."""
 
 
-def inverse_operator(model: IdentifiedModel, weight: float = 1e-3) -> InverseOfLength:
-    """Inverse of a model by finite-horizon LQR tracking, from rest and with a free final state. weight: R = weight I,
-    of |u|², (m/s² per N)²."""
+def make_inverse_operator(model: IdentifiedModel, weight: float = 1e-3) -> InverseOfLength:
+    """Make the inverse of a model by finite-horizon LQR tracking, from rest and with a free final state, for any record
+    length. weight: R = weight I, of |u|², (m/s² per N)²."""
 
-    def of_length(rows: int) -> Invert:
+    def make_inverse_of_length(rows: int) -> Invert:
         """Inverse operator for records of `rows` rows."""
-        gains = stored_gains(make_tracking_problem(model, TrackingWeights(weight)), rows)
+        gains = compute_stored_gains(make_tracking_problem(model, TrackingWeights(weight)), rows)
         return lambda reference: track(gains, reference).forces
 
-    return of_length
+    return make_inverse_of_length
 
 
 def compensate_spring(
     invert: Invert, spring: VirtualSpring, sample_rate_hz: float, band_hz: tuple[float, float]
 ) -> Invert:
-    """The operator from wanted accelerations to commands, where the device's loop adds the force of a virtual spring to
-    the commands: that force, -(k x + b v) along the planned motion, is subtracted."""
+    """Extend the inverse `invert` by the compensation of a virtual spring, whose force -(k x + b v) the device's loop
+    adds to the commands: that force, along the planned motion (position x and velocity v integrated from the reference
+    acceleration within band_hz), is subtracted. Without a spring, `invert` itself."""
     if spring == VirtualSpring():
         return invert
 
-    def commands(reference: FloatArray) -> FloatArray:
-        """Commands (N, m) for wanted accelerations (N, p)."""
+    def compute_commands(reference: FloatArray) -> FloatArray:
+        """Commands (N, m), N, for reference accelerations (N, p), m/s²."""
         motion = integrate_motion(reference, sample_rate_hz, band_hz)
         spring_force = spring.stiffness_n_per_m * motion.position + spring.damping_n_s_per_m * motion.velocity
         return np.asarray(invert(reference) + spring_force)
 
-    return commands
+    return compute_commands

@@ -1,10 +1,10 @@
-"""A transient whose direction changes while it is played: optimal forces from the model's present state, at each tick.
+"""A transient whose direction changes while it is played: optimal forces from the model's present state at each tick.
 
 The force of the tracker (`lqr`) is u_k = g_k - K_k x_k. The gains K do not depend on the direction, and the feedforward
 g is linear in it: g is stored for each element of the direction (9 for a rotation of three axes, 3 for a normal), and a
 new direction costs one linear combination per tick. Each tick is optimal for the remaining trajectory in the present
 direction. Overlapping transients have a LiveState each, and their forces are added. `restart` replaces a transient by
-another.
+another. Called by `contact` and by `equalizer.tracking.realtime`; sizes: n states, m forces, p responses.
 """
 
 from dataclasses import dataclass
@@ -13,15 +13,15 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.lqr import lqr_kernel
-from equalizer.tracking.lqr.lqr import StoredGains, costate_feedforward
-from equalizer.tracking.lqr.rotation import axis_recordings, axis_trajectories
+from equalizer.tracking.lqr.lqr import StoredGains, compute_costate_feedforward
+from equalizer.tracking.lqr.rotation import make_axis_recordings, make_axis_trajectories
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, read_only, require_trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TurningTransient:
-    """Stored gains and feedforward of a transient of N rows, made by `make_rotatable_transient` or `normal_transient`.
-    Its arrays are arguments of `lqr_kernel.tick`, for compiled loops."""
+    """Stored gains and feedforward of a transient of N rows, made by `make_rotatable_transient` or
+    `make_normal_transient`. Its arrays are arguments of `lqr_kernel.tick`, for compiled loops."""
 
     problem: TrackingProblem
     K: FloatArray
@@ -61,16 +61,17 @@ def make_rotatable_transient(gains: StoredGains, trajectory: FloatArray) -> Turn
     """Transient of a trajectory (N, p), m/s², before rotation. gains: for N rows, with a free end or rest as final
     state. Raises TrackingError for another shape."""
     p = gains.problem.outputs
-    return _make_transient(gains, axis_trajectories(require_trajectory(gains.problem, trajectory)), (p, p))
+    return _make_transient(gains, make_axis_trajectories(require_trajectory(gains.problem, trajectory)), (p, p))
 
 
-def normal_transient(gains: StoredGains, recording: FloatArray) -> TurningTransient:
-    """Transient of a recording (N,), m/s², to be played along a normal. Raises TrackingError for another shape."""
+def make_normal_transient(gains: StoredGains, recording: FloatArray) -> TurningTransient:
+    """Transient of a recording (N,), m/s², to be played along a normal (a unit vector per tick). Raises TrackingError
+    for another shape."""
     p = gains.problem.outputs
-    return _make_transient(gains, axis_recordings(recording, p), (p,))
+    return _make_transient(gains, make_axis_recordings(recording, p), (p,))
 
 
-def initial_state(transient: TurningTransient) -> LiveState:
+def make_initial_state(transient: TurningTransient) -> LiveState:
     """State at the first row, with the model at rest."""
     return LiveState(0, np.zeros(transient.problem.order))
 
@@ -91,28 +92,36 @@ def step(transient: TurningTransient, state: LiveState, direction: FloatArray) -
 
 
 def play(transient: TurningTransient, directions: FloatArray, state: LiveState | None = None) -> TurningResult:
-    """T ticks in a compiled loop. directions: (T, p, p) or (T, p), one per tick; state: None = first row, at rest.
+    """Compute T ticks in a compiled loop. directions: (T, p, p) or (T, p), one per tick; state: None = first row, at
+    rest. After the transient's last row the forces are zero.
 
     Raises TrackingError for another shape of the directions.
     """
-    problem, start_state = transient.problem, initial_state(transient) if state is None else state
+    problem, start_state = transient.problem, make_initial_state(transient) if state is None else state
     direction_rows = np.asarray(directions, dtype=np.float64)
     if direction_rows.shape[1:] != transient.direction_shape:
         raise TrackingError(
             f"a direction has shape {direction_rows.shape[1:]}; this transient takes {transient.direction_shape}"
         )
     n, m = problem.order, problem.inputs
-    work = np.zeros(2 * n + m + problem.outputs)
-    work[:n] = problem.state(start_state.x)
+    workspace = np.zeros(2 * n + m + problem.outputs)
+    workspace[:n] = problem.state(start_state.x)
     outputs = np.empty((len(direction_rows), m + problem.outputs))
-    flat = np.ascontiguousarray(direction_rows.reshape(len(direction_rows), -1))
+    flat_directions = np.ascontiguousarray(direction_rows.reshape(len(direction_rows), -1))
     lqr_kernel.run_ticks(
-        problem.step, transient.K[start_state.tick :], transient.g[start_state.tick :], flat, work, outputs
+        problem.step,
+        transient.K[start_state.tick :],
+        transient.g[start_state.tick :],
+        flat_directions,
+        workspace,
+        outputs,
     )
-    return TurningResult(outputs[:, :m], outputs[:, m:], LiveState(start_state.tick + len(direction_rows), work[:n]))
+    return TurningResult(
+        outputs[:, :m], outputs[:, m:], LiveState(start_state.tick + len(direction_rows), workspace[:n])
+    )
 
 
 def _make_transient(gains: StoredGains, references: FloatArray, direction_shape: tuple[int, ...]) -> TurningTransient:
     """Transient from trajectories (c, N, p), one per element of the direction."""
-    g = np.stack([costate_feedforward(gains, reference) for reference in references], axis=2)
+    g = np.stack([compute_costate_feedforward(gains, reference) for reference in references], axis=2)
     return TurningTransient(gains.problem, gains.gains.K, read_only(g), direction_shape)

@@ -1,11 +1,12 @@
 """Optimal tracking under a cap on the force: a constrained problem, not clipping, with the tracking loss stated.
 
-    minimise  sum (y_k - r_k)' Q (y_k - r_k) + u_k' R u_k    subject to    |u_k + already_k| <= cap    for every k
+    minimise  sum (y_k - r_k)' Q (y_k - r_k) + u_k' R u_k    subject to    |u_k + f_k| <= cap    for every k
 
-By the alternating direction method of multipliers, ADMM (Boyd et al., Distributed Optimization and Statistical Learning
-via the Alternating Direction Method of Multipliers, 2011). Two steps alternate: tracking with the gains of one Riccati
-recursion, and projection of the forces on the cap. The multipliers give a lower bound of the optimal cost (duality), so
-that the distance from the optimum is known.
+with fixed further forces f. By the alternating direction method of multipliers, ADMM (Boyd et al., Distributed
+Optimization and Statistical Learning via the Alternating Direction Method of Multipliers, 2011). Two steps alternate:
+tracking with the gains of one Riccati recursion, and projection of the forces on the cap. The multipliers give a lower
+bound of the optimal cost (duality), so that the distance from the optimum is known. Called by
+`feedforward.solve_causally` and `bands.banded_equalizer`.
 """
 
 from dataclasses import dataclass, replace
@@ -15,26 +16,27 @@ from scipy.linalg import block_diag
 
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.lqr.limits import find_force_peaks, project_to_cap, require_cap
-from equalizer.tracking.lqr.lqr import StoredGains, stored_gains, track
+from equalizer.tracking.lqr.lqr import StoredGains, compute_stored_gains, track
 from equalizer.tracking.lqr.lqr_kernel import simulate
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, require_trajectory
 
 OVER_RELAXATION = 1.7
 """Over-relaxation of ADMM; 1.5 to 1.8 converges fastest (Boyd et al. 2011, section 3.4.3)."""
 ROUNDS_BETWEEN_TUNING = 25
-"""Iterations between changes of the penalty of ADMM, of which each costs a Riccati recursion."""
+"""Number of iterations between changes of the penalty of ADMM; each change costs a Riccati recursion."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrackingLoss:
-    """Tracking error and cost without and with the cap. Errors are rms of (predicted - wanted) over rms of wanted."""
+    """Tracking error and cost without and with the cap. Errors are rms of (predicted - reference) over rms of the
+    reference."""
 
     error_free: float
     """Error of the optimal forces without a cap."""
     error_capped: float
     """Error of the returned forces."""
     error_clipped: float
-    """Error of those forces after clipping, for comparison; clipped forces are never played."""
+    """Error of the optimal forces after clipping to the cap, for comparison; clipped forces are never played."""
     cost_free: float
     """Value of the cost for the optimal forces without a cap."""
     cost_capped: float
@@ -42,7 +44,7 @@ class TrackingLoss:
     gap: float
     """Relative duality gap: bound of the relative excess of the cost over the optimum; 0 = optimal."""
     rounds: int
-    """Iterations of ADMM."""
+    """Iterations of ADMM; 0 where the forces without a cap were under it."""
 
     @property
     def lost(self) -> float:
@@ -55,9 +57,9 @@ class CappedForces:
     """Result of `track_under_cap`: forces from rest under the cap, and the tracking error that the cap causes."""
 
     forces: FloatArray
-    """(N, m), N; the norm of each row of their sum with the forces `already` is within the cap."""
+    """(N, m), N; the norm of each row of their sum with the further forces `already` is within the cap."""
     predicted: FloatArray
-    """(N, p), m/s²: the model's response."""
+    """(N, p), m/s²: the model's response to `forces`, from rest."""
     loss: TrackingLoss
 
 
@@ -68,34 +70,35 @@ class CapSettings:
     gap: float = 1e-5
     """Relative duality gap at which the iteration ends."""
     rounds: int = 5000
+    """Largest number of iterations; TrackingError beyond."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _CappedTask:
-    """The constrained problem of one trajectory: `reference` (N, p), `fixed_forces` (N, m) that count against the cap
-    too, and the cap in N."""
+class _CappedProblem:
+    """The constrained problem of one trajectory: `reference` (N, p), m/s²; `fixed_forces` (N, m), N, which count
+    against the cap too; the cap in N."""
 
     problem: TrackingProblem
     reference: FloatArray
     fixed_forces: FloatArray
     cap_n: float
 
-    def nearest(self, forces: FloatArray) -> FloatArray:
-        """(N, m): projection of forces on those allowed under the cap."""
+    def project(self, forces: FloatArray) -> FloatArray:
+        """(N, m): projection of forces on those allowed under the cap, row by row."""
         return project_to_cap(forces + self.fixed_forces, self.cap_n) - self.fixed_forces
 
-    def cost(self, forces: FloatArray) -> float:
+    def compute_cost(self, forces: FloatArray) -> float:
         """Value of the quadratic cost for forces (N, m) from rest."""
         outputs = _simulate_outputs(self.problem, forces)
         outputs[:, : self.problem.outputs] -= self.reference
         cost = (outputs @ self.problem.Q * outputs).sum() + (forces @ self.problem.R * forces).sum()
         return float(cost)
 
-    def lower_bound(self, forces: FloatArray, multipliers: FloatArray) -> float:
-        """Lower bound of the optimal cost, the dual function: cost(u) + λ·u - sum_k (cap |λ_k| - λ_k·already_k).
-        forces: u, which minimises cost(u) + λ·u without a cap; multipliers: λ, (N, m)."""
+    def compute_lower_bound(self, forces: FloatArray, multipliers: FloatArray) -> float:
+        """Lower bound of the optimal cost, the dual function: cost(u) + λ·u - sum_k (cap |λ_k| - λ_k·f_k), with the
+        fixed forces f. forces: u, which minimises cost(u) + λ·u without a cap; multipliers: λ, (N, m)."""
         support = self.cap_n * np.linalg.norm(multipliers, axis=1).sum() - (multipliers * self.fixed_forces).sum()
-        return self.cost(forces) + float((multipliers * forces).sum() - support)
+        return self.compute_cost(forces) + float((multipliers * forces).sum() - support)
 
 
 def track_under_cap(
@@ -105,10 +108,11 @@ def track_under_cap(
     already: FloatArray | None = None,
     settings: CapSettings | None = None,
 ) -> CappedForces:
-    """Track reference (N, p), m/s², from rest. already: (N, m), N, further forces, which count against the cap.
+    """Track reference (N, p), m/s², from rest. cap_n: largest norm of a row of all forces, N; already: (N, m), N,
+    further forces, which count against the cap (None = none).
 
-    Raises TrackingError for other shapes, where `already` alone is above the cap, and where the duality gap is not
-    reached within the allowed rounds.
+    Raises TrackingError for other shapes and an invalid cap, where `already` alone is above the cap, and where the
+    duality gap is not reached within the allowed rounds.
     """
     r = require_trajectory(problem, reference)
     fixed_forces = np.zeros((len(r), problem.inputs)) if already is None else np.asarray(already, dtype=np.float64)
@@ -120,45 +124,48 @@ def track_under_cap(
             f"the other forces alone reach {peaks.peak_n:.3g} N at row {peaks.peak_row}, above the cap of {cap_n:g} "
             "N; lower them, or raise the cap"
         )
-    task = _CappedTask(problem, r, fixed_forces, cap_n)
-    unconstrained = track(stored_gains(problem, len(r)), r)
+    task = _CappedProblem(problem, r, fixed_forces, cap_n)
+    unconstrained = track(compute_stored_gains(problem, len(r)), r)
     if find_force_peaks(unconstrained.forces + fixed_forces, cap_n).is_under_cap:
-        return _state_loss(task, unconstrained.forces, unconstrained.forces, 0.0, 0)
-    return _state_loss(
+        return _make_result(task, unconstrained.forces, unconstrained.forces, 0.0, 0)
+    return _make_result(
         task, unconstrained.forces, *_alternate_directions(task, unconstrained.forces, settings or CapSettings())
     )
 
 
-def _alternate_directions(task: _CappedTask, start: FloatArray, settings: CapSettings) -> tuple[FloatArray, float, int]:
-    """ADMM with over-relaxation and scaled multipliers, in Boyd's notation: u from tracking, z projected on the cap,
-    `scaled` = λ / (2 weight). Returns the best z, its relative duality gap and the number of rounds."""
-    weight = _initial_penalty(task.problem)
-    gains = _compute_penalised_gains(task.problem, len(task.reference), weight)
-    z, scaled = task.nearest(start), np.zeros_like(start)
-    best, best_cost, bound = z, task.cost(z), -np.inf
-    for round_number in range(1, settings.rounds + 1):
-        u = track(gains, np.hstack((task.reference, z - scaled))).forces
-        bound = max(bound, task.lower_bound(u, 2 * weight * (u - z + scaled)))
-        relaxed = OVER_RELAXATION * u + (1 - OVER_RELAXATION) * z
-        previous_z, z = z, task.nearest(relaxed + scaled)
-        scaled = scaled + relaxed - z
-        cost = task.cost(z)
+def _alternate_directions(
+    task: _CappedProblem, initial_forces: FloatArray, settings: CapSettings
+) -> tuple[FloatArray, float, int]:
+    """Solve by ADMM with over-relaxation, in Boyd's notation: u from tracking, z projected on the cap, scaled
+    multipliers λ / (2 penalty). Returns the best z, its relative duality gap and the number of rounds. Raises
+    TrackingError where the gap is not reached."""
+    penalty = _choose_initial_penalty(task.problem)
+    gains = _compute_penalised_gains(task.problem, len(task.reference), penalty)
+    z, scaled_multipliers = task.project(initial_forces), np.zeros_like(initial_forces)
+    best_forces, best_cost, cost_bound = z, task.compute_cost(z), -np.inf
+    for round_count in range(1, settings.rounds + 1):
+        u = track(gains, np.hstack((task.reference, z - scaled_multipliers))).forces
+        cost_bound = max(cost_bound, task.compute_lower_bound(u, 2 * penalty * (u - z + scaled_multipliers)))
+        relaxed_forces = OVER_RELAXATION * u + (1 - OVER_RELAXATION) * z
+        previous_z, z = z, task.project(relaxed_forces + scaled_multipliers)
+        scaled_multipliers = scaled_multipliers + relaxed_forces - z
+        cost = task.compute_cost(z)
         if cost < best_cost:
-            best, best_cost = z, cost
-        gap = max(0.0, (best_cost - bound) / best_cost)
+            best_forces, best_cost = z, cost
+        gap = max(0.0, (best_cost - cost_bound) / best_cost)
         if gap <= settings.gap:
-            return best, gap, round_number
-        factor = _penalty_factor(u - z, z - previous_z) if round_number % ROUNDS_BETWEEN_TUNING == 0 else 1.0
+            return best_forces, gap, round_count
+        factor = _compute_penalty_factor(u - z, z - previous_z) if round_count % ROUNDS_BETWEEN_TUNING == 0 else 1.0
         if factor != 1.0:
-            weight, scaled = weight * factor, scaled / factor
-            gains = _compute_penalised_gains(task.problem, len(task.reference), weight)
+            penalty, scaled_multipliers = penalty * factor, scaled_multipliers / factor
+            gains = _compute_penalised_gains(task.problem, len(task.reference), penalty)
     raise TrackingError(
         f"after {settings.rounds} rounds the forces under the cap of {task.cap_n:g} N are only known to be within "
         f"{gap:.2g} of the best cost; scale what is wanted down, or allow a larger gap than {settings.gap:g}"
     )
 
 
-def _penalty_factor(primal_residual: FloatArray, dual_residual: FloatArray) -> float:
+def _compute_penalty_factor(primal_residual: FloatArray, dual_residual: FloatArray) -> float:
     """Factor on the penalty that balances the primal residual u - z and the dual residual, the change of z (Boyd et
     al., section 3.4.1)."""
     ratio = float(
@@ -167,25 +174,25 @@ def _penalty_factor(primal_residual: FloatArray, dual_residual: FloatArray) -> f
     return float(np.clip(np.sqrt(ratio), 0.2, 5.0)) if not 1 / 3 < ratio < 3 else 1.0
 
 
-def _initial_penalty(problem: TrackingProblem) -> float:
-    """Initial penalty: geometric mean of the smallest force weight and the cost's curvature in the force of one
-    tick."""
+def _choose_initial_penalty(problem: TrackingProblem) -> float:
+    """Initial penalty: geometric mean of the smallest force weight and the cost's curvature in the force of one tick,
+    with lower limits of 1e-6 and 1."""
     curvature = problem.stage_cost[problem.order :, problem.order :]
     return float(np.sqrt(max(np.linalg.eigvalsh(problem.R)[0], 1e-6) * max(np.trace(curvature), 1.0)))
 
 
-def _compute_penalised_gains(problem: TrackingProblem, samples: int, weight: float) -> StoredGains:
-    """Gains of the problem with the additional cost weight |u - w|²: the forces are further tracked outputs, and w is
+def _compute_penalised_gains(problem: TrackingProblem, samples: int, penalty: float) -> StoredGains:
+    """Gains of the problem with the additional cost penalty |u - w|²: the forces are further tracked outputs, and w is
     their reference."""
     p, m = problem.outputs, problem.inputs
     C = np.insert(problem.C, [p] * m, np.zeros((m, problem.order)), axis=0)
     D = np.insert(problem.D, [p] * m, np.eye(m), axis=0)
-    Q = block_diag(problem.Q[:p, :p], weight * np.eye(m), problem.Q[p:, p:])
-    return stored_gains(replace(problem, C=C, D=D, Q=Q, outputs=p + m), samples)
+    Q = block_diag(problem.Q[:p, :p], penalty * np.eye(m), problem.Q[p:, p:])
+    return compute_stored_gains(replace(problem, C=C, D=D, Q=Q, outputs=p + m), samples)
 
 
 def _simulate_outputs(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
-    """(N, q): response of all outputs, the p tracked outputs first, to forces (N, m) from rest."""
+    """(N, q): response of all q outputs, the p tracked outputs first, to forces (N, m) from rest."""
     outputs, forces_out = np.empty((len(forces), problem.C.shape[0])), np.empty_like(forces)
     all_outputs_step = replace(problem, outputs=problem.C.shape[0]).step
     no_gain = np.zeros((len(forces), problem.inputs, problem.order))
@@ -193,22 +200,26 @@ def _simulate_outputs(problem: TrackingProblem, forces: FloatArray) -> FloatArra
     return outputs
 
 
-def _state_loss(
-    task: _CappedTask, unconstrained: FloatArray, forces: FloatArray, gap: float, rounds: int
+def _make_result(
+    task: _CappedProblem, unconstrained: FloatArray, forces: FloatArray, gap: float, rounds: int
 ) -> CappedForces:
-    """Result with the loss of `forces` against the unconstrained forces `unconstrained`, (N, m) each."""
-    p, size = task.problem.outputs, float(np.linalg.norm(task.reference)) or 1.0
+    """Result for `forces` (N, m), with the loss against the forces `unconstrained` (N, m). gap, rounds: as in
+    `TrackingLoss`."""
+    p, reference_norm = task.problem.outputs, float(np.linalg.norm(task.reference)) or 1.0
 
-    def error(tested_forces: FloatArray) -> float:
-        """Relative tracking error of forces (N, m)."""
-        return float(np.linalg.norm(_simulate_outputs(task.problem, tested_forces)[:, :p] - task.reference)) / size
+    def compute_error(tested_forces: FloatArray) -> float:
+        """Relative rms tracking error of forces (N, m); the absolute norm for a reference of zeros."""
+        return (
+            float(np.linalg.norm(_simulate_outputs(task.problem, tested_forces)[:, :p] - task.reference))
+            / reference_norm
+        )
 
     loss = TrackingLoss(
-        error(unconstrained),
-        error(forces),
-        error(task.nearest(unconstrained)),
-        task.cost(unconstrained),
-        task.cost(forces),
+        compute_error(unconstrained),
+        compute_error(forces),
+        compute_error(task.project(unconstrained)),
+        task.compute_cost(unconstrained),
+        task.compute_cost(forces),
         gap,
         rounds,
     )

@@ -8,7 +8,7 @@ E(t) = sum_i n_i E_i(t), and its relative square in the model's band is the quad
 
 whose largest eigenvalue belongs to the worst normal. The optimal tracker is not causal: forces before the contact
 reduce the error, but at an unforeseen contact there are none. Comparison of `deviation` with `early_deviation` shows
-the cost of causality.
+the cost of causality. Called by `study.workflows.equalizer.play_contact`.
 """
 
 from dataclasses import dataclass
@@ -16,16 +16,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.lqr.changing_direction import TurningTransient, normal_transient
-from equalizer.tracking.lqr.lqr import stored_gains
-from equalizer.tracking.lqr.padding import CAUSAL, Padding, band_spectrum
-from equalizer.tracking.lqr.rotation import RotationBasis, axis_recordings, normal_basis
+from equalizer.tracking.lqr.changing_direction import TurningTransient, make_normal_transient
+from equalizer.tracking.lqr.lqr import compute_stored_gains
+from equalizer.tracking.lqr.padding import CAUSAL, Padding, compute_band_spectrum
+from equalizer.tracking.lqr.rotation import RotationBasis, compute_normal_basis, make_axis_recordings
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CausalStart:
-    """Stored solutions of a transient for every contact normal. Made by `causal_start`."""
+    """Stored solutions of a transient for every contact normal. Made by `prepare_causal_start`."""
 
     basis: RotationBasis
     """Forces of the whole transient at once, for a normal (p,)."""
@@ -36,14 +36,15 @@ class CausalStart:
     early_deviation: FloatArray
     """(p, p): S for forces that may begin before the contact."""
 
-    def error(self, normal: FloatArray) -> float:
-        """Relative error of the predicted acceleration in the model's band. normal: (p,), of any length above 0. Raises
-        TrackingError for another shape, zero and values that are not finite."""
-        return _relative_error(self.deviation, normal)
+    def compute_error(self, normal: FloatArray) -> float:
+        """Relative error of the predicted acceleration in the model's band. normal: (p,), scaled to unit length here.
+        Raises TrackingError for another shape, for zero and for values that are not finite."""
+        return _compute_relative_error(self.deviation, normal)
 
-    def early_error(self, normal: FloatArray) -> float:
-        """Relative error if forces were allowed to begin before the contact. normal and errors: as for `error`."""
-        return _relative_error(self.early_deviation, normal)
+    def compute_early_error(self, normal: FloatArray) -> float:
+        """Relative error if forces were allowed to begin before the contact. Argument and exceptions as for
+        `compute_error`."""
+        return _compute_relative_error(self.early_deviation, normal)
 
     @property
     def worst_error(self) -> float:
@@ -51,56 +52,64 @@ class CausalStart:
         return float(np.sqrt(max(0.0, float(np.linalg.eigvalsh(self.deviation)[-1]))))
 
 
-def causal_start(problem: TrackingProblem, recording: FloatArray, padding: Padding | None = None) -> CausalStart:
+def prepare_causal_start(
+    problem: TrackingProblem, recording: FloatArray, padding: Padding | None = None
+) -> CausalStart:
     """Prepare a recording (N,), the acceleration (m/s²) along the normal from the contact on, at the problem's sample
-    rate. padding: its time after the recording is played, in which the device comes to rest; its time before it serves
-    the comparison only. None = 0.3 s each.
+    rate. padding: its time after the recording is played, in which the device comes to rest; its time before it is used
+    only for `early_deviation`. None = 0.3 s each.
 
     Raises TrackingError where the recording has no content in the model's band, or another shape.
     """
     full_padding = padding or Padding()
     causal = Padding(CAUSAL.before_s, full_padding.after_s)
-    _, rows_after = causal.samples(problem.sample_rate_hz)
+    _, rows_after = causal.count_rows(problem.sample_rate_hz)
     padded_recording = np.pad(np.asarray(recording, dtype=np.float64), (0, rows_after))
-    gains = stored_gains(problem, len(padded_recording))
-    basis = normal_basis(gains, padded_recording)
-    deviation = _deviation(problem, basis, padded_recording)
+    gains = compute_stored_gains(problem, len(padded_recording))
+    basis = compute_normal_basis(gains, padded_recording)
+    deviation = _compute_deviation(problem, basis, padded_recording)
     return CausalStart(
         basis,
-        normal_transient(gains, padded_recording),
+        make_normal_transient(gains, padded_recording),
         deviation,
-        _early_deviation(problem, padded_recording, full_padding),
+        _compute_early_deviation(problem, padded_recording, full_padding),
     )
 
 
-def _early_deviation(problem: TrackingProblem, recording: FloatArray, padding: Padding) -> FloatArray:
-    """(p, p): S with zeros before the transient, in which forces may begin. recording: (N,)."""
-    rows_before, _ = padding.samples(problem.sample_rate_hz)
+def _compute_early_deviation(problem: TrackingProblem, recording: FloatArray, padding: Padding) -> FloatArray:
+    """(p, p): S with zeros before the transient, during which forces may begin. recording: (N,), with its rows of rest
+    after the transient."""
+    rows_before, _ = padding.count_rows(problem.sample_rate_hz)
     padded = np.pad(recording, (rows_before, 0))
-    return _deviation(problem, normal_basis(stored_gains(problem, len(padded)), padded), padded)
+    return _compute_deviation(problem, compute_normal_basis(compute_stored_gains(problem, len(padded)), padded), padded)
 
 
-def _deviation(problem: TrackingProblem, basis: RotationBasis, recording: FloatArray) -> FloatArray:
+def _compute_deviation(problem: TrackingProblem, basis: RotationBasis, recording: FloatArray) -> FloatArray:
     """(p, p): S of the module docstring. recording: (N,), with its padding. Raises TrackingError where it has no
     content in the band."""
     p, rate_hz, band_hz = problem.outputs, problem.sample_rate_hz, problem.band_hz
-    level = float(np.linalg.norm(band_spectrum(recording[:, np.newaxis], rate_hz, band_hz)))
-    if not level > 0:
+    recording_norm = float(np.linalg.norm(compute_band_spectrum(recording[:, np.newaxis], rate_hz, band_hz)))
+    if not recording_norm > 0:
         raise TrackingError(
             f"the recording has nothing between {band_hz[0]:g} and {band_hz[1]:g} Hz, the model's band; "
             "give a transient with content there"
         )
-    references = axis_recordings(recording, p)
-    errors = [basis.predict_response(axis) - references[i] for i, axis in enumerate(np.eye(p))]
-    lines = np.array([band_spectrum(error, rate_hz, band_hz).ravel() for error in errors]) / level
-    return np.asarray(lines @ lines.T)
+    references = make_axis_recordings(recording, p)
+    axis_errors = [basis.predict_response(axis) - references[i] for i, axis in enumerate(np.eye(p))]
+    relative_error_spectra = (
+        np.array([compute_band_spectrum(error, rate_hz, band_hz).ravel() for error in axis_errors]) / recording_norm
+    )
+    return np.asarray(relative_error_spectra @ relative_error_spectra.T)
 
 
-def _relative_error(deviation: FloatArray, normal: FloatArray) -> float:
-    """sqrt(n' S n) for the normal scaled to unit length; rounding below zero counts as zero."""
-    n = np.asarray(normal, dtype=np.float64)
-    length = float(np.linalg.norm(n))
-    if n.shape != deviation.shape[:1] or not (np.isfinite(length) and length > 0):
-        raise TrackingError(f"a normal must be {len(deviation)} finite numbers, not all zero; it is {n.tolist()}")
-    n = n / length
-    return float(np.sqrt(max(0.0, float(n @ deviation @ n))))
+def _compute_relative_error(deviation: FloatArray, normal: FloatArray) -> float:
+    """sqrt(n' S n) for the normal scaled to unit length; a value below zero by rounding counts as zero. Raises
+    TrackingError for another shape, for zero and for values that are not finite."""
+    unit_normal = np.asarray(normal, dtype=np.float64)
+    normal_length = float(np.linalg.norm(unit_normal))
+    if unit_normal.shape != deviation.shape[:1] or not (np.isfinite(normal_length) and normal_length > 0):
+        raise TrackingError(
+            f"a normal must be {len(deviation)} finite numbers, not all zero; it is {unit_normal.tolist()}"
+        )
+    unit_normal = unit_normal / normal_length
+    return float(np.sqrt(max(0.0, float(unit_normal @ deviation @ unit_normal))))

@@ -3,7 +3,8 @@
 The inverse of a device is non-causal: its forces start before the trajectory and end after it. Zeros on both sides make
 room for them. Where only the trajectory's own rows are played, from rest, the forces before the first row are lost, and
 the other forces were computed for an initial motion that does not exist. No padding before the trajectory (`CAUSAL`) is
-then best: it gives the optimal forces among those that start with the first row.
+then best: it gives the optimal forces among those that start with the first row. Called by `feedforward`, `contact`,
+`bands` and `realtime`.
 """
 
 from dataclasses import dataclass
@@ -11,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.lqr.lqr import StoredGains, TrackResult, stored_gains, track
+from equalizer.tracking.lqr.lqr import StoredGains, TrackResult, compute_stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, require_trajectory
 
 
 @dataclass(frozen=True, slots=True)
 class Padding:
-    """Durations of the zeros before and after a trajectory. Raises TrackingError for a negative or non-finite
+    """Durations (s) of the zeros before and after a trajectory. Raises TrackingError for a negative or non-finite
     duration."""
 
     before_s: float = 0.3
@@ -29,7 +30,7 @@ class Padding:
             if not (np.isfinite(value) and value >= 0):
                 raise TrackingError(f"{name} is {value}; it must be a number that is not negative")
 
-    def samples(self, rate_hz: float) -> tuple[int, int]:
+    def count_rows(self, rate_hz: float) -> tuple[int, int]:
         """Numbers of rows before and after at a sample rate (Hz), rounded."""
         return round(self.before_s * rate_hz), round(self.after_s * rate_hz)
 
@@ -46,7 +47,7 @@ class PaddedTrack:
     padded: TrackResult
     """Forces and response with padding."""
     rows: slice
-    """The trajectory's own rows in `whole`."""
+    """The trajectory's own rows in `padded`."""
     padded_error: float
     """Relative rms error in the model's band over the trajectory's rows, if all rows are played."""
     cut_error: float
@@ -62,45 +63,51 @@ def track_padded(
     problem: TrackingProblem, reference: FloatArray, padding: Padding | None = None, gains: StoredGains | None = None
 ) -> PaddedTrack:
     """Track reference (N, p), m/s², from rest, with padding; None = `CAUSAL`. gains: for the length with padding; None
-    = computed here. Raises TrackingError for another shape, and where nothing is wanted in the model's band."""
+    = computed here. Raises TrackingError for another shape, and for a reference without content in the model's band."""
     r = require_trajectory(problem, reference)
-    rows_before, rows_after = (padding or CAUSAL).samples(problem.sample_rate_hz)
-    padded = np.pad(r, ((rows_before, rows_after), (0, 0)))
-    padded_track = track(gains or stored_gains(problem, len(padded)), padded)
+    rows_before, rows_after = (padding or CAUSAL).count_rows(problem.sample_rate_hz)
+    padded_reference = np.pad(r, ((rows_before, rows_after), (0, 0)))
+    padded_track = track(gains or compute_stored_gains(problem, len(padded_reference)), padded_reference)
     rows = slice(rows_before, rows_before + len(r))
     cut_response = simulate_from_rest(problem, padded_track.forces[rows])
     rate_hz, band_hz = problem.sample_rate_hz, problem.band_hz
-    whole_error = band_error(r, padded_track.predicted[rows], rate_hz, band_hz)
-    return PaddedTrack(padded_track, rows, whole_error, band_error(r, cut_response, rate_hz, band_hz))
+    padded_error = compute_band_error(r, padded_track.predicted[rows], rate_hz, band_hz)
+    return PaddedTrack(padded_track, rows, padded_error, compute_band_error(r, cut_response, rate_hz, band_hz))
 
 
 def simulate_from_rest(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
     """(N, p), m/s²: the model's response to forces (N, m), in N, from rest."""
     x, predicted = np.zeros(problem.order), np.empty((len(forces), problem.outputs))
     for k, force in enumerate(forces):
-        s = np.concatenate((x, force)) @ problem.step
-        x, predicted[k] = s[: problem.order], s[problem.order :]
+        next_state_and_output = np.concatenate((x, force)) @ problem.step
+        x, predicted[k] = next_state_and_output[: problem.order], next_state_and_output[problem.order :]
     return predicted
 
 
-def band_error(reference: FloatArray, delivered: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> float:
-    """Rms of (delivered - reference) over rms of reference, both (N, p), of their spectra within the band.
+def compute_band_error(
+    reference: FloatArray, delivered: FloatArray, rate_hz: float, band_hz: tuple[float, float]
+) -> float:
+    """Rms of (delivered - reference) over rms of the reference, both (N, p), of their spectra within the band (Hz).
 
-    Raises TrackingError where nothing is wanted in the band.
+    Raises TrackingError for a reference without content in the band.
     """
-    error, level = band_spectrum(delivered - reference, rate_hz, band_hz), band_spectrum(reference, rate_hz, band_hz)
-    if not np.abs(level).max(initial=0.0) > 0:
+    error_spectrum, reference_spectrum = (
+        compute_band_spectrum(delivered - reference, rate_hz, band_hz),
+        compute_band_spectrum(reference, rate_hz, band_hz),
+    )
+    if not np.abs(reference_spectrum).max(initial=0.0) > 0:
         raise TrackingError(
             f"nothing is wanted between {band_hz[0]:g} and {band_hz[1]:g} Hz, the model's band; "
             "give a trajectory within it, or a model of its band"
         )
-    return float(np.linalg.norm(error) / np.linalg.norm(level))
+    return float(np.linalg.norm(error_spectrum) / np.linalg.norm(reference_spectrum))
 
 
-def band_spectrum(samples: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> FloatArray:
-    """(2 lines, channels): real and imaginary parts of the spectrum (FFT, not scaled) within the band. Zero-padded to
-    at least twice the length, so that the end does not wrap around, and to at least four lines per bandwidth."""
-    length = max(2 * len(samples), int(np.ceil(4 * rate_hz / (band_hz[1] - band_hz[0]))))
-    lines = np.fft.rfftfreq(length, 1 / rate_hz)
-    spectrum = np.fft.rfft(samples, length, axis=0)[(lines >= band_hz[0]) & (lines <= band_hz[1])]
+def compute_band_spectrum(samples: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> FloatArray:
+    """(2 lines, channels): real parts, then imaginary parts, of the spectrum (FFT, not scaled) within the band (Hz).
+    Zero-padded to at least twice the length, so that the end does not wrap around, and to at least four lines per
+    bandwidth."""
+    fft_length = max(2 * len(samples), int(np.ceil(4 * rate_hz / (band_hz[1] - band_hz[0]))))
+    line_hz = np.fft.rfftfreq(fft_length, 1 / rate_hz)
+    spectrum = np.fft.rfft(samples, fft_length, axis=0)[(line_hz >= band_hz[0]) & (line_hz <= band_hz[1])]
     return np.concatenate((spectrum.real, spectrum.imag))

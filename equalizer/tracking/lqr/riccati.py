@@ -10,7 +10,8 @@ times the W of `lqr`:
     [ S B   S A ]
 
 P therefore has no negative eigenvalue, even where the forces can cancel the whole cost. `riccati_kernel` updates P
-itself, compiled: faster, but less accurate.
+itself, compiled: faster, but less accurate; `lqr.compute_stored_gains` tries it first. `preview` uses the stationary
+gains.
 """
 
 from dataclasses import dataclass
@@ -21,28 +22,30 @@ from scipy.linalg import LinAlgError, solve_discrete_are, solve_triangular
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, read_only
 
-NO_CURVATURE = (
+NO_CURVATURE_MESSAGE = (
     "at step {step} from the end a force has no effect on what is penalised: with a delay or without feedthrough "
     "the force weight must be above zero"
 )
+"""Text of the error for a singular H (no curvature of the cost in a force). step: number of steps to the end."""
 
-NOT_STATIONARY = (
+NOT_STATIONARY_MESSAGE = (
     "there are no stationary gains: states that the forces cannot control must decay without control, and with a "
     "delay or without feedthrough the force weight must be above zero"
 )
-NEGLIGIBLE = 1e-14
-"""Rank tolerance, relative to the norm of the effects of a force: below it, what these add to the effects of the forces
-before it is rounding error."""
-ROUNDED = 1e-9
+"""Text of the error where the algebraic Riccati equation has no stabilising solution."""
+RANK_TOLERANCE = 1e-14
+"""Rank tolerance, relative to the norm of a column of the array: a column whose part orthogonal to the columns before
+it is smaller counts as linearly dependent on them, up to rounding."""
+EIGENVALUE_TOLERANCE = 1e-9
 """Tolerance for negative eigenvalues, relative to a weight's largest entry (rounding of a solved Riccati equation)."""
-STATIONARY = 1e-6
+STATIONARITY_TOLERANCE = 1e-6
 """Largest change of a stationary P in a further step of the recursion, relative to its largest entry."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gains:
     """Gains of u_k = H_k⁻¹ t_k - K_k x_k, where t_k = D'Q r_k + B' v_{k+1} depends on the remaining trajectory. The
-    arrays are read-only."""
+    arrays are read-only; N steps, or N = 1 for stationary gains."""
 
     K: FloatArray
     """(N, m, n)"""
@@ -59,48 +62,51 @@ class Gains:
         return int(self.K.shape[0])
 
 
-def backward_gains(problem: TrackingProblem, samples: int, terminal_weight: FloatArray | None = None) -> Gains:
-    """Gains for `samples` steps. terminal_weight: P_N, (n, n), weight of x_N - x_f; None = free final state.
+def compute_backward_gains(problem: TrackingProblem, samples: int, terminal_weight: FloatArray | None = None) -> Gains:
+    """Gains for `samples` steps by the square-root recursion. terminal_weight: P_N, (n, n), weight of x_N - x_f; None =
+    free final state.
 
     Raises TrackingError where a force has no effect of its own on the cost, and for an invalid terminal weight.
     """
     n, m = problem.order, problem.inputs
-    S = _factor(require_terminal_weight(problem, terminal_weight))
+    S = _factorize(require_terminal_weight(problem, terminal_weight))
     K, H_inverse = np.empty((samples, m, n)), np.empty((samples, m, m))
-    joined = np.hstack((problem.B, problem.A))
-    stage = np.vstack((_factor(problem.R) @ np.eye(m, m + n), _factor(problem.Q) @ np.hstack((problem.D, problem.C))))
+    input_and_state_matrix = np.hstack((problem.B, problem.A))
+    stage_factor = np.vstack(
+        (_factorize(problem.R) @ np.eye(m, m + n), _factorize(problem.Q) @ np.hstack((problem.D, problem.C)))
+    )
     for k in range(samples - 1, -1, -1):
-        stacked = np.vstack((stage, S @ joined))
-        triangle = np.asarray(np.linalg.qr(stacked, mode="r"))
-        T, S = triangle[:m, :m], triangle[m:, m:]
-        # |T_jj| over the norm of column j of the stacked matrix: the share of the column that is orthogonal to the
+        pre_array = np.vstack((stage_factor, S @ input_and_state_matrix))
+        post_array = np.asarray(np.linalg.qr(pre_array, mode="r"))
+        T, S = post_array[:m, :m], post_array[m:, m:]
+        # |T_jj| over the norm of column j of `pre_array`: the share of the column that is orthogonal to the
         # columns before it. Zero up to rounding: the force has no effect of its own.
-        if not np.all(np.abs(np.diag(T)) > NEGLIGIBLE * np.linalg.norm(stacked[:, :m], axis=0)):
-            raise TrackingError(NO_CURVATURE.format(step=samples - k))
-        K[k] = solve_triangular(T, triangle[:m, m:])
-        inverse = solve_triangular(T, np.eye(m))
-        H_inverse[k] = inverse @ inverse.T
+        if not np.all(np.abs(np.diag(T)) > RANK_TOLERANCE * np.linalg.norm(pre_array[:, :m], axis=0)):
+            raise TrackingError(NO_CURVATURE_MESSAGE.format(step=samples - k))
+        K[k] = solve_triangular(T, post_array[:m, m:])
+        T_inverse = solve_triangular(T, np.eye(m))
+        H_inverse[k] = T_inverse @ T_inverse.T
     return Gains(K, H_inverse, S.T @ S)
 
 
-def stationary_gains(problem: TrackingProblem) -> Gains:
+def compute_stationary_gains(problem: TrackingProblem) -> Gains:
     """Gains of the infinite horizon as a single step (N = 1), by the discrete algebraic Riccati equation. Raises
-    TrackingError where it has no stabilising solution."""
+    TrackingError where it has no stabilising solution, or a further step of the recursion changes the solution."""
     A, B, C, D, Q, R = problem.A, problem.B, problem.C, problem.D, problem.Q, problem.R
     try:
         P = solve_discrete_are(A, B, C.T @ Q @ C, R + D.T @ Q @ D, s=C.T @ Q @ D)
-        gains = backward_gains(problem, 1, (P + P.T) / 2)
+        gains = compute_backward_gains(problem, 1, (P + P.T) / 2)
     except (LinAlgError, ValueError) as error:
-        raise TrackingError(NOT_STATIONARY) from error
-    steady = np.abs(np.linalg.eigvals(A - B @ gains.K[0])).max(initial=0.0) < 1
-    if not (steady and np.abs(gains.P - P).max(initial=0.0) <= STATIONARY * np.abs(P).max(initial=0.0)):
-        raise TrackingError(NOT_STATIONARY)
+        raise TrackingError(NOT_STATIONARY_MESSAGE) from error
+    is_stable = np.abs(np.linalg.eigvals(A - B @ gains.K[0])).max(initial=0.0) < 1
+    if not (is_stable and np.abs(gains.P - P).max(initial=0.0) <= STATIONARITY_TOLERANCE * np.abs(P).max(initial=0.0)):
+        raise TrackingError(NOT_STATIONARY_MESSAGE)
     return gains
 
 
 def require_terminal_weight(problem: TrackingProblem, terminal_weight: FloatArray | None) -> FloatArray:
-    """P_N, (n, n), made exactly symmetric; zeros where None. Raises TrackingError for another shape, values that are
-    not finite, asymmetry and a negative eigenvalue."""
+    """Return P_N, (n, n), made exactly symmetric; zeros for None. Raises TrackingError for another shape, values that
+    are not finite, asymmetry and a negative eigenvalue."""
     n = problem.order
     if terminal_weight is None:
         return np.zeros((n, n))
@@ -112,18 +118,18 @@ def require_terminal_weight(problem: TrackingProblem, terminal_weight: FloatArra
     ):
         raise TrackingError(f"terminal_weight must be a symmetric matrix of finite numbers of shape ({n}, {n})")
     P = (P + P.T) / 2
-    lowest = float(np.linalg.eigvalsh(P)[0]) if n else 0.0
-    if lowest < -ROUNDED * float(np.abs(P).max(initial=0.0)):
-        raise TrackingError(f"terminal_weight has the eigenvalue {lowest:g}; none may be negative")
+    lowest_eigenvalue = float(np.linalg.eigvalsh(P)[0]) if n else 0.0
+    if lowest_eigenvalue < -EIGENVALUE_TOLERANCE * float(np.abs(P).max(initial=0.0)):
+        raise TrackingError(f"terminal_weight has the eigenvalue {lowest_eigenvalue:g}; none may be negative")
     return P
 
 
-def _factor(weight: FloatArray) -> FloatArray:
+def _factorize(weight: FloatArray) -> FloatArray:
     """F with F'F = weight, a symmetric matrix, by its eigenvalues; those below zero are rounding errors and count as
     zero. The weight is scaled to a unit diagonal first: the states of a model differ in unit and size, and rounding
     errors of a large weight must not hide a small weight."""
     diagonal = np.sqrt(np.maximum(np.diag(weight), 0.0))
     scale = np.where(diagonal > 0, diagonal, 1.0)
-    values, vectors = np.linalg.eigh(weight / np.outer(scale, scale))
-    factor: FloatArray = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * scale
+    eigenvalues, eigenvectors = np.linalg.eigh(weight / np.outer(scale, scale))
+    factor: FloatArray = np.sqrt(np.maximum(eigenvalues, 0.0))[:, None] * eigenvectors.T * scale
     return factor

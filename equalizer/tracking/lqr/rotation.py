@@ -3,7 +3,8 @@
 The forces are linear in the trajectory r, and R r = sum over i, j of R_ij (e_i r_j), with the unit vectors e_i. The
 solutions for the trajectories e_i r_j, component j of r played along axis i, are stored: nine on three axes. Their sum
 with the weights R_ij is the solution for the rotation R. A recording along a single direction needs only three. All
-start from rest, because the free response of an initial motion does not rotate.
+start from rest, because the free response of an initial motion does not rotate. Called by `contact`; for a direction
+that changes during the playback see `changing_direction`.
 """
 
 from dataclasses import dataclass
@@ -17,29 +18,30 @@ from equalizer.tracking.lqr.tracking_problem import TrackingError, read_only, re
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RotationBasis:
-    """Stored solutions, made by `rotation_basis` (a direction is a rotation, (p, p)) or `normal_basis` (a normal,
-    (p,)). Directions are not checked to be orthogonal or of unit length; other matrices and vectors also change the
-    level."""
+    """Stored solutions, made by `compute_rotation_basis` (a direction is a rotation, (p, p)) or `compute_normal_basis`
+    (a normal, (p,)). Directions are not checked to be orthogonal or of unit length; other matrices and vectors also
+    change the level."""
 
     stored_forces: FloatArray
     """(directions, N * m), N: forces of each solution, flattened."""
-    stored_answers: FloatArray
+    stored_responses: FloatArray
     """(directions, N * p), m/s²: the model's response to them, flattened."""
     inputs: int
     """m, the number of forces."""
     direction_shape: tuple[int, ...]
-    """(p, p) or (p,)."""
+    """(p, p) for rotations, (p,) for normals."""
 
-    def forces(self, direction: FloatArray) -> FloatArray:
+    def compute_forces(self, direction: FloatArray) -> FloatArray:
         """(N, m), N: forces for a direction. Raises TrackingError for another shape of the direction."""
         return self._combine(self.stored_forces, direction, self.inputs)
 
     def predict_response(self, direction: FloatArray) -> FloatArray:
-        """(N, p), m/s²: the model's response to these forces. Raises TrackingError for another shape."""
-        return self._combine(self.stored_answers, direction, self.direction_shape[0])
+        """(N, p), m/s²: the model's response to the forces of a direction. Raises TrackingError for another shape."""
+        return self._combine(self.stored_responses, direction, self.direction_shape[0])
 
     def _combine(self, stored: FloatArray, direction: FloatArray, columns: int) -> FloatArray:
-        """(N, columns): stored solutions, weighted by the elements of the direction and added."""
+        """(N, columns): stored solutions, weighted by the elements of the direction and added. Raises TrackingError for
+        another shape of the direction."""
         weights = np.asarray(direction, dtype=np.float64)
         if weights.shape != self.direction_shape:
             raise TrackingError(f"a direction has shape {weights.shape}; this basis takes {self.direction_shape}")
@@ -47,25 +49,27 @@ class RotationBasis:
         return combined.reshape(-1, columns)
 
 
-def rotation_basis(gains: StoredGains, trajectory: FloatArray) -> RotationBasis:
-    """Basis of p * p solutions for every rotation of a trajectory. trajectory: (N, p), m/s², before rotation."""
+def compute_rotation_basis(gains: StoredGains, trajectory: FloatArray) -> RotationBasis:
+    """Basis of p * p solutions for every rotation of a trajectory. trajectory: (N, p), m/s², before rotation; N as of
+    the gains. Raises TrackingError for another shape."""
     p = gains.problem.outputs
-    return _solve_basis(gains, axis_trajectories(require_trajectory(gains.problem, trajectory)), (p, p))
+    return _solve_basis(gains, make_axis_trajectories(require_trajectory(gains.problem, trajectory)), (p, p))
 
 
-def normal_basis(gains: StoredGains, recording: FloatArray) -> RotationBasis:
-    """Basis of p solutions for every normal. recording: (N,), m/s², to be played along a normal."""
+def compute_normal_basis(gains: StoredGains, recording: FloatArray) -> RotationBasis:
+    """Basis of p solutions for every normal. recording: (N,), m/s², to be played along a normal; N as of the gains.
+    Raises TrackingError for another shape."""
     p = gains.problem.outputs
-    return _solve_basis(gains, axis_recordings(recording, p), (p,))
+    return _solve_basis(gains, make_axis_recordings(recording, p), (p,))
 
 
-def axis_trajectories(trajectory: FloatArray) -> FloatArray:
-    """(p * p, N, p): entry i p + j is component j of the trajectory, along axis i."""
+def make_axis_trajectories(trajectory: FloatArray) -> FloatArray:
+    """(p * p, N, p): entry i p + j is component j of the trajectory (N, p), along axis i."""
     p = trajectory.shape[1]
     return np.array([np.outer(samples, axis) for axis in np.eye(p) for samples in trajectory.T])
 
 
-def axis_recordings(recording: FloatArray, outputs: int) -> FloatArray:
+def make_axis_recordings(recording: FloatArray, outputs: int) -> FloatArray:
     """(p, N, p): entry i is the recording along axis i; outputs: p. Raises TrackingError for a recording that is not
     (N,)."""
     samples = np.asarray(recording, dtype=np.float64)

@@ -13,11 +13,17 @@ import numpy as np
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.feedforward.band_split import Bands, CausalSplit
-from equalizer.tracking.feedforward.feedforward import band_edges
+from equalizer.tracking.feedforward.feedforward import compute_band_edges
 from equalizer.tracking.lqr.changing_direction import TurningTransient, make_rotatable_transient
-from equalizer.tracking.lqr.lqr import TrackResult, stored_gains
+from equalizer.tracking.lqr.lqr import TrackResult, compute_stored_gains
 from equalizer.tracking.lqr.padding import CAUSAL
-from equalizer.tracking.lqr.preview import PreviewLoss, PreviewTracker, preview_loss, preview_tracker, stream
+from equalizer.tracking.lqr.preview import (
+    PreviewLoss,
+    PreviewTracker,
+    compute_preview_loss,
+    make_preview_tracker,
+    track_stream,
+)
 from equalizer.tracking.lqr.tracking_problem import (
     TrackingError,
     TrackingProblem,
@@ -73,7 +79,7 @@ class RealtimeController:
         """
         bands = self.split.split(reference)
         delay_rows = len(self.tracker) - 1
-        track = stream(self.tracker, np.pad(bands.middle, ((delay_rows, 0), (0, 0))))
+        track = track_stream(self.tracker, np.pad(bands.middle, ((delay_rows, 0), (0, 0))))
         return bands, TrackResult(track.forces[: len(reference)], track.predicted[: len(reference)], track.final_state)
 
 
@@ -91,14 +97,14 @@ def make_realtime_controller(
         raise TrackingError("the model has no states: its answer is a constant gain, which needs no controller")
     problem = make_tracking_problem(model, TrackingWeights(settings.weight))
     reference = make_default_transient(model) if transient is None else transient
-    _, rest_samples = CAUSAL.samples(model.sample_rate_hz)
+    _, rest_samples = CAUSAL.count_rows(model.sample_rate_hz)
     padded_transient = np.pad(np.asarray(reference, dtype=np.float64), ((0, rest_samples), (0, 0)))
     preview_samples = max(1, round(settings.preview_s * model.sample_rate_hz))
     return RealtimeController(
-        preview_tracker(problem, preview_samples),
-        CausalSplit(band_edges(model), model.sample_rate_hz),
-        make_rotatable_transient(stored_gains(problem, len(padded_transient)), padded_transient),
-        preview_loss(problem, preview_samples),
+        make_preview_tracker(problem, preview_samples),
+        CausalSplit(compute_band_edges(model), model.sample_rate_hz),
+        make_rotatable_transient(compute_stored_gains(problem, len(padded_transient)), padded_transient),
+        compute_preview_loss(problem, preview_samples),
         settings.cap_n,
     )
 

@@ -1,8 +1,10 @@
-"""Resonances of an identified model within its band, without the fit's spurious poles.
+"""Resonances of an identified model within its band, without the spurious poles of its fit.
 
-A model of order 26 of a device with four resonances in the band holds more poles there than four: some share a
-resonance between them, some answer noise. So poles only start the search: resonances are fitted to the model's own
-response, all at once, each with a pole and residues of its own, beside a smooth remainder that is free.
+A model of order 26 of a device with four resonances in the band has more than four pole pairs there: several pairs may
+describe a single resonance, or the noise of the measurement. The model's poles therefore only give start values:
+resonances, each with a pole pair and residues of its own, and a smooth remainder with free coefficients are fitted
+together to the model's response. `modal_interpolation` interpolates the resonances between places, after
+`mode_matching`.
 """
 
 from dataclasses import dataclass
@@ -15,92 +17,104 @@ from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 BAND_MARGIN = 0.12
-"""A resonance may lie this far outside the band, relative: its slope is inside."""
-LARGEST_DAMPING = 0.25
-"""Largest damping ratio of what counts as a resonance; the rest is smooth."""
-LEAST_SHARE = 0.04
-"""Least share of a resonance in the response, at the line of the band where the resonance is largest."""
-LARGEST_DRIFT = 0.1
-"""A start that moves further in the fit, relative, was no resonance."""
+"""Distance of a resonance outside the band, relative to the band edge, up to which it is kept: its slope is inside."""
+MAX_DAMPING_RATIO = 0.25
+"""Damping ratio from which a pole pair no longer counts as a resonance; such parts belong to the smooth remainder."""
+MIN_SHARE = 0.04
+"""Smallest share of a resonance in the norm of the response, at the line of the band where this share is largest."""
+MAX_FREQUENCY_CHANGE = 0.1
+"""Largest relative change of the natural frequency from its start value in the fit; a start value that moves further
+described no resonance."""
 TERMS_PER_OCTAVE = 1.7
-"""Number of Chebyshev polynomials in log frequency, per octave, that describe the smooth remainder."""
+"""Degree of the polynomial that describes the smooth remainder, in Chebyshev polynomials of log frequency, per
+octave."""
 LINES_PER_OCTAVE = 100
 """Lines per octave on which modes are fitted to a model's response."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandMode:
-    """One pole pair: R / (z - pole) and its conjugate."""
+    """A pole pair of a resonance: R / (z - pole) plus its complex conjugate at the conjugate pole."""
 
     natural_hz: float
     damping_ratio: float
     residue: ComplexArray
-    """(p, m)"""
+    """R, (p, m), in m/s² per N."""
     share: float
-    """Largest part of the response that it makes up, over the lines of the band."""
+    """Norm of the mode's response over the norm of the model's response, the largest value over the lines of the
+    band."""
     sample_rate_hz: float
 
     @property
     def pole(self) -> complex:
         """Discrete pole with the positive imaginary part, exp(s / sample_rate_hz)."""
-        return complex(_poles(np.array([self.natural_hz]), np.array([self.damping_ratio]), self.sample_rate_hz)[0])
+        return complex(
+            _compute_poles(np.array([self.natural_hz]), np.array([self.damping_ratio]), self.sample_rate_hz)[0]
+        )
 
-    def response(self, z: ComplexArray) -> ComplexArray:
-        """(lines, p, m): response at points z (lines,) of the unit circle."""
-        upper, lower = 1 / (z - self.pole), 1 / (z - self.pole.conjugate())
-        return np.asarray(upper[:, None, None] * self.residue + lower[:, None, None] * self.residue.conj())
+    def compute_response(self, z: ComplexArray) -> ComplexArray:
+        """(lines, p, m): response of the pole pair at points z (lines,) of the unit circle."""
+        positive_pole_term, negative_pole_term = 1 / (z - self.pole), 1 / (z - self.pole.conjugate())
+        return np.asarray(
+            positive_pole_term[:, None, None] * self.residue + negative_pole_term[:, None, None] * self.residue.conj()
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BandLines:
-    """A model's response where its modes are looked for."""
+    """A model's response at the lines at which its modes are fitted; made by `compute_band_lines`."""
 
     frequency_hz: FloatArray
     z: ComplexArray
     """(lines,): these frequencies as points of the unit circle."""
     response: ComplexArray
     """(lines, p, m)"""
-    size: FloatArray
+    response_norm: FloatArray
     """(lines,): Frobenius norm of the response."""
     in_band: np.ndarray[tuple[int], np.dtype[np.bool_]]
-    """(lines,): in the band itself."""
+    """(lines,): whether a line is in the band itself, not in its margin."""
 
     @property
     def smooth_basis(self) -> FloatArray:
-        """(lines, terms)"""
-        log = np.log(self.frequency_hz)
-        octaves = (log[-1] - log[0]) / np.log(2)
+        """(lines, terms): Chebyshev polynomials of log frequency, the basis of the smooth remainder."""
+        log_frequency = np.log(self.frequency_hz)
+        octaves = (log_frequency[-1] - log_frequency[0]) / np.log(2)
         return np.polynomial.chebyshev.chebvander(
-            2 * (log - log[0]) / (log[-1] - log[0]) - 1, int(np.ceil(TERMS_PER_OCTAVE * octaves))
+            2 * (log_frequency - log_frequency[0]) / (log_frequency[-1] - log_frequency[0]) - 1,
+            int(np.ceil(TERMS_PER_OCTAVE * octaves)),
         )
 
 
-def band_lines(model: IdentifiedModel, band_hz: tuple[float, float]) -> BandLines:
-    """The model's response on a logarithmic grid of LINES_PER_OCTAVE, over the band and half of BEYOND to either
-    side."""
-    low, high = band_hz
-    widened = (low * (1 - BAND_MARGIN / 2), min(high * (1 + BAND_MARGIN / 2), 0.49 * model.sample_rate_hz))
-    count = int(np.ceil(LINES_PER_OCTAVE * np.log2(widened[1] / widened[0])))
-    frequency_hz = np.geomspace(*widened, count)
+def compute_band_lines(model: IdentifiedModel, band_hz: tuple[float, float]) -> BandLines:
+    """The model's response on a logarithmic grid of LINES_PER_OCTAVE, over the band (Hz) and half of BAND_MARGIN on
+    either side, but at most 0.49 of the sample rate."""
+    low_hz, high_hz = band_hz
+    widened_band_hz = (
+        low_hz * (1 - BAND_MARGIN / 2),
+        min(high_hz * (1 + BAND_MARGIN / 2), 0.49 * model.sample_rate_hz),
+    )
+    line_count = int(np.ceil(LINES_PER_OCTAVE * np.log2(widened_band_hz[1] / widened_band_hz[0])))
+    frequency_hz = np.geomspace(*widened_band_hz, line_count)
     response = model_response(model, frequency_hz)
     return BandLines(
         frequency_hz,
         np.exp(2j * np.pi * frequency_hz / model.sample_rate_hz),
         response,
         np.linalg.norm(response, axis=(1, 2)),
-        (frequency_hz >= low) & (frequency_hz <= high),
+        (frequency_hz >= low_hz) & (frequency_hz <= high_hz),
     )
 
 
-def band_modes(model: IdentifiedModel, band_hz: tuple[float, float]) -> tuple[BandMode, ...]:
-    """Resonances by rising frequency, without those that are too damped or too weak."""
-    lines = band_lines(model, band_hz)
-    starts = _starts(model, band_hz)
+def find_band_modes(model: IdentifiedModel, band_hz: tuple[float, float]) -> tuple[BandMode, ...]:
+    """Resonances in the band (Hz) by rising frequency. All are fitted together; those that fail `_is_resonance` are
+    removed and the fit is repeated until all pass. Empty without any."""
+    lines = compute_band_lines(model, band_hz)
+    starts = _find_start_values(model, band_hz)
     while len(starts):
         fitted, residues = _fit_modes(lines, starts, model.sample_rate_hz)
         modes = [
-            _make_mode(lines, pair, residue, model.sample_rate_hz)
-            for pair, residue in zip(fitted, residues, strict=True)
+            _make_mode(lines, frequency_and_damping, residue, model.sample_rate_hz)
+            for frequency_and_damping, residue in zip(fitted, residues, strict=True)
         ]
         is_resonance = np.array(
             [_is_resonance(mode, start, band_hz) for mode, start in zip(modes, starts, strict=True)]
@@ -111,76 +125,109 @@ def band_modes(model: IdentifiedModel, band_hz: tuple[float, float]) -> tuple[Ba
     return ()
 
 
-def _starts(model: IdentifiedModel, band_hz: tuple[float, float]) -> FloatArray:
-    """(modes, 2): natural frequency and damping ratio; poles nearer than their width are one resonance."""
-    poles, vectors = np.linalg.eig(model.A)
-    driven = np.linalg.solve(vectors, model.B.astype(complex))
-    weight = np.linalg.norm(model.C @ vectors, axis=0) * np.linalg.norm(driven, axis=1)
-    upper = poles.imag > 1e-9
-    continuous = np.log(poles[upper]) * model.sample_rate_hz
-    natural, damping = np.abs(continuous) / (2 * np.pi), -continuous.real / np.abs(continuous)
-    weight = weight[upper]
-    low, high = band_hz
+def _find_start_values(model: IdentifiedModel, band_hz: tuple[float, float]) -> FloatArray:
+    """(modes, 2): natural frequency (Hz) and damping ratio of the model's poles in and near the band, by rising
+    frequency. Poles nearer to each other than half their bandwidth (damping ratio times frequency) are merged, weighted
+    by their modal gain."""
+    poles, mode_shapes = np.linalg.eig(model.A)
+    modal_inputs = np.linalg.solve(mode_shapes, model.B.astype(complex))
+    modal_gain = np.linalg.norm(model.C @ mode_shapes, axis=0) * np.linalg.norm(modal_inputs, axis=1)
+    has_positive_imaginary = poles.imag > 1e-9
+    continuous_poles = np.log(poles[has_positive_imaginary]) * model.sample_rate_hz
+    natural_hz, damping_ratio = (
+        np.abs(continuous_poles) / (2 * np.pi),
+        -continuous_poles.real / np.abs(continuous_poles),
+    )
+    modal_gain = modal_gain[has_positive_imaginary]
+    low_hz, high_hz = band_hz
     is_candidate = (
-        (damping < LARGEST_DAMPING) & (natural > low * (1 - BAND_MARGIN)) & (natural < high * (1 + BAND_MARGIN))
+        (damping_ratio < MAX_DAMPING_RATIO)
+        & (natural_hz > low_hz * (1 - BAND_MARGIN))
+        & (natural_hz < high_hz * (1 + BAND_MARGIN))
     )
     merged: list[tuple[float, float, float]] = []
-    for f, d, w in sorted(zip(natural[is_candidate], damping[is_candidate], weight[is_candidate], strict=True)):
-        if merged and f - merged[-1][0] < max(d * f, merged[-1][0] * merged[-1][1]):
-            f0, d0, w0 = merged.pop()
-            f, d, w = (w0 * f0 + w * f) / (w0 + w), (w0 * d0 + w * d) / (w0 + w), w0 + w
-        merged.append((float(f), float(d), float(w)))
-    return np.array([(f, d) for f, d, _ in merged], dtype=np.float64).reshape(-1, 2)
+    for frequency, damping, gain in sorted(
+        zip(natural_hz[is_candidate], damping_ratio[is_candidate], modal_gain[is_candidate], strict=True)
+    ):
+        if merged and frequency - merged[-1][0] < max(damping * frequency, merged[-1][0] * merged[-1][1]):
+            previous_frequency, previous_damping, previous_gain = merged.pop()
+            frequency, damping, gain = (
+                (previous_gain * previous_frequency + gain * frequency) / (previous_gain + gain),
+                (previous_gain * previous_damping + gain * damping) / (previous_gain + gain),
+                previous_gain + gain,
+            )
+        merged.append((float(frequency), float(damping), float(gain)))
+    return np.array([(frequency, damping) for frequency, damping, _ in merged], dtype=np.float64).reshape(-1, 2)
 
 
 def _fit_modes(lines: BandLines, starts: FloatArray, rate_hz: float) -> tuple[FloatArray, ComplexArray]:
-    """Variable projection: poles are searched, residues and remainder are linear. Returns natural frequencies and
-    damping ratios (modes, 2), and residues (modes, p, m)."""
-    size = lines.size[:, None]
-    target = _real_rows((lines.response.reshape(len(size), -1)) / size)
-    smooth = lines.smooth_basis / size
+    """Fit by variable projection (Golub and Pereyra 1973): natural frequencies and damping ratios are searched by least
+    squares, residues and remainder follow linearly. The misfit is relative to the norm of the response at each line.
+    starts: as returned by `_find_start_values`. Returns natural frequencies (Hz) and damping ratios (modes, 2), and
+    residues (modes, p, m)."""
+    response_norm = lines.response_norm[:, None]
+    target = _stack_real_and_imaginary((lines.response.reshape(len(response_norm), -1)) / response_norm)
+    remainder_basis = lines.smooth_basis / response_norm
 
-    def basis(logs: FloatArray) -> FloatArray:
-        natural, damping = np.exp(logs.reshape(-1, 2)).T
-        poles = _poles(natural, np.minimum(damping, 0.95), rate_hz)
-        upper, lower = 1 / (lines.z[:, None] - poles), 1 / (lines.z[:, None] - poles.conj())
-        return _real_rows(np.hstack([(upper + lower) / size, 1j * (upper - lower) / size, smooth, 1j * smooth]))
+    def compute_basis(log_parameters: FloatArray) -> FloatArray:
+        """Real basis functions of all modes and of the remainder, (2 lines, columns), for log natural frequencies and
+        log damping ratios (2 modes,)."""
+        natural_hz, damping_ratio = np.exp(log_parameters.reshape(-1, 2)).T
+        poles = _compute_poles(natural_hz, np.minimum(damping_ratio, 0.95), rate_hz)
+        positive_pole_terms, negative_pole_terms = 1 / (lines.z[:, None] - poles), 1 / (lines.z[:, None] - poles.conj())
+        return _stack_real_and_imaginary(
+            np.hstack(
+                [
+                    (positive_pole_terms + negative_pole_terms) / response_norm,
+                    1j * (positive_pole_terms - negative_pole_terms) / response_norm,
+                    remainder_basis,
+                    1j * remainder_basis,
+                ]
+            )
+        )
 
-    def residual(logs: FloatArray) -> FloatArray:
-        orthonormal = np.linalg.qr(basis(logs))[0]
+    def compute_residual(log_parameters: FloatArray) -> FloatArray:
+        """Part of the response outside the span of the basis functions, flattened."""
+        orthonormal = np.linalg.qr(compute_basis(log_parameters))[0]
         return np.asarray(target - orthonormal @ (orthonormal.T @ target)).ravel()
 
-    # A floor under the damping keeps the first pole of a spurious pair from sitting on the circle.
-    first = np.log(np.maximum(starts, [0.0, 1e-3]))
-    solution = least_squares(residual, first.ravel(), method="lm", x_scale=0.01, max_nfev=400)
-    linear = np.linalg.lstsq(basis(solution.x), target, rcond=None)[0]
-    modes, shape = len(starts), lines.response.shape[1:]
-    residues = (linear[:modes] + 1j * linear[modes : 2 * modes]).reshape(modes, *shape)
+    # A lower limit of the damping keeps the first values of spurious poles off the unit circle.
+    log_start = np.log(np.maximum(starts, [0.0, 1e-3]))
+    solution = least_squares(compute_residual, log_start.ravel(), method="lm", x_scale=0.01, max_nfev=400)
+    coefficients = np.linalg.lstsq(compute_basis(solution.x), target, rcond=None)[0]
+    mode_count, response_shape = len(starts), lines.response.shape[1:]
+    residues = (coefficients[:mode_count] + 1j * coefficients[mode_count : 2 * mode_count]).reshape(
+        mode_count, *response_shape
+    )
     return np.exp(solution.x.reshape(-1, 2)), residues
 
 
 def _is_resonance(mode: BandMode, start: FloatArray, band_hz: tuple[float, float]) -> bool:
-    low, high = band_hz
+    """Whether a fitted mode is a resonance: near its start value (natural frequency, damping ratio), weakly damped, in
+    the band (Hz) or its margin, and large enough in the response."""
+    low_hz, high_hz = band_hz
     return bool(
-        abs(mode.natural_hz / start[0] - 1) < LARGEST_DRIFT
-        and mode.damping_ratio < LARGEST_DAMPING
-        and low * (1 - BAND_MARGIN) < mode.natural_hz < high * (1 + BAND_MARGIN)
-        and mode.share >= LEAST_SHARE
+        abs(mode.natural_hz / start[0] - 1) < MAX_FREQUENCY_CHANGE
+        and mode.damping_ratio < MAX_DAMPING_RATIO
+        and low_hz * (1 - BAND_MARGIN) < mode.natural_hz < high_hz * (1 + BAND_MARGIN)
+        and mode.share >= MIN_SHARE
     )
 
 
-def _make_mode(lines: BandLines, pair: FloatArray, residue: ComplexArray, rate_hz: float) -> BandMode:
-    without_share = BandMode(float(pair[0]), min(float(pair[1]), 0.95), residue, 0.0, rate_hz)
-    part = np.linalg.norm(without_share.response(lines.z), axis=(1, 2)) / lines.size
-    return BandMode(
-        without_share.natural_hz, without_share.damping_ratio, residue, float(part[lines.in_band].max()), rate_hz
-    )
+def _make_mode(lines: BandLines, frequency_and_damping: FloatArray, residue: ComplexArray, rate_hz: float) -> BandMode:
+    """Mode of a fitted natural frequency (Hz) and damping ratio, (2,), with its share in the response. residue: (p,
+    m)."""
+    mode = BandMode(float(frequency_and_damping[0]), min(float(frequency_and_damping[1]), 0.95), residue, 0.0, rate_hz)
+    shares = np.linalg.norm(mode.compute_response(lines.z), axis=(1, 2)) / lines.response_norm
+    return BandMode(mode.natural_hz, mode.damping_ratio, residue, float(shares[lines.in_band].max()), rate_hz)
 
 
-def _poles(natural_hz: FloatArray, damping_ratio: FloatArray, rate_hz: float) -> ComplexArray:
+def _compute_poles(natural_hz: FloatArray, damping_ratio: FloatArray, rate_hz: float) -> ComplexArray:
+    """(modes,): discrete poles exp(s / rate_hz) with positive imaginary part, for s = 2 pi f (-d + i sqrt(1 - d²))."""
     s = 2 * np.pi * natural_hz * (-damping_ratio + 1j * np.sqrt(1 - damping_ratio**2))
     return np.asarray(np.exp(s / rate_hz), dtype=np.complex128)
 
 
-def _real_rows(rows: ComplexArray) -> FloatArray:
+def _stack_real_and_imaginary(rows: ComplexArray) -> FloatArray:
+    """(2 rows, columns): real parts above imaginary parts, for a real least-squares problem."""
     return np.vstack([rows.real, rows.imag])

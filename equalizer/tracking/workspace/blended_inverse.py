@@ -6,7 +6,7 @@ has two smaller resonances, and its inverse two notches.
 """
 
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
-from equalizer.tracking.workspace.place_weights import place_weights
+from equalizer.tracking.workspace.place_weights import compute_place_weights
 from equalizer.tracking.workspace.workspace_models import Place, WorkspaceModels
 
 
@@ -17,6 +17,6 @@ def blend_at(workspace: WorkspaceModels, place_m: Place) -> ModelsAtPlace:
         return ModelsAtPlace(
             place_m, workspace.models, (1.0,), ("the only model does not say where it was identified",)
         )
-    weights = place_weights(workspace.places_m, place_m)
+    weights = compute_place_weights(workspace.places_m, place_m)
     remarks = (weights.remark,) if weights.remark else ()
     return ModelsAtPlace(place_m, workspace.models, tuple(float(w) for w in weights.linear), remarks)

@@ -15,7 +15,7 @@ import numpy as np
 from equalizer.plant.model_response import model_response
 from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
-from equalizer.tracking.learning.convergence import Convergence, convergence
+from equalizer.tracking.learning.convergence import Convergence, predict_convergence
 from equalizer.tracking.workspace.feedforward_at_place import select_used_models
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 
@@ -37,7 +37,7 @@ def convergence_at(at: ModelsAtPlace, weight: float, spring: VirtualSpring, beta
     if not devices:
         return None
     closed_loops = np.array([_close_spring_loop(device, lines_hz, spring) for device in devices])
-    return convergence(at.inverse(lines_hz, weight, spring), closed_loops, lines_hz, band_hz, beta)
+    return predict_convergence(at.compute_inverse(lines_hz, weight, spring), closed_loops, lines_hz, band_hz, beta)
 
 
 def _close_spring_loop(device: ComplexArray, frequency_hz: FloatArray, spring: VirtualSpring) -> ComplexArray:

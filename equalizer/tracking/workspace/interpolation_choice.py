@@ -1,7 +1,8 @@
 """Choice between blended and modal interpolation by cross-validation at held-out places.
 
 At each held-out place, the response that was identified there is equalized by the interpolation from the other places.
-The method with the smaller largest error is chosen; blended forces where nothing can be checked.
+The method with the smaller largest error is chosen; blended forces where nothing can be checked. Called by
+`study.workflows.equalizer.playback_models`.
 """
 
 from collections.abc import Sequence
@@ -19,11 +20,11 @@ from equalizer.tracking.workspace.blended_inverse import blend_at
 from equalizer.tracking.workspace.modal_interpolation import ModalInterpolation, build_modal_interpolation
 from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
-from equalizer.tracking.workspace.place_weights import OUTSIDE_M, place_weights
+from equalizer.tracking.workspace.place_weights import OUTSIDE_M, compute_place_weights
 from equalizer.tracking.workspace.workspace_models import Place, WorkspaceError, WorkspaceModels
 
 Interpolation = Literal["blended forces", "modal"]
-LINES = 300
+LINE_COUNT = 300
 """Number of logarithmically spaced lines over the band on which interpolations are compared."""
 
 
@@ -32,6 +33,7 @@ class HeldOutPlace:
     """Reference response of the device at a place that is held out from the interpolation."""
 
     place_m: Place
+    """Position (m) of the place."""
     frequency_hz: FloatArray
     """(lines,), within the models' band."""
     response: ComplexArray
@@ -44,49 +46,55 @@ class PlaceCheck:
 
     place_m: Place
     blended: Quality
+    """Quality of the equalized response with blended forces."""
     modal: Quality | None
-    """None where resonances could not be matched between the other places."""
+    """Quality with modal interpolation; None where resonances could not be matched between the other places."""
     blended_error: float
-    """Rms over the lines of the largest singular value of T - I, with T from wanted to delivered acceleration; 0.01 =
-    1 %. Not the worst line, because at a resonance that all methods miss they are equally bad."""
+    """Error with blended forces: rms over the lines of the largest singular value of T - I, with T from reference to
+    delivered acceleration; 0.01 = 1 %. Not the largest over the lines, because at a resonance that no method models all
+    methods have about the same error."""
     modal_error: float | None
     """The same for modal interpolation; None as `modal`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InterpolationChoice:
-    """The chosen interpolation between places, ready for use by `at`, and the checks that decided it."""
+    """The chosen interpolation between places, used by `find_models_at`, and the checks that decided it. Made by
+    `choose_interpolation`."""
 
     interpolation: Interpolation
     reason: str
     """A sentence for the user."""
     checks: tuple[PlaceCheck, ...]
+    """One per held-out place; empty where nothing was checked."""
     workspace: WorkspaceModels
     modal: ModalInterpolation | None
     """Interpolation by the modes of all models; None where it is not used."""
 
-    def at(self, place_m: Place) -> ModelsAtPlace:
+    def find_models_at(self, place_m: Place) -> ModelsAtPlace:
         """Models and weights for a place (m) by the chosen interpolation. A place outside the convex hull of the models
         gets those of the nearest place inside, with a remark."""
         return self.modal.at(place_m) if self.modal else blend_at(self.workspace, place_m)
 
 
-def held_out_model(model: IdentifiedModel, band_hz: tuple[float, float]) -> HeldOutPlace:
-    """A model as the reference at its own place, over a band (Hz). Raises ValueError for a model without a place."""
+def make_held_out_place(model: IdentifiedModel, band_hz: tuple[float, float]) -> HeldOutPlace:
+    """Take a model's response over a band (Hz) as the reference at its own place. Raises ValueError for a model without
+    a place."""
     if model.place_m is None:
         raise ValueError("the model that is held out does not say where it was identified; identify it with its place")
-    frequency_hz = np.geomspace(*band_hz, LINES)
+    frequency_hz = np.geomspace(*band_hz, LINE_COUNT)
     return HeldOutPlace(model.place_m, frequency_hz, model_response(model, frequency_hz))
 
 
 def choose_interpolation(
-    workspace: WorkspaceModels, held_out: Sequence[HeldOutPlace] = (), weight: float = WEIGHT
+    workspace: WorkspaceModels, held_out_places: Sequence[HeldOutPlace] = (), weight: float = WEIGHT
 ) -> InterpolationChoice:
-    """Choose between modal and blended interpolation: by the responses at `held_out` places; without any, by leaving
+    """Choose between modal and blended interpolation: by the responses at `held_out_places`; without any, by leaving
     out in turn each model that lies between the others, which tests a coarser grid than the grid in use. Blended forces
-    where nothing can be checked or modes do not match. weight: of |force|², (m/s² per N)². Raises WorkspaceError for a
-    held-out place at which one of the models was identified, because it would test nothing."""
-    _check_distances(workspace, held_out)
+    where nothing can be checked, with a single model, or where modes do not match. weight: of |force|², (m/s² per N)².
+    Raises WorkspaceError for a held-out place at which one of the models was identified, because it would test
+    nothing."""
+    _check_distances(workspace, held_out_places)
     try:
         modal = build_modal_interpolation(workspace) if len(workspace) > 1 else None
     except ModesDoNotMatchError as error:
@@ -94,8 +102,8 @@ def choose_interpolation(
     if modal is None:
         return InterpolationChoice("blended forces", "there is only one model", (), workspace, None)
     checks = tuple(
-        [_check_place(workspace, modal, place, weight) for place in held_out]
-        if held_out
+        [_check_place(workspace, modal, place, weight) for place in held_out_places]
+        if held_out_places
         else [_check_place(*fold, weight) for fold in _leave_one_out(workspace)]
     )
     return _choose_by_checks(workspace, modal, checks)
@@ -104,28 +112,29 @@ def choose_interpolation(
 def _choose_by_checks(
     workspace: WorkspaceModels, modal: ModalInterpolation, checks: tuple[PlaceCheck, ...]
 ) -> InterpolationChoice:
-    """Modal interpolation where its largest error over all checks is smaller than that of blended forces."""
+    """Choose modal interpolation where its largest error over all checks is smaller than that of blended forces;
+    blended forces without checks, or where a check has no modal error."""
     if not checks:
         reason = (
             "forces are blended, because no model lies between the others with which a better method could be tested"
         )
         return InterpolationChoice("blended forces", reason, checks, workspace, None)
-    blended = max(check.blended_error for check in checks)
+    blended_error = max(check.blended_error for check in checks)
     modal_errors = [check.modal_error for check in checks if check.modal_error is not None]
     if len(modal_errors) < len(checks):
         reason = "forces are blended, because resonances could not be matched with a check place left out"
         return InterpolationChoice("blended forces", reason, checks, workspace, None)
-    worst = max(modal_errors)
-    places = f"{len(checks)} place{'s' * (len(checks) > 1)} held out"
-    numbers = f"error at {places}: {100 * worst:.1f} % modal, {100 * blended:.1f} % blended"
-    if worst < blended:
-        return InterpolationChoice("modal", f"resonances are interpolated ({numbers})", checks, workspace, modal)
-    return InterpolationChoice("blended forces", f"forces are blended ({numbers})", checks, workspace, None)
+    modal_error = max(modal_errors)
+    places_text = f"{len(checks)} place{'s' * (len(checks) > 1)} held out"
+    error_text = f"error at {places_text}: {100 * modal_error:.1f} % modal, {100 * blended_error:.1f} % blended"
+    if modal_error < blended_error:
+        return InterpolationChoice("modal", f"resonances are interpolated ({error_text})", checks, workspace, modal)
+    return InterpolationChoice("blended forces", f"forces are blended ({error_text})", checks, workspace, None)
 
 
-def _check_distances(workspace: WorkspaceModels, held_out: Sequence[HeldOutPlace]) -> None:
-    """Raise WorkspaceError for a held-out place within `OUTSIDE_M` of a model's place."""
-    for place in held_out:
+def _check_distances(workspace: WorkspaceModels, held_out_places: Sequence[HeldOutPlace]) -> None:
+    """Raise WorkspaceError for a held-out place within `OUTSIDE_M` (m) of a model's place."""
+    for place in held_out_places:
         distances_m = np.linalg.norm(workspace.places_m - np.array(place.place_m), axis=1)
         if distances_m.min() < OUTSIDE_M:
             raise WorkspaceError(
@@ -141,13 +150,13 @@ def _leave_one_out(workspace: WorkspaceModels) -> list[tuple[WorkspaceModels, Mo
         if len(workspace) < 3:
             break
         other_models = workspace.without_model(index)
-        if place_weights(other_models.places_m, workspace.places_m[index]).outside_m > OUTSIDE_M:
+        if compute_place_weights(other_models.places_m, workspace.places_m[index]).outside_m > OUTSIDE_M:
             continue
         try:
             modal: ModalInterpolation | None = build_modal_interpolation(other_models)
         except ModesDoNotMatchError:
             modal = None
-        folds.append((other_models, modal, held_out_model(model, workspace.band_hz)))
+        folds.append((other_models, modal, make_held_out_place(model, workspace.band_hz)))
     return folds
 
 
@@ -157,23 +166,27 @@ def _check_place(
     """Quality and error of both interpolations at a held-out place."""
     blended_response = _compute_equalized_response(blend_at(workspace, place.place_m), place, weight)
     if modal is None:
-        return PlaceCheck(place.place_m, measure_quality(blended_response), None, _rms_error(blended_response), None)
+        return PlaceCheck(
+            place.place_m, measure_quality(blended_response), None, _compute_rms_error(blended_response), None
+        )
     modal_response = _compute_equalized_response(modal.at(place.place_m), place, weight)
     return PlaceCheck(
         place.place_m,
         measure_quality(blended_response),
         measure_quality(modal_response),
-        _rms_error(blended_response),
-        _rms_error(modal_response),
+        _compute_rms_error(blended_response),
+        _compute_rms_error(modal_response),
     )
 
 
-def _compute_equalized_response(at: ModelsAtPlace, place: HeldOutPlace, weight: float) -> ComplexArray:
-    """T, (lines, p, p): reference response times interpolated inverse, from wanted to delivered acceleration."""
-    return np.asarray(place.response @ at.inverse(place.frequency_hz, weight))
+def _compute_equalized_response(place_models: ModelsAtPlace, place: HeldOutPlace, weight: float) -> ComplexArray:
+    """T, (lines, p, p): reference response times interpolated inverse, from reference to delivered acceleration."""
+    return np.asarray(place.response @ place_models.compute_inverse(place.frequency_hz, weight))
 
 
-def _rms_error(delivered: ComplexArray) -> float:
-    """Rms over the lines of the largest singular value of T - I. delivered: T, (lines, p, p)."""
-    largest = np.linalg.norm(delivered - np.eye(delivered.shape[1]), ord=2, axis=(1, 2))
-    return float(np.sqrt((largest**2).mean()))
+def _compute_rms_error(equalized_response: ComplexArray) -> float:
+    """Rms over the lines of the largest singular value of T - I. equalized_response: T, (lines, p, p)."""
+    largest_singular_values = np.linalg.norm(
+        equalized_response - np.eye(equalized_response.shape[1]), ord=2, axis=(1, 2)
+    )
+    return float(np.sqrt((largest_singular_values**2).mean()))

@@ -15,10 +15,10 @@ from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import ComplexArray, FloatArray
-from equalizer.tracking.workspace.band_modes import BandLines, BandMode, band_lines, band_modes
+from equalizer.tracking.workspace.band_modes import BandLines, BandMode, compute_band_lines, find_band_modes
 from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError, match_modes
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
-from equalizer.tracking.workspace.place_weights import place_weights
+from equalizer.tracking.workspace.place_weights import compute_place_weights
 from equalizer.tracking.workspace.workspace_models import Place, WorkspaceModels
 
 REAL_POLES_PER_OCTAVE = 2.0
@@ -48,10 +48,10 @@ class ModalInterpolation:
         """A single model for a place (m), from interpolated resonances and remainder, valid in the models' common band.
         Its remarks tell the user of a place outside the convex hull of the models, and of a poor fit of the
         remainder."""
-        weights = place_weights(self.workspace.places_m, place_m)
+        weights = compute_place_weights(self.workspace.places_m, place_m)
         modes = [_interpolate_mode(track, weights.smooth) for track in self.tracks]
         remainder = np.einsum("k,klpm->lpm", weights.linear, self.remainders)
-        total = remainder + sum((mode.response(self.lines.z) for mode in modes), np.zeros_like(remainder))
+        total = remainder + sum((mode.compute_response(self.lines.z) for mode in modes), np.zeros_like(remainder))
         model, fit_error = _assemble_model(self, modes, remainder, np.linalg.norm(total, axis=(1, 2)))
         remarks = [weights.remark] if weights.remark else []
         if fit_error > LARGEST_SILENT_ERROR:
@@ -64,13 +64,13 @@ def build_modal_interpolation(workspace: WorkspaceModels) -> ModalInterpolation:
     """Find and match the resonances of all models; called by `interpolation_choice`. Raises ModesDoNotMatchError where
     the matching of resonances of neighbouring models is ambiguous."""
     band_hz = workspace.band_hz
-    modes = [band_modes(model, band_hz) for model in workspace.models]
+    modes = [find_band_modes(model, band_hz) for model in workspace.models]
     tracks = _track_modes(workspace, modes)
-    lines = [band_lines(model, band_hz) for model in workspace.models]
+    lines = [compute_band_lines(model, band_hz) for model in workspace.models]
     remainders = []
     for index, model_lines in enumerate(lines):
         resonant_response = sum(
-            (track[index].response(model_lines.z) for track in tracks), np.zeros_like(model_lines.response)
+            (track[index].compute_response(model_lines.z) for track in tracks), np.zeros_like(model_lines.response)
         )
         remainders.append(model_lines.response - resonant_response)
     return ModalInterpolation(workspace, tracks, lines[0], np.array(remainders))

@@ -10,14 +10,14 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import ComplexArray, FloatArray
-from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, inverse_response
+from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, compute_regularised_inverse
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 from equalizer.tracking.workspace.workspace_models import Place
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelsAtPlace:
-    """Models for a place, with their weights."""
+    """Models for a place with the weights of their forces, from which inverses and forces for the place follow."""
 
     place_m: Place
     """The place, m."""
@@ -25,20 +25,30 @@ class ModelsAtPlace:
     weights: tuple[float, ...]
     """One per model, none negative, sum 1: weights of the forces, never of models or responses."""
     remarks: tuple[str, ...] = ()
-    """Sentences for the user, such as that the place is outside the identified places."""
+    """Sentences for the user, for example that the place is outside the identified places."""
 
-    def inverse(
+    def compute_inverse(
         self, frequency_hz: FloatArray, weight: float = WEIGHT, spring: VirtualSpring = NO_SPRING
     ) -> ComplexArray:
-        """(lines, m, p), N per m/s²: regularised inverse (`periodic_inverse.inverse_response`), for frequencies
+        """(lines, m, p), N per m/s²: regularised inverse (`compute_regularised_inverse`), for frequencies
         (lines,). weight: of |force|², (m/s² per N)²; spring: its force is subtracted."""
-        parts = [w * inverse_response(model, frequency_hz, weight, spring) for w, model in self._select_used_models()]
-        return np.asarray(sum(parts), dtype=np.complex128)
+        weighted_inverses = [
+            force_weight * compute_regularised_inverse(model, frequency_hz, weight, spring)
+            for force_weight, model in self._select_used_models()
+        ]
+        return np.asarray(sum(weighted_inverses), dtype=np.complex128)
 
-    def forces(self, track: Callable[[IdentifiedModel], FloatArray]) -> FloatArray:
+    def compute_forces(self, track: Callable[[IdentifiedModel], FloatArray]) -> FloatArray:
         """Forces (N, m), N, of a trajectory: the weighted sum of the forces that `track` returns for each model."""
-        return np.asarray(sum(w * track(model) for w, model in self._select_used_models()), dtype=np.float64)
+        return np.asarray(
+            sum(force_weight * track(model) for force_weight, model in self._select_used_models()),
+            dtype=np.float64,
+        )
 
     def _select_used_models(self) -> list[tuple[float, IdentifiedModel]]:
         """Weights above zero and their models."""
-        return [(w, model) for w, model in zip(self.weights, self.models, strict=True) if w > 0]
+        return [
+            (force_weight, model)
+            for force_weight, model in zip(self.weights, self.models, strict=True)
+            if force_weight > 0
+        ]

@@ -1,10 +1,11 @@
-"""Parser of the accelerometer's byte stream, which may be interrupted, incomplete or garbled: gives the samples of all
-packets with a correct checksum, in order.
+"""Parser of the accelerometer's byte stream, which may be interrupted, incomplete or garbled: gives the samples of the
+accepted packets, in order. Used by `serial_reader.SerialSource`.
 
-A packet is searched at every byte, so that a garbled packet hides none of its neighbours. A wrong packet has a correct
-checksum once in 2^16 = 65 536 times. Therefore a packet counts at once only where its sequence number and time stamp
-are the expected ones at the board's sample rate; otherwise, as after a stall or a restart of the microcontroller, it
-counts when two further packets follow it.
+A packet is searched at every byte, so that a garbled packet hides none of its neighbours. Arbitrary bytes have a
+correct checksum once in 2^16 = 65 536 times. Therefore a packet with a correct checksum is accepted at once only where
+its sequence number and time stamp are the expected ones at the board's sample rate; otherwise, as after a stall or a
+restart of the microcontroller, it is doubtful and accepted only when two further packets follow it (one at the start of
+the stream), or when it fits between two accepted packets.
 
 A packet has 16 bytes, least significant byte first (`docs/firmware/packet.h` is the sender). Offset and length of:
 
@@ -25,17 +26,18 @@ import numpy.typing as npt
 from study.devices.accelerometer.samples import Counts, Samples
 
 Bytes = npt.NDArray[np.uint8]
+"""Bytes of the stream as an array."""
 
-SIZE = 16
-"""Bytes of a packet."""
+PACKET_SIZE = 16
+"""Number of bytes of a packet."""
 SYNC = bytes((0xA5, 0x5A))
 """First two bytes of a packet."""
-CHECKED = slice(2, 14)
-"""Bytes of a packet that its checksum covers."""
-POLYNOMIAL, START = 0x1021, 0xFFFF
+CRC_BYTES = slice(2, 14)
+"""Slice of the bytes of a packet that its checksum covers."""
+CRC_POLYNOMIAL, CRC_INITIAL = 0x1021, 0xFFFF
 """CRC-16-CCITT: generator polynomial and initial value."""
 
-LAYOUT = np.dtype(
+PACKET_DTYPE = np.dtype(
     [("sync", "<u2"), ("sequence", "<u2"), ("time_us", "<u4"), ("raw", "<u2", (3,)), ("crc", "<u2")]
 )  # fmt: skip
 """Fields of a packet, as in the table above."""
@@ -43,21 +45,22 @@ LAYOUT = np.dtype(
 
 def compute_crc(rows: Bytes) -> npt.NDArray[np.uint16]:
     """(n,): CRC-16/CCITT-FALSE of each row of bytes (n, k), byte by byte with a table."""
-    crc = np.full(len(rows), START, dtype=np.uint16)
+    crc = np.full(len(rows), CRC_INITIAL, dtype=np.uint16)
     for column in rows.T:
-        crc = (crc << 8) ^ _TABLE[(crc >> 8) ^ column]
+        crc = (crc << 8) ^ _CRC_TABLE[(crc >> 8) ^ column]
     return crc
 
 
 def _make_crc_table() -> npt.NDArray[np.uint16]:
-    """The table `_TABLE`: eight steps of the shift register for each value of a byte, most significant bit first."""
+    """The table `_CRC_TABLE`: eight steps of the shift register for each value of a byte, most significant bit
+    first."""
     table = np.arange(256, dtype=np.uint32) << 8
     for _ in range(8):
-        table = np.where(table & 0x8000, (table << 1) ^ POLYNOMIAL, table << 1) & 0xFFFF
+        table = np.where(table & 0x8000, (table << 1) ^ CRC_POLYNOMIAL, table << 1) & 0xFFFF
     return table.astype(np.uint16)
 
 
-_TABLE = _make_crc_table()
+_CRC_TABLE = _make_crc_table()
 """(256,): change of the CRC register by each value of a byte."""
 
 
@@ -69,23 +72,25 @@ SHORTEST_PERIOD_US = 50
 """Shortest sample period (µs) of any board: a gap in the numbers that is too large for the time passed shows another
 clock, that is, a restart."""
 
-NEXT_US, JITTER_SHARE, PERIOD_SHARE = 1_000_000, 0.25, 0.01
-"""A packet counts at once if its time stamp is less than the first (µs) after the last packet, and agrees with its
-number at the mean period, within the second as a share of a period plus the third as a share of the time passed."""
+EXPECTED_WITHIN_US, JITTER_SHARE, PERIOD_SHARE = 1_000_000, 0.25, 0.01
+"""A packet is accepted at once if its time stamp is less than EXPECTED_WITHIN_US (µs) after the last packet, and agrees
+with its sequence number at the mean period, within JITTER_SHARE of a period plus PERIOD_SHARE of the time passed."""
 
 PERIOD_GAIN = 0.1
 """Weight of a new period in the exponential mean of the periods."""
 
-CONFIRMED_BY = 2
-"""Number of earlier doubtful packets that a packet with an unexpected number or time must follow to count (1
-for the first packets of a stream). Two false packets may follow each other by chance, three in practice do not."""
+CONFIRMING_PACKETS = 2
+"""Number of earlier doubtful packets that a packet with an unexpected number or time must follow to be accepted
+together with them (1 for the first packets of a stream). Two false packets may follow each other by chance, three in
+practice do not."""
 
 MAX_UNCONFIRMED = 8
 """Largest number of doubtful packets that are kept, the newest: more than occur by chance."""
 
 Indices = npt.NDArray[np.intp]
+"""Indices into an array of bytes."""
 Packets = npt.NDArray[np.void]
-"""Packets as an array of `LAYOUT`."""
+"""Packets as an array of `PACKET_DTYPE`."""
 
 
 class _CandidatePacket(NamedTuple):
@@ -99,7 +104,7 @@ class _CandidatePacket(NamedTuple):
 
 class PacketParser:
     """Parser of a board's byte stream: `feed` takes the bytes as they arrive, and returns the samples of complete
-    packets. Bytes of packets with a wrong checksum are skipped and counted."""
+    packets that are accepted ("count", below). Bytes of other packets are skipped and counted as spoiled."""
 
     def __init__(self) -> None:
         self._remainder: Bytes = np.zeros(0, dtype=np.uint8)
@@ -111,99 +116,101 @@ class PacketParser:
         """Mean sample period (µs) by the board's clock; NaN before the first is known."""
         self._sequence, self._time_us = 0, 0
         """Number and time (µs) of the newest packet that counts, without the wrap-around of the counters."""
-        self._received = self._used = self._shared = 0
+        self._received_bytes = self._used_bytes = self._shared_bytes = 0
         """Bytes received; bytes up to the end of the newest packet that counts; bytes shared by two such packets."""
         self.counts = Counts()
 
     def feed(self, data: bytes) -> Samples:
-        """The samples of the packets that these bytes complete."""
+        """Samples of the packets that are accepted with these bytes; updates `counts`."""
         stream = np.concatenate((self._remainder, np.frombuffer(data, dtype=np.uint8)))
-        self._received += len(data)
+        self._received_bytes += len(data)
         starts, last = _find_packets(stream), self._last
-        packets, starts = _read_packets(stream, starts), starts + (self._received - len(stream))
-        if last is not None and self._in_order(last, starts, packets):
+        packets, starts = _read_packets(stream, starts), starts + (self._received_bytes - len(stream))
+        if last is not None and self._accept_in_order(last, starts, packets):
             restarted = np.zeros(len(packets), dtype=np.int64)
         else:
-            packets, restarted = self._choose(starts, packets)
+            packets, restarted = self._choose_packets(starts, packets)
         self._last = packets[-1:].copy() if len(packets) else last
         # Up to 15 bytes at the end may be the beginning of a packet: they are kept for the next call.
-        self._remainder = stream[max(0, len(stream) - (SIZE - 1)) :].copy()
-        return self._count_on(last, packets, restarted)
+        self._remainder = stream[max(0, len(stream) - (PACKET_SIZE - 1)) :].copy()
+        return self._make_samples(last, packets, restarted)
 
-    def _in_order(self, last: Packets, starts: Indices, packets: Packets) -> bool:
-        """Whether all packets are the expected ones without overlap, so that all count (the usual, fast case). Then
-        also updates the mean period and the end of the bytes used."""
-        follows_bytes = np.diff(starts, prepend=self._used - SIZE) >= SIZE
+    def _accept_in_order(self, last: Packets, starts: Indices, packets: Packets) -> bool:
+        """Accept all packets if they are the expected ones without overlap (the usual, fast case): updates the mean
+        period and the end of the used bytes. Returns False, and changes nothing, for any other packets. last: the
+        newest accepted packet, (1,); starts: (n,), index of the packets' first bytes in all bytes received."""
+        follows_bytes = np.diff(starts, prepend=self._used_bytes - PACKET_SIZE) >= PACKET_SIZE
         if self._unconfirmed or not (follows_bytes & _is_expected(last, packets, self._period_us)).all():
             return False
         if len(packets):
-            steps, times = _steps(last, packets)
+            steps, times = _compute_increments(last, packets)
             self._period_us += PERIOD_GAIN * (float(times.sum() / steps.sum()) - self._period_us)
-            self._used = int(starts[-1]) + SIZE
+            self._used_bytes = int(starts[-1]) + PACKET_SIZE
         return True
 
-    def _choose(self, starts: Indices, packets: Packets) -> tuple[Packets, npt.NDArray[np.int64]]:
-        """Choose the packets that count. Returns them, (n,), and (n,): 1 where the firmware restarted before the
-        packet, else 0. An expected packet may share bytes with its predecessor: if the last bytes of the predecessor
-        were lost and the next packet begins with the same values, its checksum is still correct."""
+    def _choose_packets(self, starts: Indices, packets: Packets) -> tuple[Packets, npt.NDArray[np.int64]]:
+        """Accept packets one by one, and keep the doubtful ones. Returns the accepted packets, (m,), and (m,): 1 where
+        the firmware restarted before the packet, else 0. An expected packet may share bytes with its predecessor: if
+        the last bytes of the predecessor were lost and the next packet begins with the same values, its checksum is
+        still correct."""
         chosen, restarted, last = [packets[:0]], [0] * 0, self._last
         for k, start in enumerate(starts.tolist()):
             candidate = _CandidatePacket(packets[k : k + 1].copy(), start)
             is_expected = last is not None and _is_expected(last, candidate.packet, self._period_us).all()
-            if not is_expected and (start < self._used or _is_repeat(last, candidate.packet)):
+            if not is_expected and (start < self._used_bytes or _is_repeat(last, candidate.packet)):
                 continue
             if is_expected:
-                counting = [*self._select_between(last, candidate), candidate]
+                accepted_packets = [*self._select_between(last, candidate), candidate]
             else:
-                counting = self._chain_to(candidate, 1 if last is None else CONFIRMED_BY)
-            if not counting:
+                accepted_packets = self._find_chain(candidate, 1 if last is None else CONFIRMING_PACKETS)
+            if not accepted_packets:
                 self._unconfirmed = [*self._unconfirmed[1 - MAX_UNCONFIRMED :], candidate]
                 continue
-            for accepted in counting:
-                restarted.append(int(last is not None and not _follows(last, accepted.packet).all()))
+            for accepted in accepted_packets:
+                restarted.append(int(last is not None and not _can_follow(last, accepted.packet).all()))
                 chosen.append(accepted.packet)
                 last = accepted.packet
-                self._shared += max(0, self._used - accepted.start)
-                self._used = accepted.start + SIZE
+                self._shared_bytes += max(0, self._used_bytes - accepted.start)
+                self._used_bytes = accepted.start + PACKET_SIZE
             self._unconfirmed = []
         return np.concatenate(chosen), np.array(restarted, dtype=np.int64)
 
     def _select_between(self, last: Packets | None, candidate: _CandidatePacket) -> list[_CandidatePacket]:
-        """The doubtful packets whose bytes, numbers and times lie between the last packet that counts and `candidate`:
-        the board stamped or sent them late, so they count too."""
-        confirmed, used = [candidate][:0], self._used
+        """The doubtful packets whose bytes, numbers and times lie between the last accepted packet and `candidate`: the
+        board stamped or sent them late, so they are accepted too."""
+        confirmed, used_end = [candidate][:0], self._used_bytes
         for unconfirmed in self._unconfirmed:
-            lies_between = unconfirmed.start >= used and unconfirmed.start + SIZE <= candidate.start
-            if last is None or not lies_between or not _follows(last, unconfirmed.packet).all():
+            lies_between = unconfirmed.start >= used_end and unconfirmed.start + PACKET_SIZE <= candidate.start
+            if last is None or not lies_between or not _can_follow(last, unconfirmed.packet).all():
                 continue
-            if _follows(unconfirmed.packet, candidate.packet).all():
+            if _can_follow(unconfirmed.packet, candidate.packet).all():
                 confirmed.append(unconfirmed)
-                last, used = unconfirmed.packet, unconfirmed.start + SIZE
+                last, used_end = unconfirmed.packet, unconfirmed.start + PACKET_SIZE
         return confirmed
 
-    def _chain_to(self, candidate: _CandidatePacket, predecessor_count: int) -> list[_CandidatePacket]:
-        """A chain of `predecessor_count` unconfirmed packets and `candidate`, in which each packet follows its
+    def _find_chain(self, candidate: _CandidatePacket, predecessor_count: int) -> list[_CandidatePacket]:
+        """A chain of `predecessor_count` doubtful packets and `candidate`, in which each packet can follow its
         predecessor; empty if there is none. Sets the mean period from its last two packets."""
         for predecessors in combinations(self._unconfirmed[::-1], predecessor_count):
             chain = [*predecessors[::-1], candidate]
-            if all(_follows(packet.packet, next_packet.packet).all() for packet, next_packet in pairwise(chain)):
-                steps, times = _steps(chain[-2].packet, candidate.packet)
+            if all(_can_follow(packet.packet, next_packet.packet).all() for packet, next_packet in pairwise(chain)):
+                steps, times = _compute_increments(chain[-2].packet, candidate.packet)
                 self._period_us = float(times[0] / steps[0])
                 return chain
         return []
 
-    def _count_on(self, last: Packets | None, packets: Packets, restarted: npt.NDArray[np.int64]) -> Samples:
-        """Samples of these packets, with number and time counted on without wrap-around; updates `counts`. last: the
-        packet before these, (1,). At a restart of the firmware number and time increase by 1, because the number of
-        packets lost meanwhile is not known."""
+    def _make_samples(self, last: Packets | None, packets: Packets, restarted: npt.NDArray[np.int64]) -> Samples:
+        """Samples of these packets, with number and time (µs) unwrapped; updates `counts`. last: the packet before
+        these, (1,), None at the start of the stream; restarted: (n,), as from `_choose_packets`. At a restart of the
+        firmware number and time increase by 1, because the number of packets lost meanwhile is not known."""
         previous = self.counts
         if last is None and len(packets):
             last = packets[:1]
             self._sequence, self._time_us = int(last["sequence"][0]) - 1, int(last["time_us"][0]) - 1
-            steps, times = _steps(last, packets)
+            steps, times = _compute_increments(last, packets)
             steps[0] = times[0] = 1
         else:
-            steps, times = _steps(last, packets) if last is not None else (np.zeros(0, np.int64),) * 2
+            steps, times = _compute_increments(last, packets) if last is not None else (np.zeros(0, np.int64),) * 2
         steps, times = np.where(restarted, 1, steps), np.where(restarted, 1, times)
         sequence, time_us = self._sequence + np.cumsum(steps), self._time_us + np.cumsum(times)
         if len(packets):
@@ -212,7 +219,7 @@ class PacketParser:
             packets=previous.packets + len(packets),
             lost=previous.lost + int((steps - 1).sum()),
             spoiled_bytes=max(
-                previous.spoiled_bytes, self._count_decided_bytes() - SIZE * (previous.packets + len(packets))
+                previous.spoiled_bytes, self._count_decided_bytes() - PACKET_SIZE * (previous.packets + len(packets))
             ),
             restarts=previous.restarts + int(restarted.sum()),
         )
@@ -221,54 +228,56 @@ class PacketParser:
     def _count_decided_bytes(self) -> int:
         """Number of bytes whose use is decided: no later byte can make them part of a further packet. Bytes of two
         overlapping packets count twice; bytes of doubtful packets do not count yet."""
-        decided = max(self._used, self._received - len(self._remainder))
+        decided_end = max(self._used_bytes, self._received_bytes - len(self._remainder))
         return (
-            decided
-            + self._shared
-            - sum(min(SIZE, max(0, decided - unconfirmed.start)) for unconfirmed in self._unconfirmed)
+            decided_end
+            + self._shared_bytes
+            - sum(min(PACKET_SIZE, max(0, decided_end - unconfirmed.start)) for unconfirmed in self._unconfirmed)
         )
 
 
-def _steps(last: Packets, packets: Packets) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+def _compute_increments(last: Packets, packets: Packets) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """(n,) each: increase of the number and of the time (µs) from each packet's predecessor, modulo the counters."""
-    sequence = np.concatenate((last, packets))
-    numbers, times = sequence["sequence"].astype(np.int64), sequence["time_us"].astype(np.int64)
+    consecutive_packets = np.concatenate((last, packets))
+    numbers, times = consecutive_packets["sequence"].astype(np.int64), consecutive_packets["time_us"].astype(np.int64)
     return np.diff(numbers) % 2**16, np.diff(times) % 2**32
 
 
-def _follows(last: Packets, packets: Packets) -> npt.NDArray[np.bool_]:
-    """(n,): whether each packet may come from the same clock as its predecessor, and later. A time stamp may be late by
+def _can_follow(last: Packets, packets: Packets) -> npt.NDArray[np.bool_]:
+    """(n,): whether each packet may be a later one of the same clock as its predecessor. A time stamp may be late by
     less than a period, so that for consecutive numbers only the order of the times is tested."""
-    steps, times = _steps(last, packets)
+    steps, times = _compute_increments(last, packets)
     return (steps > 0) & (steps < 2**15) & (times > SHORTEST_PERIOD_US * (steps - 1)) & (times < LONGEST_SILENCE_US)
 
 
 def _is_repeat(last: Packets | None, packet: Packets) -> bool:
-    """Whether the packet equals the last byte by byte."""
+    """Whether the packet equals the last byte by byte; False without a last one."""
     return last is not None and packet.tobytes() == last.tobytes()
 
 
 def _is_expected(last: Packets, packets: Packets, period_us: float) -> npt.NDArray[np.bool_]:
     """(n,): whether number and time of each packet are expected after its predecessor, at the mean period (see
-    `NEXT_US`). False for a period of NaN."""
-    steps, times = _steps(last, packets)
-    at_rate = np.abs(times - period_us * steps) <= period_us * (JITTER_SHARE + PERIOD_SHARE * steps)
-    return at_rate & (times < NEXT_US) & _follows(last, packets)
+    `EXPECTED_WITHIN_US`). False for a period of NaN."""
+    steps, times = _compute_increments(last, packets)
+    matches_rate = np.abs(times - period_us * steps) <= period_us * (JITTER_SHARE + PERIOD_SHARE * steps)
+    return matches_rate & (times < EXPECTED_WITHIN_US) & _can_follow(last, packets)
 
 
 def _find_packets(stream: Bytes) -> Indices:
-    """Positions at which packets with a correct checksum begin."""
-    last = len(stream) - SIZE + 1
-    if last <= 0:
+    """(n,): positions in the stream at which packets with a correct checksum begin."""
+    candidate_count = len(stream) - PACKET_SIZE + 1
+    if candidate_count <= 0:
         return np.zeros(0, dtype=np.intp)
-    starts: Indices = np.flatnonzero((stream[:last] == SYNC[0]) & (stream[1 : last + 1] == SYNC[1]))
+    starts: Indices = np.flatnonzero(
+        (stream[:candidate_count] == SYNC[0]) & (stream[1 : candidate_count + 1] == SYNC[1])
+    )
     packets = _read_packets(stream, starts)
-    checked = packets.view(np.uint8).reshape(-1, SIZE)[:, CHECKED]
+    checked = packets.view(np.uint8).reshape(-1, PACKET_SIZE)[:, CRC_BYTES]
     valid_starts: Indices = starts[compute_crc(checked) == packets["crc"]]
     return valid_starts
 
 
 def _read_packets(stream: Bytes, starts: Indices) -> Packets:
-    """(n,): packets of `SIZE` bytes from these positions of the stream."""
-    packets: Packets = stream[starts[:, None] + np.arange(SIZE)].reshape(-1).view(LAYOUT)
+    """(n,): packets of `PACKET_SIZE` bytes that begin at these positions, (n,), of the stream."""
+    packets: Packets = stream[starts[:, None] + np.arange(PACKET_SIZE)].reshape(-1).view(PACKET_DTYPE)
     return packets

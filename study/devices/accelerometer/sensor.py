@@ -2,7 +2,8 @@
 
 A thread reads the source and fills two buffers: the newest sample, which the control loop reads at every tick without
 waiting (`newest_sample`), and the samples of the last minutes (`history`), from which the accelerations at the ticks of
-a recording are computed afterwards (`clock_fit`, `placement`).
+a recording are computed afterwards (`clock_fit`, `placement`). Opened by `study.devices.force_dimension.lab`, used by
+`force_dimension.rig`.
 """
 
 import contextlib
@@ -26,9 +27,9 @@ ZEROING_S = 0.5
 """Duration (s) of the measurement at rest when the sensor is opened. Its mean is subtracted from all readings: gravity,
 and the drift of the bias since the calibration."""
 
-FITTED_S = 120.0
-"""The clock is fitted to the arrivals during a recording and this time (s) before it: long enough for 1 ppm, and short
-enough that a quartz that warms up keeps its rate."""
+CLOCK_FIT_S = 120.0
+"""Time (s) before a recording from which sample arrivals are included in the fit of the sensor's clock, besides those
+of the recording itself: long enough for 1 ppm, and short enough that the rate of a quartz that warms up is constant."""
 
 LATENESS_S = 0.05
 """Wait (s) after the last tick for samples that are still on their way, in addition to half the length of the low-pass
@@ -36,11 +37,12 @@ filter."""
 
 
 class Accelerometer:
-    """An accelerometer with its own clock: the newest sample at any time, and resampled ones after a recording.
-    raw_range: lowest and highest raw value; a sample at or beyond either counts as clipped."""
+    """An accelerometer with its own clock: the newest sample at any time, and resampled samples after a recording.
+    raw_range: lowest and highest raw value; a sample at or beyond either counts as clipped. The constructor starts the
+    thread that reads the source."""
 
     def __init__(self, source: Source, calibration: Calibration, raw_range: tuple[float, float]) -> None:
-        self._source, self._calibration, self._range = source, calibration, raw_range
+        self._source, self._calibration, self._raw_range_limits = source, calibration, raw_range
         self._history = History()
         self._newest = NewestSample()
         self._rest_mps2 = np.zeros(3)
@@ -54,44 +56,48 @@ class Accelerometer:
         return self._source.counts
 
     def zero(self, seconds: float = ZEROING_S) -> None:
-        """Measure for `seconds` at rest, and take the mean as zero. Raises `DeviceError` where no sample arrives."""
-        since_s = time.monotonic()
+        """Measure for `seconds` at rest, and subtract the mean from all later readings. Raises `DeviceError` where no
+        sample arrives."""
+        start_s = time.monotonic()
         time.sleep(seconds)
-        raw = self._history.select_interval(since_s, time.monotonic()).raw
-        if not len(raw):
-            raise silence_error(seconds, self.counts.spoiled_bytes)
-        self._rest_mps2 = self._calibration.acceleration(raw.mean(axis=0))
+        rest_counts = self._history.select_interval(start_s, time.monotonic()).raw
+        if not len(rest_counts):
+            raise make_silence_error(seconds, self.counts.spoiled_bytes)
+        self._rest_mps2 = self._calibration.acceleration(rest_counts.mean(axis=0))
         self._newest.set_rest(self._rest_mps2)
 
     @property
     def samples(self) -> FloatArray:
-        """Array (`NewestSample.rows`) from which compiled code reads what `latest` returns."""
+        """Array (`NewestSample.rows`) from which compiled code reads what `read_latest` returns."""
         return self._newest.rows
 
-    def latest(self) -> tuple[FloatArray, bool]:
-        """Newest acceleration, (3,), m/s², zeroed at rest, NaN without a sample younger than
+    def read_latest(self) -> tuple[FloatArray, bool]:
+        """Newest acceleration, (3,), m/s², less the reading at rest, NaN without a sample younger than
         `newest_sample.MAX_AGE_S`; and whether a channel is at its limit. May be called from any thread."""
         return self._newest.read_zeroed(time.monotonic())
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration:
         """Accelerations at the ticks of a recording, as `study.devices.rig.OwnClockSensor` defines it. Waits until the
-        samples after the last tick have arrived."""
+        samples after the last tick have arrived. Without ticks: no accelerations, and facts about the samples since
+        since_s."""
         if len(tick_s):
             time.sleep(max(0.0, tick_s[-1] + HALF_PERIODS / rate_hz + LATENESS_S - time.monotonic()))
         resampled = self._resample_to_ticks(tick_s, rate_hz) if len(tick_s) else ResampledValues(np.zeros((0, 3)), None)
-        counts = self._history.count_since(since_s)
-        return SensedAcceleration(resampled.values, _make_sensor_facts(counts, resampled.values, resampled.fit))
+        packet_counts = self._history.count_since(since_s)
+        return SensedAcceleration(resampled.values, _make_sensor_facts(packet_counts, resampled.values, resampled.fit))
 
     def measure_rest(self, seconds: float) -> tuple[SensorFacts, FloatArray, float]:
         """Facts about the last `seconds`, during which the sensor was at rest; standard deviation of each axis (3,),
-        m/s², NaN without samples; samples per second."""
+        m/s², NaN without samples; samples per second. Called by `sensor_findings`."""
         now_s = time.monotonic()
         interval = self._history.select_interval(now_s - seconds, now_s)
-        noise = self._calibration.acceleration(interval.raw).std(axis=0) if len(interval.raw) else np.full(3, np.nan)
+        noise_mps2 = (
+            self._calibration.acceleration(interval.raw).std(axis=0) if len(interval.raw) else np.full(3, np.nan)
+        )
         fit = self._resample_to_ticks(np.array([now_s]), 1000.0).fit
         return (
             _make_sensor_facts(self._history.count_since(now_s - seconds), np.zeros((0, 3)), fit),
-            noise,
+            noise_mps2,
             len(interval.raw) / seconds,
         )
 
@@ -103,10 +109,11 @@ class Accelerometer:
             self._source.close()
 
     def _resample_to_ticks(self, tick_s: FloatArray, rate_hz: float) -> ResampledValues:
-        """Accelerations at the ticks (m/s², zeroed at rest), and the fit of the clock. tick_s: at least one."""
-        interval = self._history.select_interval(tick_s[0] - FITTED_S, time.monotonic())
-        values = self._calibration.acceleration(interval.raw) - self._rest_mps2
-        return fit_and_resample(interval, values, tick_s, rate_hz)
+        """Accelerations at the ticks (m/s², less the reading at rest), and the fit of the clock. tick_s: at least one,
+        s, by the monotonic clock; rate_hz: of the ticks."""
+        interval = self._history.select_interval(tick_s[0] - CLOCK_FIT_S, time.monotonic())
+        accelerations_mps2 = self._calibration.acceleration(interval.raw) - self._rest_mps2
+        return fit_and_resample(interval, accelerations_mps2, tick_s, rate_hz)
 
     def _read(self) -> None:
         """Loop of the reading thread. An error of the source ends it; readers notice that by the age of the newest
@@ -115,15 +122,18 @@ class Accelerometer:
             while not self._closed.is_set():
                 samples, arrived_s = self._source.read()
                 if len(samples):
-                    clipped = bool((samples.raw <= self._range[0]).any() or (samples.raw >= self._range[1]).any())
-                    value = self._calibration.acceleration(samples.raw[-1].astype(float))
-                    self._newest.add_sample(arrived_s, value, clipped)
+                    clipped = bool(
+                        (samples.raw <= self._raw_range_limits[0]).any()
+                        or (samples.raw >= self._raw_range_limits[1]).any()
+                    )
+                    acceleration_mps2 = self._calibration.acceleration(samples.raw[-1].astype(float))
+                    self._newest.add_sample(arrived_s, acceleration_mps2, clipped)
                     self._history.add(samples, arrived_s, self._source.counts)
 
 
-def silence_error(seconds: float, spoiled_bytes: int) -> DeviceError:
-    """Error for a sensor that sent no complete packet within `seconds`. spoiled_bytes: number of other bytes
-    received."""
+def make_silence_error(seconds: float, spoiled_bytes: int) -> DeviceError:
+    """Error for a sensor that sent no complete packet within `seconds`. spoiled_bytes: number of bytes received that
+    belong to no packet."""
     return DeviceError(
         "The accelerometer is silent",
         f"Within {seconds:g} s no whole packet came ({spoiled_bytes} bytes that belong to none).",
@@ -134,7 +144,8 @@ def silence_error(seconds: float, spoiled_bytes: int) -> DeviceError:
 
 
 def _make_sensor_facts(counts: Counts, resampled: FloatArray, fit: ClockFit | None) -> SensorFacts:
-    """Facts for the log. resampled: accelerations at the ticks, (k, 3), NaN where unknown; fit: of the clock."""
+    """Facts for the log. counts: of the source; resampled: accelerations at the ticks, (k, 3), NaN where unknown; fit:
+    of the sensor's clock."""
     return SensorFacts(
         packets=counts.packets,
         lost=counts.lost,

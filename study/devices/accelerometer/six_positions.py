@@ -1,7 +1,7 @@
 """Procedure of the six-position calibration: records the sensor at rest with each axis up and down.
 
-The calibration itself (least squares under gravity) is `calibration`; the result is the [accelerometer] table for the
-laboratory's settings file.
+The calibration itself (least squares under gravity) is in `calibration`; the result is the [accelerometer] table for
+the laboratory's settings file. Called through `study.devices.opening` by `hapteq doctor` and the app.
 """
 
 import time
@@ -12,13 +12,13 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, Calibration, calibrate
 from study.devices.accelerometer.samples import Source
-from study.devices.accelerometer.sensor import silence_error
+from study.devices.accelerometer.sensor import make_silence_error
 from study.devices.accelerometer.sources import open_source, reads_volts
 from study.errors import DeviceError
 
 AwaitPosition = Callable[[str, tuple[float, float, float] | None], None]
-"""before_each(position, heard): returns when the sensor lies in that position. heard: mean raw values of the three
-channels in the previous position, None for the first."""
+"""await_position(position, previous_mean): returns when the sensor lies in that position. previous_mean: mean raw
+values of the three channels in the previous position, None for the first."""
 
 REST_S = 2.0
 """Duration of the recording in each position (s): at 2 kHz 4000 samples, whose mean has a noise below 1 mg."""
@@ -27,15 +27,16 @@ SETTLE_S = 0.3
 """Time (s) after a change of position in which samples may still belong to the old one; they are discarded."""
 
 BACKLOG_SAMPLES, DRAIN_S = 200, 2.0
-"""More than MANY samples in a single read are old ones from a buffer. They are discarded too, for at most DRAIN_S (s)
-after `SETTLE_S`."""
+"""More than BACKLOG_SAMPLES samples in a single read come from a buffer and are old. They are discarded too, for at
+most DRAIN_S (s) after `SETTLE_S`."""
 
 RANGE_G = 3.0
-"""Guaranteed range of the ADXL335, in g; beyond it, a channel counts as clipped."""
+"""Guaranteed range of the ADXL335, in g (data sheet: ±3 g minimum); beyond it, a channel counts as clipped."""
 
 
 def calibrate_on_table(path: str, baud: int, await_position: AwaitPosition, rest_s: float | None = None) -> str:
-    """Record all positions and return the [accelerometer] table, as TOML. rest_s: None = `REST_S`.
+    """Record all positions and return the [accelerometer] table, as TOML. path: port of the sensor, as in `sources`;
+    baud: rate of a serial line (bit/s); rest_s: time per position (s), None = `REST_S`.
 
     Raises `DeviceError` where no samples arrive, or the positions do not fit a linear sensor.
     """
@@ -46,17 +47,18 @@ def calibrate_on_table(path: str, baud: int, await_position: AwaitPosition, rest
         raise DeviceError("The accelerometer was not calibrated", f"{error}.", "Do it again.") from error
     finally:
         source.close()
-    return calibration_toml(calibration, path, baud)
+    return format_calibration_toml(calibration, path, baud)
 
 
-def calibration_toml(calibration: Calibration, path: str, baud: int) -> str:
+def format_calibration_toml(calibration: Calibration, path: str, baud: int) -> str:
     """The [accelerometer] table for the laboratory's settings file. path: port of the sensor; baud: rate of a serial
-    line. raw_range is the range of raw values for `RANGE_G` along any direction."""
+    line (bit/s). Its raw_range holds the raw values for `RANGE_G` along any direction; counts are limited to 16
+    bits."""
     half_range = np.abs(calibration.sensitivity).sum(axis=1) * RANGE_G * GRAVITY_MPS2
     lowest, highest = float((calibration.bias - half_range).min()), float((calibration.bias + half_range).max())
     count_range = f"[{max(0, round(lowest))}, {min(65_535, round(highest))}]"
-    raw_range = _toml_numbers(np.array([lowest, highest])) if reads_volts(path) else count_range
-    rows = ", ".join(_toml_numbers(row) for row in calibration.sensitivity)
+    raw_range = _format_toml_numbers(np.array([lowest, highest])) if reads_volts(path) else count_range
+    rows = ", ".join(_format_toml_numbers(row) for row in calibration.sensitivity)
     noise = ", ".join(f"{value:.3f}" for value in calibration.noise_mps2)
     return "\n".join(
         (
@@ -65,7 +67,7 @@ def calibration_toml(calibration: Calibration, path: str, baud: int) -> str:
             f"{calibration.residual_g:.3f} g.",
             f'port = "{path}"',
             f"baud = {baud}",
-            f"bias = {_toml_numbers(calibration.bias)}",
+            f"bias = {_format_toml_numbers(calibration.bias)}",
             f"sensitivity = [{rows}]",
             f"raw_range = {raw_range}",
         )
@@ -73,7 +75,7 @@ def calibration_toml(calibration: Calibration, path: str, baud: int) -> str:
 
 
 def _record_positions(source: Source, await_position: AwaitPosition, rest_s: float) -> tuple[FloatArray, ...]:
-    """Raw samples, (n, 3) for each of `POSITIONS`."""
+    """Raw samples, (n, 3) for each of `POSITIONS`; rest_s: time per position (s)."""
     recordings: list[FloatArray] = []
     for position in POSITIONS:
         x, y, z = recordings[-1].mean(axis=0).tolist() if recordings else (0.0, 0.0, 0.0)
@@ -83,24 +85,25 @@ def _record_positions(source: Source, await_position: AwaitPosition, rest_s: flo
 
 
 def _record_position(source: Source, rest_s: float) -> FloatArray:
-    """Raw samples (n, 3) of one position. Raises `DeviceError` where fewer than two samples arrive."""
-    settled_s = time.monotonic() + SETTLE_S
+    """Raw samples (n, 3) of one position, recorded for rest_s (s). Raises `DeviceError` where fewer than two arrive."""
+    settled_at_s = time.monotonic() + SETTLE_S
     now_s, sample_count = time.monotonic(), 0
     # Discard samples of the previous position: some are in the line's buffer, and where that is full, the board
     # itself holds more.
-    while now_s < settled_s or (sample_count > BACKLOG_SAMPLES and now_s < settled_s + DRAIN_S):
+    while now_s < settled_at_s or (sample_count > BACKLOG_SAMPLES and now_s < settled_at_s + DRAIN_S):
         old_samples, now_s = source.read()
         sample_count = len(old_samples)
     spoiled_bytes, blocks = source.counts.spoiled_bytes, [np.zeros((0, 3))]
-    until_s = time.monotonic() + rest_s
-    while time.monotonic() < until_s:
+    end_s = time.monotonic() + rest_s
+    while time.monotonic() < end_s:
         blocks.append(source.read()[0].raw.astype(float))
     samples = np.concatenate(blocks)
     if len(samples) < 2:
-        raise silence_error(rest_s, source.counts.spoiled_bytes - spoiled_bytes)
+        raise make_silence_error(rest_s, source.counts.spoiled_bytes - spoiled_bytes)
     return samples
 
 
-def _toml_numbers(row: FloatArray) -> str:
-    """A row as TOML: four decimals from 100 on (counts of 16 bits), else seven (volts)."""
+def _format_toml_numbers(row: FloatArray) -> str:
+    """Format a row (n,) as a TOML array: a number of magnitude 100 or more (counts of 16 bits) with four decimals, else
+    seven (volts)."""
     return f"[{', '.join(f'{value:.4f}' if abs(value) >= 100 else f'{value:.7f}' for value in row)}]"

@@ -2,8 +2,9 @@
 
 The ticks do the same as those of `stepped_runner` and `realtime_drive` in Python, in the same order and to the last
 bit. `run_due` runs ticks one after another without waiting, for tests and for systems whose clock compiled code does
-not read; `attend` waits for each tick in real time, until the loop's thread is needed for other work. The code
-allocates nothing and holds no interpreter lock, so that no other Python thread can delay a tick.
+not read; `attend` waits for each tick in real time, until the loop's thread is needed for other work. Both are called
+by `compiled_ticks`. The code allocates nothing and does not hold Python's global interpreter lock, so that no other
+Python thread can delay a tick.
 """
 
 from pathlib import Path
@@ -14,8 +15,14 @@ from numba import njit, types
 from equalizer.signals.signal import FloatArray
 from study.devices.governor.cells import IDLE, LATE, LATEST_S, PHASE, STAMP_S
 from study.devices.governor.compiling import fingerprint, njit_inline
-from study.devices.governor.govern import MISS_SIGNATURE, PUBLISH_SIGNATURE, ROWS, TICK_SIGNATURE, VECTOR
-from study.devices.native import now_s, sleep_until
+from study.devices.governor.govern import (
+    MATRIX_TYPE,
+    MISSED_TICKS_SIGNATURE,
+    PUBLISH_SIGNATURE,
+    TICK_SIGNATURE,
+    VECTOR_TYPE,
+)
+from study.devices.native import read_clock_s, sleep_until
 from study.devices.rig import READING_SIZE
 
 (
@@ -24,11 +31,11 @@ from study.devices.rig import READING_SIZE
     RIG_GONE, DECIDING, WRITING, STAMPS, THREAD_NEEDED,
     # Real time: begin of the stimulus and of the last turn of the loop (s); number of the last tick, run or missed; due
     # time of the present tick (s); rate (Hz); gap between two turns that counts as a failure of the loop (s).
-    STARTED_S, LAST_S, RUN, DUE_S, RATE_HZ, LONGEST_GAP_S,
+    STARTED_S, LAST_S, LAST_TICK, DUE_S, RATE_HZ, LONGEST_GAP_S,
     # Readings of this call so far, of which `readings` holds the newest; size of the array.
     READING_COUNT, LOOP_STATE_SIZE,
 ) = range(13)  # fmt: skip
-"""Cells of `loop_state`. STARTED_S to LONGEST_GAP_S belong to `realtime_drive`."""
+"""Cells of `loop_state`. STARTED_S to LONGEST_GAP_S are shared with `realtime_drive`."""
 
 RUNNING, FINISHED, GAP = 0, -1, -2
 """Return codes; a code above zero is the driver's own error. RUNNING: more ticks may follow. FINISHED: that tick was
@@ -37,39 +44,40 @@ the last, or the rig is gone. GAP: no tick was run, because the previous one was
 SPIN_S = 0.00015
 """Time (s) before a tick at which the sleep ends and polling of the clock begins, because a sleep ends late."""
 
-HAIR = 1e-6
+TICK_TOLERANCE = 1e-6
 """Tolerance (ticks): a time that rounding puts just before a tick counts as that tick."""
 
 READING_ROWS = 8
-"""Number of readings in the ring `seen`. A reading that another thread is copying is overwritten only SEEN_ROWS - 1
-ticks later."""
+"""Number of readings in the ring of newest readings. A reading that another thread is copying is overwritten only
+READING_ROWS - 1 ticks later."""
 
 CALLS = types.int64[::1]
-"""Addresses of C functions: `study.devices.native.system_calls`, followed by the driver's own."""
-SENSE_SIGNATURE = types.int64(CALLS, VECTOR, ROWS, VECTOR)
+"""Type of the array of addresses of C functions: `study.devices.native.collect_system_calls`, followed by the driver's
+own."""
+SENSE_SIGNATURE = types.int64(CALLS, VECTOR_TYPE, MATRIX_TYPE, VECTOR_TYPE)
 """Signature of the compiled half `sense` of a rig, as in `study.devices.rig.CompiledIo`; that of `write` follows."""
-WRITE_SIGNATURE = types.int64(CALLS, VECTOR, VECTOR)
+WRITE_SIGNATURE = types.int64(CALLS, VECTOR_TYPE, VECTOR_TYPE)
 SENSE, WRITE = types.FunctionType(SENSE_SIGNATURE), types.FunctionType(WRITE_SIGNATURE)
-TICK, PUBLISH, MISS = map(types.FunctionType, (TICK_SIGNATURE, PUBLISH_SIGNATURE, MISS_SIGNATURE))
-_RIG = types.Tuple((CALLS, VECTOR, ROWS))  # type: ignore[no-untyped-call]
-"""Types of the grouped arguments of `_tick`. _RIG: the rig's calls, cells and samples; _GOVERNOR: the governor's arrays
-(`CompiledTicks`); _COURSE: flags, last reading, and the ring of newest readings."""
-_GOVERNOR = types.Tuple((VECTOR, VECTOR, ROWS, ROWS, VECTOR, ROWS, VECTOR))  # type: ignore[no-untyped-call]
-_COURSE = types.Tuple((VECTOR, VECTOR, ROWS))  # type: ignore[no-untyped-call]
-_RUN_DUE = types.int64(SENSE, WRITE, TICK, PUBLISH, _RIG, _GOVERNOR, _COURSE, types.int64)
+TICK, PUBLISH, RECORD_MISSED = map(types.FunctionType, (TICK_SIGNATURE, PUBLISH_SIGNATURE, MISSED_TICKS_SIGNATURE))
+_RIG = types.Tuple((CALLS, VECTOR_TYPE, MATRIX_TYPE))  # type: ignore[no-untyped-call]
+"""Types of the grouped arguments of `_run_tick`. _RIG: the rig's calls, cells and samples; _GOVERNOR: the governor's
+arrays (`CompiledTicks`); _LOOP_STATE: flags (`loop_state`), last reading, and the ring of newest readings."""
+_GOVERNOR = types.Tuple((VECTOR_TYPE, VECTOR_TYPE, MATRIX_TYPE, MATRIX_TYPE, VECTOR_TYPE, MATRIX_TYPE, VECTOR_TYPE))  # type: ignore[no-untyped-call]
+_LOOP_STATE = types.Tuple((VECTOR_TYPE, VECTOR_TYPE, MATRIX_TYPE))  # type: ignore[no-untyped-call]
+_RUN_DUE = types.int64(SENSE, WRITE, TICK, PUBLISH, _RIG, _GOVERNOR, _LOOP_STATE, types.int64)
 """Signature of the entry point `run_due`; that of `attend` follows."""
-_ATTEND = types.int64(SENSE, WRITE, TICK, PUBLISH, MISS, _RIG, _GOVERNOR, _COURSE)
+_ATTEND = types.int64(SENSE, WRITE, TICK, PUBLISH, RECORD_MISSED, _RIG, _GOVERNOR, _LOOP_STATE)
 
 
 @njit_inline
-def _tick(  # noqa: PLR0913 - compiled code takes function pointers one by one
+def _run_tick(  # noqa: PLR0913 - compiled code takes function pointers one by one
     sense: Any, write: Any, govern: Any, publish: Any, rig: Any, governor: Any, loop_state: Any
 ) -> int:
-    """A tick: sense, store the time of the reading, decide the force (`govern.tick`), write it, publish it to
+    """Run a tick: sense, store the time of the reading, decide the force (`govern.tick`), write it, publish it to
     telemetry.
 
-    Returns `RUNNING`, `FINISHED` where the force is off and stays off, or the driver's error code. The flags `DECIDING`
-    and `WRITING` show the watching thread where a tick hangs.
+    Returns `RUNNING`, `FINISHED` where the force is off and stays off or the rig is gone, or the driver's error code.
+    The flags `DECIDING` and `WRITING` show the thread that watches the loop where a tick hangs.
     """
     calls, cells, samples = rig
     # `_missed_reading`, the reading of a missed tick, is used in `_attend_tick` only.
@@ -81,13 +89,13 @@ def _tick(  # noqa: PLR0913 - compiled code takes function pointers one by one
     if flags[RIG_GONE] != 0.0:
         return FINISHED
     if flags[STAMPS] != 0.0:
-        state[STAMP_S] = now_s(calls)
+        state[STAMP_S] = read_clock_s(calls)
     flags[DECIDING] = 1.0
     is_finished = govern(state, settings, loop, buffer, reading, force)
     flags[WRITING] = 1.0
-    row = int(flags[READING_COUNT]) % READING_ROWS
+    ring_row = int(flags[READING_COUNT]) % READING_ROWS
     for i in range(READING_SIZE):
-        readings[row, i] = reading[i]
+        readings[ring_row, i] = reading[i]
     code = write(calls, cells, force)
     flags[WRITING] = 0.0
     if code != 0:
@@ -101,7 +109,7 @@ def _tick(  # noqa: PLR0913 - compiled code takes function pointers one by one
 
 
 @njit_inline
-def _due_s(flags: FloatArray, tick: float) -> float:
+def _compute_due_s(flags: FloatArray, tick: float) -> float:
     """Time (s) at which a tick is due, counted from the start, so that delays do not accumulate."""
     return float(flags[STARTED_S] + tick / flags[RATE_HZ])
 
@@ -109,11 +117,11 @@ def _due_s(flags: FloatArray, tick: float) -> float:
 @njit_inline
 def _wait_for_tick(calls: Any, flags: FloatArray) -> float:
     """Sleep, then poll the clock, until the next tick is due. Returns the time (s)."""
-    flags[DUE_S] = _due_s(flags, flags[RUN] + 1.0)
+    flags[DUE_S] = _compute_due_s(flags, flags[LAST_TICK] + 1.0)
     sleep_until(calls, flags[DUE_S] - SPIN_S)
-    time_s = now_s(calls)
+    time_s = read_clock_s(calls)
     while time_s < flags[DUE_S]:
-        time_s = now_s(calls)
+        time_s = read_clock_s(calls)
     return float(time_s)
 
 
@@ -128,30 +136,32 @@ def _must_return(governor: Any, loop_state: Any) -> bool:
 def _attend_tick(  # noqa: PLR0913 - as above
     sense: Any, write: Any, govern: Any, publish: Any, record_missed: Any, rig: Any, governor: Any, loop_state: Any
 ) -> int:
-    """Wait for the next tick, count ticks that were missed meanwhile, run the tick, and record how late it ended."""
+    """Wait for the next tick, record the ticks that were missed meanwhile, run the due tick, and record how late it
+    ended. Returns a code as `attend`."""
     calls, flags, state, code = rig[0], loop_state[0], governor[0], RUNNING
-    time_s = _wait_for_tick(calls, flags)
+    begin_s = _wait_for_tick(calls, flags)
     if flags[RIG_GONE] != 0.0 or state[PHASE] == IDLE:
         return FINISHED
-    gap_s, flags[LAST_S] = time_s - flags[LAST_S], time_s
+    gap_s, flags[LAST_S] = begin_s - flags[LAST_S], begin_s
     if gap_s > flags[LONGEST_GAP_S]:
         return GAP
-    due_tick = int((time_s - flags[STARTED_S]) * flags[RATE_HZ] + HAIR)
-    late = due_tick - int(flags[RUN]) - 1
-    if late > 0:
-        record_missed(state, governor[3], governor[6], late)
-    if late >= 0:
-        code = _tick(sense, write, govern, publish, rig, governor, loop_state)
-    flags[RUN] = due_tick
+    due_tick = int((begin_s - flags[STARTED_S]) * flags[RATE_HZ] + TICK_TOLERANCE)
+    missed_count = due_tick - int(flags[LAST_TICK]) - 1
+    if missed_count > 0:
+        record_missed(state, governor[3], governor[6], missed_count)
+    if missed_count >= 0:
+        code = _run_tick(sense, write, govern, publish, rig, governor, loop_state)
+    flags[LAST_TICK] = due_tick
     if code <= RUNNING:
-        done = now_s(calls)
-        state[LATE] += done > _due_s(flags, due_tick + 1.0)
-        state[LATEST_S] = max(state[LATEST_S], done - flags[DUE_S])
+        end_s = read_clock_s(calls)
+        state[LATE] += end_s > _compute_due_s(flags, due_tick + 1.0)
+        state[LATEST_S] = max(state[LATEST_S], end_s - flags[DUE_S])
     return code
 
 
-def _entry_points(sources: int) -> tuple[Any, Any]:
-    """Compile `run_due` and `attend`. sources: fingerprint, captured so that a change invalidates the cache."""
+def _compile_entry_points(sources_fingerprint: int) -> tuple[Any, Any]:
+    """Compile `run_due` and `attend`. sources_fingerprint: of the source files that the compiled code includes,
+    captured so that a change invalidates numba's cache."""
 
     @njit(_RUN_DUE, cache=True, nogil=True, error_model="numpy")
     def run_due(  # noqa: PLR0913 - compiled code takes function pointers one by one
@@ -159,10 +169,10 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
     ) -> int:
         """Run at most `ticks` ticks without waiting, fewer if the force is off for good before or a tick fails.
         Returns `RUNNING`, `FINISHED`, or the driver's error code."""
-        _ = sources
+        _ = sources_fingerprint
         code = RUNNING
-        for _k in range(ticks):
-            code = _tick(sense, write, govern, publish, rig, governor, loop_state)
+        for _tick_number in range(ticks):
+            code = _run_tick(sense, write, govern, publish, rig, governor, loop_state)
             if code != RUNNING or loop_state[0][RIG_GONE] != 0.0:
                 break
         return code
@@ -176,7 +186,7 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
 
         After an error code (above zero) the caller has to count the lateness of that tick.
         """
-        _ = sources
+        _ = sources_fingerprint
         code = RUNNING
         while code == RUNNING and not _must_return(governor, loop_state):
             code = _attend_tick(sense, write, govern, publish, record_missed, rig, governor, loop_state)
@@ -186,4 +196,4 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
 
 
 _DEVICES = Path(__file__).parents[1]
-run_due, attend = _entry_points(fingerprint(_DEVICES / "governor", _DEVICES / "rig.py", _DEVICES / "native.py"))
+run_due, attend = _compile_entry_points(fingerprint(_DEVICES / "governor", _DEVICES / "rig.py", _DEVICES / "native.py"))

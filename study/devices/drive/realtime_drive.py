@@ -1,7 +1,7 @@
-"""Control ticks in real time: a thread runs them as they become due.
+"""Control ticks in real time: a thread runs them as they become due. Used by `study.devices.safe.SafeDevice`.
 
 Theory of operation. Tick k is due at t_0 + k T (T = 1 ms). In each tick the loop senses (position, acceleration),
-governs (caps, slew limit, fades, workspace, faults) and writes one force, in this order: no force leaves that was not
+computes the force within its limits (`governor.govern`) and writes it, in this order: no force is written that was not
 computed from this tick's reading. The due time is counted from the start, not from the last tick, so that delays do not
 add up. The loop sleeps until `SPIN_S` before the due time, then polls the clock, because a sleep alone ends late.
 
@@ -10,11 +10,11 @@ device are counted as missed, and the waveform continues at the present time: it
 
 The thread monitors its callers (the governor's watchdog), and every caller monitors the thread (`check`).
 
-The ticks of a rig with compiled halves run in compiled code while the thread has no other work, so that the interpreter
-lock of another thread delays no tick; `pump` does the same from Python, for a tick at a time.
+The ticks of a rig with compiled `sense` and `write` run in compiled code while the thread has no other work, so that
+the interpreter lock of another thread delays no tick; `run_due_ticks` runs them from Python.
 
 Readings while nothing moves are taken by the same thread, so that only a single thread drives a rig and a stimulus that
-begins meanwhile cannot collide with the reading. A driver that hangs delays a caller by at most `PATIENCE_S`.
+begins meanwhile cannot collide with the reading. A driver that hangs delays a caller by at most `READING_TIMEOUT_S`.
 """
 
 import contextlib
@@ -31,10 +31,10 @@ from study.devices.drive.compiled_drive import (
     DUE_S,
     GAP,
     LAST_S,
+    LAST_TICK,
     LONGEST_GAP_S,
     LOOP_STATE_SIZE,
     RATE_HZ,
-    RUN,
     SPIN_S,
     STARTED_S,
     THREAD_NEEDED,
@@ -45,7 +45,7 @@ from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.drive.virtual_drive import count_due_ticks
 from study.devices.governor.governor import Governor
 
-PATIENCE_S = 0.1
+READING_TIMEOUT_S = 0.1
 """Longest wait of a caller for a reading (s). A reading takes well below 1 ms; a busy computer is late by some 10
 ms."""
 
@@ -63,20 +63,21 @@ class ReadingRequests:
     reading."""
 
     def __init__(self, clock: Clock, wake: Callable[[], None]) -> None:
-        """wake: makes the loop's thread check `is_pending`."""
+        """clock: of the drive; wake: makes the loop's thread check `is_pending`."""
         self._clock = clock
         self._wake = wake
-        self._asking = threading.Lock()
+        self._request_lock = threading.Lock()
         self._request: _Request | None = None
 
-    def ask(self) -> bool:
-        """Wait for a reading. Returns False where none was taken in time, at once after the request's deadline."""
-        with self._asking:
+    def request_reading(self) -> bool:
+        """Wait for a reading, at most `READING_TIMEOUT_S`. Returns False where none was taken in time; at once for a
+        request that is still pending after its deadline: a driver that hangs delays only the first caller."""
+        with self._request_lock:
             request = self._request
             if request is None or request.taken.is_set():
-                self._request = request = _Request(self._clock.now_s() + PATIENCE_S)
+                self._request = request = _Request(self._clock.now_s() + READING_TIMEOUT_S)
         self._wake()
-        return request.taken.wait(min(PATIENCE_S, max(0.0, request.until_s - self._clock.now_s())))
+        return request.taken.wait(min(READING_TIMEOUT_S, max(0.0, request.until_s - self._clock.now_s())))
 
     @property
     def is_pending(self) -> bool:
@@ -89,29 +90,30 @@ class ReadingRequests:
             self._request.taken.set()
 
 
-LEISURELY_S = 0.003
-"""Interval between two pumps of a simulated rig (s). It needs no wake-up per tick, because no person feels it."""
+SIMULATED_INTERVAL_S = 0.003
+"""Interval (s) between two calls of `run_due_ticks` for a simulated rig, which no person feels, so that it may wait."""
 
 LATE_S = 0.1
-"""Time without a turn (s) after which a real rig's loop counts as hanging. A busy computer is late by some 10 ms."""
+"""Time without a tick (s) after which a real rig's loop counts as hanging. A busy computer is late by some 10 ms."""
 
 GRACE_S = 0.02
 """Time (s) that a seemingly late loop gets to continue, because after a suspension of the process it looks late too."""
 
-STOP_S = 0.005
+STOP_WAIT_S = 0.005
 """Longest wait of an emergency stop for the loop to write the zero force (s)."""
 
-JOIN_S = 0.5
+THREAD_TIMEOUT_S = 0.5
 """Longest wait for the loop's thread (s), so that a driver that hangs does not block the program."""
 
-ASK_EVERY_S = 0.01
+LOCK_RETRY_S = 0.01
 """Interval (s) at which the begin of a stimulus repeats its request for the lock, which compiled ticks otherwise
 keep."""
 
 
 class RealtimeDrive:
-    """Drive of a device in real time. longest_gap_s: interruption of the loop after which it does not resume. first:
-    run the loop in the real-time class where the system allows it, for a real device."""
+    """Drive of a device in real time. rate_hz: rate of the ticks. longest_gap_s: longest interruption of the loop (s)
+    after which it resumes. in_realtime_class: run the loop in the real-time scheduling class where the system allows
+    it, for a real device."""
 
     def __init__(
         self,
@@ -120,13 +122,13 @@ class RealtimeDrive:
         clock: Clock,
         rate_hz: float,
         longest_gap_s: float,
-        first: bool = False,
+        in_realtime_class: bool = False,
     ) -> None:
-        self._first = first
+        self._in_realtime_class = in_realtime_class
         self._runner = runner
         self._governor = governor
         self._clock = clock
-        self._attending = runner if isinstance(runner, SteppedRunner) and runner.attends else None
+        self._compiled_runner = runner if isinstance(runner, SteppedRunner) and runner.attends else None
         self._loop_state: FloatArray = (
             runner.loop_state if isinstance(runner, SteppedRunner) else np.zeros(LOOP_STATE_SIZE)
         )
@@ -142,7 +144,8 @@ class RealtimeDrive:
     def start(self, begin_stimulus: Callable[[], None]) -> bool:
         """Call `begin_stimulus`, which prepares the governor, while no tick runs; from then on ticks fall due.
 
-        Returns False, without a begin, where a stimulus is in progress, or the drive has failed or is closing.
+        Returns False, without calling it, where a stimulus is in progress, or the drive has failed or is closing. A
+        loop whose thread ended or keeps the lock counts as failed.
         """
         if not (self._thread.is_alive() and self._take_lock()):
             if not self._closing:  # a closing drive's thread may have ended, which is no failure
@@ -155,101 +158,103 @@ class RealtimeDrive:
             begin_stimulus()
             self._loop_state[STARTED_S] = self._loop_state[LAST_S] = now_s = self._clock.now_s()
             self._governor.set_begin_time(now_s)
-            self._loop_state[RUN] = 0.0
+            self._loop_state[LAST_TICK] = 0.0
             self._awake.set()
             return True
         finally:
             self._lock.release()
 
     def _take_lock(self) -> bool:
-        """Take the lock from the loop's thread, within `JOIN_S`. Returns whether it was taken."""
-        for _ in range(round(JOIN_S / ASK_EVERY_S)):
+        """Take the lock from the loop's thread, within `THREAD_TIMEOUT_S`. Returns whether it was taken."""
+        for _ in range(round(THREAD_TIMEOUT_S / LOCK_RETRY_S)):
             self._loop_state[THREAD_NEEDED] = 1.0
-            if self._lock.acquire(timeout=ASK_EVERY_S):
-                self._loop_state[THREAD_NEEDED] = float(
-                    self._reading_requests.is_pending
-                )  # the first tick is compiled too
+            if self._lock.acquire(timeout=LOCK_RETRY_S):
+                # Reset where no reading is requested: the first tick is compiled too.
+                self._loop_state[THREAD_NEEDED] = float(self._reading_requests.is_pending)
                 return True
         return False
 
     def check(self) -> None:
-        """Give up a loop that does not turn while a stimulus is played. Fast enough for every call of a device."""
-        if self._runner.moving and self._late():
+        """Stop and abandon a loop that hangs while a stimulus is played: its thread ended or, for a real rig, it runs
+        no tick for `LATE_S`, both also after `GRACE_S`. Fast enough for every call of a device."""
+        if self._runner.moving and self._is_late():
             self._clock.sleep(GRACE_S)
-            if self._late():
+            if self._is_late():
                 self._runner.give_up(TimeoutError("its loop gave no sign of life"))
 
     def refresh(self) -> bool:
         """Update the last reading. Returns whether it is current. Waits for the loop's thread while nothing moves."""
         if self._runner.moving:
             return True
-        return self._thread.is_alive() and not self._closing and self._reading_requests.ask()
+        return self._thread.is_alive() and not self._closing and self._reading_requests.request_reading()
 
     def stop(self) -> None:
         """After a stop was requested: wait until the loop has executed it, else stop without the loop."""
-        until_s = self._clock.now_s() + STOP_S
-        while self._runner.moving and self._clock.now_s() < until_s:
-            self._clock.sleep(STOP_S / 10)
+        deadline_s = self._clock.now_s() + STOP_WAIT_S
+        while self._runner.moving and self._clock.now_s() < deadline_s:
+            self._clock.sleep(STOP_WAIT_S / 10)
         if self._runner.moving:
             self._runner.cut()
 
     def close(self) -> None:
-        """End the loop's thread. Waits for at most `JOIN_S`; a thread that hangs in a driver is abandoned."""
+        """End the loop's thread. Waits for at most `THREAD_TIMEOUT_S`; a thread that hangs in a driver is abandoned."""
         self._closing = True
         self._wake()
-        self._thread.join(JOIN_S)
+        self._thread.join(THREAD_TIMEOUT_S)
 
     def _wake(self) -> None:
         """Make the loop's thread leave compiled code and its wait, and look for work."""
         self._loop_state[THREAD_NEEDED] = 1.0
         self._awake.set()
 
-    def pump(self, now_s: float) -> None:
-        """Run the ticks that are due. After a gap without control (suspended process or computer) drop the force at
-        once."""
+    def run_due_ticks(self, now_s: float) -> None:
+        """Run the ticks that are due at now_s; while nothing moves, take a requested reading instead. After a gap
+        without control longer than LONGEST_GAP_S (suspended process or computer), drop the force at once."""
         with self._lock:
             if not self._governor.moving:
                 self._awake.clear()
                 if self._closing:
                     self._awake.set()
                 elif self._reading_requests.is_pending:
-                    self._runner.glance()
+                    self._runner.read_sensors()
                     self._reading_requests.mark_taken()
                 return
-            loop_state, run = self._loop_state, int(self._loop_state[RUN])
+            loop_state, completed_ticks = self._loop_state, int(self._loop_state[LAST_TICK])
             gap_s, loop_state[LAST_S] = now_s - loop_state[LAST_S], now_s
             if gap_s > loop_state[LONGEST_GAP_S]:
                 self._runner.drop(Fault.STALLED)
                 return
-            first_s = self._due_s(run + 1)
+            turn_due_s = self._compute_due_time_s(completed_ticks + 1)
             due_ticks = count_due_ticks(now_s - loop_state[STARTED_S], loop_state[RATE_HZ])
-            late = due_ticks - run - 1
-            if late > 0 and not self._runner.catches_up:
-                self._governor.record_missed_ticks(late)
-                run += late
-            self._runner.run(due_ticks - run)
-            loop_state[RUN] = due_ticks
+            late_ticks = due_ticks - completed_ticks - 1
+            if late_ticks > 0 and not self._runner.catches_up:
+                self._governor.record_missed_ticks(late_ticks)
+                completed_ticks += late_ticks
+            self._runner.run(due_ticks - completed_ticks)
+            loop_state[LAST_TICK] = due_ticks
             if not self._runner.catches_up:
-                self._count_lateness(due_ticks, first_s)
+                self._count_lateness(due_ticks, turn_due_s)
             if self._reading_requests.is_pending:  # requested directly before this stimulus began
                 self._reading_requests.mark_taken()
 
-    def _due_s(self, tick: int) -> float:
+    def _compute_due_time_s(self, tick: int) -> float:
+        """Due time of a tick, by the drive's clock (s)."""
         return float(self._loop_state[STARTED_S] + tick / self._loop_state[RATE_HZ])
 
-    def _count_lateness(self, tick: int, first_s: float) -> None:
-        """Record whether a tick ended after the next was due, and the time since first_s, the due time of its turn."""
+    def _count_lateness(self, tick: int, turn_due_s: float) -> None:
+        """Record whether a tick ended after the next was due, and the time since the first tick of its turn was due."""
         done_s = self._clock.now_s()
-        self._governor.count_lateness(done_s > self._due_s(tick + 1), done_s - first_s)
+        self._governor.count_lateness(done_s > self._compute_due_time_s(tick + 1), done_s - turn_due_s)
 
-    def _late(self) -> bool:
-        """Whether the loop's thread has ended or, for a real rig, has not turned for `LATE_S`."""
+    def _is_late(self) -> bool:
+        """Whether the loop's thread has ended or, for a real rig, has run no tick for `LATE_S`."""
         if not self._thread.is_alive():
             return True
         return not self._runner.catches_up and bool(self._clock.now_s() - self._loop_state[LAST_S] > LATE_S)
 
     def _run_ticks(self) -> None:
-        with real_time_class() if self._first else contextlib.nullcontext():
+        """Main function of the thread."""
+        with real_time_class() if self._in_realtime_class else contextlib.nullcontext():
             self._attend_until_closed()
 
     def _attend_until_closed(self) -> None:
@@ -261,7 +266,7 @@ class RealtimeDrive:
                     if self._attend_compiled():
                         continue
                     self._wait_for_tick()
-                self.pump(self._clock.now_s())
+                self.run_due_ticks(self._clock.now_s())
             except BaseException as error:  # noqa: BLE001 - a dead loop must not leave a force behind
                 self._runner.give_up(error)
                 return
@@ -270,25 +275,25 @@ class RealtimeDrive:
             self._runner.run(1)
 
     def _attend_compiled(self) -> bool:
-        """Run ticks in compiled code. Returns False where the rig has none or the thread is needed: `pump` then runs a
-        tick from Python, before which other threads can take the lock."""
+        """Run ticks in compiled code. Returns False where the rig has none or the thread is needed: `run_due_ticks`
+        then runs a tick from Python, before which other threads can take the lock."""
         thread_needed, self._loop_state[THREAD_NEEDED] = self._loop_state[THREAD_NEEDED] != 0.0, 0.0
-        if self._attending is None or thread_needed:
+        if self._compiled_runner is None or thread_needed:
             return False
         with self._lock:
-            code = self._attending.attend()
-            if code == GAP:
+            return_code = self._compiled_runner.attend()
+            if return_code == GAP:
                 self._runner.drop(Fault.STALLED)
-            elif code > 0:  # the zero force was written in `attend`
-                self._count_lateness(int(self._loop_state[RUN]), float(self._loop_state[DUE_S]))
+            elif return_code > 0:  # the zero force was written in `attend`
+                self._count_lateness(int(self._loop_state[LAST_TICK]), float(self._loop_state[DUE_S]))
         return True
 
     def _wait_for_tick(self) -> None:
-        """Wait until the next tick is due; for a simulated rig for `LEISURELY_S`."""
+        """Wait until the next tick is due; for a simulated rig for `SIMULATED_INTERVAL_S`."""
         if self._runner.catches_up:
-            self._clock.sleep(LEISURELY_S)
+            self._clock.sleep(SIMULATED_INTERVAL_S)
             return
-        due_s = self._due_s(int(self._loop_state[RUN]) + 1)
+        due_s = self._compute_due_time_s(int(self._loop_state[LAST_TICK]) + 1)
         self._clock.sleep(due_s - SPIN_S - self._clock.now_s())
         while self._clock.now_s() < due_s:
             pass

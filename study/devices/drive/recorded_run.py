@@ -24,7 +24,7 @@ def record_held_stimulus(
 ) -> PlaybackResult:
     """Recording of a held stimulus: the end of its steady part, in whole loops unless a loop is longer than the ring.
     None where not even that much was recorded. own_clock_sensor: an accelerometer with its own clock, if any."""
-    rows, loop = governor.rows(), governor.steady
+    rows, loop = governor.copy_rows(), governor.steady
     loop_rows = len(loop) if len(loop) <= len(governor.buffer) else len(governor.buffer)
     recorded_rows = len(rows) // loop_rows * loop_rows
     rows, health = _insert_acceleration(rows[len(rows) - recorded_rows :], governor, info, own_clock_sensor)
@@ -40,7 +40,7 @@ def record_commands(
 ) -> PlaybackResult:
     """Recording of commands that were played once; None after a fault or where they ended early. It has no segments:
     the caller knows them."""
-    rows = governor.rows()
+    rows = governor.copy_rows()
     if governor.fault is not Fault.NONE or len(rows) < len(governor.loop):
         return PlaybackResult(
             recording=None, health=_insert_acceleration(rows[:0], governor, info, own_clock_sensor)[1]
@@ -59,10 +59,10 @@ def _insert_acceleration(
         own_clock_sensor.sensed(governor.began_s, due_s, info.sample_rate_hz) if own_clock_sensor is not None else None
     )
     if sensor_data is None:
-        return rows, governor.health()
+        return rows, governor.collect_health()
     rows = rows.copy()
     rows[:, ACCELERATION] = sensor_data.acceleration_mps2
-    return rows, replace(governor.health(), sensor=sensor_data.health)
+    return rows, replace(governor.collect_health(), sensor=sensor_data.health)
 
 
 def _make_result(rows: FloatArray, health: Health, info: DeviceInfo, segments: tuple[Segment, ...]) -> PlaybackResult:

@@ -1,9 +1,9 @@
 """The runner of a device's control ticks: its interface, and its implementation for simulated (compiled) devices.
 
 A tick reads the sensors (sense), decides the force (govern) and applies it (advance). `CompiledRunner` runs whole
-blocks of ticks of a simulated device without Python; `stepped_runner` drives real devices. The parts of a tick are
-passed as function pointers, not inlined: one loop is compiled for all rigs, its machine code can be cached on disk, and
-it never contains an outdated copy of a part.
+blocks of ticks of a simulated device without Python; `stepped_runner` drives real devices. The drives (`virtual_drive`,
+`realtime_drive`) call a runner. The parts of a tick are passed as function pointers, not inlined: one loop is compiled
+for all rigs, its machine code can be cached on disk, and it never contains an outdated copy of a part.
 """
 
 from typing import Any, Protocol
@@ -15,20 +15,20 @@ from numba.experimental.function_type import _get_wrapper_address
 from study.devices.device import Fault
 from study.devices.drive.last_reading import LastReading
 from study.devices.governor import cells
-from study.devices.governor.govern import PUBLISH_SIGNATURE, ROWS, TICK_SIGNATURE, VECTOR, publish, tick
+from study.devices.governor.govern import MATRIX_TYPE, PUBLISH_SIGNATURE, TICK_SIGNATURE, VECTOR_TYPE, publish, tick
 from study.devices.governor.governor import Governor
 from study.devices.rig import READING_SIZE, CompiledRig
 
 _NOISE = types.uint64[::1]
 """State of a sensor's random numbers, `CompiledRig.noise`."""
-_SENSE = types.FunctionType(types.void(VECTOR, VECTOR, _NOISE, VECTOR))
+_SENSE = types.FunctionType(types.void(VECTOR_TYPE, VECTOR_TYPE, _NOISE, VECTOR_TYPE))
 """Type of the pointer to `CompiledRig.sense`; the other parts of a tick follow."""
 _TICK = types.FunctionType(TICK_SIGNATURE)
 _PUBLISH = types.FunctionType(PUBLISH_SIGNATURE)
-_ADVANCE = types.FunctionType(types.void(VECTOR, VECTOR, VECTOR))
-_RIG = types.Tuple((VECTOR, VECTOR, _NOISE, VECTOR))  # type: ignore[no-untyped-call]
+_ADVANCE = types.FunctionType(types.void(VECTOR_TYPE, VECTOR_TYPE, VECTOR_TYPE))
+_RIG = types.Tuple((VECTOR_TYPE, VECTOR_TYPE, _NOISE, VECTOR_TYPE))  # type: ignore[no-untyped-call]
 """Type of the argument `rig` of `run_block`."""
-_GOVERNOR = types.Tuple((VECTOR, VECTOR, ROWS, ROWS, VECTOR, ROWS))  # type: ignore[no-untyped-call]
+_GOVERNOR = types.Tuple((VECTOR_TYPE, VECTOR_TYPE, MATRIX_TYPE, MATRIX_TYPE, VECTOR_TYPE, MATRIX_TYPE))  # type: ignore[no-untyped-call]
 """Type of the argument `governor` of `run_block`."""
 
 
@@ -53,7 +53,7 @@ class FunctionPointer(types.WrapperAddressProtocol):
 
 
 def make_tick_pointers(sense: Any, advance: Any) -> tuple[FunctionPointer, FunctionPointer, FunctionPointer]:
-    """Make the pointers to the three parts of a tick of one rig, the first three arguments of `run_block`."""
+    """Make the pointers to sense, `govern.tick` and advance of a rig, the first three arguments of `run_block`."""
     return FunctionPointer(sense, _SENSE), FunctionPointer(tick, _TICK), FunctionPointer(advance, _ADVANCE)
 
 
@@ -102,15 +102,15 @@ class Runner(Protocol):
 
     @property
     def seen(self) -> LastReading | None:
-        """The last reading of `run` or `glance`; None before the first, and when the rig has failed. May be read from
-        any thread."""
+        """The last reading of `run` or `read_sensors`; None before the first, after a failed `read_sensors`, and when
+        the rig can no longer be used. May be read from any thread."""
         ...
 
     def prepare(self) -> None:
         """Prepare the rig. Called after the governor has begun a stimulus and before its first tick."""
         ...
 
-    def glance(self) -> None:
+    def read_sensors(self) -> None:
         """Read the sensors once while nothing moves, without writing a force. Never raises. To be called only in the
         thread that runs the ticks."""
         ...
@@ -121,7 +121,8 @@ class Runner(Protocol):
         ...
 
     def drop(self, fault: Fault) -> None:
-        """Force off at once with this fault; the rig stays usable. To be called only while no tick runs."""
+        """Force off at once with this fault; the rig stays usable if it takes the zero force. To be called only while
+        no tick runs."""
         ...
 
     def give_up(self, failure: BaseException) -> None:
@@ -135,12 +136,14 @@ class Runner(Protocol):
         ...
 
     def disconnect(self) -> None:
-        """Force off permanently, at the end of the use of the rig. Never raises. May be called twice."""
+        """Force off permanently, at the end of the use of the rig; closes a real device. Never raises. May be called
+        twice."""
         ...
 
 
 class CompiledRunner:
-    """Runner of a simulated rig, in compiled blocks of ticks. Its force is off as soon as no block runs."""
+    """Runner of a simulated rig, in compiled blocks of at most block_ticks ticks. Its force is off as soon as no block
+    runs."""
 
     catches_up = True
     force_off = disconnected = True
@@ -148,9 +151,9 @@ class CompiledRunner:
     def __init__(self, rig: CompiledRig, governor: Governor, block_ticks: int) -> None:
         self._pointers = make_tick_pointers(rig.sense, rig.advance)
         self._rig = rig
-        self._arrays = (rig.state, rig.parameters, rig.noise, np.zeros(READING_SIZE))
-        # Separate random numbers: the number of glances must not change what is recorded.
-        self._glance_noise = ~rig.noise
+        self._rig_arrays = (rig.state, rig.parameters, rig.noise, np.zeros(READING_SIZE))
+        # Separate random numbers: the number of calls of `read_sensors` must not change what is recorded.
+        self._idle_noise = ~rig.noise
         self._seen: LastReading | None = None
         self._governor = governor
         self._block_ticks = block_ticks
@@ -168,24 +171,24 @@ class CompiledRunner:
     def prepare(self) -> None:
         """Tell the rig what will be played (`CompiledRig.prepare`): rows, whether they repeat, and wait (ticks)."""
         state = self._governor.state
-        repeats, wait = bool(np.isinf(state[cells.LENGTH])), int(state[cells.ONSET_TICKS] - state[cells.TICK])
-        self._rig.prepare(self._governor.steady, repeats, wait)
+        repeats, wait_ticks = bool(np.isinf(state[cells.LENGTH])), int(state[cells.ONSET_TICKS] - state[cells.TICK])
+        self._rig.prepare(self._governor.steady, repeats, wait_ticks)
 
-    def glance(self) -> None:
-        """Read with separate random numbers, so that the number of calls changes no recording."""
+    def read_sensors(self) -> None:
+        """Read the sensors with separate random numbers, so that the number of calls changes no recording."""
         rig, reading = self._rig, np.zeros(READING_SIZE)
         try:
-            rig.sense(rig.state, rig.parameters, self._glance_noise, reading)
+            rig.sense(rig.state, rig.parameters, self._idle_noise, reading)
             self._seen = LastReading(reading, rig.buttons())
-        except Exception:  # noqa: BLE001 - a look finds no reading
+        except Exception:  # noqa: BLE001 - no reading, and `seen` is None
             self._seen = None
 
     def run(self, ticks: int) -> None:
-        """Run ticks in blocks of `block_ticks`; after each, the reading is kept for `seen`."""
+        """Run ticks in blocks of `block_ticks`; after each, the reading is stored for `seen`."""
         try:
-            for start in range(0, ticks, self._block_ticks):
-                self._run_block(min(self._block_ticks, ticks - start))
-                self._seen = LastReading(self._arrays[-1].copy(), self._rig.buttons())
+            for first_tick in range(0, ticks, self._block_ticks):
+                self._run_block(min(self._block_ticks, ticks - first_tick))
+                self._seen = LastReading(self._rig_arrays[-1].copy(), self._rig.buttons())
                 if not self._governor.moving:
                     break
         except Exception as error:  # noqa: BLE001 - any error: the force goes off, and the next call says why
@@ -197,6 +200,7 @@ class CompiledRunner:
         self._run_block(1)
 
     def give_up(self, failure: BaseException) -> None:
+        """Keep the first failure, and end the stimulus with the fault LOST."""
         self.failure = self.failure or failure
         self._governor.abandon(Fault.LOST)
 
@@ -204,10 +208,19 @@ class CompiledRunner:
         """Nothing to do: blocks are short, and the governor obeys a stop at each tick of a block."""
 
     def disconnect(self) -> None:
+        """End a stimulus that is in progress with the fault LOST."""
         if self._governor.moving:
             self._governor.abandon(Fault.LOST)
 
     def _run_block(self, ticks: int) -> None:
+        """Run a block of ticks with the present arrays of the governor."""
         governor = self._governor
-        arrays = (governor.state, governor.settings, governor.loop, governor.buffer, governor.force, governor.ring)
-        run_block(*self._pointers, PUBLISH_POINTER, self._arrays, arrays, ticks)
+        governor_arrays = (
+            governor.state,
+            governor.settings,
+            governor.loop,
+            governor.buffer,
+            governor.force,
+            governor.ring,
+        )
+        run_block(*self._pointers, PUBLISH_POINTER, self._rig_arrays, governor_arrays, ticks)

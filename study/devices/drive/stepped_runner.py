@@ -4,9 +4,9 @@
 Ticks of rigs with compiled input and output run in compiled code (`compiled_drive`), others from Python, with equal
 results.
 
-A call into a driver cannot be interrupted. A caller that gives up therefore marks the rig as gone (RIG_GONE) and lets a
-separate thread write zero force. When the call of the loop returns later, the loop writes zero once more, so that a
-late write leaves no force on the device.
+A call into a driver cannot be interrupted. A caller that stops waiting for it therefore marks the rig as gone
+(RIG_GONE) and lets a separate thread write zero force. When the call of the loop returns later, the loop writes zero
+once more, so that a late write leaves no force on the device.
 """
 
 import contextlib
@@ -19,7 +19,7 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from study.devices.device import Fault
 from study.devices.drive.compiled_drive import DECIDING, FINISHED, LOOP_STATE_SIZE, RIG_GONE, STAMPS, WRITING
-from study.devices.drive.compiled_ticks import CompiledTicks, compiled_io_of
+from study.devices.drive.compiled_ticks import CompiledTicks, get_compiled_io
 from study.devices.drive.last_reading import LastReading
 from study.devices.governor import cells, govern
 from study.devices.governor.governor import Governor
@@ -36,8 +36,8 @@ class Standby:
         threading.Thread(target=self._run_thread, name=name, daemon=True).start()
 
     def run(self, timeout_s: float) -> bool:
-        """Run the action. Returns whether it ended within timeout_s (s) with neither an error nor False. The action
-        continues even if the caller is interrupted."""
+        """Run the action. Returns whether it ended within timeout_s (s), without an exception and with another result
+        than False. The action continues after the timeout, and if the caller is interrupted."""
         answer: SimpleQueue[bool] = SimpleQueue()
         self._requests.put(answer)
         try:
@@ -46,7 +46,7 @@ class Standby:
             return False
 
     def end(self) -> None:
-        """End the thread after the calls that are queued."""
+        """End the thread after the queued requests."""
         self._requests.put(None)
 
     def _run_thread(self) -> None:
@@ -67,7 +67,7 @@ CLOSE_TIMEOUT_S = 1.0
 class SteppedRunner:
     """Runner of a real device (`drive.runner.Runner`). now_s: clock for the time stamps of readings, in real time;
     without it, readings are a tick apart. monotonic: whether that is the system's monotonic clock, which compiled code
-    can read."""
+    can read. catches_up: as in `Runner`."""
 
     def __init__(
         self,
@@ -85,12 +85,12 @@ class SteppedRunner:
         self.force_off = self.disconnected = True
         self._seen: LastReading | None = None
         self.loop_state: FloatArray = np.zeros(LOOP_STATE_SIZE)
-        compiled_io = compiled_io_of(rig) if now_s is None or monotonic else None
+        compiled_io = get_compiled_io(rig) if now_s is None or monotonic else None
         self._compiled = CompiledTicks(compiled_io, governor, self.loop_state) if compiled_io is not None else None
         self.loop_state[STAMPS] = now_s is not None
         self._closed = self._ended = False
-        self._zero = Standby(lambda: rig.write(np.zeros(3)), "force off")
-        self._disconnect = Standby(rig.close, "disconnect")
+        self._zero_writer = Standby(lambda: rig.write(np.zeros(3)), "force off")
+        self._device_closer = Standby(rig.close, "disconnect")
 
     @property
     def moving(self) -> bool:
@@ -99,14 +99,15 @@ class SteppedRunner:
 
     @property
     def seen(self) -> LastReading | None:
+        """The newest reading, also of a compiled call in progress; None when the rig is gone."""
         if self._is_rig_gone:
             return None
-        reading = self._compiled.seen() if self._compiled is not None else None
+        reading = self._compiled.get_running_reading() if self._compiled is not None else None
         return self._seen if reading is None else LastReading(reading, self._rig.buttons())
 
     @property
     def attends(self) -> bool:
-        """Whether `attend` may be called."""
+        """Whether `attend` may be called: ticks are compiled, and compiled code can read the clock."""
         return self._compiled is not None and self._compiled.attends
 
     def prepare(self) -> None:
@@ -114,9 +115,10 @@ class SteppedRunner:
 
     @property
     def _is_rig_gone(self) -> bool:
+        """Whether the rig can no longer be used."""
         return bool(self.loop_state[RIG_GONE])
 
-    def glance(self) -> None:
+    def read_sensors(self) -> None:
         """Read the sensors once while nothing moves. Never raises for a driver that fails."""
         if self._is_rig_gone:
             return
@@ -136,12 +138,12 @@ class SteppedRunner:
                 self._conclude(self._compiled.run(ticks))
                 return
             for _ in range(ticks):
-                if self._tick() or self._is_rig_gone:
+                if self._run_tick() or self._is_rig_gone:
                     break
 
     def attend(self) -> int:
-        """Run ticks in real time by `compiled_drive.attend`, and return its code. To be called only where `attends`.
-        Never raises for a failing rig."""
+        """Run ticks in real time by `compiled_drive.attend`, and return its code; FINISHED where the rig was gone
+        before. To be called only where `attends`. Never raises for a failing rig, which `failure` reports."""
         assert self._compiled is not None
         code = FINISHED
         if self._is_rig_gone:
@@ -155,7 +157,7 @@ class SteppedRunner:
     @contextlib.contextmanager
     def _handle_failures(self) -> Iterator[None]:
         """Context for ticks: if they fail or are interrupted, switch the force off; if the rig is gone, write zero
-        again."""
+        again. Exceptions of the driver end here; others, such as KeyboardInterrupt, are raised again."""
         try:
             yield
         except Exception as error:  # noqa: BLE001 - any error of a driver: force off; the next call reports it
@@ -168,15 +170,15 @@ class SteppedRunner:
                 self._repeat_zero_force()
 
     def _conclude(self, code: int) -> None:
-        """Keep the last reading of compiled ticks; raise the rig's error for a code above zero."""
+        """Store the last reading of compiled ticks for `seen`; raise the rig's error for a code above zero."""
         assert self._compiled is not None
-        if (reading := self._compiled.last_reading()) is not None:
+        if (reading := self._compiled.get_last_reading()) is not None:
             self._seen = LastReading(reading, self._rig.buttons())
         if code > 0:
             raise self._compiled.error(code)
 
     def give_up(self, failure: BaseException) -> None:
-        """Force off permanently, because of this failure; the first one is kept."""
+        """Force off permanently, because of this failure; the first failure is kept."""
         self.failure = self.failure or failure
         self.loop_state[RIG_GONE] = 1.0
         self._stop_with_zero_force(Fault.LOST)
@@ -186,7 +188,7 @@ class SteppedRunner:
         self._stop_with_zero_force(fault)
 
     def cut(self) -> None:
-        """Emergency stop: a separate thread writes zero force even if a call of the driver hangs; the rig is then
+        """Emergency stop: a separate thread writes zero force even if a call of the driver hangs; the rig is marked as
         gone."""
         self.loop_state[RIG_GONE] = 1.0
         self._stop_with_zero_force(Fault.STOPPED)
@@ -201,14 +203,14 @@ class SteppedRunner:
             self._stop_with_zero_force(Fault.LOST if self.moving else Fault.NONE)
         finally:
             self._closed = True
-            self.disconnected = self._disconnect.run(CLOSE_TIMEOUT_S)
+            self.disconnected = self._device_closer.run(CLOSE_TIMEOUT_S)
         self._ended = True
-        self._zero.end()
-        self._disconnect.end()
+        self._zero_writer.end()
+        self._device_closer.end()
 
-    def _tick(self) -> bool:
-        """A tick from Python, in the order of `compiled_drive._tick`. Returns whether the force is off and stays
-        off."""
+    def _run_tick(self) -> bool:
+        """Run a tick from Python, in the order of `compiled_drive._run_tick`. Returns whether the force is off and
+        stays off, or the rig is gone."""
         governor = self._governor
         reading = self._read()
         if self._is_rig_gone:
@@ -231,7 +233,7 @@ class SteppedRunner:
         return bool(is_finished)
 
     def _read(self) -> FloatArray:
-        """A reading of the rig. Raises ValueError for a wrong shape, and what the driver raises."""
+        """Reading (READING_SIZE,) of the rig. Raises ValueError for another shape, and what the driver raises."""
         reading = np.array(self._rig.sense(), dtype=np.float64)
         if reading.shape != (READING_SIZE,):
             raise ValueError(f"a reading has the shape {reading.shape}; it must be ({READING_SIZE},)")
@@ -240,11 +242,12 @@ class SteppedRunner:
     def _stop_with_zero_force(self, fault: Fault) -> None:
         """Write zero force, then stop the governor with this fault: the end is reported only when no force acts.
 
-        Where zero force could not be written in time, the rig is gone and the fault is FORCE_LEFT."""
+        Where zero force could not be written in time, the rig is marked as gone and the fault is FORCE_LEFT.
+        """
         zero_written = False
         try:
             zero_written = (
-                self._zero.run(ZERO_TIMEOUT_S) and not self.loop_state[WRITING]
+                self._zero_writer.run(ZERO_TIMEOUT_S) and not self.loop_state[WRITING]
             )  # a write that still hangs may take effect after the zero
         finally:
             self.force_off = zero_written
@@ -255,8 +258,8 @@ class SteppedRunner:
             self.loop_state[DECIDING] = 0.0
 
     def _repeat_zero_force(self) -> None:
-        """Write zero force again, and close the rig if that was requested: the caller gave up while this thread was in
-        the driver, which may have written a force since."""
+        """Write zero force again, and close the rig if that was requested: the caller stopped waiting while this thread
+        was in the driver, which may have written a force since. Fault FORCE_LEFT where that fails."""
         self.force_off = False
         try:
             self._rig.write(np.zeros(3))

@@ -40,7 +40,7 @@ class VirtualDrive:
     def refresh(self) -> bool:
         """Update the last reading while nothing moves. Returns whether it is current."""
         if not (self._runner.moving or self._closed):
-            self._runner.glance()
+            self._runner.read_sensors()
         return not self._closed
 
     def stop(self) -> None:

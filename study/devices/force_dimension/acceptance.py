@@ -10,7 +10,7 @@ from datetime import date, timedelta
 from pathlib import Path
 
 from study.devices.device import DeviceInfo
-from study.devices.force_dimension.lab import lab_file
+from study.devices.force_dimension.lab import locate_lab_file
 from study.errors import DeviceError
 
 FORMAT, VERSION = "hapteq-acceptance", 1
@@ -48,7 +48,7 @@ class Acceptance:
 
 def acceptance_file() -> Path:
     """Path of acceptance.json, in the folder of the lab's settings. The file need not exist."""
-    return lab_file().with_name("acceptance.json")
+    return locate_lab_file().with_name("acceptance.json")
 
 
 def write_acceptance(acceptance: Acceptance) -> Path:

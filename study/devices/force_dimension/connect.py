@@ -1,7 +1,8 @@
 """Connects to a device by model: opens it, checks power and calibration, arms the watchdog, enables forces.
 
 Each failure is a `DeviceError` that says what is missing and what to do. If opening fails, the device is closed again;
-after `open_model`, closing is the caller's task.
+after `open_model`, closing is the caller's task. Called by `rigs` (sessions), `findings` (`hapteq doctor`) and
+`linkage`.
 """
 
 import os
@@ -17,19 +18,19 @@ WATCHDOG_S = 0.03
 """Timeout of the device's watchdog (s), close to the longest that the firmware can count (31.9 ms). A loop in Python is
 late by 10 ms on a busy computer; a force that remains for 30 ms moves a handle without a hand by a few millimetres."""
 
-MOST_DEVICES = 16
-"""Largest number of devices that are tried on a computer. A library that counts more is not trusted; the error for a
+MAX_DEVICES = 16
+"""Largest number of devices that are tried on a computer. A higher count of the library is not trusted; the error for a
 device that was not found then says so."""
 
-CALIBRATE = (
+CALIBRATION_ADVICE = (
     "Push the handle gently into its calibration position, as the device's manual shows (or run the vendor's "
     "calibration program), then try again."
 )
-"""Advice for a device without calibration."""
+"""Advice to the user for a device without calibration."""
 
 
 def load_library() -> Library:
-    """Load the vendor's library. Raises `DeviceError`."""
+    """Load the vendor's library. Raises `DeviceError` where it is missing, cannot be loaded or is too old."""
     computer = describe_this_computer(os.environ)
     path = find_library(computer)
     if path is None:
@@ -38,49 +39,50 @@ def load_library() -> Library:
 
 
 def open_model(library: Library, model: DeviceModel) -> Handle:
-    """Open the first free device of this model; its watchdog is not armed and its forces are not enabled yet. Raises
-    `DeviceError` where there is none."""
+    """Open the first free device of this model; its watchdog is not armed and its forces are not enabled yet. Devices
+    of other models are closed again. Raises `DeviceError` where there is none."""
     other_devices: list[tuple[str, str | None]] = []
     failures: list[LibraryError] = []
-    count = max(0, int(library.function("dhdGetDeviceCount")()))
-    for number in range(min(MOST_DEVICES, count)):
+    device_count = max(0, int(library.get_function("dhdGetDeviceCount")()))
+    for device_index in range(min(MAX_DEVICES, device_count)):
         try:
-            handle = Handle(library, library.call("dhdOpenID", number))
+            handle = Handle(library, library.call("dhdOpenID", device_index))
         except LibraryError as error:
             failures.append(error)
             continue
         try:
-            system_type = handle.system_type()
+            system_type = handle.read_system_type()
             if system_type in model.system_types:
                 return handle
-            other_devices.append((handle.system_name(), name_of_type(system_type)))
+            other_devices.append((handle.read_system_name(), name_of_type(system_type)))
         except LibraryError as error:
             failures.append(error)
         except BaseException:
             handle.disconnect()
             raise
         handle.disconnect()
-    missing = _missing_device_error(model, other_devices, failures)
-    if count <= MOST_DEVICES:
-        raise missing
-    count_note = f"The library counts {count} devices, of which the first {MOST_DEVICES} were looked at."
-    raise DeviceError(missing.title, f"{missing.happened} {count_note}", missing.do_now)
+    missing_error = _make_missing_device_error(model, other_devices, failures)
+    if device_count <= MAX_DEVICES:
+        raise missing_error
+    count_text = f"The library counts {device_count} devices, of which the first {MAX_DEVICES} were looked at."
+    raise DeviceError(missing_error.title, f"{missing_error.happened} {count_text}", missing_error.do_now)
 
 
 def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_kg: float | None) -> float:
     """Enable forces up to cap_n (N), starting with zero. Returns the watchdog's timeout (s): how long the device holds
     a force without commands; 0: without limit. effector_mass_kg: for the gravity compensation, None = the model's.
 
-    Raises `DeviceError` for a device without power or calibration. The caller has to disconnect it then.
+    Raises `DeviceError` for a device without power or calibration, or that does not switch its forces on. The caller
+    has to disconnect it then.
     """
     try:
-        _check_fit(handle, model)
+        _check_power_and_calibration(handle, model)
         handle.disable_time_guard()
         drops_after_s = handle.arm_watchdog(WATCHDOG_S)
         handle.limit_force(cap_n)
         handle.compensate_gravity(effector_mass_kg if effector_mass_kg is not None else model.effector_mass_kg)
         handle.enable_force()
-        status = handle.status()
+        status = handle.read_status()
         if not status.gives_forces:
             raise DeviceError(
                 f"The {model.name} accepts no forces",
@@ -88,11 +90,11 @@ def make_ready(handle: Handle, model: DeviceModel, cap_n: float, effector_mass_k
                 "Check that its power supply is on, and press its force button if it has one.",
             )
     except LibraryError as error:
-        raise device_error(model.name, error) from error
+        raise make_device_error(model.name, error) from error
     return drops_after_s
 
 
-def device_error(name: str, error: LibraryError) -> DeviceError:
+def make_device_error(name: str, error: LibraryError) -> DeviceError:
     """Error for a failed call of the vendor's library. name: name of the device."""
     return DeviceError(
         f"The {name} does not work", f"The library says: {error}.", "Check its power and its cable, then try again."
@@ -100,20 +102,21 @@ def device_error(name: str, error: LibraryError) -> DeviceError:
 
 
 def make_missing_library_error(computer: Computer) -> DeviceError:
-    """Error for a computer on which the vendor's library is not found; it lists the folders that were searched."""
-    places = list(dict.fromkeys(str(folder) for folder, _ in list_library_patterns(computer)))
+    """Error for a computer on which the vendor's library is not found; it lists the folders that were searched, if
+    any."""
+    searched_folders = list(dict.fromkeys(str(folder) for folder, _ in list_library_patterns(computer)))
     return DeviceError(
         "The device's library is not installed",
-        f"Neither libdrd nor libdhd was found in {', '.join(places)}."
-        if places
+        f"Neither libdrd nor libdhd was found in {', '.join(searched_folders)}."
+        if searched_folders
         else "Neither drd64.dll nor dhd64.dll was found.",
         "Install the Force Dimension SDK from forcedimension.com, and set FDSDK to its folder.",
     )
 
 
-def _check_fit(handle: Handle, model: DeviceModel) -> None:
-    """Require power and calibration. Raises `DeviceError` or `LibraryError`."""
-    status = handle.status()
+def _check_power_and_calibration(handle: Handle, model: DeviceModel) -> None:
+    """Require power and calibration. Raises `DeviceError` where one is missing, or `LibraryError`."""
+    status = handle.read_status()
     if not status.powered:
         raise DeviceError(
             f"The {model.name} has no power",
@@ -121,10 +124,12 @@ def _check_fit(handle: Handle, model: DeviceModel) -> None:
             "Switch its power supply on, then try again.",
         )
     if not status.calibrated:
-        raise DeviceError(f"The {model.name} is not calibrated", "It does not know where its handle is.", CALIBRATE)
+        raise DeviceError(
+            f"The {model.name} is not calibrated", "It does not know where its handle is.", CALIBRATION_ADVICE
+        )
 
 
-def _missing_device_error(
+def _make_missing_device_error(
     model: DeviceModel, other_devices: list[tuple[str, str | None]], failures: list[LibraryError]
 ) -> DeviceError:
     """Error where no device of the model could be opened, with the most probable cause. other_devices: the vendor's
@@ -134,7 +139,7 @@ def _missing_device_error(
     if any(failure.code == DEVICE_IN_USE for failure in failures):
         return DeviceError(title, "A device is there, and another program has it.", "Close the other program.")
     if other_devices:
-        return _other_models_error(model, other_devices)
+        return _make_other_models_error(model, other_devices)
     if any(not device.may_open for device in find_usb_devices() or ()):
         return DeviceError(title, "A device is plugged in, and this account may not open it.", ADVICE)
     if failures:
@@ -144,10 +149,15 @@ def _missing_device_error(
     return DeviceError(title, "No device of the vendor answers.", "Plug its USB cable in and switch its power on.")
 
 
-def _other_models_error(model: DeviceModel, other_devices: list[tuple[str, str | None]]) -> DeviceError:
-    """Error where only devices of other models were found; it names them."""
-    options = [f"`--device {name}`" for _, name in other_devices if name is not None]
+def _make_other_models_error(model: DeviceModel, other_devices: list[tuple[str, str | None]]) -> DeviceError:
+    """Error where only devices of other models were found; it names them. other_devices: as for
+    `_make_missing_device_error`."""
+    option_texts = [f"`--device {name}`" for _, name in other_devices if name is not None]
     device_names = ", ".join(name or f"{reported!r}, which hapteq does not drive" for reported, name in other_devices)
-    plug_in = f"plug the {model.name} in and switch its power on."
-    remedy = f"Use {' or '.join(options)}, or {plug_in}" if options else plug_in[:1].upper() + plug_in[1:]
+    plug_in_text = f"plug the {model.name} in and switch its power on."
+    remedy = (
+        f"Use {' or '.join(option_texts)}, or {plug_in_text}"
+        if option_texts
+        else plug_in_text[:1].upper() + plug_in_text[1:]
+    )
     return DeviceError(f"There is no {model.name}", f"Found instead: {device_names}.", remedy)

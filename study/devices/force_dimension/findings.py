@@ -9,9 +9,9 @@ import time
 
 from study.devices.accelerometer.sensor_findings import check_sensor
 from study.devices.drive.real_time_class import check_real_time_rights
-from study.devices.force_dimension.connect import CALIBRATE, load_library, make_ready, open_model
+from study.devices.force_dimension.connect import CALIBRATION_ADVICE, load_library, make_ready, open_model
 from study.devices.force_dimension.handle import Handle
-from study.devices.force_dimension.lab import LabSettings, lab_file, read_lab
+from study.devices.force_dimension.lab import LabSettings, locate_lab_file, read_lab
 from study.devices.force_dimension.library import Library, LibraryError
 from study.devices.force_dimension.models import MODELS, DeviceModel
 from study.devices.force_dimension.rigs import read_info
@@ -30,7 +30,7 @@ EVERY_S = 0.002
 """Interval (s) of the zero forces sent meanwhile, shorter than the device's watchdog."""
 COMPARED_S = 0.02
 """Time (s), after `AT_REST_S`, over which the velocity is computed from two positions. The library averages over 20 ms
-too (`Handle.velocity_mps`)."""
+too (`Handle.read_velocity_mps`)."""
 DRIFTING_MPS = 0.02
 """Speed (m/s) after `AT_REST_S` above which the gravity compensation is off: an acceleration of 0.07 m/s² (0.7 % of g)
 in excess of friction. A smaller error is held by friction."""
@@ -96,7 +96,7 @@ def calibrate(name: str, patience_s: float) -> None:
         handle.calibrate(patience_s)
     except LibraryError as error:
         raise DeviceError(
-            "The device was not calibrated", f"Within {patience_s:g} s the library said: {error}.", CALIBRATE
+            "The device was not calibrated", f"Within {patience_s:g} s the library said: {error}.", CALIBRATION_ADVICE
         ) from error
     finally:
         handle.disconnect()
@@ -130,7 +130,9 @@ def _check_sensor(lab: LabSettings) -> list[DeviceFinding]:
             "PORT` and put the [accelerometer] table that this prints into that file (docs/hardware.md, The "
             "accelerometer)."
         )
-        return [DeviceFinding(SENSOR, f"none is configured in {lab_file()}", fine=False, advice=advice, warning=True)]
+        return [
+            DeviceFinding(SENSOR, f"none is configured in {locate_lab_file()}", fine=False, advice=advice, warning=True)
+        ]
     try:
         with contextlib.closing(lab.accelerometer.open_sensor()) as sensor:
             return list(check_sensor(sensor))
@@ -141,14 +143,16 @@ def _check_sensor(lab: LabSettings) -> list[DeviceFinding]:
 def _examine_opened(handle: Handle, model: DeviceModel, lab: LabSettings) -> list[DeviceFinding]:
     """Findings on an opened device: power, calibration, watchdog, masses, gravity compensation. Raises `DeviceError`,
     `LibraryError`."""
-    status = handle.status()
+    status = handle.read_status()
     power = DeviceFinding("Power", "on" if status.powered else "off", status.powered, "" if status.powered else POWER)
     calibrated = status.calibrated
     calibration_text = (
         "done" if calibrated else "not done since it was switched on: it does not know where its handle is"
     )
     advice = (
-        "" if calibrated else f"Run `hapteq doctor --device {_find_option_name(model)} --calibrate`, or: {CALIBRATE}"
+        ""
+        if calibrated
+        else f"Run `hapteq doctor --device {_find_option_name(model)} --calibrate`, or: {CALIBRATION_ADVICE}"
     )
     findings = [power, DeviceFinding("Calibration", calibration_text, calibrated, advice)]
     if not (status.powered and calibrated):
@@ -174,7 +178,7 @@ def _report_masses(model: DeviceModel, lab: LabSettings) -> DeviceFinding:
         f"{lab.effective_mass_kg:g} kg" if lab.effective_mass_kg else f"{model.effective_mass_kg:g} kg, assumed"
     )
     return DeviceFinding(
-        "Masses", f"gravity compensation {gravity_mass}, spring {spring_mass} ({lab_file()})", fine=True
+        "Masses", f"gravity compensation {gravity_mass}, spring {spring_mass} ({locate_lab_file()})", fine=True
     )
 
 
@@ -183,14 +187,14 @@ def _check_gravity(handle: Handle) -> list[DeviceFinding]:
     it; empty where positions cannot be read, which another finding reports. Raises `LibraryError`."""
     _send_zero_forces(handle, AT_REST_S)
     try:
-        began_s, from_m = time.monotonic(), handle.position_m()[2]
+        began_s, from_m = time.monotonic(), handle.read_position_m()[2]
         _send_zero_forces(handle, COMPARED_S)
-        up_mps = (handle.position_m()[2] - from_m) / (time.monotonic() - began_s)
+        up_mps = (handle.read_position_m()[2] - from_m) / (time.monotonic() - began_s)
     except LibraryError as error:
         if error.function == "dhdGetPosition":
             return []
         raise
-    reported_mps = handle.velocity_mps()[2]
+    reported_mps = handle.read_velocity_mps()[2]
     findings = [_check_drift(up_mps)]
     if not abs(reported_mps - up_mps) <= DRIFTING_MPS + 0.5 * abs(up_mps):
         value = f"the library says {reported_mps:g} m/s along z; by its positions the handle moves at {up_mps:.2g} m/s"
@@ -213,7 +217,9 @@ def _check_drift(up_mps: float) -> DeviceFinding:
     if abs(up_mps) <= DRIFTING_MPS:
         return DeviceFinding("Gravity", "compensated: the handle stays where it is", fine=True)
     is_sinking = up_mps < 0
-    advice = f"With no hand on it, make effector_mass_kg in {lab_file()} {'larger' if is_sinking else 'smaller'}."
+    advice = (
+        f"With no hand on it, make effector_mass_kg in {locate_lab_file()} {'larger' if is_sinking else 'smaller'}."
+    )
     direction = "sinks" if is_sinking else "rises"
     return DeviceFinding(
         "Gravity", f"the handle {direction} at {1000 * abs(up_mps):.0f} mm/s", False, advice, warning=True

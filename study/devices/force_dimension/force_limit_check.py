@@ -22,10 +22,11 @@ TEST_FORCE_N = 0.5
 """Force held in part 2, and cap in part 1 (N): above the friction of such devices, a sixth of the strongest stimulus
 (3 N)."""
 HOLD_DURATION_S, FADE_S, POLL_INTERVAL_S = 0.12, 0.05, 0.002
-"""Duration of the constant force, of its fades, and interval of polling the device (s). Short, because without the
-virtual spring the handle moves by some 15 mm until the device brakes."""
+"""Duration of the constant force, of the fades of all test forces, and interval of polling the device (s). Short,
+because without the virtual spring the handle moves by some 15 mm until the device brakes."""
 MIN_COMMANDED_SHARE = 0.8
-"""Share of `TEST_FORCE_N` that must have been commanded for the test to be valid: the damper subtracts some."""
+"""Share of `TEST_FORCE_N` that the device must have reported (part 1) or the loop commanded (part 2) for the test to be
+valid: the damper subtracts some."""
 PAUSE_S = 0.2
 """Pause in the commands in part 2 (s); a zero force is sent at its end."""
 
@@ -40,7 +41,7 @@ MAX_REPORTED_TO_CAP_RATIO = 1.05
 
 
 class CappedDevice(Protocol):
-    """Part of the safety layer's interface that part 1 needs."""
+    """The methods of `study.devices.safe.SafeDevice` that part 1 uses."""
 
     @property
     def info(self) -> DeviceInfo: ...
@@ -48,8 +49,8 @@ class CappedDevice(Protocol):
     def hold(self, stimulus: HeldStimulus) -> None: ...
 
     def hold_unchecked(self, stimulus: HeldStimulus) -> None:
-        """Hold a stimulus without the check of admission: see `study.devices.safe.SafeDevice.hold_unchecked`. The other
-        methods are those of `study.devices.device.Device`."""
+        """Hold a stimulus without the check of `admission`, see `SafeDevice.hold_unchecked`. The other methods are
+        those of `study.devices.device.Device`."""
         ...
 
     def keep_alive(self) -> None: ...
@@ -139,7 +140,8 @@ def _measure_largest_n(device: CappedDevice, rig: ForceReporting) -> float:
 
 
 def _check_reported_force(cap_name: str, reported_n: float) -> None:
-    """Raise `DeviceError` unless the reported force is within the cap and large enough for a valid test."""
+    """Raise `DeviceError` unless the reported force (N) is within the cap and large enough for a valid test; NaN is
+    refused. cap_name: the cap that was tested, for the message."""
     result_text = f"{COMMAND_TO_CAP_RATIO * TEST_FORCE_N:g} N were commanded, and the device gave {reported_n:.2f} N"
     if not reported_n <= MAX_REPORTED_TO_CAP_RATIO * TEST_FORCE_N:
         raise _make_acceptance_error(
@@ -176,13 +178,14 @@ def check_force_vanishes(device: Device, rig: CommandPausing) -> float:
 
 
 def _make_constant_force(rate_hz: float) -> HeldStimulus:
-    """A constant force of `TEST_FORCE_N` along x, towards the operator. rate_hz: of the device."""
+    """A constant force of `TEST_FORCE_N` along x, towards the operator. rate_hz: sample rate of the device (Hz)."""
     samples = np.tile([[TEST_FORCE_N, 0.0, 0.0]], (round(0.05 * rate_hz), 1))
     return HeldStimulus(Signal(samples, rate_hz, "force", "N", ("fx", "fy", "fz")), FADE_S, FADE_S, "linear")
 
 
 def _make_oscillation(rate_hz: float) -> HeldStimulus:
-    """A sinusoidal force along x, with `COMMAND_TO_CAP_RATIO` times the cap as amplitude. rate_hz: of the device."""
+    """A sinusoidal force along x, with `COMMAND_TO_CAP_RATIO` times the cap as amplitude. rate_hz: rate of
+    the device (Hz)."""
     phase = 2 * np.pi * np.arange(round(rate_hz / OSCILLATION_HZ)) * OSCILLATION_HZ / rate_hz
     samples = COMMAND_TO_CAP_RATIO * TEST_FORCE_N * np.sin(phase)[:, None] * [1.0, 0.0, 0.0]
     return HeldStimulus(Signal(samples, rate_hz, "force", "N", ("fx", "fy", "fz")), FADE_S, FADE_S, "linear")
@@ -197,6 +200,7 @@ def _keep_alive_for(device: Device, seconds: float) -> None:
 
 
 def _make_acceptance_error(reason: str) -> DeviceError:
+    """Error for a device that failed the test. reason: a sentence."""
     return DeviceError(
         "The device was not accepted",
         reason,

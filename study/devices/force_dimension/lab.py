@@ -1,4 +1,5 @@
-"""The laboratory's settings of its device (masses, accelerometer, onset pulse): a TOML file with only optional keys.
+"""The laboratory's settings of its device (masses, accelerometer, onset pulse): reads and writes a TOML file with only
+optional keys.
 
 Read at every opening of a real device; `hapteq doctor` writes the result of a sensor calibration into it. The keys are
 described in docs/hardware.md.
@@ -23,11 +24,12 @@ from study.errors import DeviceError
 Triple = tuple[float, float, float]
 """Three numbers, for three channels or three axes."""
 
-HEADER = re.compile(r"\s*\[\[?[\w.\"-]+\]\]?\s*(#.*)?")
-"""Header of a table in TOML; a row of numbers in brackets does not match."""
+TABLE_HEADER = re.compile(r"\s*\[\[?[\w.\"-]+\]\]?\s*(#.*)?")
+"""Line that is the header of a table in TOML, with or without a comment; an array of numbers with commas does not
+match."""
 
-FILE_VARIABLE = "HAPTEQ_DEVICE_FILE"
-"""Environment variable that names the lab's file, in place of the default one."""
+LAB_FILE_VARIABLE = "HAPTEQ_DEVICE_FILE"
+"""Environment variable with the path of the lab's file, in place of the default one."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -63,46 +65,49 @@ class LabSettings:
     """Content of the lab's settings file; every key is optional."""
 
     effector_mass_kg: float | None = Field(default=None, gt=0, le=2)
-    """Mass that the gravity compensation carries: handle and sensor. None: the model's own."""
+    """Mass that the gravity compensation carries (kg): handle and sensor. None: the model's own."""
     effective_mass_kg: float | None = Field(default=None, ge=0.01, le=5)
-    """Mass that the centring spring moves, at the handle. None: the assumption in the table of models."""
+    """Mass that the centring spring moves, at the handle (kg). None: the assumption in the table of models."""
     accelerometer: SensorSettings | None = None
     """None: no acceleration is measured."""
     pulse: PulseSettings | None = None
     """Output line that gets a pulse at the onset of each trial's force. None: no pulse."""
 
 
-def lab_file() -> Path:
+def locate_lab_file() -> Path:
     """Path of the settings file: from the environment variable HAPTEQ_DEVICE_FILE, else ~/.config/hapteq/device.toml.
     The file need not exist."""
-    environment_path = os.environ.get(FILE_VARIABLE)
+    environment_path = os.environ.get(LAB_FILE_VARIABLE)
     return Path(environment_path) if environment_path else Path.home() / ".config" / "hapteq" / "device.toml"
 
 
 def read_lab() -> LabSettings:
     """Read the laboratory's settings; all are None where the file does not exist. Raises `DeviceError` for a file that
     cannot be read or is not valid."""
-    path = lab_file()
+    path = locate_lab_file()
     try:
         text = path.read_text("utf-8")
     except FileNotFoundError:
         return LabSettings()
     except (OSError, UnicodeDecodeError) as error:
-        raise _lab_file_error(path, str(error)) from error
+        raise _make_lab_file_error(path, str(error)) from error
     try:
         return TypeAdapter(LabSettings).validate_python(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
-        raise _lab_file_error(path, str(error)) from error
+        raise _make_lab_file_error(path, str(error)) from error
     except ValidationError as error:
-        first = error.errors()[0]
-        raise _lab_file_error(path, f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+        first_problem = error.errors()[0]
+        raise _make_lab_file_error(
+            path, f"{'.'.join(map(str, first_problem['loc']))}: {first_problem['msg']}"
+        ) from error
 
 
 def write_sensor_table(table: str) -> Path:
     """Write an [accelerometer] table (TOML) into the settings file, replacing an older one, and return the path. The
-    previous file is kept as `NAME.before`. Raises `DeviceError` where the file cannot be read or written."""
+    previous file is kept as `NAME.before`. Raises `DeviceError` where the file cannot be read or written, or the new
+    content is not valid."""
     read_lab()
-    path = lab_file()
+    path = locate_lab_file()
     try:
         previous_text = path.read_text("utf-8") if path.exists() else ""
         text = _replace_sensor_table(previous_text, table)
@@ -123,10 +128,10 @@ def write_sensor_table(table: str) -> Path:
 
 
 def _replace_sensor_table(text: str, table: str) -> str:
-    """The text of the file with its [accelerometer] table removed and the new one appended."""
+    """The text of the file with its [accelerometer] table removed, up to the next header, and the new one appended."""
     lines, kept_lines, skipping = text.splitlines(), [], False
     for line in lines:
-        if HEADER.fullmatch(line):
+        if TABLE_HEADER.fullmatch(line):
             skipping = line.split("#")[0].strip() == "[accelerometer]"
         if not skipping:
             kept_lines.append(line)
@@ -134,7 +139,8 @@ def _replace_sensor_table(text: str, table: str) -> str:
     return f"{other_text}\n\n{table.rstrip()}\n" if other_text else f"{table.rstrip()}\n"
 
 
-def _lab_file_error(path: Path, reason: str) -> DeviceError:
+def _make_lab_file_error(path: Path, reason: str) -> DeviceError:
+    """Error for a settings file that cannot be read or is not valid. reason: a clause without a full stop."""
     return DeviceError(
         "The settings of the device cannot be used",
         f"{path}: {reason}.",

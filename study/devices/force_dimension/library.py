@@ -1,7 +1,8 @@
 """Bindings of Force Dimension's DHD functions by ctypes: loading, signatures, version, and error handling.
 
 A negative return value becomes a `LibraryError` with the library's own text. The library keeps its last error per
-thread, so that the text must be fetched at once, in the thread whose call failed.
+thread, so that the text must be fetched at once, in the thread whose call failed. Loaded by `connect.load_library`;
+`handle` and `linkage` call the functions.
 """
 
 import ctypes
@@ -20,17 +21,18 @@ OLDEST_SDK = (3, 16, 0)
 """Oldest version of the vendor's library that is accepted: it has all functions below, with these types."""
 
 GEOMETRY_ERROR, DEVICE_IN_USE = 8, 20
-"""Error codes of the library that callers handle in a particular way."""
+"""Error codes of the library that callers handle in a particular way: position out of reach (`linkage`), device open in
+another program (`connect`)."""
 
 HIGHEST_NOTICE = 2
-"""Highest return value that means success with a notice, from 1 on (`handle.STALE`, `handle.SCALED`). The meaning of a
-higher value is not known, so it is treated as an error."""
+"""Highest return value that means success with a notice, from 1 on (`handle.REPEATED_READING`, `handle.SCALED_FORCE`).
+The meaning of a higher value is not known, so it is treated as an error."""
 
-ANSWER_A_NUMBER = ("dhdOpenID", "dhdGetSystemType")
+RESULT_FUNCTIONS = ("dhdOpenID", "dhdGetSystemType")
 """Functions whose non-negative return value is the result itself, not a status."""
 
-_ID, _NUMBER, _NUMBERS = c_byte, c_double, POINTER(c_double)
-_THREE = (_NUMBERS, _NUMBERS, _NUMBERS, _ID)
+_ID, _DOUBLE, _DOUBLE_POINTER = c_byte, c_double, POINTER(c_double)
+_VECTOR_POINTERS = (_DOUBLE_POINTER, _DOUBLE_POINTER, _DOUBLE_POINTER, _ID)
 """Argument types of functions that write a vector: pointers to x, y, z, then the device's ID."""
 
 SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
@@ -44,18 +46,18 @@ SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "dhdGetSystemType": (c_int, (_ID,)),
     "dhdGetSystemName": (c_char_p, (_ID,)),
     "dhdGetSerialNumber": (c_int, (POINTER(c_ushort), _ID)),
-    "dhdGetVersion": (c_int, (_NUMBERS, _ID)),
+    "dhdGetVersion": (c_int, (_DOUBLE_POINTER, _ID)),
     "dhdGetStatus": (c_int, (POINTER(c_int), _ID)),
     "dhdEnableForce": (c_int, (c_ubyte, _ID)),
     "dhdSetBrakes": (c_int, (c_int, _ID)),
-    "dhdGetPosition": (c_int, _THREE),
-    "dhdGetLinearVelocity": (c_int, _THREE),
-    "dhdGetForce": (c_int, _THREE),
-    "dhdSetForce": (c_int, (_NUMBER, _NUMBER, _NUMBER, _ID)),
+    "dhdGetPosition": (c_int, _VECTOR_POINTERS),
+    "dhdGetLinearVelocity": (c_int, _VECTOR_POINTERS),
+    "dhdGetForce": (c_int, _VECTOR_POINTERS),
+    "dhdSetForce": (c_int, (_DOUBLE, _DOUBLE, _DOUBLE, _ID)),
     "dhdGetButtonMask": (c_uint, (_ID,)),
     "dhdSetGravityCompensation": (c_int, (c_int, _ID)),
-    "dhdSetEffectorMass": (c_int, (_NUMBER, _ID)),
-    "dhdSetMaxForce": (c_int, (_NUMBER, _ID)),
+    "dhdSetEffectorMass": (c_int, (_DOUBLE, _ID)),
+    "dhdSetMaxForce": (c_int, (_DOUBLE, _ID)),
     "dhdReset": (c_int, (_ID,)),
     "dhdWaitForReset": (c_int, (c_int, _ID)),
     "dhdEnableExpertMode": (c_int, ()),
@@ -66,18 +68,19 @@ SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
 """Types of result and arguments of each required function. The device's ID (`char`) is the last argument; C has no
 default for it."""
 
-_ANGLES, _COUNTS = (_NUMBER,) * 3, (c_int,) * 3
+_THREE_ANGLES, _THREE_COUNTS = (_DOUBLE,) * 3, (c_int,) * 3
 
 LINKAGE_SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
-    "dhdGetJointAngles": (c_int, (_NUMBERS, _ID)),
-    "dhdDeltaPositionToEncoder": (c_int, (*_ANGLES, *(POINTER(c_int),) * 3, _ID)),
-    "dhdDeltaEncoderToPosition": (c_int, (*_COUNTS, *_THREE)),
-    "dhdDeltaEncodersToJointAngles": (c_int, (*_COUNTS, *_THREE)),
-    "dhdDeltaJointAnglesToJacobian": (c_int, (*_ANGLES, _NUMBERS, _ID)),
-    "dhdJointAnglesToInertiaMatrix": (c_int, (_NUMBERS, _NUMBERS, _ID)),
-    "dhdJointAnglesToGravityJointTorques": (c_int, (_NUMBERS, _NUMBERS, c_ubyte, _ID)),
+    "dhdGetJointAngles": (c_int, (_DOUBLE_POINTER, _ID)),
+    "dhdDeltaPositionToEncoder": (c_int, (*_THREE_ANGLES, *(POINTER(c_int),) * 3, _ID)),
+    "dhdDeltaEncoderToPosition": (c_int, (*_THREE_COUNTS, *_VECTOR_POINTERS)),
+    "dhdDeltaEncodersToJointAngles": (c_int, (*_THREE_COUNTS, *_VECTOR_POINTERS)),
+    "dhdDeltaJointAnglesToJacobian": (c_int, (*_THREE_ANGLES, _DOUBLE_POINTER, _ID)),
+    "dhdJointAnglesToInertiaMatrix": (c_int, (_DOUBLE_POINTER, _DOUBLE_POINTER, _ID)),
+    "dhdJointAnglesToGravityJointTorques": (c_int, (_DOUBLE_POINTER, _DOUBLE_POINTER, c_ubyte, _ID)),
 }
-"""Functions that only the calibration of the linkage needs: a library without them can still drive a device."""
+"""Types of result and arguments of functions that only the calibration of the linkage needs: a library without them can
+still drive a device."""
 
 
 class LibraryError(Exception):
@@ -89,35 +92,35 @@ class LibraryError(Exception):
 
 
 class Library:
-    """The loaded library. Raises `DeviceError` where it cannot be loaded or is too old."""
+    """The loaded library. Raises `DeviceError` where it cannot be loaded, lacks a required function or is too old."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self._functions = _bind(_load(path), path)
-        self.version = self._version()
+        self.version = self._read_version()
         if self.version[:3] < OLDEST_SDK:
-            raise _outdated_error(f"{path} is version {_format_version(self.version)}")
+            raise _make_outdated_error(f"{path} is version {_format_version(self.version)}")
 
     @property
     def version_text(self) -> str:
-        """Version of the vendor's SDK in words, as "3.17.5"."""
+        """Version of the vendor's SDK as text, such as "3.17.5.0"."""
         return _format_version(self.version)
 
-    def function(self, name: str) -> Callable[..., Any]:
-        """The bare function, for calls at every tick; its return value must be passed to `check_answer`. Raises
-        `DeviceError` where the library lacks this function."""
+    def get_function(self, name: str) -> Callable[..., Any]:
+        """The function without error handling, for calls at every tick; its return value must be passed to
+        `check_return_value`. Raises `DeviceError` where the library lacks this function."""
         if name not in self._functions:
-            raise _outdated_error(f"{self.path} has no {name}")
+            raise _make_outdated_error(f"{self.path} has no {name}")
         return self._functions[name]
 
-    def check_answer(self, name: str, answer: int) -> int:
-        """Return `answer`, the value that function `name` returned. Raises `LibraryError` where it is negative or
-        unknown. Must run in the thread of the call, because the error is kept per thread."""
-        if 0 <= answer <= HIGHEST_NOTICE or (answer > 0 and name in ANSWER_A_NUMBER):
-            return answer
-        raise self.last_error(name)
+    def check_return_value(self, name: str, return_value: int) -> int:
+        """Return `return_value`, which function `name` returned. Raises `LibraryError` where it is negative or unknown.
+        Must run in the thread of the call, because the error is kept per thread."""
+        if 0 <= return_value <= HIGHEST_NOTICE or (return_value > 0 and name in RESULT_FUNCTIONS):
+            return return_value
+        raise self.fetch_last_error(name)
 
-    def last_error(self, name: str) -> LibraryError:
+    def fetch_last_error(self, name: str) -> LibraryError:
         """The library's error of function `name`, whose call has just failed in this thread."""
         code = int(self._functions["dhdErrorGetLast"]())
         if code == 0:
@@ -125,16 +128,16 @@ class Library:
         text = self._functions["dhdErrorGetLastStr"]() or b"no reason given"
         return LibraryError(name, code, text.decode("utf-8", "replace"))
 
-    def addresses(self, names: tuple[str, ...]) -> npt.NDArray[np.int64]:
+    def find_addresses(self, names: tuple[str, ...]) -> npt.NDArray[np.int64]:
         """(len(names),): addresses of the library's functions, for calls from compiled code."""
         return np.array([find_address(self._functions[name]) for name in names], dtype=np.int64)
 
     def call(self, name: str, *arguments: Any) -> int:
         """Call a function of the library and check its return value. Raises `LibraryError`, and `DeviceError` where the
         library lacks the function."""
-        return self.check_answer(name, int(self.function(name)(*arguments)))
+        return self.check_return_value(name, int(self.get_function(name)(*arguments)))
 
-    def _version(self) -> tuple[int, int, int, int]:
+    def _read_version(self) -> tuple[int, int, int, int]:
         """Version of the SDK: major, minor, release, revision."""
         parts = [c_int() for _ in range(4)]
         self._functions["dhdGetSDKVersion"](*map(ctypes.byref, parts))
@@ -143,7 +146,7 @@ class Library:
 
 
 def _load(path: Path) -> ctypes.CDLL:
-    """Load the library. Raises DeviceError."""
+    """Load the library from a file. Raises `DeviceError` where the system cannot load it."""
     try:
         # Windows searches a library's own folder for the libraries it depends on only if its full path is given.
         return ctypes.CDLL(str(path.absolute()))
@@ -156,17 +159,17 @@ def _load(path: Path) -> ctypes.CDLL:
         ) from error
 
 
-def _bind(loaded: ctypes.CDLL, path: Path) -> dict[str, Callable[..., Any]]:
-    """The library's functions by name, with their types set. Raises DeviceError where a required function is
-    missing."""
-    missing = [name for name in SIGNATURES if not hasattr(loaded, name)]
+def _bind(shared_library: ctypes.CDLL, path: Path) -> dict[str, Callable[..., Any]]:
+    """The library's functions by name, with their types set. Raises `DeviceError` where a function of `SIGNATURES` is
+    missing; those of `LINKAGE_SIGNATURES` may be missing."""
+    missing = [name for name in SIGNATURES if not hasattr(shared_library, name)]
     if missing:
-        raise _outdated_error(f"{path} has no {', '.join(missing)}")
+        raise _make_outdated_error(f"{path} has no {', '.join(missing)}")
     functions: dict[str, Callable[..., Any]] = {}
-    available = {name: types for name, types in LINKAGE_SIGNATURES.items() if hasattr(loaded, name)}
-    for name, (result, arguments) in (SIGNATURES | available).items():
-        function = getattr(loaded, name)
-        function.restype, function.argtypes = result, list(arguments)
+    available_linkage = {name: types for name, types in LINKAGE_SIGNATURES.items() if hasattr(shared_library, name)}
+    for name, (result_type, argument_types) in (SIGNATURES | available_linkage).items():
+        function = getattr(shared_library, name)
+        function.restype, function.argtypes = result_type, list(argument_types)
         functions[name] = function
     return functions
 
@@ -176,8 +179,8 @@ def _format_version(version: tuple[int, ...]) -> str:
     return ".".join(map(str, version))
 
 
-def _outdated_error(reason: str) -> DeviceError:
-    """Error for a library that is too old. reason: what shows it."""
+def _make_outdated_error(reason: str) -> DeviceError:
+    """Error for a library that is too old. reason: the version, or the missing functions."""
     return DeviceError(
         "The device's library is too old",
         f"{reason}.",

@@ -10,11 +10,11 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from study.devices.force_dimension.handle import (
     BRAKED_CAUSE,
-    BRAKING_PLACE,
-    CALIBRATED_PLACE,
-    FORCE_ON_PLACE,
-    OFF_CAUSE_PLACE,
-    POWERED_PLACE,
+    BRAKING_INDEX,
+    CALIBRATED_INDEX,
+    FORCE_ON_INDEX,
+    OFF_CAUSE_INDEX,
+    POWERED_INDEX,
     UNCALIBRATED_CAUSE,
     UNPOWERED_CAUSE,
     WATCHDOG_CAUSE,
@@ -140,13 +140,13 @@ def check_force_on(calls: Addresses, cells: FloatArray) -> int:
     status = allocate_16_words()
     if not is_success(call_int(calls[STATUS], (status, np.int32(cells[NUMBER])))):
         return record_library_failure(cells, STATUS)
-    cause, force_on = _read_int(status, OFF_CAUSE_PLACE), _read_int(status, FORCE_ON_PLACE) != 0
+    cause, force_on = _read_int(status, OFF_CAUSE_INDEX), _read_int(status, FORCE_ON_INDEX) != 0
     if force_on or cause == 0:
-        if _read_int(status, POWERED_PLACE) == 0:
+        if _read_int(status, POWERED_INDEX) == 0:
             cause = UNPOWERED_CAUSE
-        elif _read_int(status, CALIBRATED_PLACE) == 0:
+        elif _read_int(status, CALIBRATED_INDEX) == 0:
             cause = UNCALIBRATED_CAUSE
-        elif force_on and _read_int(status, BRAKING_PLACE) != 0:
+        elif force_on and _read_int(status, BRAKING_INDEX) != 0:
             cause = BRAKED_CAUSE
         elif force_on:
             return 0

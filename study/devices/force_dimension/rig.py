@@ -3,7 +3,8 @@
 The compiled functions of `tick_io` do the reading and writing; this class owns their memory cells, the threads and the
 errors. In addition to the safety layer, `tick_io` never sends a force whose norm is above the cap or NaN. Any failure
 is raised as a `DeviceError`: the safety layer then writes a zero force, and if that fails too, the device's watchdog
-switches the force off.
+switches the force off. Made by `rigs`; the acceptance test (`force_limit_check`) also calls `force_on`, `given_n`,
+`given_past_this_n` and `withhold`.
 """
 
 import contextlib
@@ -21,27 +22,29 @@ from study.devices.force_dimension import loop_cells, tick_io
 from study.devices.force_dimension.handle import Handle, describe_off_cause
 from study.devices.force_dimension.library import LibraryError
 from study.devices.force_dimension.tick_io import LOCK_S
-from study.devices.native import SharedLock, system_calls
+from study.devices.native import SharedLock, collect_system_calls
 from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED, CompiledIo, SensedAcceleration
 from study.errors import DeviceError
 
-REST_SHARE = 0.25
+ZERO_INTERVAL_SHARE = 0.25
 """Interval between two zero forces while nothing is played, as a share of the watchdog's timeout."""
 
-JOIN_S = 0.5
-"""Longest wait for the thread that repeats zeros to end (s): half of what a caller waits for a device to close."""
+JOIN_TIMEOUT_S = 0.5
+"""Longest wait (s) for the thread that repeats zeros to end: half of what a caller waits for a device to close."""
 
 
 class Accelerometer(Protocol):
-    """Port of an acceleration sensor at the handle that is read by a thread of its own."""
+    """Interface of an acceleration sensor at the handle that is read by a thread of its own, such as
+    `study.devices.accelerometer.sensor.Accelerometer`. One with an attribute `samples` is also read by compiled
+    code."""
 
-    def latest(self) -> tuple[FloatArray, bool]:
+    def read_latest(self) -> tuple[FloatArray, bool]:
         """Newest acceleration (3,), m/s², NaN without a fresh sample, and whether a channel is at its limit. Fast
         enough for every tick."""
         ...
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration | None:
-        """Accelerations at the times of the ticks, afterwards: see `study.devices.rig.OwnClockSensor`."""
+        """Accelerations at past ticks: as `study.devices.rig.OwnClockSensor.sensed`."""
         ...
 
     def close(self) -> None:
@@ -51,8 +54,8 @@ class Accelerometer(Protocol):
 
 class ForceDimensionRig:
     """An opened device. drops_force_after_s: timeout of its watchdog (s), 0 = none. cap_n: largest norm of a force that
-    `write` sends (N). rests: repeat the zero force in a thread while nothing is played, so that gravity stays
-    compensated; without it, the watchdog lets the device brake between stimuli."""
+    `write` sends (N). repeats_zero: repeat the zero force in a thread while nothing is played, so that gravity stays
+    compensated (only for a device with a watchdog); without it, the watchdog lets the device brake between stimuli."""
 
     def __init__(
         self,
@@ -67,17 +70,19 @@ class ForceDimensionRig:
         self.drops_force_after_s = drops_force_after_s
         self._handle = handle
         self._accelerometer = accelerometer
-        self._sending = SharedLock()
-        self._calls = np.concatenate([system_calls(self._sending), handle.library.addresses(loop_cells.LIBRARY)])
+        self._send_lock = SharedLock()
+        self._calls = np.concatenate(
+            [collect_system_calls(self._send_lock), handle.library.find_addresses(loop_cells.LIBRARY)]
+        )
         self._cells: FloatArray = np.zeros(loop_cells.CELLS_SIZE)
         self._cells[loop_cells.NUMBER] = handle.number
         self._cells[loop_cells.CAP_N] = min(cap_n, info.max_force_n)
         self._cells[loop_cells.DROPS_AFTER_S] = drops_force_after_s
         # The time of the last zero is unknown, so that the first force checks the status of the device.
         self._cells[loop_cells.SENT_S], self._cells[loop_cells.SENT_ZERO] = -math.inf, 1.0
-        shared: FloatArray | None = getattr(accelerometer, "samples", None)
-        self._samples: FloatArray = np.zeros((1, 1)) if shared is None else shared
-        self._overlaid = accelerometer if shared is None else None
+        sensor_rows: FloatArray | None = getattr(accelerometer, "samples", None)
+        self._samples: FloatArray = np.zeros((1, 1)) if sensor_rows is None else sensor_rows
+        self._uncompiled_accelerometer = accelerometer if sensor_rows is None else None
         self._failure: DeviceError | None = None
         self._closed = threading.Event()
         self._zero_thread = threading.Thread(target=self._repeat_zero_force, name="gravity compensation", daemon=True)
@@ -87,17 +92,19 @@ class ForceDimensionRig:
     @property
     def halves(self) -> CompiledIo | None:
         """The two halves of a compiled tick; None with an accelerometer that compiled code cannot read."""
-        if self._overlaid is not None:
+        if self._uncompiled_accelerometer is not None:
             return None
-        return CompiledIo(tick_io.sense_once, tick_io.write_once, self._calls, self._cells, self._samples, self._error)
+        return CompiledIo(
+            tick_io.sense_once, tick_io.write_once, self._calls, self._cells, self._samples, self._get_error
+        )
 
     def sense(self) -> FloatArray:
-        """A reading, shape (READING_SIZE,), with the newest acceleration; NaN without a fresh sample. Raises
+        """Reading, shape (READING_SIZE,), with the newest acceleration; NaN without a fresh sample. Raises
         `DeviceError` where the device fails or only repeats its position."""
         reading = np.empty(READING_SIZE)
         self._raise_for(tick_io.sense_once(self._calls, self._cells, self._samples, reading))
-        if self._overlaid is not None:
-            reading[ACCELERATION], clipped = self._overlaid.latest()
+        if self._uncompiled_accelerometer is not None:
+            reading[ACCELERATION], clipped = self._uncompiled_accelerometer.read_latest()
             reading[SENSOR_CLIPPED] = float(clipped)
         return reading
 
@@ -112,20 +119,20 @@ class ForceDimensionRig:
         self._raise_for(tick_io.write_once(self._calls, self._cells, np.array(force_n, dtype=np.float64)))
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration | None:
-        """Accelerations at the ticks, by the sensor's own clock; None without an accelerometer."""
+        """Accelerations at past ticks, as `study.devices.rig.OwnClockSensor.sensed`; None without an accelerometer."""
         return None if self._accelerometer is None else self._accelerometer.sensed(since_s, tick_s, rate_hz)
 
     def withhold(self, seconds: float) -> float:
-        """Simulate a stopped control loop, to test the watchdog: nothing is sent for this long, not even zeros. Returns
-        the time of the last force (s, monotonic clock)."""
-        with self._sending:
+        """Simulate a stopped control loop, to test the watchdog: nothing is sent for this time (s), not even zeros.
+        Returns the time of the last force (s, monotonic clock)."""
+        with self._send_lock:
             self._cells[loop_cells.WITHHELD_UNTIL_S] = time.monotonic() + seconds
             return float(self._cells[loop_cells.SENT_S])
 
     def force_on(self) -> bool:
         """Whether the device reports that its forces are on. May be called from any thread. Raises `DeviceError`."""
         try:
-            return self._handle.status().force_on
+            return self._handle.read_status().force_on
         except LibraryError as error:
             raise self._fail(f"The library says: {error}") from error
 
@@ -133,7 +140,7 @@ class ForceDimensionRig:
         """Norm of the horizontal force (N) that the device reports at this moment; the vertical force is left out,
         because it may compensate gravity. Raises `DeviceError`."""
         try:
-            x, y, _ = self._handle.force_n()
+            x, y, _ = self._handle.read_force_n()
         except LibraryError as error:
             raise self._fail(f"The library says: {error}") from error
         return math.hypot(x, y)
@@ -142,7 +149,7 @@ class ForceDimensionRig:
         """Horizontal force (N) that the device reports when `asked_n` (N) is sent along x without the cap of this rig,
         to test the cap of the library; a zero follows at once. Only for the acceptance test of a device, with no hand
         on the handle. Raises `DeviceError`."""
-        with self._sending:
+        with self._send_lock:
             try:
                 self._handle.set_force(asked_n, 0.0, 0.0)
                 return self.given_n()
@@ -157,53 +164,54 @@ class ForceDimensionRig:
         self._cells[loop_cells.WITHHELD_UNTIL_S] = 0.0
         self._cells[loop_cells.CLOSED] = 1.0
         self._closed.set()
-        is_locked = self._sending.acquire(LOCK_S)
+        is_locked = self._send_lock.acquire(LOCK_S)
         try:
             self._cells[loop_cells.RELEASE_CONFIRMED] = self._handle.disconnect()
         finally:
             if is_locked:
-                self._sending.release()
+                self._send_lock.release()
             if self._accelerometer is not None:
                 self._accelerometer.close()
-        self._end_zero_thread()
+        self._join_zero_thread()
         return bool(self._cells[loop_cells.RELEASE_CONFIRMED])
 
-    def _end_zero_thread(self) -> None:
+    def _join_zero_thread(self) -> None:
         """Wait for the thread that repeats zeros, after the force is off and the brakes are on, so that a hanging call
-        of that thread delays neither. The second disconnect undoes what such a call did late; if it fails, the release
-        does not count as confirmed."""
+        of that thread delays neither. The second disconnect undoes a force or a release of the brakes by such a call;
+        if it fails, the release does not count as confirmed."""
         if self._zero_thread.ident is None or self._zero_thread is threading.current_thread():
             return
-        self._zero_thread.join(JOIN_S)
+        self._zero_thread.join(JOIN_TIMEOUT_S)
         if not self._handle.disconnect():
             self._cells[loop_cells.RELEASE_CONFIRMED] = 0.0
 
     def _repeat_zero_force(self) -> None:
-        """Repeat a zero force until closed or failed; a zero is sent only where the last force was zero. Has real-time
-        priority like the control loop: if it were interrupted while it holds the lock, the loop's next force would
-        wait."""
-        every_s, zero = REST_SHARE * self.drops_force_after_s, np.zeros(3)
+        """Repeat a zero force until closed or failed; a zero is sent only where the last force was zero. Runs with the
+        real-time priority of the control loop: if it were interrupted while it holds the lock, the loop's next force
+        would wait."""
+        interval_s, zero_force = ZERO_INTERVAL_SHARE * self.drops_force_after_s, np.zeros(3)
         with real_time_class():
-            while not self._closed.wait(every_s) and self._cells[loop_cells.FAILED] == 0.0:
-                code = tick_io.repeat_zero_once(self._calls, self._cells, every_s, zero)
+            while not self._closed.wait(interval_s) and self._cells[loop_cells.FAILED] == 0.0:
+                code = tick_io.repeat_zero_once(self._calls, self._cells, interval_s, zero_force)
                 if code:
-                    self._error(code)
+                    self._get_error(code)
 
     def _raise_for(self, code: int) -> None:
         """Raise the error of a code of `tick_io` other than 0."""
         if code:
-            raise self._error(code)
+            raise self._get_error(code)
 
-    def _error(self, code: int) -> DeviceError:
-        """The error of a code. Must be called in the thread that got the code, because the library stores its last
-        error per thread."""
-        return self._failure or self._fail(self._error_text(int(self._cells[loop_cells.FAILED]) or code))
+    def _get_error(self, code: int) -> DeviceError:
+        """The error of a code; the first failure is kept. Must be called in the thread that got the code, because the
+        library stores its last error per thread."""
+        return self._failure or self._fail(self._describe_failure(int(self._cells[loop_cells.FAILED]) or code))
 
-    def _error_text(self, code: int) -> str:
-        """Description of a failure, without a full stop. code: as in `loop_cells`."""
-        function = code - loop_cells.LIBRARY_ERROR
-        if 0 <= function < len(loop_cells.LIBRARY):
-            return f"The library says: {self._handle.library.last_error(loop_cells.LIBRARY[function])}"
+    def _describe_failure(self, code: int) -> str:
+        """Description of a failure, without a full stop. code: as in `loop_cells`; LIBRARY_ERROR plus the index of a
+        function for an error of the library."""
+        function_index = code - loop_cells.LIBRARY_ERROR
+        if 0 <= function_index < len(loop_cells.LIBRARY):
+            return f"The library says: {self._handle.library.fetch_last_error(loop_cells.LIBRARY[function_index])}"
         cap_n, refused_n = self._cells[loop_cells.CAP_N], self._cells[loop_cells.REFUSED_N]
         return {
             loop_cells.STALE_READINGS: "It repeatedly reports the same position",

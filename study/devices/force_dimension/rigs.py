@@ -1,4 +1,4 @@
-"""Opens a Force Dimension device by name and makes it ready for a study.
+"""Opens a Force Dimension device by name and makes it ready for a study. Called by `study.devices.rigs_by_name`.
 
 Order: load the vendor's library, open the accelerometer and the device, check its identity and its acceptance, set
 force limit, gravity compensation and watchdog, test the watchdog. After a failure everything is closed again.
@@ -12,8 +12,8 @@ from datetime import UTC, datetime
 from study.devices.accelerometer.sensor import Accelerometer
 from study.devices.device import DeviceInfo, DeviceSettings
 from study.devices.force_dimension.acceptance import check_accepted
-from study.devices.force_dimension.connect import device_error, load_library, make_ready, open_model
-from study.devices.force_dimension.handle import NO_SERIAL, Handle
+from study.devices.force_dimension.connect import load_library, make_device_error, make_ready, open_model
+from study.devices.force_dimension.handle import UNKNOWN_SERIAL, Handle
 from study.devices.force_dimension.lab import LabSettings, read_lab
 from study.devices.force_dimension.library import Library, LibraryError
 from study.devices.force_dimension.models import MODELS, DeviceModel
@@ -25,9 +25,10 @@ RATE_HZ = 1000.0
 """Rate of the force loop (Hz), and of its samples."""
 
 
-def force_dimension_rig(name: str, settings: DeviceSettings) -> ForceDimensionRig:
-    """Open a device of the vendor by the name of its model (`MODELS`), with watchdog and gravity compensation. Raises
-    `DeviceError` with the reason; device and accelerometer are then stopped and closed."""
+def open_force_dimension_rig(name: str, settings: DeviceSettings) -> ForceDimensionRig:
+    """Open a device of the vendor by the name of its model (`MODELS`), with watchdog and gravity compensation, and its
+    accelerometer where one is configured and `settings.with_sensor`. Raises `DeviceError` with the reason; device and
+    accelerometer are then stopped and closed."""
     model, lab = MODELS[name], read_lab()
     library = load_library()
     sensor = lab.accelerometer.open_sensor() if lab.accelerometer is not None and settings.with_sensor else None
@@ -46,7 +47,8 @@ def _make_rig(
     sensor: Accelerometer | None,
     settings: DeviceSettings,
 ) -> ForceDimensionRig:
-    """Open the device and make it ready. After any error the device is disconnected. Raises `DeviceError`."""
+    """Open the device and make it ready; with a hand on the handle only if it was accepted. sensor: None without an
+    accelerometer. After any error the device is disconnected. Raises `DeviceError`."""
     handle = open_model(library, model)
     try:
         info = replace(read_info(handle, library, model, lab.effective_mass_kg), has_sensor=sensor is not None)
@@ -60,21 +62,21 @@ def _make_rig(
         return ForceDimensionRig(handle, info, drops_after_s, cap_n, sensor)
     except LibraryError as error:
         handle.disconnect()
-        raise device_error(model.name, error) from error
+        raise make_device_error(model.name, error) from error
     except BaseException:
         handle.disconnect()
         raise
 
 
 def read_info(handle: Handle, library: Library, model: DeviceModel, effective_mass_kg: float | None) -> DeviceInfo:
-    """Facts about an open device. effective_mass_kg: of the laboratory's settings; None for the model's. Raises
-    `LibraryError`, and `DeviceError` without a firmware or serial number: an acceptance holds for one device only, and
-    could not be assigned."""
-    firmware, serial = handle.firmware(), handle.serial()
+    """Properties of an open device, with `has_sensor` at its default. effective_mass_kg: from the laboratory's
+    settings; None for the model's. Raises `LibraryError`, and `DeviceError` without a firmware or serial number: an
+    acceptance holds for one device only, and could not be assigned."""
+    firmware, serial = handle.read_firmware_version(), handle.read_serial_number()
     if not 0 < firmware < math.inf:
-        raise _unknown_error(model, "firmware", f"gives {firmware:g} as the version")
-    if serial == NO_SERIAL:
-        raise _unknown_error(model, "serial number", "answers and gives none")
+        raise _make_unknown_fact_error(model, "firmware", f"gives {firmware:g} as the version")
+    if serial == UNKNOWN_SERIAL:
+        raise _make_unknown_fact_error(model, "serial number", "answers and gives none")
     return DeviceInfo(
         name=model.name,
         simulated=False,
@@ -85,9 +87,9 @@ def read_info(handle: Handle, library: Library, model: DeviceModel, effective_ma
     )
 
 
-def _unknown_error(model: DeviceModel, fact: str, library_answer: str) -> DeviceError:
-    """Error for an unknown fact of the device. fact: its name; library_answer: what the
-    library gave instead, as a predicate."""
+def _make_unknown_fact_error(model: DeviceModel, fact: str, library_answer: str) -> DeviceError:
+    """Error for a fact that the device does not report. fact: its name; library_answer: what the library returned
+    instead, as a predicate."""
     return DeviceError(
         f"The {model.name} does not report its {fact}",
         f"Its library {library_answer}, so no acceptance can be known to hold for it. Nothing has moved.",

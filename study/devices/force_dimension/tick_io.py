@@ -23,7 +23,7 @@ from study.devices.accelerometer.newest_sample import (
     TAKEN_S,
 )
 from study.devices.drive.compiled_drive import CALLS, SENSE_SIGNATURE, WRITE_SIGNATURE
-from study.devices.force_dimension.handle import STALE
+from study.devices.force_dimension.handle import REPEATED_READING
 from study.devices.force_dimension.loop_cells import (
     BRAKES,
     CAP_N,
@@ -59,8 +59,8 @@ from study.devices.force_dimension.loop_cells import (
     record_sent_force,
 )
 from study.devices.governor.compiling import fingerprint, njit_inline
-from study.devices.governor.govern import VECTOR
-from study.devices.native import Addresses, acquire, call_int, now_s, release
+from study.devices.governor.govern import VECTOR_TYPE
+from study.devices.native import Addresses, acquire, call_int, read_clock_s, release
 from study.devices.rig import ACCELERATION, READING_SIZE, SENSOR_CLIPPED
 
 LOOKS_OF, LOOKS_AT = 42.0, (0.0, 8.0, 18.0, 29.0)
@@ -77,7 +77,7 @@ recorded force. The share detects a force of which only the peaks are reduced, f
 
 ROUNDING = 1 + 1e-9
 """Factor on the cap that allows for rounding."""
-REST_SIGNATURE = types.int64(CALLS, VECTOR, types.float64, VECTOR)
+REST_SIGNATURE = types.int64(CALLS, VECTOR_TYPE, types.float64, VECTOR_TYPE)
 """Signature of the compiled function that repeats the zero force between stimuli."""
 LOCK_S = 0.002
 """Longest wait for the lock (s), ten times the duration of a write: a longer wait means that a call hangs."""
@@ -118,19 +118,19 @@ def _sense(calls: Addresses, cells: FloatArray, samples: FloatArray, reading: Fl
         if code != 0:
             return code
     cells[READ_COUNT] += 1.0
-    cells[REPEAT_COUNT] = count_beyond_share(cells[REPEAT_COUNT], answer == STALE, STALE_SHARE)
+    cells[REPEAT_COUNT] = count_beyond_share(cells[REPEAT_COUNT], answer == REPEATED_READING, STALE_SHARE)
     if cells[REPEAT_COUNT] >= STALE_FOR * (1.0 - STALE_SHARE):
         return record_failure(cells, STALE_READINGS)
     reading[SENSOR_CLIPPED] = 0.0
     if samples.shape[0] > 1:
-        _sense_acceleration(samples, now_s(calls), reading)
+        _sense_acceleration(samples, read_clock_s(calls), reading)
     return 0
 
 
 @njit_inline
 def _is_watchdog_expired(calls: Addresses, cells: FloatArray) -> bool:
     """Whether no force was sent for longer than the timeout of the device's watchdog."""
-    return bool(now_s(calls) - cells[SENT_S] > cells[DROPS_AFTER_S] > 0.0)
+    return bool(read_clock_s(calls) - cells[SENT_S] > cells[DROPS_AFTER_S] > 0.0)
 
 
 @njit_inline
@@ -176,7 +176,9 @@ def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
         if code != 0:
             return code
     x, y, z = force[0], force[1], force[2]
-    began_s = now_s(calls)  # the watchdog counts from the arrival of the force, which may be long before the call ends
+    began_s = read_clock_s(
+        calls
+    )  # the watchdog counts from the arrival of the force, which may be long before the call ends
     answer = _set_force(calls, cells, x, y, z)
     if not is_success(answer):
         return record_library_failure(cells, FORCE)
@@ -192,7 +194,7 @@ def _send_force(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
 @njit_inline
 def _send_zero(calls: Addresses, cells: FloatArray) -> int:
     """Send a zero force; brake where the library answers anything but success or a notice."""
-    began_s = now_s(calls)
+    began_s = read_clock_s(calls)
     if not is_success(_set_force(calls, cells, 0.0, 0.0, 0.0)):
         code = record_library_failure(cells, FORCE)
         _brake(calls, cells)  # the device may still give the previous force
@@ -225,7 +227,7 @@ def _write_zero(calls: Addresses, cells: FloatArray) -> int:
 @njit_inline
 def _write(calls: Addresses, cells: FloatArray, force: FloatArray) -> int:
     """Write a force (3,), N: a zero in any case, another only within the cap, without a failure, and under the lock."""
-    if now_s(calls) < cells[WITHHELD_UNTIL_S]:
+    if read_clock_s(calls) < cells[WITHHELD_UNTIL_S]:
         return 0
     norm = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
     if norm == 0.0:
@@ -251,7 +253,7 @@ def _repeat_zero(calls: Addresses, cells: FloatArray, every_s: float, force: Flo
     if not acquire(calls, LOCK_S):
         return 0
     code = 0
-    resting = cells[SENT_ZERO] != 0.0 and now_s(calls) - cells[SENT_S] >= every_s
+    resting = cells[SENT_ZERO] != 0.0 and read_clock_s(calls) - cells[SENT_S] >= every_s
     if resting and cells[CLOSED] == 0.0 and cells[FAILED] == 0.0:
         code = _send_force(calls, cells, force)
         if code == 0:

@@ -33,10 +33,10 @@ def check_watchdog(
     if drops_after_s <= 0:
         raise _watchdog_error("It has no watchdog, or none that can be set.")
     if not any(_send_zeros(handle, now_s, sleep) for _ in range(ATTEMPTS)):
-        raise _watchdog_error(f"It does not continue to accept forces: {handle.status().off_reason}.")
+        raise _watchdog_error(f"It does not continue to accept forces: {handle.read_status().off_reason}.")
     silent_since_s = now_s()
-    while (status := handle.status()).force_on:
-        if now_s() - silent_since_s > drops_after_s + MARGIN_S and handle.status().force_on:
+    while (status := handle.read_status()).force_on:
+        if now_s() - silent_since_s > drops_after_s + MARGIN_S and handle.read_status().force_on:
             raise _watchdog_error(
                 f"{1000 * (now_s() - silent_since_s):.0f} ms after the last command it still accepts forces."
             )
@@ -55,7 +55,7 @@ def _send_zeros(handle: Handle, now_s: Callable[[], float], sleep: Callable[[flo
         handle.set_force(0.0, 0.0, 0.0)
         sleep(EVERY_S)
     handle.set_force(0.0, 0.0, 0.0)
-    return handle.status().force_on
+    return handle.read_status().force_on
 
 
 def _check_reason(status: Status) -> None:

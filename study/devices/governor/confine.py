@@ -1,6 +1,7 @@
 """Limits the norm of a force to a cap within a tick, with its direction unchanged: F <- F min(1, cap / |F|).
 
-A force that is not finite becomes zero. The functions are compiled into the safety layer's tick (`govern`).
+A force that is not finite becomes zero. The functions are compiled into the safety layer's tick (`govern`, `feedback`,
+`plausibility`).
 """
 
 import math
@@ -8,7 +9,7 @@ import math
 from equalizer.signals.signal import FloatArray
 from study.devices.governor.compiling import njit_inline
 
-OVERFLOWING = 1e100
+OVERFLOW_FORCE_N = 1e100
 """Component or norm (N) from which squares of components may overflow; such a force becomes zero."""
 
 LIMIT_FACTOR, EXCESS_FACTOR = 1 - 1e-12, 1 + 1e-9
@@ -17,7 +18,7 @@ counts as limited only beyond EXCESS_FACTOR times the limit, so that a stimulus 
 
 
 @njit_inline
-def norm_of(x: float, y: float, z: float) -> float:
+def compute_norm(x: float, y: float, z: float) -> float:
     """Euclidean norm of the vector (x, y, z)."""
     return math.sqrt(x * x + y * y + z * z)
 
@@ -36,23 +37,24 @@ def clear(force: FloatArray) -> None:
 
 
 @njit_inline
-def limiting_factor(norm: float, cap: float) -> float:
+def compute_limiting_factor(norm_n: float, cap_n: float) -> float:
     """Factor that limits a force of this norm (N) to the cap (N): 1 up to the cap, then cap / norm. 0 where either is
-    not a number, the cap is not positive, or the norm is not below `OVERFLOWING`."""
-    if not (cap > 0.0 and norm < OVERFLOWING):
+    not a number, the cap is not positive, or the norm is not below `OVERFLOW_FORCE_N`."""
+    if not (cap_n > 0.0 and norm_n < OVERFLOW_FORCE_N):
         return 0.0
-    return 1.0 if norm <= cap * LIMIT_FACTOR else cap * LIMIT_FACTOR / norm
+    return 1.0 if norm_n <= cap_n * LIMIT_FACTOR else cap_n * LIMIT_FACTOR / norm_n
 
 
 @njit_inline
-def confine(force: FloatArray, cap: float) -> bool:
-    """Limit a force (3,), N, to the cap (N) in place; zero where a component is not finite or the cap is not positive.
-    Returns whether the force exceeded the cap by more than rounding; False where it was not finite."""
-    if not (is_bounded(force, OVERFLOWING) and cap > 0.0):
+def confine(force: FloatArray, cap_n: float) -> bool:
+    """Limit a force (3,), N, to the cap (N) in place; zero where a component is not finite or not below
+    `OVERFLOW_FORCE_N`, or the cap is not positive: then returns False. Else returns whether the force exceeded the cap
+    by more than rounding."""
+    if not (is_bounded(force, OVERFLOW_FORCE_N) and cap_n > 0.0):
         clear(force)
         return False
-    norm = norm_of(force[0], force[1], force[2])
-    if norm > cap * LIMIT_FACTOR:
+    norm_n = compute_norm(force[0], force[1], force[2])
+    if norm_n > cap_n * LIMIT_FACTOR:
         for i in range(3):
-            force[i] *= cap * LIMIT_FACTOR / norm
-    return norm > cap * EXCESS_FACTOR
+            force[i] *= cap_n * LIMIT_FACTOR / norm_n
+    return norm_n > cap_n * EXCESS_FACTOR

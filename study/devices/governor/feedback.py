@@ -27,7 +27,7 @@ from study.devices.governor.cells import (
     VELOCITY_SHARE,
 )
 from study.devices.governor.compiling import njit_inline
-from study.devices.governor.confine import EXCESS_FACTOR, limiting_factor, norm_of
+from study.devices.governor.confine import EXCESS_FACTOR, compute_limiting_factor, compute_norm
 
 
 @njit_inline
@@ -66,15 +66,15 @@ def add_feedback(state: FloatArray, settings: FloatArray, reading: FloatArray, g
     y = stiffness * (reading[1] - settings[CENTRE_X + 1])
     z = stiffness * (reading[2] - settings[CENTRE_X + 2])
     u, v, w = damping * state[VELOCITY], damping * state[VELOCITY + 1], damping * state[VELOCITY + 2]
-    spring_norm, damper_norm = norm_of(x, y, z), norm_of(u, v, w)
-    spring_factor, damper_factor = limiting_factor(spring_norm, cap), limiting_factor(damper_norm, cap)
+    spring_norm, damper_norm = compute_norm(x, y, z), compute_norm(u, v, w)
+    spring_factor, damper_factor = compute_limiting_factor(spring_norm, cap), compute_limiting_factor(damper_norm, cap)
     x, y, z = (
         spring_factor * x + damper_factor * u,
         spring_factor * y + damper_factor * v,
         spring_factor * z + damper_factor * w,
     )
-    total_norm = norm_of(x, y, z)
-    total_factor = limiting_factor(total_norm, cap)
+    total_norm = compute_norm(x, y, z)
+    total_factor = compute_limiting_factor(total_norm, cap)
     state[PULL] = abs(gain) * total_factor * total_norm
     _ease_feedback(state, settings)
     share = gain * (1.0 - state[EASED])

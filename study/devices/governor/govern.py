@@ -8,7 +8,8 @@ Steps of `tick`, in this order:
 4. the result is capped once more, independent of all steps before: no force above the cap, and none that is not a
    number, is ever written.
 
-Machine code that is cached on disk is invalidated when any of these files changes: see `compiling`.
+Machine code that is cached on disk is invalidated when any of these files changes: see `compiling`. The entry points
+`tick`, `publish` and `record_missed_ticks` are called by `governor` and by the loops of `study.devices.drive`.
 """
 
 import math
@@ -19,7 +20,7 @@ from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
 from study.devices.governor.compiling import fingerprint, njit_inline
-from study.devices.governor.confine import EXCESS_FACTOR, LIMIT_FACTOR, clear, confine, is_bounded, norm_of
+from study.devices.governor.confine import EXCESS_FACTOR, LIMIT_FACTOR, clear, compute_norm, confine, is_bounded
 from study.devices.governor.feedback import add_feedback
 from study.devices.governor.plausibility import fault_of_reading
 from study.devices.governor.telemetry_row import write_row
@@ -38,19 +39,19 @@ from study.devices.governor.cells import (
 # fmt: on
 # isort: on
 
-IMPLAUSIBLE_N = 1e6
+IMPLAUSIBLE_STIMULUS_N = 1e6
 """A stimulus with a component of this magnitude (N) or more is treated like NaN."""
 
-LEAST_ELAPSED = 1e-3
+MIN_ELAPSED_TICKS = 1e-3
 """Smallest interval between two readings (ticks), used where a time stamp did not advance or is not a number."""
 
-VECTOR, ROWS = types.float64[::1], types.float64[:, ::1]
+VECTOR_TYPE, MATRIX_TYPE = types.float64[::1], types.float64[:, ::1]
 """numba types of contiguous arrays with one and two dimensions."""
-TICK_SIGNATURE = types.boolean(VECTOR, VECTOR, ROWS, ROWS, VECTOR, VECTOR)
+TICK_SIGNATURE = types.boolean(VECTOR_TYPE, VECTOR_TYPE, MATRIX_TYPE, MATRIX_TYPE, VECTOR_TYPE, VECTOR_TYPE)
 """Signature of the entry point `tick`, whose docstring names the arguments; those of `publish` and
 `record_missed_ticks` follow."""
-PUBLISH_SIGNATURE = types.void(VECTOR, VECTOR, ROWS, VECTOR)
-MISS_SIGNATURE = types.void(VECTOR, ROWS, VECTOR, types.int64)
+PUBLISH_SIGNATURE = types.void(VECTOR_TYPE, VECTOR_TYPE, MATRIX_TYPE, VECTOR_TYPE)
+MISSED_TICKS_SIGNATURE = types.void(VECTOR_TYPE, MATRIX_TYPE, VECTOR_TYPE, types.int64)
 
 
 @njit_inline
@@ -66,7 +67,7 @@ def _start_safety_fade(state: FloatArray, fault: int) -> None:
 
 @njit_inline
 def _update_phase_while_playing(state: FloatArray, settings: FloatArray) -> None:
-    """End of the stimulus: by request, at its length, without a sign of life (watchdog), or after the longest time."""
+    """End the stimulus: by request, at its length, without a sign of life (watchdog), or after the longest time."""
     tick = state[TICK]
     if state[SIGN_OF_LIFE] != 0.0:
         state[SIGN_OF_LIFE] = 0.0
@@ -82,7 +83,7 @@ def _update_phase_while_playing(state: FloatArray, settings: FloatArray) -> None
 
 @njit_inline
 def _update_phase(state: FloatArray, settings: FloatArray) -> None:
-    """Change of phase by requests and by time."""
+    """Change the phase by requests (stop before let-go before release) and by time."""
     phase = state[PHASE]
     if state[STOP_ASKED] != 0.0:
         if phase != IDLE and state[FAULT] == NO_FAULT:
@@ -100,8 +101,9 @@ def _update_phase(state: FloatArray, settings: FloatArray) -> None:
 
 
 @njit_inline
-def _fade_share(ticks: float, length: float, raised_cosine: float) -> float:
-    """Gain of a fade-in, from 0 at 0 ticks to 1 at `length`: linear, or (1 - cos(pi ticks / length)) / 2."""
+def _compute_fade_gain(ticks: float, length: float, raised_cosine: float) -> float:
+    """Gain of a fade-in, from 0 at 0 ticks to 1 at `length` ticks: linear, or (1 - cos(pi ticks / length)) / 2 where
+    raised_cosine is not 0."""
     if ticks >= length:
         return 1.0
     if ticks <= 0:
@@ -115,45 +117,46 @@ def _fade_share(ticks: float, length: float, raised_cosine: float) -> float:
 def _compute_gains(state: FloatArray) -> tuple[float, float]:
     """Gains (0 to 1) of stimulus and of spring and damper at this tick. A release during a fade-in starts from the gain
     reached."""
-    tick, cosine = state[TICK], state[RAISED_COSINE]
+    tick, raised_cosine = state[TICK], state[RAISED_COSINE]
     if state[PHASE] == PLAYING:
-        state[STIMULUS_GAIN] = _fade_share(tick, state[FADE_IN], cosine)
-        state[SPRING_GAIN] = _fade_share(tick - state[START], state[SPRING_RAMP], cosine)
+        state[STIMULUS_GAIN] = _compute_fade_gain(tick, state[FADE_IN], raised_cosine)
+        state[SPRING_GAIN] = _compute_fade_gain(tick - state[START], state[SPRING_RAMP], raised_cosine)
         return state[STIMULUS_GAIN], state[SPRING_GAIN]
-    remaining = 1.0 - _fade_share(tick - state[RELEASED_AT], state[FADE_OUT], cosine)
-    return remaining * state[STIMULUS_GAIN], remaining * state[SPRING_GAIN]
+    remaining_gain = 1.0 - _compute_fade_gain(tick - state[RELEASED_AT], state[FADE_OUT], raised_cosine)
+    return remaining_gain * state[STIMULUS_GAIN], remaining_gain * state[SPRING_GAIN]
 
 
 @njit_inline
 def _update_elapsed(state: FloatArray, settings: FloatArray) -> None:
-    """Time since the last reading, in ticks; by the time stamps of the readings where there are any."""
-    elapsed = state[TICK] - state[READ_AT]
+    """Set the time since the last reading (ticks); by the time stamps of the readings where there are any."""
+    elapsed_ticks = state[TICK] - state[READ_AT]
     if state[STAMP_S] > 0.0 and state[READ_AT_S] > 0.0:
-        elapsed = (state[STAMP_S] - state[READ_AT_S]) / settings[TICK_S]
-    state[ELAPSED] = elapsed if elapsed > LEAST_ELAPSED else LEAST_ELAPSED
+        elapsed_ticks = (state[STAMP_S] - state[READ_AT_S]) / settings[TICK_S]
+    state[ELAPSED] = elapsed_ticks if elapsed_ticks > MIN_ELAPSED_TICKS else MIN_ELAPSED_TICKS
     state[READ_AT], state[READ_AT_S] = state[TICK], state[STAMP_S]
 
 
 @njit_inline
 def _limit_slew(state: FloatArray, settings: FloatArray, force: FloatArray) -> bool:
-    """Shorten the step from the last force to the slew limit. Both forces lie within the cap, and a ball is convex, so
-    that the new force lies within it too. Returns whether the step exceeded the limit by more than rounding."""
+    """Shorten the step from the last force to the slew limit, in place (force (3,), N). Both forces lie within the cap,
+    and a ball is convex, so that the new force lies within it too. Returns whether the step exceeded the limit by more
+    than rounding."""
     x, y, z = force[0] - state[FORCE], force[1] - state[FORCE + 1], force[2] - state[FORCE + 2]
-    step = norm_of(x, y, z)
-    if step > settings[SLEW_STEP] * LIMIT_FACTOR:
-        share = settings[SLEW_STEP] * LIMIT_FACTOR / step
-        force[0] = state[FORCE] + share * x
-        force[1] = state[FORCE + 1] + share * y
-        force[2] = state[FORCE + 2] + share * z
-    return bool(step > settings[SLEW_STEP] * EXCESS_FACTOR)
+    step_n = compute_norm(x, y, z)
+    if step_n > settings[SLEW_STEP] * LIMIT_FACTOR:
+        step_share = settings[SLEW_STEP] * LIMIT_FACTOR / step_n
+        force[0] = state[FORCE] + step_share * x
+        force[1] = state[FORCE + 1] + step_share * y
+        force[2] = state[FORCE + 2] + step_share * z
+    return bool(step_n > settings[SLEW_STEP] * EXCESS_FACTOR)
 
 
 @njit_inline
 def _compute_force(
     state: FloatArray, settings: FloatArray, loop: FloatArray, reading: FloatArray, force: FloatArray
 ) -> None:
-    """Force (N) of stimulus, spring and damper within all limits. An implausible stimulus or reading is a fault: it
-    starts the safety fade instead."""
+    """Fill force (3,), N: stimulus, spring and damper within all limits. An implausible stimulus or reading is a fault:
+    it starts the safety fade instead."""
     tick = int(state[TICK])
     clear(force)
     if 0 <= tick < state[LENGTH]:
@@ -162,7 +165,7 @@ def _compute_force(
         for i in range(3):
             force[i] = loop[row, i]
     _update_elapsed(state, settings)
-    fault = fault_of_reading(state, settings, reading) if is_bounded(force, IMPLAUSIBLE_N) else NOT_A_NUMBER
+    fault = fault_of_reading(state, settings, reading) if is_bounded(force, IMPLAUSIBLE_STIMULUS_N) else NOT_A_NUMBER
     if fault != NO_FAULT:
         _start_safety_fade(state, fault)
         return
@@ -180,17 +183,19 @@ def _compute_force(
 
 @njit_inline
 def _apply_safety_fade(state: FloatArray, settings: FloatArray, force: FloatArray) -> None:
-    """Safety fade: the last force before the fade, reduced linearly to zero within LET_GO_TICKS ticks."""
-    remaining = 1.0 - (state[TICK] - state[LET_GO_AT] + 1.0) / settings[LET_GO_TICKS]
+    """Fill force (3,), N, during the safety fade: the last force before it, reduced linearly to zero within
+    LET_GO_TICKS ticks. At zero the phase becomes IDLE."""
+    remaining_gain = 1.0 - (state[TICK] - state[LET_GO_AT] + 1.0) / settings[LET_GO_TICKS]
     for i in range(3):
-        force[i] = max(remaining, 0.0) * state[LET_GO_FROM + i]
-    if remaining <= 0.0:
+        force[i] = max(remaining_gain, 0.0) * state[LET_GO_FROM + i]
+    if remaining_gain <= 0.0:
         state[PHASE] = IDLE
 
 
 @njit_inline
 def _record_row(state: FloatArray, buffer: FloatArray, reading: FloatArray) -> None:
-    """Write command, excitation and reading of a tick into the recording ring, where the oldest row was."""
+    """Write command, excitation and reading of a tick of the recorded part into the recording ring, in place of the
+    oldest row; do nothing outside of it."""
     if state[PHASE] == PLAYING and state[RECORD_FROM] <= state[TICK] < state[LENGTH]:
         row = int(state[RECORDED]) % buffer.shape[0]
         for i in range(3):
@@ -215,8 +220,10 @@ def _compile_publish(sources: int) -> Any:
     return publish
 
 
-def _entry_points(sources: int) -> tuple[Any, Any]:
-    @njit(MISS_SIGNATURE, cache=True, nogil=True, error_model="numpy")
+def _compile_tick(sources: int) -> tuple[Any, Any]:
+    """Compile `tick` and `record_missed_ticks`. sources: as in `_compile_publish`."""
+
+    @njit(MISSED_TICKS_SIGNATURE, cache=True, nogil=True, error_model="numpy")
     def record_missed_ticks(state: FloatArray, buffer: FloatArray, missed_reading: FloatArray, ticks: int) -> None:
         """Record missed ticks: their rows contain the last force, and `missed_reading` (NaN) as the reading."""
         _ = sources
@@ -231,11 +238,9 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
         state: FloatArray, settings: FloatArray, loop: FloatArray, buffer: FloatArray, reading: FloatArray,
         force: FloatArray,
     ) -> bool:  # fmt: skip
-        """Decide the force of one tick. Returns whether the force is off and stays off.
-
-        state (STATE_SIZE,) and buffer (rows, ROW_SIZE) are changed in place; settings (SETTINGS_SIZE,); loop (n, 3), N:
-        the stimulus; reading (READING_SIZE,): from the rig's `sense`; force (3,), N: the result, written in place.
-        """
+        """Compute the force of one tick. Returns whether the force is off and stays off. state (STATE_SIZE,), buffer
+        (rows, ROW_SIZE): changed in place; settings (SETTINGS_SIZE,); loop (n, 3), N: the stimulus; reading
+        (READING_SIZE,): from the rig's `sense`; force (3,), N: the result, written in place."""
         _ = sources
         _update_phase(state, settings)
         if state[PHASE] in (PLAYING, RELEASING):
@@ -247,7 +252,7 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
         confine(force, settings[TOTAL_CAP])
         for i in range(3):
             state[FORCE + i] = force[i]
-        state[PEAK] = max(state[PEAK], norm_of(force[0], force[1], force[2]))
+        state[PEAK] = max(state[PEAK], compute_norm(force[0], force[1], force[2]))
         state[SENSOR_CLIPS] += reading[SENSOR_CLIPPED] == 1.0
         state[TICKS] += 1
         _record_row(state, buffer, reading)
@@ -259,5 +264,5 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
 
 _SOURCES = fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py")
 """Fingerprint of all files whose code is compiled into the entry points."""
-tick, record_missed_ticks = _entry_points(_SOURCES)
+tick, record_missed_ticks = _compile_tick(_SOURCES)
 publish = _compile_publish(_SOURCES)

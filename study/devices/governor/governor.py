@@ -1,7 +1,8 @@
 """Python interface of the safety layer's tick: owns its arrays, starts stimuli, sends requests, reads the counters.
 
-The cells of the arrays are defined in `cells`; `govern.tick` computes with them. Drive and runners
-read or write only a few of them directly, such as the time stamp; all other access goes through this class.
+The cells of the arrays are defined in `cells`; `govern.tick` computes with them. Drive and runners read or write only a
+few of them directly, such as the time stamp; all other access goes through this class. Made by `study.devices.safe`,
+one per device.
 """
 
 import math
@@ -16,15 +17,15 @@ from study.devices.governor.plausibility import MOVING_BELOW_HZ
 from study.devices.rig import READING_SIZE
 from study.session.stimulus.held_stimulus import HeldStimulus
 
-VELOCITY_CORNER_HZ = 50.0
-"""Corner frequency of the velocity low-pass of the damper: far above the natural frequency of the spring, far below the
-encoders' quantization noise."""
+VELOCITY_CUTOFF_HZ = 50.0
+"""Cutoff frequency (Hz) of the velocity low-pass of the damper: far above the natural frequency of the spring, far
+below the encoders' quantization noise."""
 
-ACCELERATION_S = 0.02
+ACCELERATION_TIME_CONSTANT_S = 0.02
 """Time constant (s) of the low-pass for the acceleration of the position readings, a plausibility check."""
 
 SETTLE_S = 0.5
-"""Time (s) before the first command of a recording: half for the fade-in of the spring, half for the handle to come to
+"""Time (s) before the first command of `begin_play`: half for the fade-in of the spring, half for the handle to come to
 rest."""
 
 FAULTS = tuple(Fault)
@@ -34,14 +35,15 @@ FAULTS = tuple(Fault)
 class Governor:
     """Settings, state, stimulus and recording ring of one device.
 
-    Requests (`request_*`, `sign_of_life`) and queries may be made from any thread at any time, `begin_*` and `rows`
-    only while nothing moves."""
+    Requests (`request_*`, `restart_watchdog`) and queries may be made from any thread at any time, `begin_*` and
+    `copy_rows` only while nothing moves.
+    """
 
     def __init__(self, info: DeviceInfo, settings: DeviceSettings, ring: FloatArray | None = None) -> None:
         """ring: rows of the telemetry ring (`study.devices.telemetry`), where each tick writes a row; None: no
         telemetry."""
         self._rate_hz = info.sample_rate_hz
-        self._longest_s = settings.limits.longest_hold_s
+        self._longest_hold_s = settings.limits.longest_hold_s
         self._keep_s = settings.keep_s
         self.settings = pack_settings(info, settings)
         self.state = np.zeros(cells.STATE_SIZE)
@@ -54,7 +56,7 @@ class Governor:
 
     @property
     def moving(self) -> bool:
-        """Whether a stimulus or one of its fades is in progress."""
+        """Whether a stimulus or a fade is in progress."""
         return bool(self.state[cells.PHASE] != cells.IDLE)
 
     @property
@@ -69,7 +71,7 @@ class Governor:
 
     @property
     def ticks(self) -> int:
-        """Ticks run since `begin_hold` or `begin_play`."""
+        """Ticks since `begin_hold` or `begin_play`, missed ticks included."""
         return int(self.state[cells.TICKS])
 
     @property
@@ -79,7 +81,7 @@ class Governor:
 
     def begin_hold(self, stimulus: HeldStimulus) -> None:
         """Set up a stimulus that is repeated until its release; the next tick is its first. The limits are checked
-        before, in `admission`."""
+        before, in `study.devices.admission`."""
         fade_in, fade_out = self._count_ticks(stimulus.fade_in_s), self._count_ticks(stimulus.fade_out_s)
         self._reset_run(stimulus.onset_then_loop, self._count_recorded_rows(len(stimulus.loop)))
         state, onset_ticks = self.state, len(stimulus.onset) if stimulus.onset is not None else 0
@@ -89,20 +91,20 @@ class Governor:
         state[cells.RAISED_COSINE] = stimulus.fade_shape == "raised_cosine"
         state[cells.SPRING_RAMP] = max(fade_in, self.settings[cells.LET_GO_TICKS])
         state[cells.LENGTH] = math.inf
-        state[cells.LONGEST] = self._count_ticks(self._longest_s)
+        state[cells.LONGEST] = self._count_ticks(self._longest_hold_s)
         state[cells.RECORD_FROM] = max(fade_in, onset_ticks)
         state[cells.PHASE] = cells.PLAYING
 
     def begin_play(self, commands: Signal) -> None:
-        """Set up commands that are played once, after `SETTLE_S` with the spring alone; the next tick is the first of
-        these."""
-        settle = self._count_ticks(SETTLE_S)
+        """Set up commands (n, 3), N, that are played once, after `SETTLE_S` with the spring alone; the next tick is the
+        first of these."""
+        settle_ticks = self._count_ticks(SETTLE_S)
         self._reset_run(commands.samples, len(commands))
         state = self.state
-        state[cells.START] = state[cells.TICK] = state[cells.LAST_SIGN] = -settle
+        state[cells.START] = state[cells.TICK] = state[cells.LAST_SIGN] = -settle_ticks
         state[cells.FADE_OUT] = self.settings[cells.LET_GO_TICKS]
         state[cells.RAISED_COSINE] = 1.0
-        state[cells.SPRING_RAMP] = settle // 2
+        state[cells.SPRING_RAMP] = settle_ticks // 2
         state[cells.LENGTH] = len(commands)
         state[cells.LONGEST] = math.inf
         state[cells.PHASE] = cells.PLAYING
@@ -111,8 +113,9 @@ class Governor:
         """Store the time of the begin (s, by the loop's clock); the first tick is due one tick later."""
         self.state[cells.BEGAN_S] = now_s
 
-    def sign_of_life(self) -> None:
-        """Restart the watchdog's timeout, at the next tick."""
+    def restart_watchdog(self) -> None:
+        """Restart the timeout of the safety layer's watchdog, at the next tick. Called for each keep-alive of the
+        program."""
         self.state[cells.SIGN_OF_LIFE] = 1.0
 
     def request_release(self) -> None:
@@ -120,7 +123,7 @@ class Governor:
         self.state[cells.RELEASE_ASKED] = 1.0
 
     def request_let_go(self) -> None:
-        """Request the safety fade within `release_s`, for any stimulus."""
+        """Request the safety layer's fade to zero within `release_s`, for any stimulus."""
         self.state[cells.LET_GO_ASKED] = 1.0
 
     def request_stop(self) -> None:
@@ -133,15 +136,15 @@ class Governor:
         return bool(self.state[cells.STOP_ASKED] != 0.0)
 
     def abandon(self, fault: Fault) -> None:
-        """End the stimulus at once, without the loop. The first fault is kept, except that FORCE_LEFT replaces any. The
-        caller must ensure that the device gets zero force."""
+        """End the stimulus at once, without waiting for the loop. The first fault is kept, except that FORCE_LEFT
+        replaces any. The caller must ensure that the device gets zero force."""
         if fault is Fault.FORCE_LEFT or self.fault is Fault.NONE:
             self.state[cells.FAULT] = FAULTS.index(fault)
         self.state[cells.PHASE] = cells.IDLE
         self.state[cells.FORCE : cells.FORCE + 3] = 0.0
 
     def record_missed_ticks(self, ticks: int) -> None:
-        """Record missed ticks: the device held its last force, and its sensors were not read."""
+        """Record this number of missed ticks: the device held its last force, and its sensors were not read."""
         govern.record_missed_ticks(self.state, self.buffer, self.missed_reading, ticks)
 
     def count_lateness(self, late: bool, after_s: float) -> None:
@@ -150,8 +153,8 @@ class Governor:
         self.state[cells.LATE] += late
         self.state[cells.LATEST_S] = max(self.state[cells.LATEST_S], after_s)
 
-    def health(self) -> Health:
-        """Counters since `begin_hold` or `begin_play`."""
+    def collect_health(self) -> Health:
+        """Counters since `begin_hold` or `begin_play`; without the facts about an accelerometer with its own clock."""
         state = self.state
         return Health(
             fault=self.fault,
@@ -167,17 +170,17 @@ class Governor:
             latest_s=float(state[cells.LATEST_S]),
         )
 
-    def rows(self) -> FloatArray:
-        """The recorded rows, shape (n, cells.ROW_SIZE), n at most the length of the ring."""
-        recorded, size = int(self.state[cells.RECORDED]), len(self.buffer)
-        row_count = min(recorded, size)
-        return self.buffer[np.arange(recorded - row_count, recorded) % size]
+    def copy_rows(self) -> FloatArray:
+        """Copy the recorded rows, oldest first, shape (n, cells.ROW_SIZE), n at most the length of the ring."""
+        recorded_count, ring_rows = int(self.state[cells.RECORDED]), len(self.buffer)
+        row_count = min(recorded_count, ring_rows)
+        return self.buffer[np.arange(recorded_count - row_count, recorded_count) % ring_rows]
 
     def compute_row_times(self) -> FloatArray:
-        """Times at which the ticks of `rows` were due, (n,), s, by the clock of `set_begin_time`."""
-        state, row_count = self.state, len(self.rows())
-        last = state[cells.RECORD_FROM] + state[cells.RECORDED] - 1.0
-        ticks = last - np.arange(row_count)[::-1]
+        """Times at which the ticks of `copy_rows` were due, (n,), s, by the clock of `set_begin_time`."""
+        state, row_count = self.state, len(self.copy_rows())
+        last_tick = state[cells.RECORD_FROM] + state[cells.RECORDED] - 1.0
+        ticks = last_tick - np.arange(row_count)[::-1]
         due_s: FloatArray = state[cells.BEGAN_S] + (ticks - state[cells.START] + 1.0) * self.settings[cells.TICK_S]
         return due_s
 
@@ -200,13 +203,14 @@ class Governor:
         self.state[cells.LAST_POSITION : cells.LAST_POSITION + 3] = np.nan
         self.state[cells.LAST_STEP] = np.nan
 
-    def _count_recorded_rows(self, length: int) -> int:
-        """Rows recorded of a loop: as many whole loops as fit in `keep_s`, or `keep_s` of a longer loop."""
-        keep = self._count_ticks(self._keep_s)
-        return keep // length * length if length <= keep else keep
+    def _count_recorded_rows(self, loop_rows: int) -> int:
+        """Rows recorded of a loop of loop_rows rows: as many whole loops as fit in `keep_s`, or `keep_s` of a longer
+        loop."""
+        kept_rows = self._count_ticks(self._keep_s)
+        return kept_rows // loop_rows * loop_rows if loop_rows <= kept_rows else kept_rows
 
     def _count_ticks(self, seconds: float) -> int:
-        """The nearest number of ticks."""
+        """Number of ticks nearest to a time (s)."""
         return round(seconds * self._rate_hz)
 
 
@@ -216,36 +220,38 @@ NEVER_TICKS = 1e15
 
 def pack_settings(info: DeviceInfo, settings: DeviceSettings) -> FloatArray:
     """Compute the array `settings` of `govern.tick`, fixed from opening to closing: SI units, times in ticks (`cells`).
-    Stiffness K = m (2 pi f)²; low-pass coefficients 1 - exp(-2 pi f_c / rate)."""
+    Stiffness K = m (2 pi f)²; low-pass coefficients 1 - exp(-2 pi f_c / rate). The check for readings that do not
+    change is off for a simulated device that no force moves (a replay)."""
     limits, rate_hz = settings.limits, info.sample_rate_hz
-    values = np.zeros(cells.SETTINGS_SIZE)
-    values[cells.TICK_S] = 1.0 / rate_hz
-    values[cells.STIFFNESS] = info.effective_mass_kg * (2 * math.pi * settings.spring_frequency_hz) ** 2
-    values[cells.DAMPING] = settings.spring_damping_n_s_per_m
-    values[cells.VELOCITY_SHARE] = 1.0 - math.exp(-2 * math.pi * VELOCITY_CORNER_HZ / rate_hz)
-    values[cells.CENTRE_X : cells.CENTRE_Z + 1] = settings.place_m
-    values[cells.STIMULUS_CAP] = limits.stimulus_cap_n
-    values[cells.FEEDBACK_CAP] = min(limits.feedback_cap_n, limits.total_cap_n)
-    values[cells.TOTAL_CAP] = limits.total_cap_n
-    values[cells.SLEW_STEP] = limits.slew_n_per_s / rate_hz
-    values[cells.WATCHDOG_TICKS] = round(limits.watchdog_s * rate_hz)
-    values[cells.LET_GO_TICKS] = max(1, math.floor(limits.release_s * rate_hz))
-    _pack_plausibility(values, limits.plausibility, rate_hz)
+    packed = np.zeros(cells.SETTINGS_SIZE)
+    packed[cells.TICK_S] = 1.0 / rate_hz
+    packed[cells.STIFFNESS] = info.effective_mass_kg * (2 * math.pi * settings.spring_frequency_hz) ** 2
+    packed[cells.DAMPING] = settings.spring_damping_n_s_per_m
+    packed[cells.VELOCITY_SHARE] = 1.0 - math.exp(-2 * math.pi * VELOCITY_CUTOFF_HZ / rate_hz)
+    packed[cells.CENTRE_X : cells.CENTRE_Z + 1] = settings.place_m
+    packed[cells.STIMULUS_CAP] = limits.stimulus_cap_n
+    packed[cells.FEEDBACK_CAP] = min(limits.feedback_cap_n, limits.total_cap_n)
+    packed[cells.TOTAL_CAP] = limits.total_cap_n
+    packed[cells.SLEW_STEP] = limits.slew_n_per_s / rate_hz
+    packed[cells.WATCHDOG_TICKS] = round(limits.watchdog_s * rate_hz)
+    packed[cells.LET_GO_TICKS] = max(1, math.floor(limits.release_s * rate_hz))
+    _pack_plausibility(packed, limits.plausibility, rate_hz)
     if info.simulated and not info.moved_by_force:
-        values[cells.STALE_TICKS] = NEVER_TICKS
-    return values
+        packed[cells.STALE_TICKS] = NEVER_TICKS
+    return packed
 
 
-def _pack_plausibility(values: FloatArray, bounds: PlausibilitySettings, rate_hz: float) -> None:
-    """Fill in the bounds of plausible position readings (`protocols.definition.plausibility`), converted to ticks."""
-    values[cells.WORKSPACE] = bounds.workspace_m
-    values[cells.LONGEST_JUMP] = bounds.longest_jump_m
-    values[cells.FASTEST_STEP] = bounds.fastest_m_per_s / rate_hz
-    values[cells.ACCELERATION] = bounds.acceleration_mps2
-    values[cells.ACCELERATION_SHARE] = 1.0 - math.exp(-1.0 / (ACCELERATION_S * rate_hz))
-    values[cells.PASSED_SHARE] = 1.0 - math.exp(-2 * math.pi * MOVING_BELOW_HZ / rate_hz)
-    values[cells.RESOLUTION] = bounds.resolution_m
-    values[cells.FRICTION] = bounds.friction_n
-    values[cells.STALE_TICKS] = math.ceil(bounds.stale_s * rate_hz)
+def _pack_plausibility(packed: FloatArray, bounds: PlausibilitySettings, rate_hz: float) -> None:
+    """Write the bounds of plausible position readings (`protocols.definition.plausibility`) into the array `packed`,
+    converted to ticks."""
+    packed[cells.WORKSPACE] = bounds.workspace_m
+    packed[cells.LONGEST_JUMP] = bounds.longest_jump_m
+    packed[cells.FASTEST_STEP] = bounds.fastest_m_per_s / rate_hz
+    packed[cells.ACCELERATION] = bounds.acceleration_mps2
+    packed[cells.ACCELERATION_SHARE] = 1.0 - math.exp(-1.0 / (ACCELERATION_TIME_CONSTANT_S * rate_hz))
+    packed[cells.PASSED_SHARE] = 1.0 - math.exp(-2 * math.pi * MOVING_BELOW_HZ / rate_hz)
+    packed[cells.RESOLUTION] = bounds.resolution_m
+    packed[cells.FRICTION] = bounds.friction_n
+    packed[cells.STALE_TICKS] = math.ceil(bounds.stale_s * rate_hz)
     # Half of still_s until the feedback force begins to be reduced at an unchanged reading, half for the reduction.
-    values[cells.EASE_TICKS] = max(1, math.floor(bounds.still_s * rate_hz / 2))
+    packed[cells.EASE_TICKS] = max(1, math.floor(bounds.still_s * rate_hz / 2))

@@ -52,7 +52,7 @@ from study.devices.governor.cells import (
     WORKSPACE,
 )
 from study.devices.governor.compiling import njit_inline
-from study.devices.governor.confine import is_bounded, norm_of
+from study.devices.governor.confine import compute_norm, is_bounded
 
 IMPLAUSIBLE_M = 0.5
 """A reading (m) with a component beyond this is treated as invalid, like NaN."""
@@ -100,7 +100,7 @@ def _expect_motion(state: FloatArray, settings: FloatArray) -> None:
     x = state[PASSED_TWICE] - state[MOVING_FORCE]
     y = state[PASSED_TWICE + 1] - state[MOVING_FORCE + 1]
     z = state[PASSED_TWICE + 2] - state[MOVING_FORCE + 2]
-    difference_n = norm_of(x, y, z)
+    difference_n = compute_norm(x, y, z)
     share = 1.0 - settings[FRICTION] / difference_n if difference_n > settings[FRICTION] else 0.0
     state[MOVING_FORCE] += share * x
     state[MOVING_FORCE + 1] += share * y
@@ -114,7 +114,7 @@ def _expect_motion(state: FloatArray, settings: FloatArray) -> None:
 def _has_changed(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
     """Whether the reading differs by half the resolution or more from the reference, the last reading that had changed.
     If so, it becomes the new reference, and the expected range starts anew."""
-    distance_m = norm_of(
+    distance_m = compute_norm(
         reading[0] - state[REFERENCE], reading[1] - state[REFERENCE + 1], reading[2] - state[REFERENCE + 2]
     )
     if distance_m < 0.5 * settings[RESOLUTION]:
@@ -190,7 +190,7 @@ def _is_shaken(state: FloatArray, settings: FloatArray, x: float, y: float, z: f
     tick."""
     last = state[LAST_STEP]
     if not math.isnan(last):  # NaN before the second reading
-        change = norm_of(x - last, y - state[LAST_STEP + 1], z - state[LAST_STEP + 2])
+        change = compute_norm(x - last, y - state[LAST_STEP + 1], z - state[LAST_STEP + 2])
         change = max(0.0, change - STEPS_OF_RESOLUTION * settings[RESOLUTION])
         acceleration = change / (settings[TICK_S] * settings[TICK_S])
         state[SHAKING] += settings[ACCELERATION_SHARE] * (acceleration - state[SHAKING])
@@ -204,7 +204,7 @@ def fault_of_reading(state: FloatArray, settings: FloatArray, reading: FloatArra
     position and the ticks since then (LAST_POSITION, ELAPSED)."""
     if not is_bounded(reading, IMPLAUSIBLE_M):
         return NOT_A_NUMBER
-    if not norm_of(reading[0], reading[1], reading[2]) <= settings[WORKSPACE]:
+    if not compute_norm(reading[0], reading[1], reading[2]) <= settings[WORKSPACE]:
         return OUTSIDE
     last_x = state[LAST_POSITION]
     if math.isnan(last_x):  # the first reading
@@ -215,7 +215,7 @@ def fault_of_reading(state: FloatArray, settings: FloatArray, reading: FloatArra
     x, y, z = reading[0] - last_x, reading[1] - state[LAST_POSITION + 1], reading[2] - state[LAST_POSITION + 2]
     # Driver and loop have separate clocks: successive samples of the driver may seem to be less than a tick apart.
     ticks = max(1.0, state[ELAPSED])
-    step_m = norm_of(x, y, z)
+    step_m = compute_norm(x, y, z)
     if not (step_m <= settings[LONGEST_JUMP] and step_m <= settings[FASTEST_STEP] * ticks + settings[RESOLUTION]):
         return JUMPED
     if _is_shaken(state, settings, x / ticks, y / ticks, z / ticks):

@@ -1,4 +1,5 @@
 """Caller's end of the pipes to the process of the device loop: remote calls with progress, timeout and cancellation.
+Used by `remote_device` and `start`; the process's end is `serve`.
 
 Each pipe has a thread that writes and reads, so that an interrupted caller leaves no incomplete message in the pipe and
 waits no longer than its timeout for a process that hangs. Messages are pickled: (name, arguments) as request; (kind,
@@ -16,29 +17,31 @@ from typing import Any
 if sys.platform == "win32":
     from multiprocessing.connection import PipeConnection
 
-    End = PipeConnection
+    PipeEnd = PipeConnection
 else:
     from multiprocessing.connection import Connection
 
-    End = Connection
+    PipeEnd = Connection
 
-LINES = ("work", "signs", "look", "stop", "close")
+LINE_NAMES = ("work", "signs", "look", "stop", "close")
 """Names of the pipes, one per group of methods: neither a long `release`, `play` or `close` nor a reading that hangs
 delays a sign of life or a stop."""
 
 VALUE, ERROR, PROGRESS = range(3)
-"""Kinds of messages from the process. After PROGRESS the process waits for a bool: whether to continue."""
+"""Kinds of messages from the process: result of the method, exception that it raised, share done (0 to 1). After
+PROGRESS the process waits for a bool: whether to continue."""
 
 
 GRACE_S = 0.5
 """Additional wait (s) after a timeout: if this process was suspended, the other only seems late."""
 
-CLOSE_S = 6.0
+CLOSE_TIMEOUT_S = 6.0
 """Time (s) beyond the fade in which the process may end in an orderly way; a driver that hangs is abandoned sooner."""
 
 
 class LoopGoneError(Exception):
-    """The loop's process ended, or hangs (`hangs`: it did not answer within the timeout)."""
+    """The loop's process ended, or hangs (`hangs`: it did not answer within the timeout). reason: a clause whose
+    subject is the process."""
 
     def __init__(self, reason: str, hangs: bool) -> None:
         super().__init__(reason)
@@ -51,66 +54,68 @@ class Call:
 
     def __init__(self, name: str, arguments: tuple[Any, ...]) -> None:
         self.request = pickle.dumps((name, arguments))
-        self.goes_on: SimpleQueue[bool] = SimpleQueue()
+        self.continue_decisions: SimpleQueue[bool] = SimpleQueue()
         self._progress: SimpleQueue[float] = SimpleQueue()
-        self._last: tuple[int, Any] | None = None
+        self._final_message: tuple[int, Any] | None = None
         """The answer (kind, value), kept so that a caller that was interrupted on its arrival can ask for it again."""
-        self._news = threading.Event()
+        self._message_arrived = threading.Event()
 
     @property
     def is_over(self) -> bool:
-        """Whether the answer has arrived, or is known never to arrive."""
-        return self._last is not None
+        """Whether the answer has arrived, or the process counts as gone."""
+        return self._final_message is not None
 
     def receive(self, message: tuple[int, Any]) -> None:
         """Take a message of the process: progress, or the answer that ends the call. Called by the line's thread."""
         if message[0] == PROGRESS:
             self._progress.put(message[1])
         else:
-            self._last = message
-        self._news.set()
+            self._final_message = message
+        self._message_arrived.set()
 
-    def answer(
+    def wait_for_answer(
         self,
         patience_s: float,
         on_progress: Callable[[float], None] | None = None,
         grace_s: float | None = None,
         sending_s: float = 0.0,
     ) -> Any:
-        """Wait for the answer and return it. patience_s: timeout for each message. grace_s: additional wait, None =
-        `GRACE_S`. sending_s: added to the timeout before the first progress and after a progress of 1, when a request
-        or a recording is sent. Raises what the method raised, `LoopGoneError`, and what `on_progress` raises. May be
-        called again after an interruption."""
+        """Wait for the answer and return it. patience_s: timeout (s) for each message. grace_s: additional wait (s),
+        None = `GRACE_S`. on_progress(share): called for each progress, 0 to 1. sending_s: time (s) added to the timeout
+        before the first progress and after a progress of 1, when a request or a recording is sent. Raises what the
+        method raised, `LoopGoneError`, and what `on_progress` raises. May be called again after an interruption."""
         share: float | None = 1.0
-        while (share := self._next_progress(patience_s + sending_s * (share == 1.0), grace_s)) is not None:
+        while (share := self._wait_for_progress(patience_s + sending_s * (share == 1.0), grace_s)) is not None:
             if on_progress is not None:
                 on_progress(share)
-            self.goes_on.put(True)
-        assert self._last is not None
-        kind, value = self._last
+            self.continue_decisions.put(True)
+        assert self._final_message is not None
+        kind, value = self._final_message
         if kind == ERROR:
             raise value
         return value
 
-    def break_off(self, patience_s: float) -> None:
-        """Cancel the call at its next progress, and wait until it has ended. Raises `LoopGoneError`."""
-        self.goes_on.put(False)
-        while self._next_progress(patience_s) is not None:
+    def cancel(self, timeout_s: float) -> None:
+        """Cancel the call at its next progress, and wait until it has ended; timeout_s: for each message. Raises
+        `LoopGoneError`; any other error of the call is ignored."""
+        self.continue_decisions.put(False)
+        while self._wait_for_progress(timeout_s) is not None:
             pass
-        if self._last is not None and isinstance(self._last[1], LoopGoneError):
-            raise self._last[1]
+        if self._final_message is not None and isinstance(self._final_message[1], LoopGoneError):
+            raise self._final_message[1]
 
-    def _next_progress(self, patience_s: float, grace_s: float | None = None) -> float | None:
-        """The next progress (0 to 1), or None when the call is over, also after both waits without a message."""
-        for wait_s in (patience_s, GRACE_S if grace_s is None else grace_s):
-            self._news.clear()
-            if self._last is None and self._progress.empty():
-                self._news.wait(wait_s)
+    def _wait_for_progress(self, timeout_s: float, grace_s: float | None = None) -> float | None:
+        """Wait for the next progress and return it (0 to 1); None when the call is over. Without a message within
+        timeout_s and then grace_s, the call ends with `LoopGoneError`."""
+        for wait_s in (timeout_s, GRACE_S if grace_s is None else grace_s):
+            self._message_arrived.clear()
+            if self._final_message is None and self._progress.empty():
+                self._message_arrived.wait(wait_s)
             with contextlib.suppress(Empty):
                 return self._progress.get_nowait()
-            if self._last is not None:
+            if self._final_message is not None:
                 return None
-        self._last = (ERROR, LoopGoneError(f"it did not answer for {patience_s:g} s", hangs=True))
+        self._final_message = (ERROR, LoopGoneError(f"it did not answer for {timeout_s:g} s", hangs=True))
         return None
 
 
@@ -118,7 +123,7 @@ class Line:
     """A pipe to the loop's process, with a thread that sends its calls in order. A broken pipe ends every open call
     with `LoopGoneError`."""
 
-    def __init__(self, connection: End, name: str) -> None:
+    def __init__(self, connection: PipeEnd, name: str) -> None:
         self._connection = connection
         self._calls: SimpleQueue[Call | None] = SimpleQueue()
         self._ended = threading.Event()
@@ -130,7 +135,7 @@ class Line:
         call = Call(name, arguments)
         self._calls.put(call)
         if self._ended.is_set():
-            self._refuse_all()
+            self._fail_queued_calls()
         return call
 
     def end(self) -> None:
@@ -148,10 +153,10 @@ class Line:
                         call.receive((ERROR, _make_loop_gone_error(error)))
         finally:
             self._ended.set()
-            self._refuse_all()
+            self._fail_queued_calls()
 
-    def _refuse_all(self) -> None:
-        """Answer calls that were queued while the pipe closed with an error."""
+    def _fail_queued_calls(self) -> None:
+        """End the calls that are queued after the pipe was closed with `LoopGoneError`."""
         with contextlib.suppress(Empty):
             while True:
                 if (call := self._calls.get_nowait()) is not None:
@@ -165,12 +170,13 @@ class Line:
         while message[0] == PROGRESS:
             call.receive(message)
             # No timeout: where the caller hangs, its signs of life stop and the device fades the force.
-            connection.send(call.goes_on.get())
+            connection.send(call.continue_decisions.get())
             message = connection.recv()
         call.receive(message)
 
 
 def _make_loop_gone_error(error: Exception) -> LoopGoneError:
+    """The error of a call whose pipe broke or whose answer cannot be unpickled."""
     if isinstance(error, EOFError | OSError):
         return LoopGoneError("it ended", hangs=False)
     return LoopGoneError(f"its answer cannot be read ({type(error).__name__}: {error})", hangs=False)

@@ -1,7 +1,7 @@
 """Device port over a device whose control loop runs in a separate process. Every call has a timeout.
 
 A process that has ended or does not answer is a lost device. It is killed if it still runs, so that it commands no
-further force; the device's own watchdog switches off the force that it held.
+further force; the device's own watchdog switches off its last force. Called by `study.devices.opening`.
 """
 
 import atexit
@@ -14,25 +14,24 @@ from typing import Any
 
 from equalizer.signals.signal import Signal
 from study.devices.device import DeviceInfo, DeviceSettings, Fault, Health, Look, PlaybackResult
-from study.devices.loop_process.line import CLOSE_S, Call, Line, LoopGoneError
+from study.devices.loop_process.line import CLOSE_TIMEOUT_S, Call, Line, LoopGoneError
 from study.devices.loop_process.start import LoopProcess
 from study.devices.telemetry import Ring
 from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
 
-OPENING_S = 180.0
+OPENING_TIMEOUT_S = 180.0
 """Timeout (s) for starting the process, compiling where necessary, and opening the device."""
 
-ANSWER_S = 3.0
+ANSWER_TIMEOUT_S = 3.0
 """Timeout for an answer (s), longer than the delays of a busy computer and than the safety layer's own timeouts: 0.1 s
 for a loop that hangs, 0.1 s for writing a zero force, 1 s after the fades for a device that does not become still."""
 
-STOP_S = 0.5
+STOP_TIMEOUT_S = 0.5
 """Timeout of an emergency stop (s), after which the process is killed at once."""
 
 SENT_S_PER_RECORDED_S = 0.05
-"""Additional timeout (s) per recorded second, which is some 100 kB: a pipe takes it in 2 ms, on a busy computer more
-slowly."""
+"""Additional timeout (s) per recorded second (100 kB, 2 ms through a pipe, more on a busy computer)."""
 
 INITIAL_HEALTH = Health(Fault.NONE, 0, 0, 0, 0, 0, 0, 0.0)
 """Health before the first stimulus: no fault, nothing counted."""
@@ -45,7 +44,9 @@ def open_remotely(name: str, settings: DeviceSettings, seed: int) -> "RemoteDevi
     ring = Ring()
     try:
         process = LoopProcess()
-        info: DeviceInfo = process.work.queue_call("open", name, settings, seed, ring.path).answer(OPENING_S)
+        info: DeviceInfo = process.work.queue_call("open", name, settings, seed, ring.path).wait_for_answer(
+            OPENING_TIMEOUT_S
+        )
         return RemoteDevice(process, info, settings, ring)
     except LoopGoneError as loop_error:
         assert process is not None
@@ -60,7 +61,7 @@ def open_remotely(name: str, settings: DeviceSettings, seed: int) -> "RemoteDevi
         ring.remove()
         if process is not None:
             process.hang_up()
-            process.end(CLOSE_S)
+            process.end(CLOSE_TIMEOUT_S)
         raise
 
 
@@ -109,17 +110,17 @@ class RemoteDevice:
             raise
 
     def keep_alive(self) -> None:
-        """Sign of life. Does not raise for a lost process, which `fault` reports."""
+        """Restart the watchdog. Does not raise for a lost process, which `fault` reports."""
         with contextlib.suppress(DeviceError):
             self._call_remote(self._process.signs, "keep_alive")
 
     def fault(self) -> Fault:
         """Fault of the device. Where the process is lost: STOPPED after an emergency stop, FORCE_LEFT if that was
-        reported before, else LOST."""
+        reported before, else LOST. After `close`: the fault reported last."""
         try:
             fault: Fault = self._call_remote(self._process.signs, "fault")
         except DeviceError:
-            return self._fault_when_lost()
+            return self._find_fault_when_lost()
         self._force_left |= fault is Fault.FORCE_LEFT
         return fault
 
@@ -128,7 +129,7 @@ class RemoteDevice:
         try:
             return self._note_health(self._call_remote(self._process.signs, "health"))
         except DeviceError:
-            return self._health_when_lost()
+            return self._make_health_when_lost()
 
     def release(self) -> PlaybackResult:
         """Release the stimulus and return what was played. Where the process is lost: no recording, and the counters
@@ -137,15 +138,15 @@ class RemoteDevice:
             if self._held_stimulus is None:
                 self._require_connected()
             self._held_stimulus = None
-            return PlaybackResult(recording=None, health=self._health_when_lost())
+            return PlaybackResult(recording=None, health=self._make_health_when_lost())
         fade_out_s = self._held_stimulus.fade_out_s if self._held_stimulus is not None else 0.0
         # A caller that was interrupted while it waited gets the answer of the same release.
         self._releasing = self._releasing or self._process.work.queue_call("release")
         try:
-            result: PlaybackResult = self._releasing.answer(fade_out_s + self._patience_s(self._keep_s))
+            result: PlaybackResult = self._releasing.wait_for_answer(fade_out_s + self._compute_timeout_s(self._keep_s))
         except LoopGoneError as loop_error:
             self._mark_lost(loop_error)
-            result = PlaybackResult(recording=None, health=self._health_when_lost())
+            result = PlaybackResult(recording=None, health=self._make_health_when_lost())
         except Exception:  # raised in the process. After an interruption the answer is awaited again.
             self._releasing = self._held_stimulus = None
             raise
@@ -156,17 +157,17 @@ class RemoteDevice:
     def play(self, commands: Signal, on_progress: Callable[[float], None] | None = None) -> PlaybackResult:
         self._require_idle()
         call = self._process.work.queue_call("play", commands)
-        patience_s = self._patience_s(0.0)
+        timeout_s = self._compute_timeout_s(0.0)
         try:
-            result: PlaybackResult = call.answer(
-                patience_s, on_progress, sending_s=SENT_S_PER_RECORDED_S * commands.duration_s
+            result: PlaybackResult = call.wait_for_answer(
+                timeout_s, on_progress, sending_s=SENT_S_PER_RECORDED_S * commands.duration_s
             )
         except LoopGoneError as loop_error:
             self._mark_lost(loop_error)
-            raise self._lost_error() from loop_error
+            raise self._make_lost_error() from loop_error
         except BaseException:
             if not call.is_over:
-                self._break_off(call, patience_s)
+                self._break_off(call, timeout_s)
             raise
         self._note_health(result.health)
         return result
@@ -181,13 +182,12 @@ class RemoteDevice:
         """No effect: real devices have no simulated hand."""
 
     def stop(self) -> None:
-        """Emergency stop. The process is killed where it does not answer within `STOP_S`; the device's own watchdog
-        then switches the force off."""
+        """Emergency stop. Without an answer within `STOP_TIMEOUT_S` the process is killed, and the watchdog acts."""
         if self._loss_reason or self._ended:
             return
         try:
             with contextlib.suppress(DeviceError):
-                self._process.stop.queue_call("stop").answer(STOP_S, grace_s=0.0)
+                self._process.stop.queue_call("stop").wait_for_answer(STOP_TIMEOUT_S, grace_s=0.0)
                 self._stopped = True
         except LoopGoneError as loop_error:
             # Kill here: `_mark_lost` may wait for another call that waits for the process to fade its force and end.
@@ -195,8 +195,7 @@ class RemoteDevice:
             self._mark_lost(loop_error)
 
     def close(self) -> None:
-        """Close device and process. Waits at most for the fade and twice `CLOSE_S`; a process that does not end is
-        killed."""
+        """Close device and process, within the fade and twice `CLOSE_TIMEOUT_S`; a process that runs on is killed."""
         if self._ended:
             return
         self._closing = True
@@ -204,12 +203,12 @@ class RemoteDevice:
             if not (self._loss_reason or self._closed):
                 with contextlib.suppress(DeviceError):
                     self._note_health(
-                        self._call_remote(self._process.close, "close", patience_s=self._fade_s + CLOSE_S)
+                        self._call_remote(self._process.close, "close", timeout_s=self._fade_s + CLOSE_TIMEOUT_S)
                     )
         finally:  # closed pipes make the process fade the force and end
             self._closed = True
             self._process.hang_up()
-        self._process.end(CLOSE_S)
+        self._process.end(CLOSE_TIMEOUT_S)
         if self._ring is not None:
             self._ring.remove()
         # Last, so that an interrupted close is repeated when the program ends.
@@ -225,23 +224,26 @@ class RemoteDevice:
             except KeyboardInterrupt:  # arrived before SIGINT was ignored
                 continue
 
-    def _patience_s(self, recorded_s: float) -> float:
-        return self._fade_s + ANSWER_S + SENT_S_PER_RECORDED_S * recorded_s
+    def _compute_timeout_s(self, recorded_s: float) -> float:
+        """Timeout (s) of a call that returns a recording of this length (s), or none, after a fade."""
+        return self._fade_s + ANSWER_TIMEOUT_S + SENT_S_PER_RECORDED_S * recorded_s
 
-    def _call_remote(self, line: Line, name: str, *arguments: Any, patience_s: float | None = None) -> Any:
+    def _call_remote(self, line: Line, name: str, *arguments: Any, timeout_s: float | None = None) -> Any:
         """Call a method in the process. Raises `DeviceError` for a device that is lost or closed, and what the method
         raised."""
         self._require_connected()
         try:
-            return line.queue_call(name, *arguments).answer(ANSWER_S if patience_s is None else patience_s)
+            return line.queue_call(name, *arguments).wait_for_answer(
+                ANSWER_TIMEOUT_S if timeout_s is None else timeout_s
+            )
         except LoopGoneError as loop_error:
             self._mark_lost(loop_error)
-            raise self._lost_error() from loop_error
+            raise self._make_lost_error() from loop_error
 
-    def _break_off(self, call: Call, patience_s: float) -> None:
+    def _break_off(self, call: Call, timeout_s: float) -> None:
         """Cancel `play` with a fade, and wait for its end."""
         try:
-            call.break_off(patience_s)
+            call.cancel(timeout_s)
         except LoopGoneError as loop_error:
             self._mark_lost(loop_error)
         except BaseException:  # interrupted again: stop without a fade
@@ -255,10 +257,11 @@ class RemoteDevice:
                 self._process.hang_up()
                 # A process that closed its pipes may still be fading the force: wait for its end.
                 self._loss_reason = (
-                    f"{loop_error}, {self._process.end(0.0 if loop_error.hangs else self._fade_s + CLOSE_S)}"
+                    f"{loop_error}, {self._process.end(0.0 if loop_error.hangs else self._fade_s + CLOSE_TIMEOUT_S)}"
                 )
 
     def _note_health(self, health: Health) -> Health:
+        """Store the counters for the time after a loss of the process, and return them."""
         self._health = health
         self._force_left |= health.fault is Fault.FORCE_LEFT
         return health
@@ -270,9 +273,9 @@ class RemoteDevice:
 
     def _require_connected(self) -> None:
         if self._closed or self._loss_reason:
-            raise self._lost_error()
+            raise self._make_lost_error()
 
-    def _lost_error(self) -> DeviceError:
+    def _make_lost_error(self) -> DeviceError:
         """Error for a call on a closed or lost device."""
         if self._closing:
             return DeviceError("The device cannot do this now", "The device is closed.", "Open it again.")
@@ -283,14 +286,14 @@ class RemoteDevice:
             "open the device again; a session is continued with `hapteq resume`.",
         )
 
-    def _fault_when_lost(self) -> Fault:
-        """Fault without the process; see `fault`."""
+    def _find_fault_when_lost(self) -> Fault:
+        """Fault without the process; see `fault`. After a normal close: the fault reported last."""
         if self._force_left:
             return Fault.FORCE_LEFT
         if self._closed and not self._loss_reason:
             return self._health.fault
         return Fault.STOPPED if self._stopped else Fault.LOST
 
-    def _health_when_lost(self) -> Health:
+    def _make_health_when_lost(self) -> Health:
         reason = f"the process of its loop is gone: {self._loss_reason}" if self._loss_reason else self._health.why
-        return replace(self._health, fault=self._fault_when_lost(), why=reason)
+        return replace(self._health, fault=self._find_fault_when_lost(), why=reason)

@@ -20,7 +20,7 @@ from typing import Any
 from equalizer.signals.signal import Signal
 from study.devices.clock import RealClock
 from study.devices.device import Device, PlaybackResult
-from study.devices.loop_process.line import CLOSE_S, ERROR, LINES, PROGRESS, VALUE, End
+from study.devices.loop_process.line import CLOSE_TIMEOUT_S, ERROR, LINE_NAMES, PROGRESS, VALUE, PipeEnd
 from study.devices.opening import open_device, raise_thread_priority
 
 POLL_EVERY_S = 0.2
@@ -34,7 +34,7 @@ OPENING_GRACE_S = 1.0
 """Time (s) that the process may still run after its caller has ended while the device is being opened: no stimulus has
 to be faded out then."""
 
-OVERDUE_S = CLOSE_S + 3.0
+OVERDUE_S = CLOSE_TIMEOUT_S + 3.0
 """Time (s) in addition to the fade after which a process that does not end is terminated: it hangs, in the driver or in
 an exit handler."""
 
@@ -44,17 +44,17 @@ class BrokenOffError(Exception):
 
 
 class DeviceServer:
-    """Serves an opened device to the caller's process: a thread per pipe of `LINES` calls the device's methods."""
+    """Serves an opened device to the caller's process: a thread per pipe of `LINE_NAMES` calls the device's methods."""
 
     def __init__(
         self,
         device: Device,
-        ends: tuple[End, ...],
+        ends: tuple[PipeEnd, ...],
         at_rest: Callable[[], object] = lambda: None,
         raise_thread_priority: Callable[[], AbstractContextManager[object]] = contextlib.nullcontext,
     ) -> None:
-        """ends: ends of the pipes, in the order of `LINES`. at_rest: called after each stimulus. raise_thread_priority:
-        context in which the threads for stops and signs of life run."""
+        """ends: ends of the pipes, in the order of `LINE_NAMES`. at_rest: called after each stimulus.
+        raise_thread_priority: context in which the threads for stops and signs of life run."""
         self._device = device
         self._at_rest = at_rest
         self._raise_priority = raise_thread_priority
@@ -62,7 +62,7 @@ class DeviceServer:
         self.ended = threading.Event()
         """Set when the caller is gone or has asked to close the device."""
         work, signs, look, stop, close = ends
-        tables: tuple[tuple[End, dict[str, Callable[..., Any]]], ...] = (
+        tables: tuple[tuple[PipeEnd, dict[str, Callable[..., Any]]], ...] = (
             (
                 work,
                 {
@@ -78,7 +78,7 @@ class DeviceServer:
         )
         self._threads = [
             threading.Thread(target=self._serve, args=table, name=f"serve {name}", daemon=True)
-            for name, table in zip(LINES, tables, strict=True)
+            for name, table in zip(LINE_NAMES, tables, strict=True)
         ]
 
     def start(self) -> None:
@@ -92,7 +92,7 @@ class DeviceServer:
         self._closed.set()
         self._threads[-1].join(LAST_ANSWER_S)
 
-    def _serve(self, end: End, table: dict[str, Callable[..., Any]]) -> None:
+    def _serve(self, end: PipeEnd, table: dict[str, Callable[..., Any]]) -> None:
         """Thread of a pipe: receive calls and send answers, until the caller is gone. table: functions by name."""
         urgent = "stop" in table or "keep_alive" in table
         try:
@@ -107,7 +107,7 @@ class DeviceServer:
         finally:
             self.ended.set()
 
-    def _play_commands(self, end: End, commands: Signal) -> PlaybackResult:
+    def _play_commands(self, end: PipeEnd, commands: Signal) -> PlaybackResult:
         """Play commands; after each progress, continue only with the caller's consent."""
 
         def await_consent(share: float) -> None:
@@ -126,12 +126,12 @@ class DeviceServer:
 
 def run(parent: int, *handles: int) -> None:
     """The main function of the process. parent: process id of the caller; handles: of the ends of the pipes, in the
-    order of `LINES`."""
+    order of `LINE_NAMES`."""
     told_to_end: list[int] = []
     _leave_signals_to_the_caller(told_to_end)
     lifetime = Lifetime(parent, told_to_end)
     threading.Thread(target=lifetime.watch, name="lifetime", daemon=True).start()
-    ends = tuple(End(handle) for handle in handles)
+    ends = tuple(PipeEnd(handle) for handle in handles)
     with contextlib.suppress(EOFError, OSError):  # the caller is gone: the device is closed all the same
         _open_and_serve(lifetime, ends)
 
@@ -161,7 +161,7 @@ class Lifetime:
         os._exit(1)
 
 
-def _open_and_serve(lifetime: Lifetime, ends: tuple[End, ...]) -> None:
+def _open_and_serve(lifetime: Lifetime, ends: tuple[PipeEnd, ...]) -> None:
     """Open the device that the first message names, serve it until the end is due, and close it with a fade. An error
     while opening is sent to the caller."""
     name, settings, seed, telemetry = ends[0].recv()[1]

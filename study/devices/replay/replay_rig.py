@@ -3,7 +3,7 @@
 Before each stimulus, the stretch is searched whose recorded excitation is nearest to the stimulus (least squares over
 the whole stretch), and its motion is replayed: exactly for commands that were recorded, else that of the nearest ones.
 A stimulus that is repeated repeats its stretch, with a cross-fade from its end to its beginning. Between stimuli the
-handle rests where it is, and its sensor has noise.
+handle rests where it is, and its sensor has noise. Made by `study.devices.rigs_by_name` for the device `replay:FILE`.
 """
 
 from pathlib import Path
@@ -22,12 +22,12 @@ from study.devices.rig import ACCELERATION, POSITION, READING_SIZE, SENSOR_CLIPP
 from study.errors import DeviceError, StudyError
 from study.store.formats.recording_file import read_recording
 
-REPEATED_S = 0.5
-"""Least length (s) of a repeated stretch, in whole loops: long enough that the hand's motion does not look periodic.
-By hand."""
+MIN_REPEATED_S = 0.5
+"""Smallest length (s) of a repeated stretch of several loops, rounded down to whole loops: long enough that the hand's
+motion does not look periodic. Set by hand."""
 CROSSFADE_S = 0.02
-"""Length (s) of the cross-fade from the end of a repeated stretch to its beginning. By hand."""
-NOMINAL = MODELS["omega3"]
+"""Length (s) of the cross-fade from the end of a repeated stretch to its beginning. Set by hand."""
+NOMINAL_MODEL = MODELS["omega3"]
 """Model whose maximum force and mass are taken for the replayed device: a recording contains neither."""
 
 TICK, FIRST, LENGTH, REPEATS, CROSSFADE_TICKS = range(5)
@@ -35,30 +35,39 @@ TICK, FIRST, LENGTH, REPEATS, CROSSFADE_TICKS = range(5)
 whether it is repeated, and rows over which its end is cross-faded into its beginning."""
 
 AX, TRUE_AX = ACCELERATION.start, TRUE_ACCELERATION.start
+"""Indices in a reading of the x components of measured and true acceleration."""
 
 _VECTOR = types.float64[::1]
 _NOISE = types.uint64[::1]
+"""numba's types of the arguments: vectors of floats, and the state of the random generator."""
 
 
-def _entry_points(sources: int) -> tuple[Any, Any]:
+def _compile_entry_points(sources: int) -> tuple[Any, Any]:
+    """Compile `sense` and `advance`. sources: fingerprint, enclosed so that a change of any source compiles anew."""
+
     @njit(types.void(_VECTOR, _VECTOR, _NOISE, _VECTOR), cache=True, nogil=True)
     def sense(state: FloatArray, parameters: FloatArray, noise: npt.NDArray[np.uint64], reading: FloatArray) -> None:
         """Fill the reading of the tick in `state`. noise: (1,), 0 during ticks; else the state of the random generator,
         for readings while nothing is played, with the handle at rest and noise in the acceleration."""
         _ = sources
-        first, length, crossfade = int(state[FIRST]), int(state[LENGTH]), int(state[CROSSFADE_TICKS])
+        first_row, stretch_rows, crossfade_rows = int(state[FIRST]), int(state[LENGTH]), int(state[CROSSFADE_TICKS])
         tick = int(state[TICK])
-        tick = tick % length if state[REPEATS] != 0.0 else min(max(tick, 0), length - 1)
-        share = (
-            (tick - (length - crossfade) + 1.0) / (crossfade + 1.0)
-            if crossfade > 0 and tick >= length - crossfade
+        tick = tick % stretch_rows if state[REPEATS] != 0.0 else min(max(tick, 0), stretch_rows - 1)
+        earlier_weight = (
+            (tick - (stretch_rows - crossfade_rows) + 1.0) / (crossfade_rows + 1.0)
+            if crossfade_rows > 0 and tick >= stretch_rows - crossfade_rows
             else 0.0
         )
-        present_index, earlier_index = READING_SIZE * (first + tick), READING_SIZE * (first + tick - length)
+        present_offset, earlier_offset = (
+            READING_SIZE * (first_row + tick),
+            READING_SIZE * (first_row + tick - stretch_rows),
+        )
         for i in range(READING_SIZE):
-            reading[i] = parameters[present_index + i]
-            if share > 0.0 and i != SENSOR_CLIPPED:
-                reading[i] = (1.0 - share) * parameters[present_index + i] + share * parameters[earlier_index + i]
+            reading[i] = parameters[present_offset + i]
+            if earlier_weight > 0.0 and i != SENSOR_CLIPPED:
+                reading[i] = (1.0 - earlier_weight) * parameters[present_offset + i] + earlier_weight * parameters[
+                    earlier_offset + i
+                ]
         if noise[0] != 0:
             for i in range(3):
                 noise[0] ^= noise[0] << np.uint64(13)  # Marsaglia, Xorshift RNGs, 2003
@@ -69,13 +78,14 @@ def _entry_points(sources: int) -> tuple[Any, Any]:
 
     @njit(types.void(_VECTOR, _VECTOR, _VECTOR), cache=True, nogil=True)
     def advance(state: FloatArray, parameters: FloatArray, force_n: FloatArray) -> None:
+        """Go on to the next row of the recording; the force has no effect."""
         _ = sources
         state[TICK] += 1.0
 
     return sense, advance
 
 
-sense, advance = _entry_points(fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py"))
+sense, advance = _compile_entry_points(fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py"))
 
 
 def make_replay_rig(path: Path) -> CompiledRig:
@@ -83,33 +93,36 @@ def make_replay_rig(path: Path) -> CompiledRig:
     try:
         recording = read_recording(path)
     except StudyError as problem:
-        raise _replay_error(f"{problem.title}: {problem.happened}") from problem
+        raise _make_replay_error(f"{problem.title}: {problem.happened}") from problem
     readings, excitation = _collect_readings(recording, path), _select_excitation(recording, path)
     rate_hz, state = recording.sample_rate_hz, np.zeros(CROSSFADE_TICKS + 1)
     state[LENGTH] = len(readings)
 
     def prepare(rows: FloatArray, repeats: bool, wait: int) -> None:
-        longest_rows = round(REPEATED_S * rate_hz)
-        commands = np.tile(rows, (max(1, longest_rows // len(rows)), 1)) if repeats else rows
-        length = min(len(commands), len(readings))
-        crossfade = min(round(CROSSFADE_S * rate_hz), length - 1, len(readings) - length) if repeats else 0
+        """Choose the stretch of the recording for the commands rows (n, 3), N; see `CompiledRig.prepare`."""
+        min_rows = round(MIN_REPEATED_S * rate_hz)
+        commands = np.tile(rows, (max(1, min_rows // len(rows)), 1)) if repeats else rows
+        stretch_rows = min(len(commands), len(readings))
+        crossfade_rows = (
+            min(round(CROSSFADE_S * rate_hz), stretch_rows - 1, len(readings) - stretch_rows) if repeats else 0
+        )
         # The cross-fade needs the rows before the stretch, where the end of the loop must have been played, too.
-        lead_in = commands[:length][length - crossfade :]
-        first = crossfade + _find_nearest(excitation, np.concatenate([lead_in, commands[:length]]))
-        state[[TICK, FIRST, LENGTH, REPEATS, CROSSFADE_TICKS]] = -wait, first, length, repeats, crossfade
+        lead_in = commands[:stretch_rows][stretch_rows - crossfade_rows :]
+        first_row = crossfade_rows + _find_nearest(excitation, np.concatenate([lead_in, commands[:stretch_rows]]))
+        state[[TICK, FIRST, LENGTH, REPEATS, CROSSFADE_TICKS]] = -wait, first_row, stretch_rows, repeats, crossfade_rows
 
     return CompiledRig(
         info=DeviceInfo(
             name=f"replay of {recording.device or path.name}",
             simulated=True,
             sample_rate_hz=rate_hz,
-            max_force_n=NOMINAL.max_force_n,
-            effective_mass_kg=NOMINAL.effective_mass_kg,
+            max_force_n=NOMINAL_MODEL.max_force_n,
+            effective_mass_kg=NOMINAL_MODEL.effective_mass_kg,
             details=f"{path.name}, {len(readings)} samples; no force changes what is replayed",
             moved_by_force=False,
         ),
         state=state,
-        parameters=np.append(readings.reshape(-1), _noise_mps2(readings[:, ACCELERATION])),
+        parameters=np.append(readings.reshape(-1), _estimate_noise_mps2(readings[:, ACCELERATION])),
         noise=np.zeros(1, dtype=np.uint64),
         sense=sense,
         advance=advance,
@@ -118,44 +131,51 @@ def make_replay_rig(path: Path) -> CompiledRig:
 
 
 def _find_nearest(excitation: FloatArray, pattern: FloatArray) -> int:
-    """Index in the excitation (N, 3) of the stretch that differs least from wanted (n, 3), n <= N."""
-    rows = len(excitation) - len(pattern) + 1
-    size = len(excitation) + len(pattern)
-    spectrum = np.fft.rfft(excitation, size, axis=0) * np.fft.rfft(pattern, size, axis=0).conj()
-    correlation = np.fft.irfft(spectrum, size, axis=0).sum(axis=1)[:rows]
+    """Index in the excitation (N, 3), N, of the stretch with the smallest sum of squared differences from the pattern
+    (n, 3), n <= N; by cross-correlation with the fast Fourier transform."""
+    candidate_count = len(excitation) - len(pattern) + 1
+    fft_length = len(excitation) + len(pattern)
+    spectrum = np.fft.rfft(excitation, fft_length, axis=0) * np.fft.rfft(pattern, fft_length, axis=0).conj()
+    correlation = np.fft.irfft(spectrum, fft_length, axis=0).sum(axis=1)[:candidate_count]
     energy = np.concatenate([[0.0], np.cumsum((excitation**2).sum(axis=1))])
-    return int(np.argmin(energy[len(pattern) :] - energy[:rows] - 2 * correlation))
+    return int(np.argmin(energy[len(pattern) :] - energy[:candidate_count] - 2 * correlation))
 
 
 def _collect_readings(recording: Recording, path: Path) -> FloatArray:
-    """Recorded readings (n, READING_SIZE). Clipping of the sensor is not recorded, and is 0."""
+    """Recorded readings (n, READING_SIZE). Clipping of the sensor is not recorded, and is 0. Raises `DeviceError` for a
+    recording without a position in m or an acceleration in m/s², three channels each."""
     position, response = recording.position, recording.response
     if position is None or position.samples.shape[1] != 3 or set(position.units) != {"m"}:
-        raise _replay_error(f"{path.name} has no position of a handle, three channels in metres.")
+        raise _make_replay_error(f"{path.name} has no position of a handle, three channels in metres.")
     if response.samples.shape[1] != 3 or set(response.units) != {"m/s^2"}:
-        raise _replay_error(f"{path.name} has no acceleration of a handle as its response, three channels in m/s^2.")
+        raise _make_replay_error(
+            f"{path.name} has no acceleration of a handle as its response, three channels in m/s^2."
+        )
     readings = np.zeros((len(recording), READING_SIZE))
     readings[:, POSITION] = position.samples
     readings[:, ACCELERATION] = readings[:, TRUE_ACCELERATION] = response.samples
     return readings
 
 
-def _noise_mps2(acceleration: FloatArray) -> float:
-    """Half width (m/s²) of a uniform noise as strong as the sensor's, sqrt(3) times its standard deviation: from third
-    differences, which remove smooth motion and multiply the variance of white noise by 20."""
+def _estimate_noise_mps2(acceleration: FloatArray) -> float:
+    """Half width (m/s²) of a uniform noise with the sensor's standard deviation, which is sqrt(3) times that. The
+    deviation is 1/0.6745 of the median absolute third difference, which removes smooth motion, over sqrt(20), by which
+    differencing scales white noise. acceleration: (n, 3); 0 for fewer than four samples."""
     residual = np.diff(acceleration, n=3, axis=0) / np.sqrt(20.0)
     return float(np.sqrt(3.0) * np.nanmedian(np.abs(residual)) / 0.6745) if residual.size else 0.0
 
 
 def _select_excitation(recording: Recording, path: Path) -> FloatArray:
-    """The recorded excitation (n, 3), N; the command where none was recorded. Missing samples count as 0."""
-    decided: Signal = recording.command if recording.excitation is None else recording.excitation
-    if decided.samples.shape[1] != 3 or set(decided.units) != {"N"}:
-        raise _replay_error(f"{path.name} has no force on a handle as its command, three channels in N.")
-    return np.nan_to_num(np.asarray(decided.samples, dtype=np.float64))
+    """The recorded excitation (n, 3), N; the command where none was recorded. Missing samples count as 0. Raises
+    `DeviceError` for other units or numbers of channels."""
+    excitation: Signal = recording.command if recording.excitation is None else recording.excitation
+    if excitation.samples.shape[1] != 3 or set(excitation.units) != {"N"}:
+        raise _make_replay_error(f"{path.name} has no force on a handle as its command, three channels in N.")
+    return np.nan_to_num(np.asarray(excitation.samples, dtype=np.float64))
 
 
-def _replay_error(reason: str) -> DeviceError:
+def _make_replay_error(reason: str) -> DeviceError:
+    """Error for a file that cannot be replayed. reason: a sentence."""
     return DeviceError(
         "This cannot be replayed", reason, f"Give a recording of `hapteq record`, as --device {REPLAY}FILE.h5."
     )

@@ -14,19 +14,20 @@ from numpy import uint64
 from equalizer.signals.signal import FloatArray
 from study.devices.governor.compiling import fingerprint
 from study.devices.simulated.dynamics import integrate_tick
-from study.devices.simulated.linkage import inverse_kinematics
+from study.devices.simulated.linkage import solve_inverse_kinematics
 from study.devices.simulated.sensors import read_sensors
 
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
-_NOISE = types.uint64[::1]
-"""numba's types of the arguments: vectors and matrices of floats, and the state of the random numbers."""
+_RANDOM_STATE = types.uint64[::1]
+"""numba's types of the arguments: vectors and matrices of floats, and the state of the random generator."""
 
 
-def _entry_points(sources: int) -> tuple[Any, Any, Any]:
-    """`sense`, `advance` and `pose`. sources: fingerprint, enclosed so that a change of any source compiles anew."""
+def _compile_entry_points(sources: int) -> tuple[Any, Any, Any]:
+    """Compile `sense`, `advance` and `solve_pose`. sources: fingerprint, enclosed so that a change of any source
+    compiles anew."""
 
-    @njit(types.void(_VECTOR, _VECTOR, _NOISE, _VECTOR), cache=True, nogil=True)
+    @njit(types.void(_VECTOR, _VECTOR, _RANDOM_STATE, _VECTOR), cache=True, nogil=True)
     def sense(state: FloatArray, parameters: FloatArray, noise: npt.NDArray[uint64], reading: FloatArray) -> None:
         _ = sources
         read_sensors(state, parameters, noise, reading)
@@ -37,12 +38,15 @@ def _entry_points(sources: int) -> tuple[Any, Any, Any]:
         integrate_tick(state, parameters, force_n)
 
     @njit(types.void(_VECTOR, _VECTOR, _VECTOR, _MATRIX), cache=True, nogil=True)
-    def pose(parameters: FloatArray, position: FloatArray, angles: FloatArray, jacobian: FloatArray) -> None:
+    def solve_pose(parameters: FloatArray, position: FloatArray, angles: FloatArray, jacobian: FloatArray) -> None:
         _ = sources
-        inverse_kinematics(parameters, position, angles, jacobian)
+        solve_inverse_kinematics(parameters, position, angles, jacobian)
 
-    return sense, advance, pose
+    return sense, advance, solve_pose
 
 
-sense, advance, pose = _entry_points(fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py"))
-"""`sense` and `advance` with the arguments that `study.devices.rig.CompiledRig` states; `pose`: inverse kinematics."""
+sense, advance, solve_pose = _compile_entry_points(
+    fingerprint(Path(__file__).parent, Path(__file__).parents[1] / "rig.py")
+)
+"""`sense` and `advance` with the arguments that `study.devices.rig.CompiledRig` states; `solve_pose`: joint
+angles and inverse Jacobian at a position, see `linkage.solve_inverse_kinematics`."""

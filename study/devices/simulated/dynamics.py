@@ -39,7 +39,7 @@ from study.devices.simulated.layout import (
     TICK_S,
     VELOCITY,
 )
-from study.devices.simulated.linkage import inverse_kinematics
+from study.devices.simulated.linkage import solve_inverse_kinematics
 
 
 @inlined
@@ -102,8 +102,8 @@ def _compute_constants(state: FloatArray, parameters: FloatArray, force_n: Float
     constants = TickConstants(np.empty(3), np.empty((3, 3)), np.empty((SIZE, SIZE)), np.empty(3), np.empty(3))
     for axis in range(3):
         midpoint[axis] = state[RELATIVE + axis] + 0.5 * TICK_S * state[VELOCITY + axis]
-    inverse_kinematics(parameters, midpoint, angles, constants.jacobian)
-    inverse_kinematics(parameters, state[RELATIVE : RELATIVE + 3], angles, start_jacobian)
+    solve_inverse_kinematics(parameters, midpoint, angles, constants.jacobian)
+    solve_inverse_kinematics(parameters, state[RELATIVE : RELATIVE + 3], angles, start_jacobian)
     solve_transposed(start_jacobian, force_n, constants.command)
     constants.centrifugal[:] = 0.0
     for number in range(3):

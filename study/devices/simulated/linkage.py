@@ -11,7 +11,7 @@ satisfies
 
 The inverse solves this for q, leg by leg; the forward solution is the intersection of the three spheres of radius
 `forearm` about the elbows. All lengths in m, angles in rad. Source: R. Clavel, "Conception d'un robot parallèle rapide
-à 4 degrés de liberté", thesis 925, EPFL 1991.
+à 4 degrés de liberté", thesis 925, EPFL 1991. Compiled into `compiled` (inverse), `dynamics` and `sensors` (forward).
 """
 
 import math
@@ -24,69 +24,74 @@ from study.devices.simulated.layout import AZIMUTH, FOREARM, PLATFORM_DEPTH, RAD
 
 
 @inlined
-def solve_leg(parameters: FloatArray, position: FloatArray, number: int, row: FloatArray) -> float:
-    """Joint angle of one leg, rad, with the elbow outwards; `row` (3,) becomes d angle / d position, rad/m.
+def solve_leg(parameters: FloatArray, position: FloatArray, leg: int, angle_gradient: FloatArray) -> float:
+    """Joint angle of one leg (0 to 2), rad, with the elbow outwards; fills `angle_gradient` (3,), d angle / d position,
+    rad/m. parameters: as in `layout`; position: (3,), m.
 
     Where the handle is out of reach, which the mechanical stops exclude, the cosine is clipped: the angle is that of an
-    upper arm in line with the handle, and the row is singular.
+    upper arm in line with the handle, and the gradient is singular.
     """
-    upper, forearm = parameters[UPPER_ARM], parameters[FOREARM]
-    cosine, sine = parameters[AZIMUTH + 2 * number], parameters[AZIMUTH + 2 * number + 1]
+    upper_arm, forearm = parameters[UPPER_ARM], parameters[FOREARM]
+    cosine, sine = parameters[AZIMUTH + 2 * leg], parameters[AZIMUTH + 2 * leg + 1]
     depth = position[0] + parameters[PLATFORM_DEPTH]
     inward = position[1] * cosine + position[2] * sine - parameters[RADIUS]
     lateral = position[2] * cosine - position[1] * sine
     reach = math.sqrt(inward * inward + depth * depth)
     # Law of cosines for the angle between the upper arm and the line from its pivot to the handle, in the leg's plane.
-    cos_elbow = (reach * reach + lateral * lateral + upper * upper - forearm * forearm) / (2.0 * upper * reach)
+    cos_elbow = (reach * reach + lateral * lateral + upper_arm * upper_arm - forearm * forearm) / (
+        2.0 * upper_arm * reach
+    )
     cos_elbow = min(1.0, max(-1.0, cos_elbow))
     sin_elbow = math.sqrt(1.0 - cos_elbow * cos_elbow)
     cos_q = (inward * cos_elbow + depth * sin_elbow) / reach
     sin_q = (depth * cos_elbow - inward * sin_elbow) / reach
-    radial = inward - upper * cos_q
-    axial = depth - upper * sin_q
+    radial = inward - upper_arm * cos_q
+    axial = depth - upper_arm * sin_q
     # (p - e) . (dp - de/dq dq) = 0, from the forearm's constant length; lever = (p - e) . de/dq.
-    lever = upper * (axial * cos_q - radial * sin_q)
-    row[0] = axial / lever
-    row[1] = (radial * cosine - lateral * sine) / lever
-    row[2] = (radial * sine + lateral * cosine) / lever
+    lever = upper_arm * (axial * cos_q - radial * sin_q)
+    angle_gradient[0] = axial / lever
+    angle_gradient[1] = (radial * cosine - lateral * sine) / lever
+    angle_gradient[2] = (radial * sine + lateral * cosine) / lever
     return math.atan2(sin_q, cos_q)
 
 
 @inlined
-def inverse_kinematics(parameters: FloatArray, position: FloatArray, angles: FloatArray, jacobian: FloatArray) -> None:
+def solve_inverse_kinematics(
+    parameters: FloatArray, position: FloatArray, angles: FloatArray, jacobian: FloatArray
+) -> None:
     """Fill angles (3,), rad, and jacobian (3, 3), rad/m: joint speeds = jacobian @ handle velocity. position: (3,),
     m."""
-    for number in range(3):
-        angles[number] = solve_leg(parameters, position, number, jacobian[number])
+    for leg in range(3):
+        angles[leg] = solve_leg(parameters, position, leg, jacobian[leg])
 
 
 @inlined
-def forward_kinematics(parameters: FloatArray, angles: FloatArray, position: FloatArray) -> None:
+def solve_forward_kinematics(parameters: FloatArray, angles: FloatArray, position: FloatArray) -> None:
     """Fill position (3,), m: of the two points at the forearm's length from all three elbows, the one farther along x.
     angles: (3,), rad."""
     elbows = np.empty((3, 3))
-    for number in range(3):
-        radial = parameters[RADIUS] + parameters[UPPER_ARM] * math.cos(angles[number])
-        elbows[number, 0] = parameters[UPPER_ARM] * math.sin(angles[number])
-        elbows[number, 1] = radial * parameters[AZIMUTH + 2 * number]
-        elbows[number, 2] = radial * parameters[AZIMUTH + 2 * number + 1]
-    first, second, normal = np.empty(3), np.empty(3), np.empty(3)
+    for leg in range(3):
+        radial = parameters[RADIUS] + parameters[UPPER_ARM] * math.cos(angles[leg])
+        elbows[leg, 0] = parameters[UPPER_ARM] * math.sin(angles[leg])
+        elbows[leg, 1] = radial * parameters[AZIMUTH + 2 * leg]
+        elbows[leg, 2] = radial * parameters[AZIMUTH + 2 * leg + 1]
+    first_side, second_side, normal = np.empty(3), np.empty(3), np.empty(3)
     for axis in range(3):
-        first[axis] = elbows[1, axis] - elbows[0, axis]
-        second[axis] = elbows[2, axis] - elbows[0, axis]
-    _cross(first, second, normal)
-    g11, g12, g22 = _dot(first, first), _dot(first, second), _dot(second, second)
-    # Circumcentre of the elbows, from the first one in the basis of two sides; area is |normal|^2.
-    area = g11 * g22 - g12 * g12
-    along_first = 0.5 * g22 * (g11 - g12) / area
-    along_second = 0.5 * g11 * (g22 - g12) / area
-    centre = along_first * along_first * g11 + 2.0 * along_first * along_second * g12 + along_second**2 * g22
+        first_side[axis] = elbows[1, axis] - elbows[0, axis]
+        second_side[axis] = elbows[2, axis] - elbows[0, axis]
+    _cross(first_side, second_side, normal)
+    g11, g12, g22 = _dot(first_side, first_side), _dot(first_side, second_side), _dot(second_side, second_side)
+    # Circumcentre of the elbows, from the first one in the basis of two sides; squared_area is |normal|^2.
+    squared_area = g11 * g22 - g12 * g12
+    first_share = 0.5 * g22 * (g11 - g12) / squared_area
+    second_share = 0.5 * g11 * (g22 - g12) / squared_area
+    squared_radius = first_share * first_share * g11 + 2.0 * first_share * second_share * g12 + second_share**2 * g22
     # Distance of the handle from the elbows' plane, in units of the normal.
-    height = math.sqrt(max(parameters[FOREARM] ** 2 - centre, 0.0) / area)
+    height = math.sqrt(max(parameters[FOREARM] ** 2 - squared_radius, 0.0) / squared_area)
     if normal[0] < 0.0:
         height = -height
     for axis in range(3):
-        in_plane = along_first * first[axis] + along_second * second[axis]
+        in_plane = first_share * first_side[axis] + second_share * second_side[axis]
         position[axis] = elbows[0, axis] + in_plane + height * normal[axis]
     position[0] -= parameters[PLATFORM_DEPTH]
 
@@ -99,7 +104,7 @@ def _dot(a: FloatArray, b: FloatArray) -> float:
 
 @inlined
 def _cross(a: FloatArray, b: FloatArray, product: FloatArray) -> None:
-    """Fill out (3,) with the vector product a x b."""
+    """Fill product (3,) with the vector product a x b."""
     product[0] = a[1] * b[2] - a[2] * b[1]
     product[1] = a[2] * b[0] - a[0] * b[2]
     product[2] = a[0] * b[1] - a[1] * b[0]

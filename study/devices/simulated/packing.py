@@ -11,7 +11,7 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.simulated import layout
-from study.devices.simulated.compiled import pose
+from study.devices.simulated.compiled import solve_pose
 from study.devices.simulated.parameters import GRAVITY_M_S2, Linkage, Omega3Parameters, Vector
 
 
@@ -49,7 +49,7 @@ def make_rest_state(packed: FloatArray, place_m: Vector) -> FloatArray:
     cables and modes without load. packed: the result of `pack_parameters`."""
     state = np.zeros(layout.STATE_SIZE)
     _write_elements(state, layout.RELATIVE, place_m)
-    pose(packed, np.array(place_m, dtype=float), state[layout.MOTOR : layout.MOTOR + 3], np.empty((3, 3)))
+    solve_pose(packed, np.array(place_m, dtype=float), state[layout.MOTOR : layout.MOTOR + 3], np.empty((3, 3)))
     return state
 
 
@@ -58,7 +58,7 @@ def compute_effective_mass_kg(parameters: Omega3Parameters, packed: FloatArray) 
     handle and forearms, the inertia I of an arm with its drive, and the Jacobian J from velocity to joint speeds. At
     the isotropic point it is the same in all directions."""
     jacobian = np.empty((3, 3))
-    pose(packed, np.zeros(3), np.empty(3), jacobian)
+    solve_pose(packed, np.zeros(3), np.empty(3), jacobian)
     masses = parameters.masses
     joint_inertia = packed[layout.ARM_INERTIA] + masses.drive_kg_m2
     return masses.handle_kg + masses.forearm_kg + float(joint_inertia * np.trace(jacobian.T @ jacobian) / 3)

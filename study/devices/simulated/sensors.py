@@ -23,7 +23,7 @@ from study.devices.simulated.layout import (
     SENSOR_RANGE,
     TRUE,
 )
-from study.devices.simulated.linkage import forward_kinematics
+from study.devices.simulated.linkage import solve_forward_kinematics
 from study.devices.simulated.parameters import GRAVITY_M_S2
 
 _STEP = np.uint64(0x9E3779B97F4A7C15)
@@ -69,7 +69,7 @@ def read_sensors(state: FloatArray, parameters: FloatArray, noise: npt.NDArray[n
     count = parameters[COUNT]
     for drive in range(3):
         angles[drive] = count * math.floor(state[MOTOR + drive] / count + 0.5)
-    forward_kinematics(parameters, angles, reading[_POSITION:_ACCELERATION])
+    solve_forward_kinematics(parameters, angles, reading[_POSITION:_ACCELERATION])
     reading[rig.SENSOR_CLIPPED] = _read_accelerometer(state, parameters, noise, reading[_ACCELERATION:_TRUE])
     for axis in range(3):
         reading[_TRUE + axis] = state[TRUE + axis]

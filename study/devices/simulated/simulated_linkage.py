@@ -17,7 +17,7 @@ from equalizer.linkage.grid import estimate_arm_azimuths
 from equalizer.signals.signal import FloatArray
 from study.devices.device import DeviceInfo
 from study.devices.simulated import layout
-from study.devices.simulated.compiled import pose
+from study.devices.simulated.compiled import solve_pose
 from study.devices.simulated.omega3 import NAME, make_omega3_info
 from study.devices.simulated.packing import compute_effective_mass_kg, compute_isotropic_depth_m, pack_parameters
 from study.devices.simulated.parameters import GRAVITY_M_S2, Linkage, Masses, Omega3Parameters
@@ -37,7 +37,7 @@ class SimulatedLinkage:
         self._packed = pack_parameters(parameters, False, (0.0, 0.0, 0.0))
         self._masses, self._reach_m = parameters.masses, parameters.stops.radius_m
 
-    def at(self, position_m: FloatArray) -> LinkageReading | None:
+    def compute_reading_at(self, position_m: FloatArray) -> LinkageReading | None:
         """Joint angles (rad), Jacobian (m/rad), inertia matrix (kg) and gravity force (N) at a position of the handle
         (3,), m; None at or beyond the end stop."""
         if not float(np.linalg.norm(position_m)) < self._reach_m:
@@ -50,7 +50,7 @@ class SimulatedLinkage:
         jacobian: FloatArray = np.asarray(np.linalg.inv(rates), dtype=np.float64)
         return LinkageReading(np.array(position_m), angles, jacobian, inertia, gravity_force_n)
 
-    def angles_at(self, position_m: FloatArray) -> FloatArray | None:
+    def compute_angles_at(self, position_m: FloatArray) -> FloatArray | None:
         """Joint angles (3,), rad, at a position of the handle (3,), m; None at or beyond the end stop."""
         return _compute_pose(self._packed, position_m)[0] if float(np.linalg.norm(position_m)) < self._reach_m else None
 
@@ -93,9 +93,10 @@ def fit_linkage(calibration: LinkageCalibration) -> FittedLinkage:
 
 
 def _compute_pose(packed: FloatArray, position_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Joint angles (3,), and joint speeds per handle velocity (3, 3), rad/m."""
+    """Joint angles (3,), rad, and joint speeds per handle velocity (3, 3), rad/m, at a position (3,), m. packed:
+    parameters as in `layout`."""
     angles, rates = np.empty(3), np.empty((3, 3))
-    pose(packed, np.array(position_m, dtype=float), angles, rates)
+    solve_pose(packed, np.array(position_m, dtype=float), angles, rates)
     return angles, rates
 
 
@@ -106,12 +107,12 @@ def _compute_rates(parameters: Omega3Parameters, positions: FloatArray) -> Float
 
 
 def _fit_lengths(positions: FloatArray, rates: FloatArray, azimuths: FloatArray) -> tuple[Linkage, float]:
-    """Least-squares linkage and its misfit. rates: (n, 3, 3), rad/m. azimuths: (3,), rad. The unknowns are the
-    logarithms of four lengths over their start values, which are scaled to the size of the device, and a turn of all
-    azimuths."""
+    """Fit the linkage by least squares. Returns it and its misfit, see `FittedLinkage`. positions: (n, 3), m; rates:
+    (n, 3, 3), rad/m; azimuths: (3,), rad. The unknowns are the logarithms of four lengths over their start values,
+    which are scaled to the size of the device, and a turn of all azimuths."""
     nominal = Linkage()
-    size_ratio = float(np.abs(_compute_rates(Omega3Parameters(), positions)).max() / np.abs(rates).max())
-    start_lengths_m = size_ratio * np.array(
+    scale = float(np.abs(_compute_rates(Omega3Parameters(), positions)).max() / np.abs(rates).max())
+    start_lengths_m = scale * np.array(
         [nominal.upper_arm_m, nominal.forearm_m, nominal.radius_m, compute_isotropic_depth_m(nominal)]
     )
     largest_rate = float(np.abs(rates).max())
@@ -119,9 +120,9 @@ def _fit_lengths(positions: FloatArray, rates: FloatArray, azimuths: FloatArray)
     def make_linkage(unknowns: FloatArray) -> Linkage:
         """Linkage of the unknowns (5,): four logarithms of length ratios, and the turn of the azimuths (rad)."""
         azimuths_deg = np.degrees(azimuths + unknowns[4])
-        upper, forearm, radius, depth = (float(length) for length in start_lengths_m * np.exp(unknowns[:4]))
+        upper_arm, forearm, radius, depth = (float(length) for length in start_lengths_m * np.exp(unknowns[:4]))
         return Linkage(
-            upper, forearm, radius, (float(azimuths_deg[0]), float(azimuths_deg[1]), float(azimuths_deg[2])), depth
+            upper_arm, forearm, radius, (float(azimuths_deg[0]), float(azimuths_deg[1]), float(azimuths_deg[2])), depth
         )
 
     def compute_misfits(unknowns: FloatArray) -> FloatArray:
@@ -134,8 +135,9 @@ def _fit_lengths(positions: FloatArray, rates: FloatArray, azimuths: FloatArray)
 
 
 def _fit_masses(parameters: Omega3Parameters, calibration: LinkageCalibration) -> tuple[Masses, float]:
-    """Masses by linear least squares on the calibration's inertia matrices, m I + i J^T J: m moves with the handle, and
-    i (kg m²) turns with each arm. Returns the relative misfit too. Raises ValueError for masses that are too small."""
+    """Fit the masses by linear least squares to the calibration's inertia matrices, m I + i J^T J with J the joint
+    speeds per handle velocity (rad/m): m (kg) moves with the handle, and i (kg m²) turns with each arm. Returns the
+    misfit too, see `FittedLinkage`. Raises ValueError for masses that are too small."""
     nominal, arm_m = parameters.masses, parameters.linkage.upper_arm_m
     rates = _compute_rates(parameters, calibration.position_m)
     rate_products = np.einsum("nki,nkj->nij", rates, rates)

@@ -22,7 +22,7 @@ import analysis.diagnosis
 import equalizer
 import study
 from study.evaluation.bank.proof_folder import ANSWER, CLEAN_FOLDER, MODEL, RECORDING, SETTINGS
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
 
@@ -77,7 +77,7 @@ def isolate_process(open_folder: Path) -> None:
 def hash_other_recordings(case_folder: Path) -> dict[str, str]:
     """SHA-256 of every recording of a case but the first, by its path relative to the case's folder `case_folder`."""
     paths = [path for path in sorted(case_folder.rglob("*.h5")) if path != case_folder / RECORDING]
-    return {str(path.relative_to(case_folder)): sha256_of(path) for path in paths}
+    return {str(path.relative_to(case_folder)): compute_sha256(path) for path in paths}
 
 
 def answer_case(case_folder: Path, engine_hash: str) -> None:
@@ -92,8 +92,8 @@ def answer_case(case_folder: Path, engine_hash: str) -> None:
         "name": case_folder.name,
         "seconds": time.perf_counter() - start_s,
         "cpu_seconds": time.process_time() - processor_start_s,
-        "recording_sha256": sha256_of(case_folder / RECORDING),
-        "model_sha256": sha256_of(case_folder / MODEL),
+        "recording_sha256": compute_sha256(case_folder / RECORDING),
+        "model_sha256": compute_sha256(case_folder / MODEL),
         "others_sha256": hash_other_recordings(case_folder),
         "engine": engine_hash,
         "knows_the_challenge": is_challenge_loaded(),

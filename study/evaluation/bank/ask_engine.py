@@ -1,7 +1,8 @@
-"""Runs the diagnosis of a bank's open cases in worker processes (`answer_cases`), each for many cases.
+"""Runs the diagnosis of a bank's unanswered cases in worker processes (`answer_cases`), each for many cases. Called by
+`prove`, `follow_up`, `run_controls`, `laws.prove_laws` and, for real recordings, `study.evaluation.real.inject_real`.
 
-The processes run on this computer, or on the workers of an executor. A case is tried `TRIES` times, with a new process
-where the last died or exceeded `PATIENCE_S`; then it counts as failed.
+The processes run on this computer, or on the workers of an executor. A case is tried `MAX_ATTEMPTS` times, with a new
+process where the last died or exceeded `CASE_TIMEOUT_S`; then it counts as failed.
 """
 
 import json
@@ -22,11 +23,11 @@ from study.store.disk.folder_contents import Files, read_files, write_files
 from study.store.disk.text_file import read_text, write_text
 from study.workflows.run_on_executor import run_tasks
 
-PATIENCE_S = 1200.0
+CASE_TIMEOUT_S = 1200.0
 """Longest wait for one case (s); a case takes seconds to a minute."""
-GLANCE_S = 0.5
-"""Interval at which the calling thread checks that workers still run (s)."""
-TRIES = 2
+POLL_INTERVAL_S = 0.5
+"""Interval at which the calling thread checks that the threads of the processes still run (s)."""
+MAX_ATTEMPTS = 2
 """Attempts per case: a process may have died because it was killed from outside."""
 
 
@@ -39,8 +40,9 @@ class Engine:
         self._lock = threading.Lock()
         self.ended = False
 
-    def ask(self, name: str) -> bool:
-        """Send one case name and block until its answer; False if the process failed, timed out or was ended."""
+    def request_answer(self, name: str) -> bool:
+        """Send one case name and wait until the process has written its answer; False if the process died, timed out or
+        was ended."""
         with self._lock:
             if self.ended:
                 return False
@@ -48,7 +50,7 @@ class Engine:
                 self.close()
                 self._process = self._start_process()
             process = self._process
-        if answered := _ask_process(process, name):
+        if answered := _send_case_name(process, name):
             return answered
         # A process that is about to end still seems to run, and the next request would be lost with it.
         process.kill()
@@ -56,7 +58,7 @@ class Engine:
         return answered
 
     def end(self) -> None:
-        """Kill the process permanently; a caller that is waiting gets False."""
+        """Kill the process and start no other; a caller that is waiting gets False."""
         with self._lock:
             self.ended = True
             if self._process is not None:
@@ -71,6 +73,7 @@ class Engine:
                     pipe.close()
 
     def _start_process(self) -> subprocess.Popen[str]:
+        """Start a process of `answer_cases` on the folder; its stderr is appended to the folder's log file."""
         with self._folder.log_file.open("a", encoding="utf-8") as log:
             return subprocess.Popen(
                 [sys.executable, "-m", "study.evaluation.bank.answer_cases", str(self._folder.open)],
@@ -81,9 +84,10 @@ class Engine:
             )
 
 
-def _ask_process(process: "subprocess.Popen[str]", name: str) -> bool:
-    """Send a case name and wait for its echo. Kills the process after `PATIENCE_S`, which ends the wait."""
-    timeout = threading.Timer(PATIENCE_S, process.kill)
+def _send_case_name(process: "subprocess.Popen[str]", name: str) -> bool:
+    """Send a case name and wait until the process repeats it, when its answer is written. Kills the process after
+    `CASE_TIMEOUT_S`, which ends the wait. Returns whether the name came back."""
+    timeout = threading.Timer(CASE_TIMEOUT_S, process.kill)
     timeout.daemon = True
     timeout.start()
     try:
@@ -102,7 +106,7 @@ Workers = int | Executor
 """Number of processes on this computer, or an executor to whose workers the cases are sent: they may share no disk."""
 
 
-def ask_and_count(
+def diagnose_and_count(
     folder: ProofFolder,
     names: Sequence[str],
     workers: Workers,
@@ -111,29 +115,32 @@ def ask_and_count(
     keep: bool,
     diagnosable: Sequence[str] | None = None,
 ) -> None:
-    """Diagnose the cases `names` that have no answer, calling `on_done(answered, total)`. keep: do not delete
-    recordings of answered cases. diagnosable: those of `names` that can be diagnosed; None = all. Raises StudyError as
-    `ask_engine`."""
-    done = sum(is_answered(folder.open / name) for name in names)
-    on_done(done, len(names))
+    """Diagnose the cases `names` that have no answer, calling `on_done(answered, total)`. keep: do not delete the
+    recordings of cases that are answered now. diagnosable: those of `names` that can be diagnosed; None = all. Raises
+    StudyError as `diagnose_cases`."""
+    answered_count = sum(is_answered(folder.open / name) for name in names)
+    on_done(answered_count, len(names))
 
     def on_answered(name: str) -> None:
-        nonlocal done
-        done += 1
+        """Count a case that was answered now, and delete its recordings unless `keep`."""
+        nonlocal answered_count
+        answered_count += 1
         if not keep:
-            forget_recordings(folder.open / name)
-        on_done(done, len(names))
+            delete_answered_recordings(folder.open / name)
+        on_done(answered_count, len(names))
 
-    ask_engine(folder, names if diagnosable is None else diagnosable, workers, on_answered)
+    diagnose_cases(folder, names if diagnosable is None else diagnosable, workers, on_answered)
 
 
-def ask_engine(folder: ProofFolder, names: Sequence[str], workers: Workers, on_answered: Callable[[str], None]) -> None:
+def diagnose_cases(
+    folder: ProofFolder, names: Sequence[str], workers: Workers, on_answered: Callable[[str], None]
+) -> None:
     """Diagnose the cases `names` that have no answer yet; blocks until done. `on_answered(name)` is called in this
     thread after each case. Raises StudyError if all worker processes ended early."""
     pending, answered = SimpleQueue[str](), SimpleQueue[str]()
     unanswered = [name for name in names if not is_answered(folder.open / name)]
     if isinstance(workers, Executor):
-        _send_cases(folder, unanswered, workers, on_answered)
+        _diagnose_on_executor(folder, unanswered, workers, on_answered)
         return
     for name in unanswered:
         pending.put(name)
@@ -141,16 +148,16 @@ def ask_engine(folder: ProofFolder, names: Sequence[str], workers: Workers, on_a
         missing_count = len(unanswered)
         while missing_count:
             try:
-                name = answered.get(timeout=GLANCE_S)
+                name = answered.get(timeout=POLL_INTERVAL_S)
             except Empty:
                 if not any(thread.is_alive() for thread in threads) and answered.empty():
-                    raise _processes_ended_error(folder, missing_count) from None
+                    raise _make_processes_ended_error(folder, missing_count) from None
                 continue
             missing_count -= 1
             on_answered(name)
 
 
-def _send_cases(
+def _diagnose_on_executor(
     folder: ProofFolder, names: Sequence[str], executor: Executor, on_answered: Callable[[str], None]
 ) -> None:
     """Diagnose the cases on an executor, and write the answers that it returns."""
@@ -164,26 +171,27 @@ def _send_cases(
 
 
 def answer_sent_case(name: str, case: Files) -> str | None:
-    """Runs on a worker of an executor: the text of answer.json, from a process in a temporary folder with nothing but
-    the files of the case. None if the process died or timed out at every attempt."""
+    """Diagnose a case on a worker of an executor. Returns the text of answer.json, from a process in a temporary folder
+    with nothing but the files of the case. None if the process died or timed out at every attempt."""
     with TemporaryDirectory() as temporary:
         folder = ProofFolder(Path(temporary))
         write_files(folder.open / name, case)
         engine = Engine(folder)
         try:
-            done = any(engine.ask(name) for _ in range(TRIES))
+            is_done = any(engine.request_answer(name) for _ in range(MAX_ATTEMPTS))
         finally:
             engine.end()
             engine.close()
-        return read_text(folder.open / name / ANSWER) if done else None
+        return read_text(folder.open / name / ANSWER) if is_done else None
 
 
 @contextmanager
 def _start_engines(
-    folder: ProofFolder, workers: int, pending: SimpleQueue[str], answered: SimpleQueue[str]
+    folder: ProofFolder, worker_count: int, pending: SimpleQueue[str], answered: SimpleQueue[str]
 ) -> Iterator[list[threading.Thread]]:
-    """Context with a thread per worker process. On exit, also by an exception, the processes are killed."""
-    engines = [Engine(folder) for _ in range(workers)]
+    """Context with a thread per worker process (`_run_worker`). On exit, also by an exception, the pending names are
+    dropped and the processes killed."""
+    engines = [Engine(folder) for _ in range(worker_count)]
     threads = [
         threading.Thread(target=_run_worker, args=(worker, folder, pending, answered), daemon=True)
         for worker in engines
@@ -203,23 +211,25 @@ def _start_engines(
 
 
 def _run_worker(engine: Engine, folder: ProofFolder, pending: SimpleQueue[str], answered: SimpleQueue[str]) -> None:
-    """Take names from `pending` until it is empty; put them into `answered` once an answer or a failure is written."""
+    """Take names from `pending` until it is empty; put them into `answered` once an answer or a failure is written.
+    Ends early, without a failure, where the engine was ended."""
     while True:
         try:
             name = pending.get_nowait()
         except Empty:
             return
-        if not any(engine.ask(name) for _ in range(TRIES)):
+        if not any(engine.request_answer(name) for _ in range(MAX_ATTEMPTS)):
             if engine.ended:
                 return
             _write_failure(folder.open / name)
         answered.put(name)
 
 
-def _processes_ended_error(folder: ProofFolder, missing: int) -> StudyError:
+def _make_processes_ended_error(folder: ProofFolder, missing_count: int) -> StudyError:
+    """Error for threads that ended before all cases were answered. missing_count: number of unanswered cases."""
     return StudyError(
         "The processes of the diagnosis ended before their work was done",
-        f"{missing} cases have no answer; the last output of the processes is in {folder.log_file}.",
+        f"{missing_count} cases have no answer; the last output of the processes is in {folder.log_file}.",
         "Run the same command again: it continues where it stopped.",
         saved=f"All answers so far are in {folder.open}.",
     )
@@ -233,14 +243,14 @@ def is_answered(case_folder: Path) -> bool:
 
 def _write_failure(case_folder: Path) -> None:
     """Write an answer that says that the process died or timed out."""
-    reason = f"the process died {TRIES} times, or took longer than {PATIENCE_S:g} s"
+    reason = f"the process died {MAX_ATTEMPTS} times, or took longer than {CASE_TIMEOUT_S:g} s"
     document = {"name": case_folder.name, "failed": reason, WORKER_DIED: True}
     write_text(case_folder / ANSWER, json.dumps(document, indent=1) + "\n", overwrite=True)
 
 
-def forget_recordings(case_folder: Path) -> None:
-    """Delete the recordings of an answered case to save disk space; the label has their hash, and the seed reproduces
-    them."""
+def delete_answered_recordings(case_folder: Path) -> None:
+    """Delete the recordings of an answered case to save disk space, and ignore errors; nothing for an unanswered one.
+    The label has their hash, and the seed reproduces them."""
     if is_answered(case_folder):
         for path in (case_folder / RECORDING, *case_folder.glob(FURTHER_RECORDING.format("*"))):
             with suppress(OSError):

@@ -18,7 +18,7 @@ from analysis.diagnosis.next_experiment.experiment_menu import Experiment, list_
 from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Outcome
 from study.evaluation.bank.answer_cases import hash_other_recordings
-from study.evaluation.bank.ask_engine import Workers, ask_and_count
+from study.evaluation.bank.ask_engine import Workers, diagnose_and_count
 from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, show_case
 from study.evaluation.bank.proof_folder import (
     FURTHER_RECORDING,
@@ -28,10 +28,16 @@ from study.evaluation.bank.proof_folder import (
     ProofFolder,
     open_proof_folder,
 )
-from study.evaluation.bank.proof_seals import answers_sealed_case, broken_seal_error, read_answer, read_label, seal
+from study.evaluation.bank.proof_seals import (
+    is_answer_to_sealed_case,
+    make_broken_seal_error,
+    read_answer,
+    read_label,
+    seal,
+)
 from study.evaluation.bank.seal_cases import SALT_BYTES, BankPlan, redraw_recording
 from study.evaluation.challenge.drive_plan import RATE_HZ
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.disk.text_file import read_text, write_text
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import write_recording
@@ -68,7 +74,7 @@ def follow_up(
     seal(next_bank)
     labels = [read_label(next_bank.label_file(undecided_case.number)) for undecided_case in undecided]
     names = [label[key]["name"] for label in labels for key in (PROPOSED_KEY, RANDOM_KEY) if key in label]
-    ask_and_count(next_bank, names, workers, on_done, keep=keep)
+    diagnose_and_count(next_bank, names, workers, on_done, keep=keep)
     return tuple(
         _follow_up_outcome(next_bank, undecided_case, label)
         for undecided_case, label in zip(undecided, labels, strict=True)
@@ -115,8 +121,8 @@ def _write_case(
     return {
         "name": case_folder.name,
         "words": "; ".join(experiment.words for experiment in experiments),
-        "recording_sha256": sha256_of(case_folder / RECORDING),
-        "model_sha256": sha256_of(case_folder / MODEL),
+        "recording_sha256": compute_sha256(case_folder / RECORDING),
+        "model_sha256": compute_sha256(case_folder / MODEL),
         "others_sha256": hash_other_recordings(case_folder),
     }
 
@@ -128,8 +134,8 @@ def _follow_up_outcome(next_bank: ProofFolder, start: Outcome, label: dict[str, 
         if key not in label:
             return "", ()
         answer = read_answer(next_bank.open / label[key]["name"])
-        if not answers_sealed_case(label[key], answer):
-            raise broken_seal_error([label[key]["name"]], next_bank.path)
+        if not is_answer_to_sealed_case(label[key], answer):
+            raise make_broken_seal_error([label[key]["name"]], next_bank.path)
         returned_effects = () if "failed" in answer else diagnosis_from_json(answer["diagnosis"]).returned_set
         return label[key]["words"], returned_effects
 

@@ -2,7 +2,8 @@
 compared at every later step.
 
 So neither a truth nor a recording can be changed to suit an answer: a label holds the hashes of the files of its case,
-and an answer must have been given to files with the same hashes.
+and an answer must have been given to files with the same hashes. Called by `seal_cases`, `follow_up`, `sealed_bank` and
+`study.evaluation.real.inject_real`.
 """
 
 import hashlib
@@ -13,11 +14,11 @@ from study.errors import StudyError
 from study.evaluation.bank.proof_folder import ANSWER, WORKER_DIED, ProofFolder
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.json_document import parse_json
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
 
-HASHED = ("recording_sha256", "model_sha256", "others_sha256")
+HASH_KEYS = ("recording_sha256", "model_sha256", "others_sha256")
 """Keys of hashes in the label and in the answer; equal values show that the answer belongs to the sealed files."""
 
 
@@ -29,32 +30,34 @@ def seal(folder: ProofFolder) -> str:
     """
     sealed_hashes = read_seals(folder)
     if changed_names := [name for name, digest in sealed_hashes.items() if _hash_file(folder.path / name) != digest]:
-        raise broken_seal_error(changed_names, folder.path)
+        raise make_broken_seal_error(changed_names, folder.path)
     new_labels = [path for path in sorted(folder.sealed.glob("*.json")) if f"sealed/{path.name}" not in sealed_hashes]
     lines = [f"{digest}  {name}\n" for name, digest in sealed_hashes.items()]
-    lines += [f"{sha256_of(path)}  sealed/{path.name}\n" for path in new_labels]
+    lines += [f"{compute_sha256(path)}  sealed/{path.name}\n" for path in new_labels]
     if new_labels or not folder.seals_file.exists():
         write_text(folder.seals_file, "".join(lines), overwrite=True)
     return hashlib.sha256("".join(lines).encode()).hexdigest()
 
 
 def read_seals(folder: ProofFolder) -> dict[str, str]:
-    """SHA-256 by file name; empty if nothing is sealed yet. Raises StudyError for a malformed file."""
+    """SHA-256 by path of a label relative to the bank, from labels.sha256; empty if nothing is sealed yet. Raises
+    StudyError for a malformed file."""
     if not folder.seals_file.exists():
         return {}
     parts = [line.split() for line in read_text(folder.seals_file).splitlines()]
     if any(len(part) != 2 or len(part[0]) != 64 for part in parts):
-        raise broken_seal_error([folder.seals_file.name], folder.path)
+        raise make_broken_seal_error([folder.seals_file.name], folder.path)
     return {name: digest for digest, name in parts}
 
 
 def read_label(path: Path) -> dict[str, Any]:
-    """The sealed label at `path`, parsed. Raises StudyError."""
+    """The sealed label at `path`, parsed. Raises StudyError where it cannot be read or is no JSON object."""
     return parse_json(path, read_text(path), "sealed label")
 
 
 def read_answer(case_folder: Path) -> dict[str, Any]:
-    """The answer.json in `case_folder`, parsed; it may contain NaN (an unknown error). Raises StudyError."""
+    """The answer.json in `case_folder`, parsed; it may contain NaN (an unknown error). Raises StudyError where
+    it cannot be read or is no JSON object."""
     try:
         document = load_json(read_text(case_folder / ANSWER), with_nan=True)
     except ValueError as problem:
@@ -66,19 +69,19 @@ def read_answer(case_folder: Path) -> dict[str, Any]:
     return document
 
 
-def answers_sealed_case(label: dict[str, Any], answer: dict[str, Any]) -> bool:
+def is_answer_to_sealed_case(label: dict[str, Any], answer: dict[str, Any]) -> bool:
     """Whether an answer belongs to the sealed files and comes from a process that had not imported the challenge. True
-    for the answer of a process that died, which contains no diagnosis."""
+    for the answer of a process that died, which contains no diagnosis. label: of the case, revealed."""
     if WORKER_DIED in answer:
         return True
     return answer.get("knows_the_challenge") is False and all(
-        key in answer and answer[key] == label[key] for key in HASHED if key in label
+        key in answer and answer[key] == label[key] for key in HASH_KEYS if key in label
     )
 
 
-def broken_seal_error(names: list[str], path: Path) -> StudyError:
-    """The error for cases whose files differ from the sealed files. names: of the cases or labels; path: of the
-    bank."""
+def make_broken_seal_error(names: list[str], path: Path) -> StudyError:
+    """The error for cases whose files differ from the sealed files. names: of the cases or labels; path:
+    folder of the bank."""
     return StudyError(
         "A seal is broken",
         f"Of {len(names)} cases ({', '.join(names[:5])}) in {path} the label, the recording or the model is not what "
@@ -90,4 +93,4 @@ def broken_seal_error(names: list[str], path: Path) -> StudyError:
 
 def _hash_file(path: Path) -> str:
     """SHA-256 of a file; empty where there is none."""
-    return sha256_of(path) if path.exists() else ""
+    return compute_sha256(path) if path.exists() else ""

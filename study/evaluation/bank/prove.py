@@ -15,7 +15,7 @@ from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Concealed, Outcome
 from analysis.evaluation.blind_test.score import Score, compute_score
 from study.errors import resumable
-from study.evaluation.bank.ask_engine import ask_and_count, is_answered
+from study.evaluation.bank.ask_engine import diagnose_and_count, is_answered
 from study.evaluation.bank.follow_up import FOLLOW_UP_FOLDER, follow_up
 from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import read_label
@@ -27,7 +27,13 @@ from study.evaluation.bank.seal_cases import (
     redraw_recording,
     seal_cases,
 )
-from study.evaluation.bank.sealed_bank import BankOptions, Progress, answered_fields, engines, reveal_bank
+from study.evaluation.bank.sealed_bank import (
+    BankOptions,
+    Progress,
+    collect_answered_fields,
+    list_engine_digests,
+    reveal_bank,
+)
 
 
 def outcome_of(label: dict[str, Any], answer: dict[str, Any]) -> Outcome:
@@ -41,7 +47,7 @@ def outcome_of(label: dict[str, Any], answer: dict[str, Any]) -> Outcome:
         model=label["concealed"],
         concealed=concealed,
         strengths=tuple(label["strengths"]),
-        **answered_fields(label, answer),
+        **collect_answered_fields(label, answer),
     )
 
 
@@ -85,7 +91,7 @@ def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progres
         )
         controls = _run_all_controls(path, plan, options, on_progress)
     return BlindTest(
-        folder, plan, seal, outcomes, compute_score(outcomes, follow_ups), engines(folder, names),
+        folder, plan, seal, outcomes, compute_score(outcomes, follow_ups), list_engine_digests(folder, names),
         _collect_other_digests(path), controls, follow_ups, plan.cases - len(numbers),
     )  # fmt: skip
 
@@ -99,7 +105,7 @@ def _collect_other_digests(path: Path) -> tuple[str, ...]:
     digests = {
         digest
         for folder in folders
-        for digest in engines(folder, [case_folder.name for case_folder in folder.open.glob("*")])
+        for digest in list_engine_digests(folder, [case_folder.name for case_folder in folder.open.glob("*")])
     }
     return tuple(sorted(digests))
 
@@ -111,7 +117,7 @@ def _answer_cases(
     for name, number in numbers.items():
         if not is_answered(folder.open / name) and not (folder.open / name / RECORDING).exists():
             redraw_recording(folder.open / name, plan, read_label(folder.label_file(number)))
-    ask_and_count(folder, tuple(numbers), options.answering, partial(on_progress, "diagnosing"), keep=options.keep)
+    diagnose_and_count(folder, tuple(numbers), options.answering, partial(on_progress, "diagnosing"), keep=options.keep)
 
 
 def _run_all_controls(

@@ -8,7 +8,7 @@ from pathlib import Path
 from analysis.diagnosis.document import Diagnosis, diagnosis_from_json
 from analysis.evaluation.blind_test.control_claims import ControlOutcome, judge_control
 from study.errors import StudyError
-from study.evaluation.bank.ask_engine import Workers, ask_and_count
+from study.evaluation.bank.ask_engine import Workers, diagnose_and_count
 from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
 from study.evaluation.bank.proof_seals import read_answer
 from study.evaluation.challenge.case_settings import CaseSettings
@@ -36,7 +36,7 @@ def run_controls(
     folder.open.mkdir(parents=True, exist_ok=True)
     names = {control.name: _prepare_control(folder, seed, control, settings) for control in controls}
     all_names = [name for control_names in names.values() for name in control_names]
-    ask_and_count(folder, all_names, workers, on_done, keep=False)
+    diagnose_and_count(folder, all_names, workers, on_done, keep=False)
     return tuple(
         judge_control(
             f"{control.name}, seed {seed}",

@@ -22,7 +22,7 @@ from study.evaluation.bank.proof_seals import read_label, seal
 from study.evaluation.challenge.draw_bank import CaseDraw, draw_case_plan, generate_case
 from study.evaluation.challenge.draw_case import Case
 from study.evaluation.challenge.second_engine import second_engine
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.disk.text_file import write_text
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.recording_file import write_recording
@@ -107,7 +107,7 @@ def redraw_recording(case_folder: Path, plan: BankPlan, label: dict[str, Any]) -
     """Draw and write the recording of a sealed case again. Raises StudyError where its hash is not the sealed one."""
     case = generate_case(draw_case_plan(plan.seed, label["number"], plan.brief), label["name"])
     write_recording(case_folder / RECORDING, case.recording, precision="float32", overwrite=True)
-    if sha256_of(case_folder / RECORDING) != label["recording_sha256"]:
+    if compute_sha256(case_folder / RECORDING) != label["recording_sha256"]:
         raise StudyError(
             "A device of the bank cannot be drawn again",
             f"Case {label['number']} gives another recording than the one that was sealed.",
@@ -129,8 +129,8 @@ def _make_label(case_draw: CaseDraw, case: Case, case_folder: Path) -> dict[str,
         "without": list(case_draw.excluded_effects),
         "truth": list_concealed_effects(case),
         "adds": case.detectability,
-        "recording_sha256": sha256_of(case_folder / RECORDING),
-        "model_sha256": sha256_of(case_folder / MODEL),
+        "recording_sha256": compute_sha256(case_folder / RECORDING),
+        "model_sha256": compute_sha256(case_folder / MODEL),
         "salt": secrets.token_hex(SALT_BYTES),
     }
 

@@ -1,7 +1,7 @@
 """Steps that all sealed banks (effects and laws) share: check the seals, reveal the labels, pair them with answers.
 
 A label is revealed only if its SHA-256 is the sealed hash, and an answer counts only if it was given to the sealed
-files (`proof_seals`).
+files (`proof_seals`). Called by `prove` and `laws.prove_laws`.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -13,18 +13,18 @@ from analysis.diagnosis.document import diagnosis_from_json
 from study.evaluation.bank.ask_engine import Workers
 from study.evaluation.bank.proof_folder import ANSWER, ProofFolder
 from study.evaluation.bank.proof_seals import (
-    answers_sealed_case,
-    broken_seal_error,
+    is_answer_to_sealed_case,
+    make_broken_seal_error,
     read_answer,
     read_label,
     read_seals,
 )
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 
 Progress = Callable[[str, int, int], None]
-"""Called with the current step, the number done, the total."""
+"""on_progress(step, done, total): the name of the current step, the number of cases done in it, and their total."""
 OutcomeT = TypeVar("OutcomeT")
-"""Type of an outcome."""
+"""Type of the outcome of a case."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +34,9 @@ class BankOptions:
     workers: int = 2
     """Number of processes of this computer that draw and seal cases, and diagnose them if there is no executor."""
     keep: bool = False
-    """Keep recordings after they are answered."""
+    """Whether recordings are kept after their cases are answered."""
     controls: bool = False
-    """Also run the controls."""
+    """Whether the controls (`run_controls`) are run as well."""
     executor: Executor | None = None
     """Executor on whose workers the cases are diagnosed; None: on this computer."""
 
@@ -48,18 +48,18 @@ class BankOptions:
 
 def reveal_bank(
     folder: ProofFolder,
-    cases: int,
-    outcome_of: Callable[[dict[str, Any], dict[str, Any]], OutcomeT],
+    case_count: int,
+    make_outcome: Callable[[dict[str, Any], dict[str, Any]], OutcomeT],
     is_unchanged: Callable[[dict[str, Any]], bool] = lambda label: True,
 ) -> tuple[OutcomeT, ...]:
-    """Outcomes of the answered cases with numbers below `cases`. outcome_of: makes an outcome from a label and its
-    answer. is_unchanged: whether further files whose hashes the label holds are unchanged. Raises StudyError where a
-    seal is broken."""
+    """Check all seals, and return the outcomes of the answered cases with numbers below `case_count`. make_outcome:
+    makes an outcome from a label and its answer. is_unchanged: whether further files whose hashes the label holds are
+    unchanged. Raises StudyError where a label or such a file has changed, or an answer was given to other files."""
     seals = read_seals(folder)
     outcomes: list[OutcomeT] = []
     broken_names: list[str] = []
     for path in sorted(folder.sealed.glob("*.json")):
-        if seals.get(f"sealed/{path.name}") != sha256_of(path):
+        if seals.get(f"sealed/{path.name}") != compute_sha256(path):
             broken_names.append(path.name)
             continue
         label = read_label(path)
@@ -67,19 +67,19 @@ def reveal_bank(
             broken_names.append(path.name)
             continue
         case_folder = folder.open / label["name"]
-        if label["number"] >= cases or not (case_folder / ANSWER).exists():
+        if label["number"] >= case_count or not (case_folder / ANSWER).exists():
             continue
         answer = read_answer(case_folder)
-        if not answers_sealed_case(label, answer):
+        if not is_answer_to_sealed_case(label, answer):
             broken_names.append(path.name)
-        outcomes.append(outcome_of(label, answer))
+        outcomes.append(make_outcome(label, answer))
     if broken_names:
-        raise broken_seal_error(broken_names, folder.path)
+        raise make_broken_seal_error(broken_names, folder.path)
     return tuple(outcomes)
 
 
-def answered_fields(label: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, Any]:
-    """Fields of an `AnsweredCase`, from a revealed label and the answer of the diagnosis."""
+def collect_answered_fields(label: Mapping[str, Any], answer: Mapping[str, Any]) -> dict[str, Any]:
+    """Collect the fields of an `AnsweredCase` from a revealed label and the answer of the diagnosis."""
     return {
         **{key: label[key] for key in ("number", "seed", "kind", "adds")},
         "axes": tuple(label["axes"]),
@@ -89,7 +89,8 @@ def answered_fields(label: Mapping[str, Any], answer: Mapping[str, Any]) -> dict
     }
 
 
-def engines(folder: ProofFolder, names: Iterable[str]) -> tuple[str, ...]:
-    """Digests of the code that gave the answers to the cases `names`; several if the code changed during the run."""
+def list_engine_digests(folder: ProofFolder, names: Iterable[str]) -> tuple[str, ...]:
+    """Digests of the code that gave the answers to the cases `names`, sorted; several if the code changed during the
+    run. Cases without an answer, or whose answer names no digest, are left out."""
     answers = [read_answer(folder.open / name) for name in names if (folder.open / name / ANSWER).exists()]
     return tuple(sorted({answer["engine"] for answer in answers if "engine" in answer}))

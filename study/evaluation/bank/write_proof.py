@@ -19,7 +19,7 @@ from analysis.reports.blind_test_report import BlindTestFacts, render_blind_test
 from study.evaluation.bank.answer_cases import compute_engine_digest
 from study.evaluation.bank.proof_summary import list_remarks
 from study.evaluation.bank.prove import BlindTest
-from study.local_clock import local_now
+from study.local_clock import format_local_now
 from study.store.disk.csv_rows import format_csv_table
 from study.store.disk.json_document import read_json, write_json
 from study.store.disk.provenance import anonymise_arguments, gather_provenance, list_versions
@@ -118,9 +118,8 @@ def write_proof(result: BlindTest) -> None:
         result.controls,
         result.follow_ups,
     )
-    page = render_blind_test_report(
-        result.outcomes, score, pictures, facts, {"command": " ".join(anonymise_arguments(sys.argv))}, local_now()
-    )
+    source = {"command": " ".join(anonymise_arguments(sys.argv))}
+    page = render_blind_test_report(result.outcomes, score, pictures, facts, source, format_local_now())
     write_text(folder / PAGE, page, overwrite=True)
 
 

@@ -29,12 +29,13 @@ class EffectContext:
     """0 = weakest, 1 = strongest effect that is drawn; between them, the main parameter is interpolated
     geometrically."""
     bench: Bench
+    """Linear dynamics of the device."""
     axis: int
     """Axis at which the effect is built in, 0 to 2."""
     travel_m: FloatArray
-    """(3,): largest distance of the handle from the centre, per axis, without the effect."""
+    """(3,): largest distance of the handle from the centre, per axis, without the effect (m)."""
     peak_mps2: FloatArray
-    """(3,): largest magnitude of the reading, per axis, without the effect."""
+    """(3,): largest magnitude of the accelerometer's reading, per axis, without the effect (m/s²)."""
     axes: tuple[int, ...] = (0, 1, 2)
     """Driven and measured axes."""
 
@@ -64,6 +65,7 @@ class ConcealedEffect:
     name: str
     """Name in the vocabulary of effects; a decoy (an effect outside the vocabulary) has another name."""
     place: Place
+    """Place at which it acts."""
     of_axis: bool
     """Whether the effect acts on one axis; otherwise on all."""
     draw: Callable[[EffectContext], dict[str, float]]
@@ -81,12 +83,14 @@ def with_cells(table: FloatArray, axis: int, cells: Mapping[int, float]) -> Floa
 
 
 def with_forces(device: Device, axis: int, cells: Mapping[int, float]) -> Device:
-    """The device with these columns of position- and velocity-dependent forces set on one axis."""
+    """The device with these columns of position- and velocity-dependent forces set on one axis. cells: value by column
+    of `handle_force_kernel`."""
     return replace(device, forces=with_cells(device.forces, axis, cells))
 
 
 def with_amplifier(device: Device, axis: int | None, cells: Mapping[int, float]) -> Device:
-    """The device with these amplifier columns set; axis None: on all axes."""
+    """The device with these amplifier columns set; axis None: on all axes. cells: value by column of
+    `actuator_kernel`."""
     table = device.amplifiers
     for amplifier_axis in range(3) if axis is None else (axis,):
         table = with_cells(table, amplifier_axis, cells)

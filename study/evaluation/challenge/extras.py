@@ -2,7 +2,7 @@
 
 Each device gets four, drawn from seven; the labels of the cases do not name them. A diagnosis must not report them, nor
 be misled by them. At factor 1 they change the readings by about a tenth of the noise; the factor scales each size. The
-sizes that the functions below state are those at factor 1.
+sizes that the functions below state are those at factor 1. Called by `draw_case` and `laws.draw_law`.
 """
 
 from collections.abc import Callable
@@ -17,18 +17,18 @@ from study.evaluation.challenge.handle_force_kernel import CUBE, DRAG, PHASE, PI
 
 Extra = Callable[[Device, float, np.random.Generator], Device]
 """extra(device, factor, random): the device with this effect added, of a random size times the factor."""
-COUNT = 4
+EFFECTS_PER_DEVICE = 4
 """Number of nuisance effects per device."""
 
 
 def with_extras(device: Device, factor: float, seed: int) -> Device:
-    """The device with `COUNT` different nuisance effects. The same seed gives the same effects; with factor 0 the
-    device is unchanged."""
+    """The device with `EFFECTS_PER_DEVICE` different nuisance effects, their sizes times `factor`. The same seed gives
+    the same effects; with factor 0 the device is unchanged."""
     if factor == 0.0:
         return device
     random = np.random.default_rng([seed, 977])
-    for number in random.choice(len(EXTRAS), COUNT, replace=False):
-        device = EXTRAS[number](device, factor, random)
+    for index in random.choice(len(EXTRAS), EFFECTS_PER_DEVICE, replace=False):
+        device = EXTRAS[index](device, factor, random)
     return device
 
 
@@ -41,13 +41,15 @@ def _with_columns(table: FloatArray, cells: dict[int, FloatArray | float]) -> Fl
 
 
 def _add_friction(device: Device, factor: float, random: np.random.Generator) -> Device:
-    """Dry friction of 25 to 100 µN per axis, as a bristle of 3e5 N/m."""
-    level = factor * random.uniform(0.25e-4, 1e-4, 3)
-    return replace(device, friction=_with_columns(device.friction, {STIFFNESS: 3e5, POSITIVE: level, NEGATIVE: level}))
+    """Add dry friction of 25 to 100 µN per axis, as a bristle of 3e5 N/m."""
+    friction_n = factor * random.uniform(0.25e-4, 1e-4, 3)
+    return replace(
+        device, friction=_with_columns(device.friction, {STIFFNESS: 3e5, POSITIVE: friction_n, NEGATIVE: friction_n})
+    )
 
 
 def _add_ripple(device: Device, factor: float, random: np.random.Generator) -> Device:
-    """Cogging of 50 to 200 µN per axis, with a pitch of 0.7 to 3 mm and any phase."""
+    """Add cogging of 50 to 200 µN per axis, with a pitch of 0.7 to 3 mm and any phase."""
     cells = {
         RIPPLE: factor * random.uniform(0.5e-4, 2e-4, 3),
         PITCH: random.uniform(7e-4, 3e-3, 3),
@@ -57,17 +59,17 @@ def _add_ripple(device: Device, factor: float, random: np.random.Generator) -> D
 
 
 def _add_hardening(device: Device, factor: float, random: np.random.Generator) -> Device:
-    """Cubic stiffness of up to 40 N/m³ of either sign per axis (hardening or softening)."""
+    """Add a cubic stiffness of up to 40 N/m³ of either sign per axis (hardening or softening)."""
     return replace(device, forces=_with_columns(device.forces, {CUBE: factor * random.uniform(-40.0, 40.0, 3)}))
 
 
 def _add_drag(device: Device, factor: float, random: np.random.Generator) -> Device:
-    """Quadratic damping of up to 0.004 N s²/m² per axis."""
+    """Add quadratic damping of up to 0.004 N s²/m² per axis."""
     return replace(device, forces=_with_columns(device.forces, {DRAG: factor * random.uniform(0.0, 0.004, 3)}))
 
 
 def _shift_modes(device: Device, factor: float, random: np.random.Generator) -> Device:
-    """Frequencies of the structural modes changed by up to 0.04 %."""
+    """Change the frequency of each structural mode by up to 0.04 %."""
     oscillators = device.bench.oscillators
     factors = 1.0 + factor * random.uniform(-4e-4, 4e-4, oscillators.frequency_hz.shape)
     return replace(
@@ -77,13 +79,13 @@ def _shift_modes(device: Device, factor: float, random: np.random.Generator) -> 
 
 
 def _mix_channels(device: Device, factor: float, random: np.random.Generator) -> Device:
-    """Cross-axis sensitivity of the accelerometer of up to 0.3 %."""
+    """Add a cross-axis sensitivity of the accelerometer of up to 0.3 %."""
     mixing = device.sensor.orientation + factor * random.uniform(-3e-3, 3e-3, (3, 3)) * (1.0 - np.eye(3))
     return replace(device, sensor=replace(device.sensor, orientation=mixing))
 
 
 def _add_hum(device: Device, factor: float, random: np.random.Generator) -> Device:
-    """Mains hum in the acceleration: sine and cosine of up to 0.004 m/s² per channel."""
+    """Set the mains hum in the acceleration: sine and cosine of up to 0.004 m/s² per channel."""
     return replace(device, sensor=replace(device.sensor, hum=factor * random.uniform(-0.004, 0.004, (2, 3))))
 
 
@@ -96,4 +98,4 @@ EXTRAS: tuple[Extra, ...] = (
     _mix_channels,
     _add_hum,
 )
-"""All nuisance effects, of which `COUNT` are drawn. The order matters: the seed draws indices."""
+"""All nuisance effects, of which `EFFECTS_PER_DEVICE` are drawn. The order matters: the seed draws indices."""

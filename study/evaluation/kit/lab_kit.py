@@ -14,7 +14,7 @@ from equalizer.plant.mechanical_model import suggest_word
 from study.errors import StudyError
 from study.store.disk.csv_rows import CsvError, format_csv_table, parse_csv_table
 from study.store.disk.file_errors import UnusableFileError
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.disk.text_file import read_text, write_text
 
 SEAL_SUFFIX = ".sha256"
@@ -63,7 +63,7 @@ def seal_labels(path: Path) -> str:
     """SHA-256 of the table's bytes, also written to the file `seal_of` in the format of `sha256sum --check`. An
     existing seal is not replaced. Raises StudyError where the table is invalid or was sealed with other content."""
     read_labels(path)
-    digest, seal = sha256_of(path), seal_of(path)
+    digest, seal = compute_sha256(path), seal_of(path)
     if not seal.exists():
         write_text(seal, f"{digest}  {path.name}\n")
     elif (earlier_hash := read_sealed_hash(path)) != digest:

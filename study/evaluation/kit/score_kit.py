@@ -21,7 +21,7 @@ from analysis.evaluation.blind_test.lab_kit import (
 from study.errors import StudyError, WrongUseError
 from study.evaluation.kit.lab_kit import read_labels, read_sealed_hash, seal_of
 from study.store.disk.csv_rows import format_csv_table
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.disk.text_file import write_text
 from study.store.formats.diagnosis_file import DIAGNOSIS_NAME, read_diagnosis
 
@@ -47,7 +47,7 @@ def score_kit(path: Path, diagnoses: Path, scores_path: Path, seal: str | None =
     """Score a laboratory's diagnoses against its revealed table, and write the scored rows to `scores_path` as CSV.
     diagnoses: a folder per recording, as `hapteq diagnose --out` writes them. seal: the hash that was handed over
     before the diagnoses; None: the table is compared only with the seal file next to it. Raises StudyError."""
-    digest = sha256_of(path)
+    digest = compute_sha256(path)
     compared_with = _require_sealed(path, digest, seal)
     labels = read_labels(path)
     diagnosis_of_labels = _read_diagnoses(diagnoses, labels)

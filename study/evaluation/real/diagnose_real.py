@@ -82,7 +82,7 @@ def diagnose_real(
         settings = DiagnosisSettings(
             names=(real_recording.name,),
             clean=() if case.reference is None else (case.reference,),
-            fitted=real_recording.model() is None,
+            fitted=real_recording.read_model() is None,
             balances=case.balances,
             time_left=time_left,
             guard=guard,
@@ -161,7 +161,7 @@ def _import_case(
 def _allows_force_balance(real_recording: RealRecording) -> bool:
     """Whether a force balance of the recording is possible: neither a given model nor a reference recording fixes its
     commands and responses."""
-    return real_recording.reference is None and real_recording.model() is None
+    return real_recording.reference is None and real_recording.read_model() is None
 
 
 def _choose_model(
@@ -169,7 +169,7 @@ def _choose_model(
 ) -> FirstModel:
     """The given model, else a linear model fitted to the recording, and its force balance where there is no reference
     recording. Raises StudyError."""
-    given_model = real_recording.model()
+    given_model = real_recording.read_model()
     if given_model is None:
         diagnosis_input = DiagnosisInput((recording,), (real_recording.name,), real_recording.found_map.files, ())
         if real_recording.reference is not None:

@@ -20,16 +20,22 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from study.errors import StudyError
 from study.evaluation.bank.answer_cases import hash_other_recordings
-from study.evaluation.bank.ask_engine import Workers, ask_engine, is_answered
+from study.evaluation.bank.ask_engine import Workers, diagnose_cases, is_answered
 from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, show_case
 from study.evaluation.bank.proof_folder import CLEAN_FOLDER, MODEL, RECORDING, SETTINGS, ProofFolder, open_proof_folder
-from study.evaluation.bank.proof_seals import answers_sealed_case, broken_seal_error, read_answer, read_label, seal
+from study.evaluation.bank.proof_seals import (
+    is_answer_to_sealed_case,
+    make_broken_seal_error,
+    read_answer,
+    read_label,
+    seal,
+)
 from study.evaluation.bank.seal_cases import format_settings
-from study.evaluation.challenge.injection.injections import applicable_injections, inject, place_of
+from study.evaluation.challenge.injection.injections import find_place, inject, list_applicable_injections
 from study.evaluation.real.diagnose_real import import_real_recording
-from study.evaluation.real.injected_halves import blank_lead_responses, draw_halves, held_out_change
+from study.evaluation.real.injected_halves import blank_lead_responses, compute_held_out_change, draw_halves
 from study.evaluation.real.real_folder import RealRecording
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.disk.text_file import write_text
 from study.store.formats.diagnosis_file import MODEL_NAME
 from study.store.formats.mechanical_model_file import read_mechanical_model, write_mechanical_model
@@ -103,7 +109,7 @@ def _write_injection(folder: ProofFolder, carriers: Sequence[Carrier], number: i
         injected = inject(faulty, effect, strength, generator)
         faulty, values = injected.recording, values | injected.values
     intact, faultless, faulty = (_remove_origin(blank_lead_responses(half)) for half in (intact, faultless, faulty))
-    change = held_out_change(intact, faultless, faulty) if effects else 1.0
+    change = compute_held_out_change(intact, faultless, faulty) if effects else 1.0
     case_folder = begin_case(folder)
     (case_folder / CLEAN_FOLDER).mkdir()
     write_recording(case_folder / RECORDING, faulty, precision="float64")
@@ -116,12 +122,12 @@ def _write_injection(folder: ProofFolder, carriers: Sequence[Carrier], number: i
         "seed": seed,
         "recording": carrier.name,
         "effects": list(effects),
-        "places": [place_of(effect) for effect in effects],
+        "places": [find_place(effect) for effect in effects],
         "strength": strength if effects else 0.0,
         "values": values,
         "change": change,
-        "recording_sha256": sha256_of(case_folder / RECORDING),
-        "model_sha256": sha256_of(case_folder / MODEL),
+        "recording_sha256": compute_sha256(case_folder / RECORDING),
+        "model_sha256": compute_sha256(case_folder / MODEL),
         "others_sha256": hash_other_recordings(case_folder),
         "salt": secrets.token_hex(16),
     }
@@ -132,11 +138,11 @@ def _write_injection(folder: ProofFolder, carriers: Sequence[Carrier], number: i
 
 def _draw_effects(recording: Recording, generator: np.random.Generator) -> tuple[str, ...]:
     """Names of one or two faults that the recording allows, in the order in which they are injected."""
-    applicable = applicable_injections(recording)
+    applicable = list_applicable_injections(recording)
     count = 2 if generator.random() < TWO_FAULTS_SHARE else 1
     effects = [str(effect) for effect in generator.choice(applicable, count, replace=False)]
     # A sensor reads the motion that all other faults have changed: its fault is injected last.
-    return tuple(sorted(effects, key=lambda effect: place_of(effect) == "sensor"))
+    return tuple(sorted(effects, key=lambda effect: find_place(effect) == "sensor"))
 
 
 def _remove_origin(recording: Recording) -> Recording:
@@ -167,11 +173,13 @@ def run_injections(
         answered += 1
         on_done(answered, count)
 
-    ask_engine(folder, names, workers, count_answer)
+    diagnose_cases(folder, names, workers, count_answer)
     labels = [read_label(folder.label_file(number)) for number in range(len(names))]
     answers = [read_answer(folder.open / name) for name in names]
     if broken_names := [
-        label["name"] for label, answer in zip(labels, answers, strict=True) if not answers_sealed_case(label, answer)
+        label["name"]
+        for label, answer in zip(labels, answers, strict=True)
+        if not is_answer_to_sealed_case(label, answer)
     ]:
-        raise broken_seal_error(broken_names, folder.path)
+        raise make_broken_seal_error(broken_names, folder.path)
     return tuple(read_outcome(label, answer) for label, answer in zip(labels, answers, strict=True))

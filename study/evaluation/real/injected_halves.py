@@ -1,4 +1,7 @@
-"""Split a real recording into an intact half and one that carries a fault, and measure how visible the fault is."""
+"""Split a real recording into an intact half and one that carries a fault, and measure how visible the fault is.
+
+Called by `inject_real`, which injects the fault into the second half.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,41 +17,46 @@ from equalizer.signals.joining import concatenate, concatenate_if_all
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
 
-MOST_SAMPLES = 5_000
-"""Longest half, and longest lead before it (samples)."""
-SHORTEST = 0.6
-"""Shortest half as a fraction of the longest possible."""
-PARTS = 4
+MAX_SAMPLES = 5_000
+"""Largest number of samples of a half, and of the lead recorded before it."""
+MIN_LENGTH_RATIO = 0.6
+"""Shortest half as a fraction of the longest possible, where halves are stretches."""
+MIN_PARTS = 4
 """From this number of parts on, halves may also be drawn from parts."""
 
 
 def draw_halves(recording: Recording, random: np.random.Generator) -> tuple[Recording, Recording]:
-    """Two random stretches of the recording, or random sets of its parts; which one stays intact is also random.
-    Both are without roles: the fit samples are drawn anew in each."""
+    """Draw two adjoining stretches of the recording, or two random sets of its parts. Returns the half that stays
+    intact and the half for the fault, in random order. Both are without roles: the fit samples are drawn anew in
+    each."""
     without_roles = replace(recording, segments=tuple(replace(segment, role="") for segment in recording.segments))
     parts = find_parts(without_roles)
-    if len(parts) >= PARTS and random.random() < 0.5:
+    if len(parts) >= MIN_PARTS and random.random() < 0.5:
         order = random.permutation(len(parts))
         part_sets = [sorted(order[: len(parts) // 2]), sorted(order[len(parts) // 2 :])]
-        first, second = (_join_parts(without_roles, [parts[k] for k in part_numbers]) for part_numbers in part_sets)
-    else:
-        half = int(min(len(recording) // 2, MOST_SAMPLES) * random.uniform(SHORTEST, 1.0))
-        start = int(random.integers(len(recording) - 2 * half + 1))
-        first, second = (
-            _half_with_lead(without_roles, start, start + half),
-            _half_with_lead(without_roles, start + half, start + 2 * half),
+        first_half, second_half = (
+            _join_parts(without_roles, [parts[part_number] for part_number in part_numbers])
+            for part_numbers in part_sets
         )
-    return (first, second) if random.random() < 0.5 else (second, first)
+    else:
+        half_length = int(min(len(recording) // 2, MAX_SAMPLES) * random.uniform(MIN_LENGTH_RATIO, 1.0))
+        start = int(random.integers(len(recording) - 2 * half_length + 1))
+        first_half, second_half = (
+            _cut_half_with_lead(without_roles, start, start + half_length),
+            _cut_half_with_lead(without_roles, start + half_length, start + 2 * half_length),
+        )
+    return (first_half, second_half) if random.random() < 0.5 else (second_half, first_half)
 
 
 def _join_parts(recording: Recording, parts: Sequence[tuple[int, int]]) -> Recording:
-    """Concatenate parts up to the length of a half; the last one may be cut."""
+    """Concatenate parts, (start, stop) in samples, up to `MAX_SAMPLES`; the last one may be cut. The meta entry "parts"
+    states their bounds."""
     stretches: list[Recording] = []
-    remaining = MOST_SAMPLES
+    remaining_samples = MAX_SAMPLES
     for start, stop in parts:
-        if remaining > 0:
-            stretches.append(cut_part(recording, start, min(stop, start + remaining)))
-            remaining -= len(stretches[-1])
+        if remaining_samples > 0:
+            stretches.append(cut_part(recording, start, min(stop, start + remaining_samples)))
+            remaining_samples -= len(stretches[-1])
     stops = np.cumsum([len(stretch) for stretch in stretches])
     starts = stops - [len(stretch) for stretch in stretches]
     segments = [
@@ -57,9 +65,9 @@ def _join_parts(recording: Recording, parts: Sequence[tuple[int, int]]) -> Recor
         for segment in stretch.segments
     ]
     part_bounds = [{"start": int(start), "stop": int(stop)} for start, stop in zip(starts, stops, strict=True)]
-    first = stretches[0]
+    first_stretch = stretches[0]
     return replace(
-        first,
+        first_stretch,
         command=concatenate([stretch.command for stretch in stretches]),
         response=concatenate([stretch.response for stretch in stretches]),
         position=concatenate_if_all([stretch.position for stretch in stretches]),
@@ -71,45 +79,51 @@ def _join_parts(recording: Recording, parts: Sequence[tuple[int, int]]) -> Recor
     )
 
 
-def _half_with_lead(recording: Recording, start: int, stop: int) -> Recording:
-    """A half begins in the middle of a motion: what was recorded before it is put in front, outside all segments, so
-    that a simulation can start from rest."""
-    lead = min(start, MOST_SAMPLES)
-    lead_and_half = cut_part(recording, start - lead, stop)
+def _cut_half_with_lead(recording: Recording, start: int, stop: int) -> Recording:
+    """Cut the samples start to stop, and put what was recorded before them in front, outside all segments: a half
+    begins in the middle of a motion, and with the lead a simulation can start from rest."""
+    lead_samples = min(start, MAX_SAMPLES)
+    lead_and_half = cut_part(recording, start - lead_samples, stop)
     half_segments = [
-        replace(segment, start=max(segment.start, lead)) for segment in lead_and_half.segments if segment.stop > lead
+        replace(segment, start=max(segment.start, lead_samples))
+        for segment in lead_and_half.segments
+        if segment.stop > lead_samples
     ]
     parts = [
-        {"start": max(part_start, start - lead) - start + lead, "stop": min(part_stop, stop) - start + lead}
+        {
+            "start": max(part_start, start - lead_samples) - start + lead_samples,
+            "stop": min(part_stop, stop) - start + lead_samples,
+        }
         for part_start, part_stop in find_parts(recording)
-        if min(part_stop, stop) > max(part_start, start - lead)
+        if min(part_stop, stop) > max(part_start, start - lead_samples)
     ]
     meta = {key: value for key, value in recording.meta.items() if key != "parts"}
     return replace(
         lead_and_half,
-        segments=tuple(half_segments) or (Segment(lead, len(lead_and_half), "noise", 0.0),),
+        segments=tuple(half_segments) or (Segment(lead_samples, len(lead_and_half), "noise", 0.0),),
         meta={**meta, "parts": parts} if len(parts) > 1 else meta,
     )
 
 
 def blank_lead_responses(recording: Recording) -> Recording:
-    """The recording whose lead keeps only the command; the responses there are NaN."""
-    lead = min((segment.start for segment in recording.segments), default=0)
-    position = None if recording.position is None else _blank_lead(recording.position, lead)
-    return replace(recording, response=_blank_lead(recording.response, lead), position=position)
+    """The recording with NaN as response and position in its lead, the samples before the first segment; the command
+    there is kept."""
+    lead_samples = min((segment.start for segment in recording.segments), default=0)
+    position = None if recording.position is None else _blank_lead(recording.position, lead_samples)
+    return replace(recording, response=_blank_lead(recording.response, lead_samples), position=position)
 
 
-def _blank_lead(signal: Signal, lead: int) -> Signal:
-    """The signal with NaN in the lead."""
+def _blank_lead(signal: Signal, lead_samples: int) -> Signal:
+    """The signal with NaN in its first `lead_samples` samples."""
     samples = signal.samples.copy()
-    samples[:lead] = np.nan
+    samples[:lead_samples] = np.nan
     return replace(signal, samples=samples)
 
 
-def held_out_change(intact: Recording, faultless: Recording, faulty: Recording) -> float | None:
-    """Visibility of a fault: ratio of the prediction error on the half with the fault to that on the same half without
-    it, for a model fitted to the intact half; in the axis or channel where it is largest. None where no model can be
-    fitted.
+def compute_held_out_change(intact: Recording, faultless: Recording, faulty: Recording) -> float | None:
+    """Compute the visibility of a fault: ratio of the prediction error on the half with the fault to that on the same
+    half without it, for a model fitted to the intact half; in the axis or channel where it differs most from 1, by its
+    logarithm. None where no model can be fitted.
 
     The model is the baseline of a comparison: forces along the motion where they balance, otherwise an autoregression
     of each reading. It contains no faults.
@@ -130,15 +144,17 @@ def held_out_change(intact: Recording, faultless: Recording, faulty: Recording) 
 
 
 def _measure_error(base: Base, clean_parts: tuple[Part, ...], other_parts: tuple[Part, ...]) -> float:
-    """Rms residual on the other parts of a base model fitted to the clean ones."""
+    """Rms residual, on the other parts, of a base model fitted to the clean ones by least squares; in the unit of the
+    model's first column."""
     clean_rows, other_rows = _stack_rows(base, clean_parts), _stack_rows(base, other_parts)
-    size = np.sqrt(np.mean(clean_rows**2, axis=0))
-    size = np.where(size > 0, size, 1.0)
-    weights = solve_residual_weights((clean_rows / size).T @ (clean_rows / size)) / size
-    return float(np.sqrt(np.mean((other_rows @ weights * size[0]) ** 2)))
+    column_rms = np.sqrt(np.mean(clean_rows**2, axis=0))
+    column_rms = np.where(column_rms > 0, column_rms, 1.0)
+    weights = solve_residual_weights((clean_rows / column_rms).T @ (clean_rows / column_rms)) / column_rms
+    return float(np.sqrt(np.mean((other_rows @ weights * column_rms[0]) ** 2)))
 
 
 def _stack_rows(base: Base, parts: tuple[Part, ...]) -> FloatArray:
+    """(n, k): rows of the model's regression at the valid samples of all parts."""
     return np.vstack(
         [part[mask] for part, mask in zip(base.build_rows(parts), base.mask_valid_samples(parts), strict=True)]
     )

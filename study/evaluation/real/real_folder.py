@@ -1,14 +1,14 @@
 """Inventory of a folder of real recordings: sub-folders of recordings with maps that say how to read them.
 
 A map may also say that a recording only tests another's diagnosis (`tests`), and that two were made before and after a
-change of the device (`pair`); see `[diagnosis]` in docs/importing.md.
+change of the device (`pair`); see `[diagnosis]` in docs/importing.md. Called by `real_recordings`.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.reports.real_report import Trouble
+from analysis.reports.real_report import UnusableInput
 from equalizer.plant.mechanical_model import MechanicalModel
 from study.errors import StudyError
 from study.importing.map_library import FoundMap, find_map, map_by_header
@@ -21,37 +21,40 @@ class RealRecording:
     """One recording to diagnose."""
 
     folder: Path
+    """Sub-folder in which it lies."""
     found_map: FoundMap
+    """Its files, and the map that says how to read them."""
     tests: tuple[FoundMap, ...] = ()
     """Recordings of the same device that are only predicted."""
     reference: FoundMap | None = None
     """Recording of the same device before something was changed on it."""
     changed: str = ""
-    """That change in words."""
+    """That change in words; empty without a reference."""
 
     @property
     def name(self) -> str:
         """Name of the recording, by its map."""
         return self.found_map.name
 
-    def model(self) -> MechanicalModel | None:
-        """The given model; None where a linear one is to be fitted. Raises StudyError."""
-        path = self._model_path()
+    def read_model(self) -> MechanicalModel | None:
+        """Read the model that the map names; None where it names none, so that a linear one is to be fitted. Raises
+        StudyError."""
+        path = self._find_model_path()
         return None if path is None else read_mechanical_model(path)
 
     @property
     def parents(self) -> tuple[Path, ...]:
-        """Input files of the diagnosis: recordings, map, and the model if given."""
+        """Input files of the diagnosis: recordings, map, and the model if the map names one that exists."""
         reference_files = () if self.reference is None else self.reference.files
         try:
-            model = self._model_path()
+            model_path = self._find_model_path()
         except StudyError:
-            model = None
+            model_path = None
         return (
             *self.found_map.files,
             *reference_files,
             self.found_map.source.path,
-            *(() if model is None else (model,)),
+            *(() if model_path is None else (model_path,)),
         )
 
     @property
@@ -59,7 +62,8 @@ class RealRecording:
         """Files of the recordings that are only predicted, and their maps."""
         return tuple(path for test in self.tests for path in (*test.files, test.source.path))
 
-    def _model_path(self) -> Path | None:
+    def _find_model_path(self) -> Path | None:
+        """Path of the model that the map names; None where it names none. Raises StudyError for an unknown model."""
         model_name = self.found_map.source.map.diagnosis.model
         return model_for(model_name, self.folder) if model_name else None
 
@@ -69,13 +73,13 @@ class RealFolder:
     """Recordings found in a folder, and the sub-folders that could not be used."""
 
     recordings: tuple[RealRecording, ...]
-    troubles: tuple[Trouble, ...]
+    troubles: tuple[UnusableInput, ...]
     """Why a sub-folder could not be used, by its name."""
 
 
 def read_real_folder(folder: Path) -> RealFolder:
-    """Recordings of the sub-folders in alphabetical order; of the folder itself where it has none. Raises StudyError
-    where there is no such folder."""
+    """Find the recordings of the sub-folders in alphabetical order, or of the folder itself where it has no
+    sub-folders. Names that begin with a dot are left out. Raises StudyError where there is no such folder."""
     if not folder.is_dir():
         raise StudyError(
             "There is no such folder",
@@ -85,18 +89,19 @@ def read_real_folder(folder: Path) -> RealFolder:
         )
     subfolders = sorted(path for path in folder.iterdir() if path.is_dir() and not path.name.startswith("."))
     recordings: list[RealRecording] = []
-    troubles: list[Trouble] = []
+    troubles: list[UnusableInput] = []
     for subfolder in subfolders or [folder]:
         try:
             new_recordings = _select_recordings(subfolder, find_map(subfolder) or (map_by_header(subfolder),))
         except (StudyError, OSError) as problem:
-            troubles.append(Trouble(subfolder.name, _describe_problem(problem)))
+            troubles.append(UnusableInput(subfolder.name, _describe_problem(problem)))
             continue
         recordings += new_recordings
     return RealFolder(tuple(recordings), tuple(troubles))
 
 
 def _describe_problem(problem: StudyError | OSError) -> str:
+    """Why a sub-folder could not be used, as a sentence."""
     return problem.happened if isinstance(problem, StudyError) else f"{problem.strerror or problem}."
 
 
@@ -120,8 +125,8 @@ def _is_test_of(test: FoundMap, base: FoundMap) -> bool:
         return False
     if tested_name == base.name:
         return True
-    same_stem = test.files[0].stem.split("_")[0] == base.files[0].stem.split("_")[0]
-    return tested_name == base.source.name and (not base.source.map.separate or same_stem)
+    has_same_stem = test.files[0].stem.split("_")[0] == base.files[0].stem.split("_")[0]
+    return tested_name == base.source.name and (not base.source.map.separate or has_same_stem)
 
 
 def _find_pair(found_map: FoundMap, found_maps: Sequence[FoundMap]) -> tuple[FoundMap | None, str]:
@@ -142,4 +147,5 @@ def _find_pair(found_map: FoundMap, found_maps: Sequence[FoundMap]) -> tuple[Fou
 
 
 def _fits_pattern(found_map: FoundMap, pattern: str) -> bool:
+    """Whether the first file of a recording matches a pattern of file names."""
     return found_map.files[0].match(pattern)

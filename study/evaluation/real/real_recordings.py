@@ -33,7 +33,7 @@ from study.evaluation.real.reuse_answers import (
     locate_answer_folder,
 )
 from study.evaluation.real.write_real import PAGE_NAME, RealResults, WrittenReal, write_real
-from study.local_clock import machine_zone
+from study.local_clock import convert_to_machine_zone
 from study.session.views.local_time import format_time_in_zone
 from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.folder_contents import Files, read_files, write_files
@@ -108,7 +108,7 @@ def diagnose_folder(
         return write_real(
             plan.out,
             RealResults(answers, inventory.troubles, injected),
-            format_time_in_zone(used_clock.utc(), machine_zone),
+            format_time_in_zone(used_clock.utc(), convert_to_machine_zone),
         )
 
 

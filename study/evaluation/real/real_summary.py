@@ -3,7 +3,7 @@
 from analysis.diagnosis.real_answer.real_answer import RealAnswer
 from analysis.diagnosis.unit_wording import format_error
 from analysis.evaluation.blind_test.injected import score_injections
-from analysis.reports.injected_section import figure_text
+from analysis.reports.injected_section import format_rate
 from analysis.reports.real_report import VERDICT_WORDS
 from study.evaluation.real.write_real import WrittenReal
 
@@ -14,7 +14,7 @@ def real_lines(written: WrittenReal) -> tuple[str, ...]:
     results = written.results
     troubles = tuple(f"Could not be used: {trouble.location}: {trouble.reason}" for trouble in results.troubles)
     figures = score_injections(results.injected) if results.injected else ()
-    injected_lines = tuple(f"Injected: {figure.name}: {figure_text(figure)}" for figure in figures)
+    injected_lines = tuple(f"Injected: {figure.name}: {format_rate(figure)}" for figure in figures)
     lines = (*(_format_answer(answer) for answer in results.answers), *troubles, *injected_lines)
     return (*lines, "", f"Page: {written.page}", f"Table: {written.table}")
 

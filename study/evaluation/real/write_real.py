@@ -7,7 +7,7 @@ from pathlib import Path
 from analysis.diagnosis.real_answer.real_answer import RealAnswer
 from analysis.evaluation.blind_test.injected import InjectedOutcome
 from analysis.figures.diagnosis.real_held_out import make_real_picture
-from analysis.reports.real_report import Trouble, render_real_report
+from analysis.reports.real_report import UnusableInput, render_real_report
 from study.store.disk.csv_rows import format_csv_table
 from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.provenance import gather_provenance
@@ -69,7 +69,7 @@ class RealResults:
     """Answers for a folder of real recordings, files that could not be used, and outcomes of injected faults."""
 
     answers: tuple[RealAnswer, ...]
-    troubles: tuple[Trouble, ...]
+    troubles: tuple[UnusableInput, ...]
     injected: tuple[InjectedOutcome, ...] = ()
 
 

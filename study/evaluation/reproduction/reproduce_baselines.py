@@ -1,7 +1,8 @@
 """Play baseline methods of equalization on the simulated device, for comparison with the equalizer.
 
 Each method is played at the centre of the workspace, near its edge, and in a simulated hand. All baselines are designed
-from the data of the centre without a hand; `equalizer.tracking.feedforward.baselines` defines them.
+from the data of the centre without a hand; `equalizer.tracking.feedforward.baselines` defines them. Called by the
+reproduction of the figures (`study.evaluation.reproduction`).
 """
 
 from collections.abc import Callable
@@ -9,10 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.evaluation.reproduction.played_response import PlayedResponse, lines_of_band
+from analysis.evaluation.reproduction.played_response import PlayedResponse, mask_lines_in_band
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.tracking.feedforward.baselines import Inverse, baseline_inverses
+from equalizer.tracking.feedforward.baselines import Inverse, compute_baseline_inverses
 from equalizer.tracking.workspace.blended_inverse import blend_at
 from study.evaluation.reproduction.reproduce_equalized import (
     PlacedModels,
@@ -25,9 +26,10 @@ from study.evaluation.reproduction.reproduction_plan import CENTRE, EDGE, Place,
 
 @dataclass(frozen=True, slots=True)
 class _Placement:
-    """Place of the handle (m), and whether a simulated hand holds it. words: its description in the name of a row."""
+    """Place of the handle (m), and whether a simulated hand holds it. description: its words in the name of
+    a row."""
 
-    words: str
+    description: str
     place_m: Place
     hand: bool
 
@@ -48,26 +50,28 @@ def play_baselines(
 
     estimate: frequency response at the centre, including the spring. on_share: called with the fraction done, 0 to 1.
     """
-    inverses = baseline_inverses(models.centre, estimate, _band_lines_hz(plan, models.centre.sample_rate_hz))
-    total = len(_PLACEMENTS) * len(inverses) + 2
+    inverses = compute_baseline_inverses(
+        models.centre, estimate, _list_band_frequencies_hz(plan, models.centre.sample_rate_hz)
+    )
+    row_count = len(_PLACEMENTS) * len(inverses) + 2
     responses: list[PlayedResponse] = []
     for placement in _PLACEMENTS:
         for inverse in inverses:
             row = PlaybackRow(
-                f"{inverse.name}, {placement.words}",
+                f"{inverse.name}, {placement.description}",
                 _make_driver(plan, inverse),
                 placement.place_m,
                 hand=placement.hand,
             )
             response = replace(play_row(plan, row), multiply_adds=inverse.multiply_adds)
             responses.append(response)
-            on_share(len(responses) / total)
-        responses += [play_row(plan, row) for row in _equalizers_for_placement(placement, models)]
-        on_share(len(responses) / total)
+            on_share(len(responses) / row_count)
+        responses += [play_row(plan, row) for row in _make_equalizer_rows(placement, models)]
+        on_share(len(responses) / row_count)
     return tuple(responses)
 
 
-def _equalizers_for_placement(placement: _Placement, models: PlacedModels) -> tuple[PlaybackRow, ...]:
+def _make_equalizer_rows(placement: _Placement, models: PlacedModels) -> tuple[PlaybackRow, ...]:
     """The equalizer designed for a condition: from the model identified in the hand, or at the edge from the blended
     models of other places; none at the centre."""
     if placement.hand:
@@ -81,20 +85,23 @@ def _equalizers_for_placement(placement: _Placement, models: PlacedModels) -> tu
     return ()
 
 
-def _band_lines_hz(plan: ReproductionPlan, rate_hz: float) -> FloatArray:
-    """(lines,): frequencies (Hz) of the spectral lines of one period that lie in the band."""
-    period = round(plan.period_s * rate_hz)
+def _list_band_frequencies_hz(plan: ReproductionPlan, rate_hz: float) -> FloatArray:
+    """(lines,): frequencies (Hz) of the spectral lines in the band, for the period of the plan.
+    rate_hz: sample rate."""
+    period_samples = round(plan.period_s * rate_hz)
     return np.asarray(
-        np.fft.rfftfreq(period, 1 / rate_hz)[lines_of_band(plan.band_hz, period, rate_hz)], dtype=np.float64
+        np.fft.rfftfreq(period_samples, 1 / rate_hz)[mask_lines_in_band(plan.band_hz, period_samples, rate_hz)],
+        dtype=np.float64,
     )
 
 
 def _make_driver(plan: ReproductionPlan, inverse: Inverse) -> Driver:
-    """The driver that multiplies the spectrum of the wanted acceleration by the inverse, line by line in the band;
-    other lines are zero."""
+    """The driver that multiplies the spectrum of the target acceleration by the inverse, line by line in the band, to
+    give the forces (n, axes), N; lines outside the band are zero."""
 
     def drive(target: Signal) -> FloatArray:
-        band_lines = lines_of_band(plan.band_hz, len(target), target.sample_rate_hz)
+        """Forces (n, axes), N, for a period of the target acceleration."""
+        band_lines = mask_lines_in_band(plan.band_hz, len(target), target.sample_rate_hz)
         spectrum = np.fft.rfft(target.samples, axis=0)
         forces = np.zeros((len(spectrum), inverse.response.shape[1]), dtype=complex)
         forces[band_lines] = np.einsum("lmp,lp->lm", inverse.response, spectrum[band_lines])

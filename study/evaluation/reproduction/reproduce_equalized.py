@@ -8,7 +8,7 @@ from analysis.evaluation.reproduction.equalized_findings import EqualizedRows
 from analysis.evaluation.reproduction.played_response import PlayedResponse, normalise_gain
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.tracking.feedforward.periodic_inverse import periodic_command
+from equalizer.tracking.feedforward.periodic_inverse import compute_periodic_command
 from equalizer.tracking.workspace.blended_inverse import blend_at
 from equalizer.tracking.workspace.modal_interpolation import build_modal_interpolation
 from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError
@@ -68,7 +68,7 @@ def make_blending_driver(models: ModelsAtPlace) -> Driver:
     """Driver with the weighted sum of the forces that each model computes (`ModelsAtPlace.forces`)."""
 
     def drive(target: Signal) -> FloatArray:
-        return models.forces(lambda model: periodic_command(model, target).samples)
+        return models.compute_forces(lambda model: compute_periodic_command(model, target).samples)
 
     return drive
 
@@ -101,7 +101,7 @@ def _list_rows(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, Playba
 
 def make_single_model_driver(model: IdentifiedModel) -> Driver:
     """Driver by the periodic inverse of a single model."""
-    return lambda target: periodic_command(model, target).samples
+    return lambda target: compute_periodic_command(model, target).samples
 
 
 def _interpolate_modes(workspace: WorkspaceModels) -> tuple[dict[str, PlaybackRow], tuple[str, ...]]:

@@ -9,7 +9,7 @@ from analysis.evaluation.reproduction.document import UsedModel
 from analysis.evaluation.reproduction.measured_device import MeasuredDevice
 from analysis.psychophysics.ellipsoid import EllipsoidResult, compute_ellipsoids, read_sensor_frame
 from analysis.psychophysics.study_analysis import analyse_study
-from equalizer.identification.frequency_response.coupling_onset import coupling_onset
+from equalizer.identification.frequency_response.coupling_onset import find_coupling_onset
 from equalizer.identification.frequency_response.resonances import find_resonances
 from equalizer.identification.frequency_response.transfer_estimate import TransferEstimateError, estimate_transfer
 from equalizer.identification.state_space.held_out_validation import HeldOutValidation, validate_on_test
@@ -24,7 +24,7 @@ from study.evaluation.reproduction.reproduction_plan import INTERMEDIATE_PLACES,
 from study.evaluation.reproduction.reproduction_results import Results
 from study.evaluation.reproduction.write_reproduction import WrittenReproduction, write_reproduction_folder
 from study.store.disk.file_errors import CannotWriteError, UnusableFileError
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.protocol_files import read_study_protocol
 from study.workflows.equalizer.identify_model import IdentifyPlan, identify_model
@@ -73,7 +73,7 @@ def _load_cached_model(path: Path, plan: ReproductionPlan, source: Path) -> Iden
     if model is None or model.quality is None or (model.order, model.band_hz) != (plan.order, plan.band_hz):
         return None
     parents = [parent.get("sha256") for parent in model.provenance.get("parents", ())]
-    return model if parents == [sha256_of(source)] else None
+    return model if parents == [compute_sha256(source)] else None
 
 
 def use_excitation_as_command(recording: Recording) -> Recording:
@@ -212,7 +212,7 @@ def _collect_results(
 def _measure_device(recording: Recording) -> MeasuredDevice:
     """Frequency response of the sweep, its resonances and the onset of coupling."""
     response = estimate_transfer((recording,))
-    return MeasuredDevice(response, find_resonances(response), coupling_onset(response))
+    return MeasuredDevice(response, find_resonances(response), find_coupling_onset(response))
 
 
 def _measure_ellipsoids(recording: Recording) -> tuple[EllipsoidResult, ...]:

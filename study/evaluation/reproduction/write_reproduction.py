@@ -7,11 +7,11 @@ from pathlib import Path
 from analysis.evaluation.reproduction.document import FigureFindings, Reproduction
 from analysis.evaluation.reproduction.ellipsoid_findings import ellipsoid_findings
 from analysis.evaluation.reproduction.equalized_findings import make_equalized_findings
-from analysis.evaluation.reproduction.played_response import describe_played
+from analysis.evaluation.reproduction.played_response import make_played_row
 from analysis.evaluation.reproduction.response_findings import make_band_findings, make_response_findings
 from analysis.evaluation.reproduction.study_findings import find_direction_limit, make_study_findings
 from analysis.figures.reproduction_pictures import reproduction_pictures
-from analysis.reports.reproduction_report import overview_lines, render_reproduction_report
+from analysis.reports.reproduction_report import render_reproduction_report, summarise_figures
 from equalizer.identification.frequency_response.frequency_bands import (
     PUBLISHED_DIRECTION_LIMIT_HZ,
     FrequencyBand,
@@ -19,7 +19,7 @@ from equalizer.identification.frequency_response.frequency_bands import (
 )
 from study.evaluation.reproduction.reproduction_plan import ReproductionPlan
 from study.evaluation.reproduction.reproduction_results import Results
-from study.local_clock import local_now
+from study.local_clock import format_local_now
 from study.store.disk.provenance import Provenance, gather_provenance
 from study.store.disk.text_file import write_text
 from study.store.formats.reproduction_file import REPRODUCTION_NAME, write_reproduction
@@ -37,7 +37,9 @@ class WrittenReproduction:
     lines: tuple[str, ...]
     """One line per figure, for a terminal."""
     document: Path
+    """Path of the document of numbers (JSON)."""
     report: Path
+    """Path of the page (HTML)."""
 
 
 def write_reproduction_folder(
@@ -56,15 +58,15 @@ def write_reproduction_folder(
     on_share(0.2)
     write_pictures(plan.figures, [picture for figure_pictures in pictures.values() for picture in figure_pictures])
     on_share(0.8)
-    origin = gather_provenance(
+    provenance = gather_provenance(
         protocol_hash=results.protocol_hash, seeds={"reproduction": plan.seed}, parents=results.sources
     )
     document, report = plan.out / REPRODUCTION_NAME, plan.out / PAGE_NAME
-    write_reproduction(document, reproduction, origin)
-    page = render_reproduction_report(reproduction, pictures, _origin_entries(origin), local_now())
-    write_text(report, page, overwrite=True)
+    write_reproduction(document, reproduction, provenance)
+    page_html = render_reproduction_report(reproduction, pictures, _format_provenance(provenance), format_local_now())
+    write_text(report, page_html, overwrite=True)
     on_share(1.0)
-    return WrittenReproduction(reproduction, overview_lines(reproduction), document, report)
+    return WrittenReproduction(reproduction, summarise_figures(reproduction), document, report)
 
 
 def _make_document(
@@ -88,26 +90,26 @@ def _make_document(
             make_study_findings(results.study),
             ellipsoid_findings(results.ellipsoids),
             make_response_findings(results.device.response, results.device.resonances, results.device.onset),
-            _equalization_findings(results),
+            _make_equalization_findings(results),
         ),
-        played=tuple(describe_played(row) for row in (*playback.rows.all, *playback.table_rows)),
-        baselines=tuple(describe_played(row) for row in results.baselines),
+        played=tuple(make_played_row(row) for row in (*playback.rows.all, *playback.table_rows)),
+        baselines=tuple(make_played_row(row) for row in results.baselines),
         models=results.models,
     )
 
 
-def _equalization_findings(results: Results) -> FigureFindings:
+def _make_equalization_findings(results: Results) -> FigureFindings:
     """Findings on figure 5, with the errors of the tested models with and without friction where both are known."""
     with_friction, frictionless = results.tested, results.tested_frictionless
     errors = (with_friction.error, frictionless.error) if with_friction and frictionless else None
     return make_equalized_findings(results.played.rows, errors, (*results.remarks, *results.played.remarks))
 
 
-def _origin_entries(origin: Provenance) -> dict[str, str]:
+def _format_provenance(provenance: Provenance) -> dict[str, str]:
     """Provenance as entries of the last section of the page."""
     return {
-        "recordings": ", ".join(f"{parent.file} ({parent.sha256[:12]})" for parent in origin.parents),
-        "study protocol": f"hash {origin.protocol_hash}",
-        "versions": ", ".join(f"{name} {version}" for name, version in origin.versions.items()),
-        "command": " ".join(origin.command),
+        "recordings": ", ".join(f"{parent.file} ({parent.sha256[:12]})" for parent in provenance.parents),
+        "study protocol": f"hash {provenance.protocol_hash}",
+        "versions": ", ".join(f"{name} {version}" for name, version in provenance.versions.items()),
+        "command": " ".join(provenance.command),
     }

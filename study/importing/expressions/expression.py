@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from study.importing.expressions.budget import Budget
 from study.importing.expressions.functions import FUNCTIONS, Clock, Value
-from study.importing.map_format.map_errors import ImportProblemError, suggestion
+from study.importing.map_format.map_errors import ImportProblemError, suggest_name
 
 Lookup = Callable[[str], Value]
 """Returns the value of a name. Raises ImportProblemError for an unknown name."""
@@ -173,7 +173,7 @@ class _Evaluation:
             return self._look_up_array(arguments)
         if name not in FUNCTIONS:
             raise ImportProblemError(
-                f"in '{self.text}' there is no function '{name}'{suggestion(name, FUNCTIONS)}; {ALLOWED}"
+                f"in '{self.text}' there is no function '{name}'{suggest_name(name, FUNCTIONS)}; {ALLOWED}"
             )
         function = FUNCTIONS[name]
         if not function.min_arguments <= len(arguments) <= function.max_arguments:

@@ -14,7 +14,7 @@ from study.importing.arrays.mat_arrays import suggest_conversion
 from study.importing.expressions.budget import Budget
 from study.importing.expressions.expression import evaluate
 from study.importing.expressions.functions import Clock, Value
-from study.importing.map_format.map_errors import ImportProblemError, suggestion
+from study.importing.map_format.map_errors import ImportProblemError, suggest_name
 from study.importing.map_format.signal_words import split_bracketed_unit
 
 _MAX_LISTED_ARRAYS = 24
@@ -68,7 +68,7 @@ class Namespace:
             raise ImportProblemError("clock_s is known in [[computed]] channels only, on the recording's grid")
         names = [*self.arrays, *self.definitions]
         raise ImportProblemError(
-            f"there is no array '{name}' in {self.file_name}{suggestion(name, names)}; there are {self.list_names()}"
+            f"there is no array '{name}' in {self.file_name}{suggest_name(name, names)}; there are {self.list_names()}"
         )
 
     def has_name(self, name: str) -> bool:

@@ -1,4 +1,4 @@
-"""Errors of an import: what is wrong, and what to do about it."""
+"""Errors of an import, raised throughout `study.importing`: what is wrong, and what to do about it."""
 
 import re
 from collections.abc import Iterable
@@ -8,13 +8,13 @@ from itertools import islice
 from analysis.wording import format_sentence
 from study.errors import StudyError, WrongUseError
 
-_LONGEST_WORD = 60
-"""Most characters of a name that are compared and shown."""
-_LONGEST_SENTENCE = 2000
-"""Most characters of a message."""
-_MOST_NAMES = 500
-"""Most known names with which an unknown name is compared."""
-_QUOTED = re.compile(rf"(?<!\w)'([^']{{{_LONGEST_WORD}}})[^']+'(?!\w)")
+_MAX_WORD_LENGTH = 60
+"""Largest number of characters of a name that are compared and shown."""
+_MAX_SENTENCE_LENGTH = 2000
+"""Largest number of characters of a message."""
+_MAX_NAMES = 500
+"""Largest number of known names with which an unknown name is compared."""
+_LONG_QUOTATION = re.compile(rf"(?<!\w)'([^']{{{_MAX_WORD_LENGTH}}})[^']+'(?!\w)")
 """A quotation that is longer than a message may show."""
 
 NOTHING_WRITTEN = "Nothing was written."
@@ -27,25 +27,26 @@ class ImportProblemError(ValueError):
 
 
 class ImportRefusedError(StudyError):
-    """An import that failed. subject: the files; problem: a clause; remedy: remedy, by default to correct the map."""
+    """An import that failed. subject: the files, for the title; problem: what is wrong, a clause; remedy: what to do, a
+    sentence, by default to correct the map."""
 
     def __init__(self, subject: str, problem: str, remedy: str = "") -> None:
         super().__init__(
             title=f"{subject} cannot be imported",
-            happened=_sentence(problem),
+            happened=_format_problem(problem),
             saved=NOTHING_WRITTEN,
             do_now=remedy or "Correct the map (docs/importing.md lists its keys) and import again.",
         )
 
 
 class MapNeededError(WrongUseError):
-    """An import without a map of a file whose arrays are not all understood. reason: what is open; skeleton: a map for
-    this file, to be completed."""
+    """An import without a map of a file whose arrays are not all understood. reason: what is not understood, a clause;
+    skeleton: text of a map for this file, to be completed."""
 
     def __init__(self, file: str, reason: str, skeleton: str) -> None:
         super().__init__(
             title=f"{file} needs a map",
-            happened=_sentence(reason),
+            happened=_format_problem(reason),
             saved=NOTHING_WRITTEN,
             do_now="A map for this file follows on the standard output: keep it as MAP.toml, complete it, and import "
             "again with --map MAP.toml.",
@@ -53,20 +54,20 @@ class MapNeededError(WrongUseError):
         self.skeleton = skeleton
 
 
-def _sentence(problem: str) -> str:
-    """The problem as a sentence. Long quotations and long lists are shortened: a name in a damaged file may have a
+def _format_problem(problem: str) -> str:
+    """Format a problem as a sentence. Long quotations and long lists are shortened: a name in a damaged file may have a
     million letters."""
-    text = _QUOTED.sub(r"'\1…'", problem)
-    if len(text) > _LONGEST_SENTENCE:
-        text = f"{text[:_LONGEST_SENTENCE].rpartition('; ')[0] or text[:_LONGEST_SENTENCE]}; and more"
+    text = _LONG_QUOTATION.sub(r"'\1…'", problem)
+    if len(text) > _MAX_SENTENCE_LENGTH:
+        text = f"{text[:_MAX_SENTENCE_LENGTH].rpartition('; ')[0] or text[:_MAX_SENTENCE_LENGTH]}; and more"
     return format_sentence(text)
 
 
-def suggestion(word: str, known_names: Iterable[str]) -> str:
-    """The clause "; did you mean 'x'" with the known name x that is most similar; empty without a similar name."""
-    names = list(islice(known_names, _MOST_NAMES))  # comparing a name of a million letters would take minutes
+def suggest_name(word: str, known_names: Iterable[str]) -> str:
+    """Make the clause "; did you mean 'x'" with the known name x that is most similar; empty without a similar name."""
+    names = list(islice(known_names, _MAX_NAMES))  # comparing a name of a million letters would take minutes
     matches = (
-        get_close_matches(word[:_LONGEST_WORD], names, n=1)
+        get_close_matches(word[:_MAX_WORD_LENGTH], names, n=1)
         or [name for name in names if name.lower() == word.lower()][:1]
     )
     return f"; did you mean '{matches[0]}'" if matches else ""

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from protocols.document.schema import Node, Place, describe_allowed, find_node, list_keys, resolve_reference
+from protocols.document.schema import Node, ValuePath, describe_allowed, find_node, list_keys, resolve_reference
 from protocols.document.validation_messages import describe_value, find_nearest_key, format_key_path
 from study.importing.map_format.import_map import ImportMap
 from study.store.disk.file_errors import UnusableFileError
@@ -51,7 +51,7 @@ def is_map(values: dict[str, Any]) -> bool:
 def _describe_errors(errors: Sequence[Any]) -> Iterator[str]:
     """A clause for each validation error of pydantic."""
     for error in errors:
-        place: Place = error["loc"]
+        place: ValuePath = error["loc"]
         if error["type"] == "json_invalid":  # nested too deeply
             yield f"it cannot be read: {error['msg']}"
             continue
@@ -64,7 +64,7 @@ def _describe_errors(errors: Sequence[Any]) -> Iterator[str]:
             yield f"{key} is {_quote_value(error['input'])}; it must be {_describe_allowed(place)}"
 
 
-def _describe_unknown_key(key: str, place: Place) -> str:
+def _describe_unknown_key(key: str, place: ValuePath) -> str:
     table = find_node(MAP_SCHEMA, place[:-1])
     known_keys = list_keys(MAP_SCHEMA, table) if table else ()
     nearest = find_nearest_key(str(place[-1]), known_keys)
@@ -77,7 +77,7 @@ def _quote_value(value: Any) -> str:
     return f'"{value}"' if isinstance(value, str) else describe_value(value)
 
 
-def _describe_allowed(place: Place) -> str:
+def _describe_allowed(place: ValuePath) -> str:
     node = find_node(MAP_SCHEMA, place)
     if node is None:
         parent = resolve_reference(MAP_SCHEMA, find_node(MAP_SCHEMA, place[:-1]) or {})

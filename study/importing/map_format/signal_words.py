@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
-from equalizer.signals.quantity_words import SEVERAL_MEANINGS, quantity_in, words_in
+from equalizer.signals.quantity_words import WORDS_NEEDING_UNIT, detect_quantity, split_into_words
 from equalizer.signals.units import (
     QUANTITY_UNITS,
     UNSTATED,
@@ -135,7 +135,7 @@ def parse_signal_name(header: str) -> ParsedName:
     contradiction between both is a doubt."""
     name, unit = split_bracketed_unit(header)
     foreign_word = max((stated for stated in FOREIGN_WORDS if stated in name.lower()), key=len, default="")
-    stated = quantity_in(name) if FOREIGN_WORDS.get(foreign_word, "time") == "time" else FOREIGN_WORDS[foreign_word]
+    stated = detect_quantity(name) if FOREIGN_WORDS.get(foreign_word, "time") == "time" else FOREIGN_WORDS[foreign_word]
     unit_text = unit or split_unit_at_end(name)[1]
     try:
         parsed_unit = parse_unit(unit_text)
@@ -154,7 +154,7 @@ def parse_signal_name(header: str) -> ParsedName:
     try:
         check_quantity(stated, parsed_unit)
     except UnknownUnitError:
-        if SEVERAL_MEANINGS & set(words_in(name)):
+        if WORDS_NEEDING_UNIT & set(split_into_words(name)):
             return ParsedName(header, name, unit_text, by_unit, "")
         hint = suggest_force_unit(stated, parsed_unit)
         doubt = f"its name says {stated}, its unit, {unit_text}, says {by_unit}{hint}"
@@ -250,7 +250,7 @@ def _find_stated_roles(columns: Sequence[ParsedName]) -> list[_Role]:
     textbook_roles = _TEXTBOOK_ROLES if {"u", "y"} <= first_words and "x" not in first_words else {}
     roles: list[_Role] = []
     for column in columns:
-        words = words_in(column.name)
+        words = split_into_words(column.name)
         role_of_name: _Role = _ROLE_OF_NAME.get(words[0], "") if len(words) == 1 else ""
         default_role = role_of_name or (textbook_roles.get(words[0], "") if words else "")
         roles.append(next((_ROLE_OF_WORD[word] for word in words if word in _ROLE_OF_WORD), default_role))

@@ -1,7 +1,8 @@
-"""Meaning of a level where stimuli are equalized: a wanted acceleration, equal for both directions.
+"""Meaning of a level where stimuli are equalized: a target acceleration, equal for both directions.
 
 Levels remain forces in newtons, so that cap, steps and rules do not change: a level is the larger of the two forces
 that the directions need for the same acceleration. Both directions therefore reach the cap at the same acceleration.
+The facts are written into the log when a session is opened; `due_trial` and the modules of trials convert levels.
 """
 
 from pydantic.dataclasses import dataclass
@@ -16,9 +17,9 @@ class LevelScale:
 
     frequency_hz: FrequencyHz
     n_per_mps2: Positive
-    """Level for a wanted acceleration of 1 m/s²."""
+    """Level for a target acceleration of 1 m/s² (N per m/s²)."""
     reachable_mps2: Magnitude
-    """Acceleration at the cap of the staircase, in either direction."""
+    """Acceleration at the cap of the staircase, in either direction (m/s²)."""
 
 
 @dataclass(frozen=True, config=FACT)
@@ -35,9 +36,11 @@ class EqualizedFacts:
     """Errors of the model, and how they were measured, in words; empty in logs of earlier versions."""
 
 
-def acceleration_of_level(equalized: EqualizedFacts | None, level_n: float, frequency_hz: float) -> float | None:
-    """Acceleration (m/s^2) that a level (N) stands for; None where levels are commanded forces. Raises ValueError
-    for a frequency without a scale."""
+def convert_level_to_acceleration(
+    equalized: EqualizedFacts | None, level_n: float, frequency_hz: float
+) -> float | None:
+    """Convert a level (N) to the acceleration (m/s^2) that it stands for; None where levels are commanded forces.
+    Raises ValueError for a frequency without a scale."""
     if equalized is None:
         return None
     scale = next((scale for scale in equalized.levels if scale.frequency_hz == frequency_hz), None)
@@ -46,8 +49,9 @@ def acceleration_of_level(equalized: EqualizedFacts | None, level_n: float, freq
     return level_n / scale.n_per_mps2
 
 
-def equalizer_amplitude(equalized: EqualizedFacts | None, level_n: float, frequency_hz: float) -> float:
-    """Amplitude of a level in the unit of the input: N without an equalizer, m/s^2 with one. Raises ValueError for a
+def convert_level_to_amplitude(equalized: EqualizedFacts | None, level_n: float, frequency_hz: float) -> float:
+    """Convert a level (N) to the amplitude of the stimulus: a force (N) without an equalizer, an acceleration (m/s^2)
+    with one. Raises ValueError for a
     frequency without a scale."""
-    acceleration_mps2 = acceleration_of_level(equalized, level_n, frequency_hz)
+    acceleration_mps2 = convert_level_to_acceleration(equalized, level_n, frequency_hz)
     return level_n if acceleration_mps2 is None else acceleration_mps2

@@ -17,7 +17,7 @@ from protocols.procedure.schedule import (
 from protocols.procedure.staircase import StaircaseState, level_n, to_db
 from protocols.trial import Phase
 from study.session.facts.events import SessionOpened
-from study.session.facts.level_scale import acceleration_of_level
+from study.session.facts.level_scale import convert_level_to_acceleration
 from study.session.state.rules import repeats_same_stimulus
 from study.session.stimulus.stimulus import compute_direction_angle_deg
 
@@ -93,7 +93,7 @@ def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRul
         direction=direction,
         angle_deg=compute_direction_angle_deg(protocol.directions, direction),
         polarity=draw.polarity,
-        wanted_mps2=acceleration_of_level(opened.equalized, force_n, run.frequency_hz),
+        wanted_mps2=convert_level_to_acceleration(opened.equalized, force_n, run.frequency_hz),
         nominal_n=nominal_n,
     )
 

@@ -1,8 +1,8 @@
 """State machine of a session: the next action, as a function of the state that `fold` computes from the log.
 
-`next_preparation` gives the steps before the instructions of a sitting (forms, device check) and is called by
-`prepare_sitting`. `next_action` gives the steps after them and is called by `run_session`; its order of precedence is:
-end of the session, limits of the sitting, demonstration, rest, reference, probe, trial.
+`find_next_preparation` gives the steps before the instructions of a sitting (forms, device check) and is called by
+`prepare_sitting`. `find_next_action` gives the steps after them and is called by `run_session`; its order of precedence
+is: end of the session, limits of the sitting, demonstration, rest, reference, probe, trial.
 """
 
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ class EndSitting:
     """The sitting must end here."""
 
     reason: str
-    """Reason that the user is shown, in words."""
+    """Reason for the user, a clause in words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,9 +62,9 @@ Action = Demonstrate | PresentTrial | Probe | Reference | TakeRest | FillIn | En
 """The possible next actions of a session."""
 
 
-def next_preparation(state: SessionState) -> Preparation | None:
-    """Next step before the instructions of this sitting; None when all are done, after the last trial of the session,
-    and for simulated participants."""
+def find_next_preparation(state: SessionState) -> Preparation | None:
+    """Find the next step before the instructions of this sitting; None when all are done, after the last trial of the
+    session, and for simulated participants."""
     sitting = state.sitting
     if state.opened.observer is not None or state.finished:
         return None
@@ -76,15 +76,15 @@ def next_preparation(state: SessionState) -> Preparation | None:
         (FormKind.QUESTIONNAIRE, sitting.questioned),
         (FormKind.SETUP, sitting.setup_done),
     )
-    for kind, done in forms:
-        form = None if done else make_form(state.protocol, kind)
+    for kind, is_done in forms:
+        form = None if is_done else make_form(state.protocol, kind)
         if form is not None:
             return FillIn(form)
     return None if sitting.device_checked else CheckDevice()
 
 
-def next_action(state: SessionState, utc: str = "", monotonic_s: float | None = None) -> Action:
-    """The next action. Raises ValueError while a trial is open: its answer, its measurement or its failure must be
+def find_next_action(state: SessionState, utc: str = "", monotonic_s: float | None = None) -> Action:
+    """Find the next action. Raises ValueError while a trial is open: its answer, its measurement or its failure must be
     logged first.
 
     utc, monotonic_s: the present time (ISO 8601) and monotonic clock (s), by which the limits of a sitting are judged;
@@ -113,10 +113,10 @@ def find_reached_limit(state: SessionState, utc: str, monotonic_s: float | None 
     sitting = pass_time(state.sitting, Moment(utc, monotonic_s))
     if (sitting.sat_s or 0.0) / 60.0 >= limits.longest_min:
         return f"the longest sitting of {limits.longest_min:g} minutes is reached; go on another day"
-    dose = compute_a8_mps2(compute_daily_dose(sitting))
-    if dose >= limits.dose_a8_mps2:
+    a8_mps2 = compute_a8_mps2(compute_daily_dose(sitting))
+    if a8_mps2 >= limits.dose_a8_mps2:
         return (
-            f"the hand has got its vibration dose for today (A(8) {dose:.2f} of {limits.dose_a8_mps2:g} m/s²); "
+            f"the hand has got its vibration dose for today (A(8) {a8_mps2:.2f} of {limits.dose_a8_mps2:g} m/s²); "
             "go on another day"
         )
     return ""

@@ -1,4 +1,5 @@
-"""Safety limits of a sitting, computed from its protocol; the device's safety layer enforces them at every tick.
+"""Safety limits of a sitting or recording, computed from its protocol by the workflows that open a device; the device's
+safety layer enforces them at every tick.
 
 The slew rate is the largest slope that a stimulus of the protocol can have, plus an allowance for the spring:
 
@@ -21,7 +22,7 @@ SPRING_SLEW_N_PER_S = 100.0
 SLEW_MARGIN = 1.05
 """Factor on the steepest slope of the stimuli, for rounding and fades."""
 
-BETWEEN_SAMPLES = math.sqrt(2)
+MULTISINE_PEAK_FACTOR = math.sqrt(2)
 """Bound of a multisine between its samples: with lines below a quarter of the rate the continuous signal exceeds the
 largest sample by at most this factor (Ehlich and Zeller 1964), and Bernstein's inequality then bounds its slope like
 that of a sine. Above a quarter, the bound exceeds twice the largest sample per tick, the most that two consecutive
@@ -33,8 +34,11 @@ class Limits:
     """Limits that the device's safety layer enforces: caps of the forces (N), slew rate (N/s) and durations (s)."""
 
     stimulus_cap_n: float
+    """Limit of the stimulus alone."""
     total_cap_n: float
+    """Limit of the sum of stimulus, spring and damper."""
     slew_n_per_s: float
+    """Limit of the change of the total force."""
     longest_hold_s: float
     """Longest duration of a stimulus, after which it is released."""
     watchdog_s: float
@@ -47,27 +51,30 @@ class Limits:
 
 
 def make_study_limits(protocol: StudyProtocol) -> Limits:
-    """Limits with a slew rate just above that of the steepest stimulus: the highest frequency at the highest level,
-    while it is faded."""
+    """Limits of a study, with a slew rate just above that of the steepest stimulus: the highest frequency at the
+    highest level, while it is faded."""
     stimulus = protocol.stimulus
-    fastest_hz = max(protocol.all_frequencies_hz)
+    highest_frequency_hz = max(protocol.all_frequencies_hz)
     fade_s = min(stimulus.fade_in_s, stimulus.fade_out_s)
-    return _make_limits(protocol.safety, _slew(fastest_hz, highest_level_n(protocol), fade_s))
+    return _make_limits(
+        protocol.safety, _bound_slew_n_per_s(highest_frequency_hz, compute_highest_level_n(protocol), fade_s)
+    )
 
 
-def highest_level_n(protocol: StudyProtocol) -> float:
-    """Highest level (N) of a trial: the staircase's cap plus the largest roving, limited by the safety cap."""
+def compute_highest_level_n(protocol: StudyProtocol) -> float:
+    """Compute the highest level (N) of a trial: the staircase's cap plus the largest roving, limited by the safety
+    cap."""
     return min(highest_roved_n(protocol.staircase.cap_n, protocol.stimulus.rove_db), protocol.safety.stimulus_cap_n)
 
 
 def make_recording_limits(protocol: RecordingProtocol) -> Limits:
-    """Limits with a slew rate just above that of the steepest excitation of this recording."""
-    slews = [
-        (BETWEEN_SAMPLES if isinstance(segment, MultisineSegment) else 1.0)
-        * _slew(highest_hz(segment), segment.amplitude_n, protocol.fade_s)
+    """Limits of a recording, with a slew rate just above that of its steepest excitation."""
+    slew_rates_n_per_s = [
+        (MULTISINE_PEAK_FACTOR if isinstance(segment, MultisineSegment) else 1.0)
+        * _bound_slew_n_per_s(highest_hz(segment), segment.amplitude_n, protocol.fade_s)
         for segment in protocol.segments
     ]
-    return _make_limits(protocol.safety, max(slews))
+    return _make_limits(protocol.safety, max(slew_rates_n_per_s))
 
 
 def describe_forces(safety: SafetySettings) -> str:
@@ -79,14 +86,15 @@ def describe_forces(safety: SafetySettings) -> str:
     )
 
 
-def _slew(frequency_hz: float, amplitude_n: float, fade_s: float) -> float:
-    """Slew rate (N/s): bound of |d/dt (fade(t) A sin(2 pi f t))| with margin and spring. The slope of a raised-cosine
-    fade is at most pi / (2 fade_s), that of a linear fade less."""
-    steepest = amplitude_n * (2 * math.pi * frequency_hz + math.pi / (2 * fade_s))
-    return SLEW_MARGIN * steepest + SPRING_SLEW_N_PER_S
+def _bound_slew_n_per_s(frequency_hz: float, amplitude_n: float, fade_s: float) -> float:
+    """Bound |d/dt (fade(t) A sin(2 pi f t))| (N/s), with margin and spring; amplitude A (N), fade of fade_s (s). The
+    slope of a raised-cosine fade is at most pi / (2 fade_s), that of a linear fade less."""
+    max_slope_n_per_s = amplitude_n * (2 * math.pi * frequency_hz + math.pi / (2 * fade_s))
+    return SLEW_MARGIN * max_slope_n_per_s + SPRING_SLEW_N_PER_S
 
 
 def _make_limits(safety: SafetySettings, slew_n_per_s: float) -> Limits:
+    """Limits of a protocol's safety settings, with this slew rate (N/s)."""
     return Limits(
         stimulus_cap_n=safety.stimulus_cap_n,
         total_cap_n=safety.total_cap_n,

@@ -86,7 +86,10 @@ def make_held_stimulus(
         channels=("fx", "fy", "fz") if is_force else ("ax", "ay", "az"),
     )
     envelope = compute_fade_in(settings, sample_rate_hz)
-    loop, onset = equalizer.periodic(target_signal), equalizer.onset(target_signal, envelope)
+    loop, onset = (
+        equalizer.compute_loop_commands(target_signal),
+        equalizer.compute_onset_commands(target_signal, envelope),
+    )
     if onset is not None:
         # The loop is rotated so that its first sample is the one that follows the last sample of the onset.
         loop = replace(loop, samples=np.roll(loop.samples, -len(envelope), axis=0))

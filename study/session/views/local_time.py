@@ -1,7 +1,7 @@
 """Format logged UTC times as local time with the offset from UTC, for screens, command-line tables and messages.
 
 Logs, tables and JSON contain UTC. The time zone is an argument, because this package does not read settings of the
-computer; `study.tui` and `study.cli` pass `study.local_clock.machine_zone`.
+computer; `study.tui` and `study.cli` pass `study.local_clock.convert_to_machine_zone`.
 """
 
 from collections import Counter

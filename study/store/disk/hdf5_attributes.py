@@ -1,6 +1,7 @@
 """Attributes of HDF5 files as Python values, independent of whether they are stored as scalars or as arrays.
 
-Values of another type or number are refused with a message that names the attribute and its object.
+Values of another type or number are refused with a message that names the attribute and its object. Called by the
+readers and writers of HDF5 files in `study.store.formats`. `owner` is the file, group or dataset with the attribute.
 """
 
 import math
@@ -9,9 +10,9 @@ from typing import Any
 import h5py
 import numpy as np
 
-_MOST_ENTRIES = 1000
+_MAX_ENTRIES = 1000
 """Largest number of entries of an attribute that is read."""
-_LONGEST_SHOWN = 100
+_MAX_SHOWN_CHARACTERS = 100
 """Number of characters of a value that a message shows."""
 
 
@@ -21,7 +22,8 @@ class AttributeProblemError(ValueError):
 
 
 def read_text_attribute(owner: Any, name: str, default: str | None = None) -> str:
-    """A single text. Raises AttributeProblemError if it is missing and has no default, or is not exactly one text."""
+    """Read a single text. Raises AttributeProblemError if it is missing and has no default, or is not exactly one
+    text."""
     texts = read_texts_attribute(owner, name, None if default is None else (default,))
     if len(texts) != 1:
         raise AttributeProblemError(f"{_describe_attribute(owner, name)} holds {len(texts)} texts; it must be one")
@@ -29,19 +31,22 @@ def read_text_attribute(owner: Any, name: str, default: str | None = None) -> st
 
 
 def read_texts_attribute(owner: Any, name: str, default: tuple[str, ...] | None = None) -> tuple[str, ...]:
-    """One text or a list of texts, as a tuple; UTF-8 is required. Raises AttributeProblemError."""
+    """Read one text or a list of texts, as a tuple. Raises AttributeProblemError if it is missing and has no default,
+    or is not text in UTF-8."""
     if name not in owner.attrs:
         if default is None:
             raise AttributeProblemError(f"{_describe_attribute(owner, name)} is missing")
         return default
-    stored = _value(owner, name)
-    values = np.atleast_1d(stored).ravel().tolist()
+    stored_value = _read_value(owner, name)
+    values = np.atleast_1d(stored_value).ravel().tolist()
     if not all(isinstance(value, str | bytes) for value in values):
-        raise AttributeProblemError(f"{_describe_attribute(owner, name)} is {_shorten_value(stored)}; it must be text")
+        raise AttributeProblemError(
+            f"{_describe_attribute(owner, name)} is {_shorten_value(stored_value)}; it must be text"
+        )
     try:
         # h5py returns bytes that are not UTF-8 as surrogates, which cannot be encoded again.
-        texts = tuple(value if isinstance(value, bytes) else value.encode() for value in (*values, name))
-        return tuple(text.decode() for text in texts[:-1])
+        encoded_texts = tuple(value if isinstance(value, bytes) else value.encode() for value in (*values, name))
+        return tuple(text.decode() for text in encoded_texts[:-1])
     except UnicodeError:
         raise AttributeProblemError(f"{_describe_attribute(owner, name)} is not text in UTF-8") from None
 
@@ -49,24 +54,25 @@ def read_texts_attribute(owner: Any, name: str, default: tuple[str, ...] | None 
 def read_numbers_attribute(
     owner: Any, name: str, count: int, default: tuple[float, ...] | None = None
 ) -> tuple[float, ...]:
-    """`count` numbers as floats; a single number may be a scalar or a list of length 1. Raises
-    AttributeProblemError."""
+    """Read `count` numbers as floats; a single number may be a scalar or a list of length 1. Raises
+    AttributeProblemError if it is missing and has no default, or holds another number of values or other types."""
     if name not in owner.attrs:
         if default is None:
             raise AttributeProblemError(f"{_describe_attribute(owner, name)} is missing")
         return default
-    stored = _value(owner, name)
-    values = np.atleast_1d(stored).ravel()
+    stored_value = _read_value(owner, name)
+    values = np.atleast_1d(stored_value).ravel()
     if values.dtype.kind not in "iuf" or len(values) != count:
         expected = "a number" if count == 1 else f"{count} numbers"
         raise AttributeProblemError(
-            f"{_describe_attribute(owner, name)} is {_shorten_value(stored)}; it must be {expected}"
+            f"{_describe_attribute(owner, name)} is {_shorten_value(stored_value)}; it must be {expected}"
         )
     return tuple(float(value) for value in values)
 
 
-def text_or_list(texts: tuple[str, ...]) -> str | tuple[str, ...]:
-    """The text itself where the tuple has one entry, which then holds for all channels; otherwise the tuple."""
+def collapse_single_text(texts: tuple[str, ...]) -> str | tuple[str, ...]:
+    """Collapse a tuple of one text, which then holds for all channels, to the text; return any other tuple
+    unchanged."""
     return texts[0] if len(texts) == 1 else texts
 
 
@@ -78,19 +84,20 @@ def write_texts(owner: Any, name: str, texts: str | tuple[str, ...]) -> None:
         owner.attrs.create(name, list(texts), dtype=h5py.string_dtype())
 
 
-def _value(owner: Any, name: str) -> Any:
-    """The value as h5py gives it. Raises AttributeProblemError, before memory is allocated, if it is too large."""
+def _read_value(owner: Any, name: str) -> Any:
+    """Read the value as h5py gives it. Raises AttributeProblemError, before memory is allocated, if it is too large."""
     shape = owner.attrs.get_id(name).shape
-    if shape is None or math.prod(shape) > _MOST_ENTRIES:
+    if shape is None or math.prod(shape) > _MAX_ENTRIES:
         raise AttributeProblemError(
-            f"{_describe_attribute(owner, name)} has the shape {shape}; up to {_MOST_ENTRIES} are read"
+            f"{_describe_attribute(owner, name)} has the shape {shape}; up to {_MAX_ENTRIES} are read"
         )
     return owner.attrs[name]
 
 
 def _shorten_value(value: Any) -> str:
+    """The value as text for messages, cut to `_MAX_SHOWN_CHARACTERS`."""
     text = repr(np.asarray(value).tolist())
-    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…"
+    return text if len(text) <= _MAX_SHOWN_CHARACTERS else f"{text[:_MAX_SHOWN_CHARACTERS]}…"
 
 
 def _describe_attribute(owner: Any, name: str) -> str:

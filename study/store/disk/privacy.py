@@ -11,7 +11,7 @@ import os
 import stat
 from pathlib import Path
 
-from study.store.disk.real_folder import RealFolder, is_real_folder, open_folder
+from study.store.disk.real_folder import OpenedFolder, is_real_folder, open_folder
 
 PRIVATE_FOLDER, PRIVATE_FILE = 0o700, 0o600
 """Modes of folders and files with participants' data."""
@@ -101,19 +101,19 @@ def format_data_folder_warning(data: Path) -> str:
     return format_privacy_warning(data, reason) if reason else ""
 
 
-def _restrict_folder(opened_folder: RealFolder, recursive: bool) -> None:
+def _restrict_folder(opened_folder: OpenedFolder, recursive: bool) -> None:
     """Remove the rights of group and others from an opened folder; recursive: also from its contents. Non-blocking
     opening, because an entry may be a pipe."""
     if opened_folder.descriptor is None:
         return
     _restrict_access(opened_folder.descriptor)
-    for name in opened_folder.names() if recursive else ():
+    for name in opened_folder.list_names() if recursive else ():
         with contextlib.suppress(OSError):
             descriptor = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=opened_folder.descriptor)
             try:
                 _restrict_access(descriptor)
                 if stat.S_ISDIR(os.fstat(descriptor).st_mode):
-                    _restrict_folder(RealFolder(opened_folder.path / name, descriptor), recursive)
+                    _restrict_folder(OpenedFolder(opened_folder.path / name, descriptor), recursive)
             finally:
                 os.close(descriptor)
 

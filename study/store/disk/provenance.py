@@ -1,6 +1,7 @@
 """Provenance of a result: versions, command, protocol, seeds, settings, and input files with their checksums.
 
-It contains no paths of the computer and no dates, so that the same work gives the same file.
+It contains no paths of the computer and no dates, so that the same work gives the same file. Gathered by every command
+that writes a result.
 """
 
 import hashlib
@@ -62,15 +63,15 @@ def gather_provenance(
     settings: Mapping[str, float | None] | None = None,
     parents: Sequence[Path] = (),
 ) -> Provenance:
-    """Provenance of a result of the running program. parents: paths of the input files. Raises CannotReadError where
-    one cannot be read."""
+    """Gather the provenance of a result of the running program. parents: paths of the input files; other arguments as
+    in `Provenance`. Raises CannotReadError where an input file cannot be read."""
     return Provenance(
         versions=list_versions(),
         command=anonymise_arguments(sys.argv),
         protocol_hash=protocol_hash,
         seeds=seeds,
         settings=settings,
-        parents=tuple(Parent(replace_invalid_bytes(path.name), sha256_of(path)) for path in parents),
+        parents=tuple(Parent(replace_invalid_bytes(path.name), compute_sha256(path)) for path in parents),
     )
 
 
@@ -89,8 +90,8 @@ def replace_invalid_bytes(name: str) -> str:
     return name.encode(errors="replace").decode()
 
 
-def sha256_of(path: Path) -> str:
-    """SHA-256 of a regular file's content, in hexadecimal. Raises CannotReadError."""
+def compute_sha256(path: Path) -> str:
+    """Compute the SHA-256 of a regular file's content, in hexadecimal. Raises CannotReadError."""
     try:
         with open_regular(path) as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
@@ -100,6 +101,7 @@ def sha256_of(path: Path) -> str:
 
 @cache
 def _find_version(package: str) -> str:
+    """Version of an installed package; "not installed" without it. Cached, because it does not change."""
     try:
         return version(package)
     except PackageNotFoundError:
@@ -107,6 +109,7 @@ def _find_version(package: str) -> str:
 
 
 def _remove_folders(argument: str) -> str:
+    """The argument with a path, also one after `--option=`, reduced to its last part."""
     option, equals, value = argument.partition("=") if argument.startswith("--") else ("", "", argument)
-    name = PurePath(value).name if "/" in value or "\\" in value else value
-    return replace_invalid_bytes(option + equals + name)
+    value_name = PurePath(value).name if "/" in value or "\\" in value else value
+    return replace_invalid_bytes(option + equals + value_name)

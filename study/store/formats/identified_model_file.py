@@ -17,10 +17,10 @@ from equalizer.plant.model_quality import ModelQuality
 from equalizer.signals.signal import FloatArray
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.hdf5_attributes import (
+    collapse_single_text,
     read_numbers_attribute,
     read_text_attribute,
     read_texts_attribute,
-    text_or_list,
     write_texts,
 )
 from study.store.disk.hdf5_file import Problems, open_hdf5, read_float_dataset, write_hdf5
@@ -157,7 +157,7 @@ def _read_model_fields(file: Any, problems: Problems) -> dict[str, Any]:
     optional_matrices = [name for name in ("covariance", "samples") if name in file]
     return {
         **{name: read_matrix(name) for name in ("A", "B", "C", "D", *optional_matrices)},
-        **{name: text_or_list(read_texts(name)) for name in ("input_unit", "output_unit")},
+        **{name: collapse_single_text(read_texts(name)) for name in ("input_unit", "output_unit")},
         **{name: read_texts(name) for name in ("input_channels", "output_channels")},
         "sample_rate_hz": read_numbers("sample_rate_hz", 1)[0],
         "band_hz": read_numbers("band_hz", 2),

@@ -16,7 +16,7 @@ from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.loading import Protocol, ProtocolError
 from protocols.document.lock import LockError, ProtocolLock, check_lock, lock_from_json, lock_to_json, make_lock
 from study.errors import StudyError, WrongUseError
-from study.local_clock import machine_zone
+from study.local_clock import convert_to_machine_zone
 from study.regular_file import DOCUMENT_BYTES
 from study.session.views.local_time import format_time_in_zone
 from study.store.disk.file_errors import UnusableFileError
@@ -148,7 +148,7 @@ def _read_lock(path: Path, protocol: Protocol) -> ProtocolLock | None:
     except LockError as error:
         raise UnusableFileError(path, "protocol lock", (str(error),)) from error
     try:
-        check_lock(lock, protocol, format_time_in_zone(lock.locked_utc, machine_zone))
+        check_lock(lock, protocol, format_time_in_zone(lock.locked_utc, convert_to_machine_zone))
     except LockError as error:
         raise LockedProtocolChangedError(path, error) from error
     return lock

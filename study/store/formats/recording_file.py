@@ -14,10 +14,10 @@ from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.units import check_quantity, parse_unit
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.hdf5_attributes import (
+    collapse_single_text,
     read_numbers_attribute,
     read_text_attribute,
     read_texts_attribute,
-    text_or_list,
     write_texts,
 )
 from study.store.disk.hdf5_file import Problems, open_hdf5, read_float_dataset, write_hdf5
@@ -109,7 +109,7 @@ def _read_signal(file: Any, name: str, rate_hz: float) -> Signal:
     quantity, unit, channels = (read_texts_attribute(file[name], key) for key in ("quantity", "unit", "channels"))
     channels = _split_channel_names(channels, samples.shape[1])
     try:
-        signal = Signal(samples, rate_hz, text_or_list(quantity), text_or_list(unit), channels)
+        signal = Signal(samples, rate_hz, collapse_single_text(quantity), collapse_single_text(unit), channels)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from error
     scale, offset, si = [], [], []

@@ -2,7 +2,7 @@
 
 The sender writes a file under a temporary name and renames it, so that the session never reads an incomplete request;
 the session reads and removes it. The final name is unique and begins with the kind of request, so that a stop is
-recognised even if its content cannot be read.
+recognised even if its content cannot be read. Sent by `study.workflows.views.send_request`, taken by a running session.
 """
 
 import errno
@@ -30,40 +30,42 @@ REQUEST_VERSION = 1
 
 KINDS: dict[str, type[Request]] = {"stop": StopAsked, "pause": PauseAsked, "note": NoteAsked}
 """Kinds of requests, by the beginning of the file's name."""
-_STOP = "stop"
+_STOP_PREFIX = "stop"
 """Beginning of the name of a request to stop: it counts even if its content cannot be read."""
-_NOTE = "note-"
+_NOTE_PREFIX = "note-"
 """Beginning of the name of a note: unread notes are kept from one sitting to the next."""
 _SOURCES = get_args(RequestSource)
 """Senders that a reader accepts."""
-_LARGEST = 1 << 16
+_MAX_REQUEST_BYTES = 1 << 16
 """Largest number of bytes of a request that are read; a note has only a few sentences."""
-_AT_ONCE = 50
+_MAX_PER_CALL = 50
 """Largest number of requests taken in one call: many requests at once must not block the session's loop."""
 _counter = itertools.count()
 """Makes the names of this program's requests unique, and keeps them in order, within one tick of the clock."""
 
 
 class RequestInbox:
-    """Implements `study.workflows.trial.requests_port.Requests`. Many senders, one receiver."""
+    """Folder of the requests to a session; implements `study.workflows.trial.requests_port.Requests`. Any number of
+    programs may send, only the session itself takes. session: the session's folder."""
 
     def __init__(self, session: Path) -> None:
         self._folder = session / REQUESTS_NAME
-        self._passed_over: set[str] = set()
+        self._ignored_names: set[str] = set()
         """Names of files that could be neither used nor removed: they are examined once, not twenty times a second."""
 
     def send(self, request: Request) -> str:
-        """Returns the request's name, for `unread` and `take_back`. Raises StudyError if it cannot be written."""
-        kind = next(word for word, request_class in KINDS.items() if isinstance(request, request_class))
-        key = f"{time.time_ns():020d}-{os.getpid():07d}-{next(_counter):06d}-{secrets.token_hex(4)}"
-        name = f"{kind}-{key}.json"
+        """Write a request. Returns its name, for `is_unread` and `take_back`. Raises StudyError if it cannot be
+        written."""
+        kind = next(kind_name for kind_name, request_class in KINDS.items() if isinstance(request, request_class))
+        unique_key = f"{time.time_ns():020d}-{os.getpid():07d}-{next(_counter):06d}-{secrets.token_hex(4)}"
+        name = f"{kind}-{unique_key}.json"
         document = {"format": REQUEST_FORMAT, "version": REQUEST_VERSION, "request": kind, **asdict(request)}
-        part = self._folder / f".{name}.part"
+        temporary_path = self._folder / f".{name}.part"
         try:
             self._make_folder()
             # No fsync: a request concerns only the running session and need not survive a power failure.
-            write_private(part, f"{json.dumps(document)}\n".encode())
-            part.replace(self._folder / name)
+            write_private(temporary_path, f"{json.dumps(document)}\n".encode())
+            temporary_path.replace(self._folder / name)
         except OSError as problem:
             raise StudyError(
                 "The session could not be reached",
@@ -72,12 +74,12 @@ class RequestInbox:
             ) from problem
         return name
 
-    def unread(self, name: str) -> bool:
+    def is_unread(self, name: str) -> bool:
         """Whether the session has not taken this request yet."""
         return (self._folder / name).exists()
 
     def take_back(self, name: str) -> bool:
-        """Remove a request. False if it was already taken."""
+        """Remove a request. Returns False if it was already taken or cannot be removed."""
         try:
             (self._folder / name).unlink()
         except OSError:
@@ -85,25 +87,29 @@ class RequestInbox:
         return True
 
     def clear(self) -> None:
-        """Remove old stop and pause requests, at the start of a sitting. Notes are kept for the log. Never raises."""
+        """Remove all files but notes, such as old requests to stop or pause, at the start of a sitting. Notes are kept
+        for the log. Never raises."""
         try:
             self._make_folder()
             names = os.listdir(self._folder)  # noqa: PTH208
         except OSError:
             return
         for name in names:
-            if not name.startswith(_NOTE):
+            if not name.startswith(_NOTE_PREFIX):
                 self._remove(name)
 
     def take(self) -> tuple[Request, ...]:
-        """Take and remove requests, stops first, then oldest first. Never raises."""
+        """Take and remove up to `_MAX_PER_CALL` requests, stops first, then oldest first. Never raises."""
         try:
             # listdir takes half the time of Path.iterdir, twenty times a second.
             file_names = os.listdir(self._folder) if is_real_folder(self._folder) else ()  # noqa: PTH208
         except OSError:
             return ()
-        names = sorted((n for n in file_names if n[0] != "." and n not in self._passed_over), key=_stops_then_oldest)
-        return tuple(request for name in names[:_AT_ONCE] if (request := self._take_request(name)) is not None)
+        names = sorted(
+            (file_name for file_name in file_names if file_name[0] != "." and file_name not in self._ignored_names),
+            key=_make_sort_key,
+        )
+        return tuple(request for name in names[:_MAX_PER_CALL] if (request := self._take_request(name)) is not None)
 
     def _make_folder(self) -> None:
         """Create the folder. Raises OSError, also for a symbolic link, which may lead outside the session."""
@@ -115,7 +121,7 @@ class RequestInbox:
         """Read and remove a request. An unreadable stop counts as the experimenter's; other unreadable requests are set
         aside."""
         request = _parse_request(_read_content(self._folder / name))
-        if request is None and name.startswith(_STOP):
+        if request is None and name.startswith(_STOP_PREFIX):
             request = StopAsked("experimenter")
         if request is None:
             self._set_aside(name)
@@ -128,19 +134,19 @@ class RequestInbox:
         try:
             (self._folder / name).unlink()
         except OSError:
-            self._passed_over.add(name)
+            self._ignored_names.add(name)
 
     def _set_aside(self, name: str) -> None:
         """Rename to a hidden name, for later inspection; where that fails, ignore the file from now on."""
         try:
             (self._folder / name).rename(self._folder / f".unusable-{name}")
         except OSError:
-            self._passed_over.add(name)
+            self._ignored_names.add(name)
 
 
-def _stops_then_oldest(name: str) -> tuple[bool, str]:
-    """Sort key: stops first, then by the time in the name."""
-    return not name.startswith(_STOP), name.partition("-")[2]
+def _make_sort_key(name: str) -> tuple[bool, str]:
+    """Sort key of a file name: stops first, then by the time in the name."""
+    return not name.startswith(_STOP_PREFIX), name.partition("-")[2]
 
 
 def _read_content(path: Path) -> bytes:
@@ -151,7 +157,7 @@ def _read_content(path: Path) -> bytes:
         return b""
     try:
         is_regular = stat.S_ISREG(os.fstat(descriptor).st_mode)
-        return os.read(descriptor, _LARGEST) if is_regular else b""
+        return os.read(descriptor, _MAX_REQUEST_BYTES) if is_regular else b""
     except OSError:
         return b""
     finally:
@@ -159,23 +165,27 @@ def _read_content(path: Path) -> bytes:
 
 
 def _parse_request(content: bytes) -> Request | None:
-    """The request in a file; None where the content is not a valid one."""
+    """Parse the content of a request's file; None where it is no valid request of this version."""
     try:
         document = load_json(content)
     except ValueError:
         return None
     if not isinstance(document, dict) or document.pop("format", None) != REQUEST_FORMAT:
         return None
-    kind = KINDS.get(str(document.pop("request", None)))
-    if document.pop("version", None) != REQUEST_VERSION or kind is None or not _has_valid_fields(kind, document):
+    request_class = KINDS.get(str(document.pop("request", None)))
+    if (
+        document.pop("version", None) != REQUEST_VERSION
+        or request_class is None
+        or not _has_valid_fields(request_class, document)
+    ):
         return None
-    return kind(**document)
+    return request_class(**document)
 
 
-def _has_valid_fields(kind: type[Request], values: dict[str, Any]) -> bool:
+def _has_valid_fields(request_class: type[Request], values: dict[str, Any]) -> bool:
     """Whether the values are exactly the fields of this kind, each of its type, from a known sender."""
     field_types = {"who": str, "text": str, "adverse": bool}
-    field_names = {field.name for field in fields(kind)}
+    field_names = {field.name for field in fields(request_class)}
     return (
         values.keys() == field_names
         and all(isinstance(value, field_types[name]) for name, value in values.items())

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from equalizer.signals.recording import Recording
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.formats.recording_file import read_recording, write_recording
 from study.store.sessions.archive import SessionFolder
 
@@ -50,7 +50,7 @@ def save_trial_recording(
     name = _find_free_name(folder.path, name)
     path = folder.path / name
     write_recording(path, replace(recording, meta={**recording.meta, **conditions}), precision="float32")
-    return SavedRecording(name, sha256_of(path))
+    return SavedRecording(name, compute_sha256(path))
 
 
 def find_trial_recording(folder: SessionFolder, name: str) -> tuple[SavedRecording, Recording] | None:
@@ -64,7 +64,7 @@ def find_trial_recording(folder: SessionFolder, name: str) -> tuple[SavedRecordi
     path = [folder.path / name, *numbered_paths][-1]
     if not path.exists():
         return None
-    return SavedRecording(path.relative_to(folder.path).as_posix(), sha256_of(path)), read_recording(path)
+    return SavedRecording(path.relative_to(folder.path).as_posix(), compute_sha256(path)), read_recording(path)
 
 
 def _find_free_name(folder: Path, name: str) -> str:

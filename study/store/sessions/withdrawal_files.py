@@ -101,7 +101,7 @@ def list_remaining(folder: SessionFolder) -> tuple[str, ...]:
     the folder cannot be read."""
     try:
         with open_folder(folder.path) as place:
-            names = [name for name in place.names() if name not in (folder.tombstone.name, LOCK_NAME)]
+            names = [name for name in place.list_names() if name not in (folder.tombstone.name, LOCK_NAME)]
     except OSError:
         return ()
     return tuple(f"{name}/" if is_real_folder(folder.path / name) else name for name in names)

@@ -133,7 +133,7 @@ class SittingScreens:
             case ParticipantWords(words=words):
                 self.words = words
                 if self._preparing is not None:
-                    self._preparing.speak(words)
+                    self._preparing.set_language(words)
             case PreparationStarted(sentence=sentence):
                 await self.prepare(sentence)
 
@@ -180,7 +180,7 @@ class SittingScreens:
             self._request_screen.update_view(update.view)
 
     def _show_trouble(self, sentence: str) -> None:
-        sentence = self.words.fact(sentence)
+        sentence = self.words.translate_fact(sentence)
         if self._trial is not None:
             self._trial.show_trouble(sentence)
         if self._trial is None or self._request_screen is not None:

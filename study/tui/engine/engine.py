@@ -68,7 +68,7 @@ class Engine:
         """Wait for the next command; None after the end of the screen's process."""
         if not self._link.command_waits:
             self._import_in_advance()
-        return self._link.next_command()
+        return self._link.wait_for_command()
 
     def _import_in_advance(self) -> None:
         """Import modules in advance, as long as no command waits."""

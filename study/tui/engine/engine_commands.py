@@ -15,9 +15,9 @@ from pathlib import Path
 from protocols.wording.words import Words
 from study.devices.clock import RealClock
 from study.devices.device import Device
-from study.devices.opening import calibrate_accelerometer, lab_file_path, save_accelerometer_calibration
+from study.devices.opening import calibrate_accelerometer, get_lab_file_path, save_accelerometer_calibration
 from study.errors import StudyError, WrongUseError
-from study.local_clock import machine_zone
+from study.local_clock import convert_to_machine_zone
 from study.session.views.archive_views import HomeView
 from study.session.views.forms import make_words
 from study.store.disk.privacy import format_data_folder_warning
@@ -99,7 +99,7 @@ class EngineCommands:
             case Analyze(session=session):
                 self._link.send(PreparationStarted("Making the tables and the report."))
                 write_results(SessionFolder(Path(session)))
-                self._link.send(SessionContent(make_session_view(Path(session), machine_zone)))
+                self._link.send(SessionContent(make_session_view(Path(session), convert_to_machine_zone)))
             case Withdraw(session=session):
                 self._withdraw(SessionFolder(Path(session)))
             case Diagnose():
@@ -162,7 +162,7 @@ class EngineCommands:
     def _open_participant(self) -> Iterator[Participant]:
         """Make the participant at the screen, without requests and replies of an earlier session."""
         self._link.requests.take()  # discard requests to an earlier session
-        self._link.forget_replies()
+        self._link.drop_replies()
         display = RemoteDisplay(self._link, self._clock)
         try:
             yield Participant(display, PersonsHand(), self._clock, self._link.requests, self._connect_requests)
@@ -206,14 +206,14 @@ class EngineCommands:
             self._link.send(CalibrationStored(str(save_accelerometer_calibration(command.table))))
             return
         request_numbers = itertools.count(1)
-        self._link.forget_replies()
+        self._link.drop_replies()
 
         def request_placement(position: str, readings: tuple[float, float, float] | None) -> None:
             """Ask the user to place the sensor in a position, and wait for the reply. readings: of the position
             before."""
             request = PlacementRequest(next(request_numbers), position, readings)
             self._link.send(request)
-            while (reply := self._link.reply(REPLY_POLL_S)) is None or reply.number != request.number:
+            while (reply := self._link.wait_for_reply(REPLY_POLL_S)) is None or reply.number != request.number:
                 pass
 
         try:
@@ -222,7 +222,7 @@ class EngineCommands:
             if self._link.ended:
                 raise
             raise CALIBRATION_STOPPED from None
-        self._link.send(CalibrationComputed(table, str(lab_file_path())))
+        self._link.send(CalibrationComputed(table, str(get_lab_file_path())))
 
 
 def _read_view(command: ShowHome | ShowSession | ShowDiagnosis) -> HomeContent | SessionContent | DiagnosisContent:
@@ -231,7 +231,7 @@ def _read_view(command: ShowHome | ShowSession | ShowDiagnosis) -> HomeContent |
         case ShowHome():
             return HomeContent(_read_home_view(command))
         case ShowSession(path=path):
-            return SessionContent(make_session_view(Path(path), machine_zone))
+            return SessionContent(make_session_view(Path(path), convert_to_machine_zone))
         case ShowDiagnosis(path=path):
             return _read_diagnosis(Path(path))
 

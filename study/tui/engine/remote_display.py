@@ -1,5 +1,5 @@
 """The engine's implementation of the display port (`study.workflows.trial.display.Display`), by messages to the screen
-process.
+process. Made by `engine_commands` for each sitting.
 
 While a stimulus may play, `sign_of_life` (the keep-alive call that resets the device's watchdog) is called at least
 every `KEEPALIVE_INTERVAL_S`, so that the safety limits of the vibration hold even if the screen hangs. A missing
@@ -55,13 +55,15 @@ TIMED_OUT = Unanswered("no answer within the time limit", ends_sitting=False, ca
 
 class RemoteDisplay:
     """The display port over a pipe; the docstrings of `Display` apply. Any method raises KeyboardInterrupt if the
-    screen process has ended. load: returns the load average per processor (see `load_per_processor`), None if
+    screen process has ended. get_load: returns the load average per processor (see `load_per_processor`), None if
     unknown."""
 
-    def __init__(self, link: ScreenLink, clock: Clock, load: Callable[[], float | None] = load_per_processor) -> None:
+    def __init__(
+        self, link: ScreenLink, clock: Clock, get_load: Callable[[], float | None] = load_per_processor
+    ) -> None:
         self._link = link
         self._clock = clock
-        self._get_load = load
+        self._get_load = get_load
         self._request_number = 0
         self._wake_delay_s = 0.0
         """Longest delay (s) of this process's own wake-ups since the last request was shown."""
@@ -206,13 +208,13 @@ class RemoteDisplay:
         """The screen's reply to this request; None if no reply came within `timeout_s` (s), or only a reply to an
         earlier request."""
         start_s = self._clock.now_s()
-        reply = self._link.reply(timeout_s)
+        reply = self._link.wait_for_reply(timeout_s)
         self._wake_delay_s = max(self._wake_delay_s, self._clock.now_s() - start_s - timeout_s)
         return reply if reply is not None and reply.number == request_number else None
 
     def _is_screen_silent(self) -> bool:
         """Whether the screen's last heartbeat is older than `HEARTBEAT_TIMEOUT_S`."""
-        return self._link.silent_s() > HEARTBEAT_TIMEOUT_S
+        return self._link.compute_silence_s() > HEARTBEAT_TIMEOUT_S
 
     def _close_request(self, request_number: int, reason: Unanswered) -> Unanswered:
         """Close the request on the screen and return the reason. request_number: 0 where nothing is shown."""

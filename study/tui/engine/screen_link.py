@@ -1,4 +1,4 @@
-"""The engine's end of the pipe to the screen.
+"""The engine's end of the pipe to the screen. Used by `engine`, `engine_commands` and `remote_display`.
 
 A thread reads all messages while the main thread runs a session, so that Ctrl-C at the screen takes the force off at
 once. It sorts messages into commands, replies and requests, and detects that the screen's process has ended.
@@ -27,7 +27,7 @@ class ScreenLink:
         self, connection: Connection, interrupt: Callable[[], None], on_screen_ended: Callable[[], None]
     ) -> None:
         self._commands: SimpleQueue[Command | None] = SimpleQueue()
-        self._received, self._taken_count, self._let_go_up_to = 0, 0, 0
+        self._received_count, self._taken_count, self._let_go_up_to = 0, 0, 0
         """Numbers of commands received, taken by the main thread, and received before the last interruption. They are
         needed because an interrupted command may not have been begun or taken yet."""
         self.requests = QueuedRequests()
@@ -39,8 +39,8 @@ class ScreenLink:
         self._interrupt = interrupt
         self._on_screen_ended = on_screen_ended
         self._replies: SimpleQueue[Reply] = SimpleQueue()
-        self._sending = threading.Lock()
-        self._heard_s = time.monotonic()
+        self._send_lock = threading.Lock()
+        self._last_message_s = time.monotonic()
         """Time of the last message (s, monotonic clock)."""
 
     def start(self) -> None:
@@ -50,13 +50,13 @@ class ScreenLink:
     def send(self, message: FromEngine) -> None:
         """Send a message to the screen, from any thread. Raises KeyboardInterrupt if the screen's process has ended."""
         try:
-            with self._sending:
+            with self._send_lock:
                 self._connection.send(message)
         except OSError:
             self.ended = True
             raise KeyboardInterrupt from None
 
-    def next_command(self) -> Command | None:
+    def wait_for_command(self) -> Command | None:
         """Wait for the next command; None if the screen's process has ended."""
         command = self._commands.get()
         self._taken_count += 1
@@ -72,24 +72,24 @@ class ScreenLink:
         """Whether the user interrupted (`LetGo`) after sending the command that was taken last."""
         return self._taken_count <= self._let_go_up_to
 
-    def reply(self, patience_s: float) -> Reply | None:
-        """The next reply, of any number; None if no reply came within `patience_s` (s). Raises KeyboardInterrupt if the
-        screen's process has ended."""
+    def wait_for_reply(self, timeout_s: float) -> Reply | None:
+        """Wait for the next reply, of any number; None if no reply came within `timeout_s` (s). Raises
+        KeyboardInterrupt if the screen's process has ended."""
         if self.ended:
             raise KeyboardInterrupt
         try:
-            return self._replies.get(timeout=patience_s)
+            return self._replies.get(timeout=timeout_s)
         except Empty:
             return None
 
-    def forget_replies(self) -> None:
+    def drop_replies(self) -> None:
         """Drop replies to an earlier sitting, whose requests had the same numbers."""
         while not self._replies.empty():
             self._replies.get()
 
-    def silent_s(self) -> float:
+    def compute_silence_s(self) -> float:
         """Time since the last message of the screen (s)."""
-        return time.monotonic() - self._heard_s
+        return time.monotonic() - self._last_message_s
 
     def _listen(self) -> None:
         """Read messages until the pipe is closed; then take the force off and end the engine. Runs in a thread."""
@@ -109,9 +109,10 @@ class ScreenLink:
                 self._on_screen_ended()
 
     def _handle_message(self, message: ToEngine) -> None:
-        """Put a message into the queue of its kind, or act on it at once (`LetGo`)."""
+        """Put a message into the queue of its kind, pass a request to the session (`Relay`), or interrupt at once
+        (`LetGo`)."""
         # Any message shows that the screen is alive; heartbeats are only the regular ones.
-        self._heard_s = time.monotonic()
+        self._last_message_s = time.monotonic()
         match message:
             case Heartbeat():
                 return
@@ -122,13 +123,13 @@ class ScreenLink:
             case LetGo():
                 self._let_go()
             case _:
-                self._received += 1
+                self._received_count += 1
                 self._commands.put(message)
 
     def _let_go(self) -> None:
         """Interrupt the current command and take the force off. The interrupted main thread takes it off too, but it
         may be waiting for a disk or a driver."""
-        self._let_go_up_to = self._received
+        self._let_go_up_to = self._received_count
         self._interrupt()
         if (stop := self.stop_device) is not None:
             stop()

@@ -1,6 +1,7 @@
 """Dialogue of line mode: writes sentences to the terminal and waits for typed lines.
 
-While it waits, it calls the sign of life of the session, which keeps the device running and may end the wait.
+While it waits, it calls the sign of life of the session, which keeps the device running and may end the wait. Used by
+`PlainDisplay` and the functions of `plain_forms`, `plain_demo`, `plain_question` and `plain_pause`.
 """
 
 import textwrap
@@ -64,7 +65,7 @@ class Conversation:
         self.say(*(self.words[key] for key in keys))
 
     def refuse(self, key: str, line: Line) -> None:
-        """Write that a line was not understood. key: of the text, which quotes the line."""
+        """Write that a line was not understood. key: of the text in the words, which quotes the line."""
         self.say(self.words.fill(key, {"typed": quote_line(line, self.words)}))
 
     def prompt(self, text: str) -> None:
@@ -92,24 +93,24 @@ class Conversation:
             if now_s > until_s:
                 return WaitOver.TIME_LIMIT
 
-    def answer(self) -> Line:
+    def read_line(self) -> Line:
         """Wait for the next line while no stimulus is played. Raises KeyboardInterrupt at the end of the input."""
-        reply = self.wait(_keep_waiting)
-        if isinstance(reply, WaitOver):
+        result = self.wait(_keep_waiting)
+        if isinstance(result, WaitOver):
             raise KeyboardInterrupt
-        return reply
+        return result
 
-    def answer_or_leave(self) -> Line:
+    def read_line_or_leave(self) -> Line:
         """Wait for the next line while no stimulus is played. Raises KeyboardInterrupt for "q" and at the end of the
         input."""
-        line = self.answer()
+        line = self.read_line()
         if line.word == "q":
             raise KeyboardInterrupt
         return line
 
     def poll_line(self) -> Line | None:
-        """A line that was typed already, without waiting; None without one. Always None for a pipe, whose lines are
-        meant for later questions. Raises KeyboardInterrupt at the end of the input."""
+        """Read a line that was typed already, without waiting; None without one. Always None for a pipe, whose lines
+        are meant for later questions. Raises KeyboardInterrupt at the end of the input."""
         if not self._lines.interactive:
             return None
         try:
@@ -118,20 +119,20 @@ class Conversation:
             raise KeyboardInterrupt from None
         return None if text is None else Line(text, self.clock.now_s())
 
-    def input_is_over(self) -> bool:
+    def has_input_ended(self) -> bool:
         """Whether the input has ended and all its lines were read."""
         return self._lines.has_ended()
 
 
-def printable(text: str) -> str:
-    """The text without control characters, such as those of arrow keys, and without surrounding blanks."""
-    return "".join(c for c in text if c.isprintable()).strip()
+def remove_control_characters(text: str) -> str:
+    """Remove control characters, such as those of arrow keys, and surrounding blanks."""
+    return "".join(character for character in text if character.isprintable()).strip()
 
 
 def quote_line(line: Line, words: Words = ENGLISH_WORDS) -> str:
     """The typed line as quoted in a sentence, with at most 20 characters; words for an empty line."""
-    quoted = printable(line.text)[:20]
-    return f"'{quoted}'" if quoted else words["line_enter_alone"]
+    shown_text = remove_control_characters(line.text)[:20]
+    return f"'{shown_text}'" if shown_text else words["line_enter_alone"]
 
 
 def _keep_waiting() -> bool:

@@ -28,7 +28,9 @@ def choose_demo(menu: DemoMenu, conversation: Conversation, keys: AnswerKeys, si
     vibration = menu.vibration
     conversation.say("", _place_text(menu, vibration, conversation.words))
     while True:
-        conversation.prompt(conversation.words.fill("line_demo_prompt", {"keys": keys.choice(conversation.words)}))
+        conversation.prompt(
+            conversation.words.fill("line_demo_prompt", {"keys": keys.describe_keys(conversation.words)})
+        )
         line = conversation.wait(sign_of_life)
         if line is WaitOver.CUT_SHORT:
             return DemoDone()
@@ -40,7 +42,7 @@ def choose_demo(menu: DemoMenu, conversation: Conversation, keys: AnswerKeys, si
             vibration, sentence = _step_vibration(menu, vibration, 1 if line.word == "n" else -1, conversation.words)
             conversation.say(sentence)
             continue
-        number = keys.answer(line.text)
+        number = keys.parse_answer(line.text)
         if number is not None:
             return PlayDemo(vibration, number)
         conversation.refuse("line_demo_no_key", line)
@@ -56,7 +58,7 @@ def show_playing(notice: PlayingNotice, conversation: Conversation, sign_of_life
             if notice.picture is None
             else f" ({describe_direction_ends(notice.picture, notice.number, conversation.words)})"
         )
-        conversation.say(f"{conversation.words.fact(notice.title)}{direction_text}")
+        conversation.say(f"{conversation.words.translate_fact(notice.title)}{direction_text}")
     until_s = conversation.clock.now_s() + notice.seconds
     while (remaining_s := until_s - conversation.clock.now_s()) > 1e-9:
         early_end = _wait_briefly(conversation, sign_of_life, min(POLL_INTERVAL_S, remaining_s))
@@ -75,10 +77,12 @@ def await_handle(
     while not (view := look()).ready:
         now_s = conversation.clock.now_s()
         if view.sentence != last_sentence and now_s - said_at_s >= SAY_AGAIN_S:
-            conversation.say(conversation.words.fact(view.sentence))
+            conversation.say(conversation.words.translate_fact(view.sentence))
             last_sentence, said_at_s = view.sentence, now_s
         early_end = (
-            INPUT_ENDED if conversation.input_is_over() else _wait_briefly(conversation, sign_of_life, POLL_INTERVAL_S)
+            INPUT_ENDED
+            if conversation.has_input_ended()
+            else _wait_briefly(conversation, sign_of_life, POLL_INTERVAL_S)
         )
         if early_end is not None:
             return early_end

@@ -1,7 +1,7 @@
 """Line mode: the display of a session in plain sentences, for any terminal, a screen reader, or answers from a pipe.
 
 `PlainDisplay` implements the display port by the functions of `plain_forms`, `plain_demo`, `plain_question` and
-`plain_pause`, which share a `Conversation`.
+`plain_pause`, which share a `Conversation`. Made by `study.cli.conduct`.
 """
 
 from collections.abc import Callable
@@ -62,7 +62,7 @@ class PlainDisplay:
         return plain_forms.ask_form(form, self._conversation)
 
     def device_checked(self, report: DeviceReport) -> bool:
-        return plain_forms.device_checked(report, self._conversation)
+        return plain_forms.show_device_check(report, self._conversation)
 
     def welcome(self, notice: Welcome) -> None:
         plain_question.show_instructions(notice, self._conversation, self._keys)
@@ -98,13 +98,13 @@ class PlainDisplay:
         return plain_pause.run_rest(notice, self._conversation, sign_of_life)
 
     def pause(self, notice: PauseNotice, sign_of_life: SignOfLife) -> AfterPause:
-        return plain_pause.pause(notice, self._conversation, self._note, sign_of_life)
+        return plain_pause.run_pause(notice, self._conversation, self._note, sign_of_life)
 
     def await_return(self, reason: str) -> None:
         self._conversation.discard_early_lines()
         self._conversation.say("", f"{self._words['void_title']}. {describe_void_trial(reason, self._words)}")
         self._conversation.say_texts("line_ready_again")
-        self._conversation.answer_or_leave()
+        self._conversation.read_line_or_leave()
 
     def goodbye(self, notice: Goodbye) -> None:
         words = self._words
@@ -113,9 +113,9 @@ class PlainDisplay:
         elif notice.finished:
             self._conversation.say("", words.fill_count("line_finished", notice.answers))
         else:
-            ending_with_reason = words.fill("line_over_because", {"reason": words.fact(notice.reason)})
+            ending_with_reason = words.fill("line_over_because", {"reason": words.translate_fact(notice.reason)})
             ending = ending_with_reason if notice.reason else words["line_over"]
             self._conversation.say("", f"{ending} {words.fill_count('saved', notice.answers)} {words['line_thanks']}")
 
     def trouble(self, sentence: str) -> None:
-        self._conversation.say(self._words.fact(sentence))
+        self._conversation.say(self._words.translate_fact(sentence))

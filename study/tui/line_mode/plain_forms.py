@@ -1,10 +1,10 @@
-"""Line mode: forms, one question after another, and the device check."""
+"""Line mode: forms, one question after another, and the device check. Called by `PlainDisplay`."""
 
 from protocols.wording.words import Words
 from study.session.views.form_entry import CHECKED
 from study.session.views.form_views import Form, FormField, FormReply, has_answer
 from study.session.views.views import DeviceReport
-from study.tui.line_mode.conversation import Conversation, Line, printable, quote_line
+from study.tui.line_mode.conversation import Conversation, Line, quote_line, remove_control_characters
 from study.tui.trial_words import describe_form_origin, describe_number_limits
 
 BACK = "b"
@@ -43,48 +43,51 @@ def _confirm_changes(form: Form, answers: dict[str, str], conversation: Conversa
     conversation.say("", words.fill("line_form_changed", {"answers": text}))
     while True:
         conversation.prompt(words["line_form_confirm"])
-        line = conversation.answer_or_leave()
+        line = conversation.read_line_or_leave()
         if line.word in (words["line_form_confirm_letter"], words["yes"], BACK):
             return line.word != BACK
         conversation.discard_early_lines()
         conversation.refuse("no_answer", line)
 
 
-def device_checked(report: DeviceReport, conversation: Conversation) -> bool:
-    """Write the findings of the device check. True: continue; False: check again."""
+def show_device_check(report: DeviceReport, conversation: Conversation) -> bool:
+    """Write the findings of the device check, and ask how to go on. Returns True to continue, False to check again.
+    Raises KeyboardInterrupt when the participant leaves."""
     conversation.discard_early_lines()
     words = conversation.words
-    moves = f" {words['simulation']}" if report.simulated else ""
-    conversation.say("", f"{words.fill('line_check', {'device': words.fact(report.device)})}{moves}")
+    simulation_text = f" {words['simulation']}" if report.simulated else ""
+    conversation.say(
+        "", f"{words.fill('line_check', {'device': words.translate_fact(report.device)})}{simulation_text}"
+    )
     if report.findings:
         conversation.say_texts("for_experimenter")
     for finding in report.findings:
         advice = f". {finding.advice}" if finding.advice and not finding.fine else ""
         conversation.say(f"{finding.verdict}: {finding.name}, {finding.value}{advice}")
-    ready = "check_ready" if report.fine else "check_ready_warning"
-    conversation.say_texts(ready if report.usable else "line_check_look")
+    ready_key = "check_ready" if report.fine else "check_ready_warning"
+    conversation.say_texts(ready_key if report.usable else "line_check_look")
     while True:
         conversation.prompt(words["line_check_prompt"])
-        line = conversation.answer_or_leave()
+        line = conversation.read_line_or_leave()
         if line.word in ("", "c"):
             return not line.word
         conversation.discard_early_lines()
         conversation.refuse("no_answer", line)
 
 
-def _ask_field(field: FormField, place: tuple[int, int], conversation: Conversation) -> str | None:
-    """Ask a field until its answer is valid; None: return to the previous field. place: number of the field, and of all
-    fields."""
-    by_number = bool(field.choices) and not any(choice.isdigit() for choice in field.choices)
+def _ask_field(field: FormField, field_position: tuple[int, int], conversation: Conversation) -> str | None:
+    """Ask a field until its answer is valid; None: return to the previous field. field_position: number of the field,
+    from 1, and number of fields. Raises KeyboardInterrupt when the participant leaves."""
+    is_numbered = bool(field.choices) and not any(choice.isdigit() for choice in field.choices)
     words = conversation.words
-    place_values = {"number": place[0], "all": place[1], "question": field.label}
+    place_values = {"number": field_position[0], "all": field_position[1], "question": field.label}
     conversation.say("", words.fill("line_form_place", place_values))
     for number, choice in enumerate(field.choices, start=1):
-        conversation.say(f"  {number}  {choice}" if by_number else f"  {choice}")
+        conversation.say(f"  {number}  {choice}" if is_numbered else f"  {choice}")
     while True:
-        conversation.prompt(_prompt(field, by_number, words))
-        line = conversation.answer()
-        answer = _parse_answer(field, line, by_number)
+        conversation.prompt(_choose_prompt(field, is_numbered, words))
+        line = conversation.read_line()
+        answer = _parse_answer(field, line, is_numbered)
         if answer is not None:
             return answer
         if line.word == "q":
@@ -92,19 +95,19 @@ def _ask_field(field: FormField, place: tuple[int, int], conversation: Conversat
         if line.word == BACK:
             return None
         conversation.discard_early_lines()  # lines that were typed in advance belong to later questions
-        conversation.say(_refusal(field, line, by_number, words))
+        conversation.say(_format_refusal(field, line, is_numbered, words))
 
 
-def _parse_answer(field: FormField, line: Line, by_number: bool) -> str | None:
-    """The answer in a line; None if the line is no valid answer to this field. by_number: choices may be given by
-    number."""
-    text = printable(line.text)
+def _parse_answer(field: FormField, line: Line, is_numbered: bool) -> str | None:
+    """The answer in a line; None if the line is no valid answer to this field. is_numbered: choices may be given by
+    their number."""
+    text = remove_control_characters(line.text)
     if not text:
         return None if field.needed else ""
     if not field.choices:
         is_valid = line.word not in (BACK, "q") and has_answer(field, text)
         return text if is_valid else None
-    if by_number and text.isdecimal() and 1 <= int(text) <= len(field.choices):
+    if is_numbered and text.isdecimal() and 1 <= int(text) <= len(field.choices):
         return field.choices[int(text) - 1]
     matching_choices = [choice for choice in field.choices if choice.casefold() == text.casefold()]
     if not matching_choices and line.word in (BACK, "q"):
@@ -116,14 +119,15 @@ def _parse_answer(field: FormField, line: Line, by_number: bool) -> str | None:
     return matching_choices[0] if len(matching_choices) == 1 else None
 
 
-def _prompt(field: FormField, by_number: bool, words: Words) -> str:
-    """The prompt of a field: for a number or an answer, and whether it may be left empty."""
-    text_key = "line_form_number" if by_number else "line_form_answer"
+def _choose_prompt(field: FormField, is_numbered: bool, words: Words) -> str:
+    """Choose the prompt of a field: for a number or an answer, and whether it may be left empty."""
+    text_key = "line_form_number" if is_numbered else "line_form_answer"
     return words[text_key if field.needed else f"{text_key}_or_none"]
 
 
-def _refusal(field: FormField, line: Line, by_number: bool, words: Words) -> str:
-    """Text on a line that is no valid answer: the limits or the choices of the field."""
+def _format_refusal(field: FormField, line: Line, is_numbered: bool, words: Words) -> str:
+    """Format the text on a line that is no valid answer: it states the limits or the choices of the field, or that an
+    answer is needed."""
     quoted_line = quote_line(line, words)
     if field.limits is not None:
         return words.fill(
@@ -135,4 +139,4 @@ def _refusal(field: FormField, line: Line, by_number: bool, words: Words) -> str
     for choice in field.choices[1:]:
         answers = words.fill("line_form_or", {"first": answers, "second": choice})
     values = {"typed": quoted_line, "answers": answers, "count": len(field.choices)}
-    return words.fill("line_form_none_numbered" if by_number else "line_form_none", values)
+    return words.fill("line_form_none_numbered" if is_numbered else "line_form_none", values)

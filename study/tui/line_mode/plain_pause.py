@@ -1,6 +1,6 @@
 """Line mode: enforced rests, and pauses with the choices to continue, to leave, to withdraw or to write a note.
 
-No stimulus is played meanwhile.
+No stimulus is played meanwhile. Called by `PlainDisplay`.
 """
 
 from collections.abc import Callable
@@ -8,11 +8,11 @@ from collections.abc import Callable
 from protocols.wording.words import Words
 from study.session.views.views import AfterPause, PauseNotice, RestNotice
 from study.session.watching.requests import NoteAsked
-from study.tui.line_mode.conversation import POLL_INTERVAL_S, Conversation, Line, WaitOver, printable
+from study.tui.line_mode.conversation import POLL_INTERVAL_S, Conversation, Line, WaitOver, remove_control_characters
 from study.tui.trial_words import describe_progress
 from study.workflows.trial.display import SignOfLife
 
-COUNT_EVERY_S = 10.0
+COUNTDOWN_INTERVAL_S = 10.0
 """Interval at which the remaining time is written (s)."""
 
 
@@ -20,8 +20,8 @@ def run_rest(notice: RestNotice, conversation: Conversation, sign_of_life: SignO
     """Count down an enforced rest, then wait for Enter. Returns the time rested (s). Raises KeyboardInterrupt when the
     participant leaves, or at the end of the input."""
     words = conversation.words
-    rested = words.fill("line_rest", {"seconds": f"{notice.seconds:.0f}"})
-    conversation.say("", f"{rested} {words.fill_count('runs_left', notice.runs_left)}")
+    rest_text = words.fill("line_rest", {"seconds": f"{notice.seconds:.0f}"})
+    conversation.say("", f"{rest_text} {words.fill_count('runs_left', notice.runs_left)}")
     if notice.progress is not None:
         conversation.say(describe_progress(notice.progress, words))
     started_s = conversation.clock.now_s()
@@ -34,16 +34,19 @@ def run_rest(notice: RestNotice, conversation: Conversation, sign_of_life: SignO
     return conversation.clock.now_s() - started_s
 
 
-def pause(
-    notice: PauseNotice, conversation: Conversation, note: Callable[[NoteAsked], None] | None, sign_of_life: SignOfLife
+def run_pause(
+    notice: PauseNotice,
+    conversation: Conversation,
+    store_note: Callable[[NoteAsked], None] | None,
+    sign_of_life: SignOfLife,
 ) -> AfterPause:
-    """Wait in a pause until the participant decides how to continue; LEAVE if the sign of life ends the wait. note:
-    stores a note in the log; None offers no notes. Raises KeyboardInterrupt at the end of the input."""
+    """Wait in a pause until the participant decides how to continue; END_SITTING if the sign of life ends the wait.
+    store_note: stores a note in the log; None offers no notes. Raises KeyboardInterrupt at the end of the input."""
     conversation.discard_early_lines()
     words = conversation.words
-    paused = words.fill("line_pause", {"reason": words.fact(notice.reason)})
-    conversation.say("", f"{paused} {words.fill_count('saved', notice.answers)}")
-    conversation.say(_choices(note is not None, words))
+    pause_text = words.fill("line_pause", {"reason": words.translate_fact(notice.reason)})
+    conversation.say("", f"{pause_text} {words.fill_count('saved', notice.answers)}")
+    conversation.say(_list_pause_keys(store_note is not None, words))
     while True:
         conversation.prompt(words["line_pause_prompt"])
         line = conversation.wait(sign_of_life)
@@ -57,52 +60,53 @@ def pause(
             case "q":
                 return AfterPause.END_SITTING
             case "w":
-                if _withdraws(conversation):
+                if _confirm_withdrawal(conversation):
                     return AfterPause.WITHDRAW
-            case "n" | "e" if note is not None:
-                _take_note(line.word == "e", conversation, note)
+            case "n" | "e" if store_note is not None:
+                _take_note(line.word == "e", conversation, store_note)
             case "?":
-                conversation.say(_choices(note is not None, words))
+                conversation.say(_list_pause_keys(store_note is not None, words))
             case _:
                 conversation.refuse("line_pause_no_key", line)
 
 
-def _choices(notes: bool, words: Words) -> str:
-    """The keys of a pause. notes: whether notes are offered."""
-    return " ".join(words[key] for key in ("line_pause_keys", *(["line_pause_notes"] if notes else [])))
+def _list_pause_keys(has_notes: bool, words: Words) -> str:
+    """Text on the keys of a pause. has_notes: whether notes are offered."""
+    return " ".join(words[key] for key in ("line_pause_keys", *(["line_pause_notes"] if has_notes else [])))
 
 
-def _withdraws(conversation: Conversation) -> bool:
-    """Whether the participant confirms the withdrawal of consent by typing a word."""
+def _confirm_withdrawal(conversation: Conversation) -> bool:
+    """Ask the participant to confirm the withdrawal of consent by typing a word. Returns whether it was typed."""
     word = conversation.words["withdraw_word"]
     conversation.say_texts("withdraw_all")
     conversation.prompt(conversation.words.fill("line_withdraw", {"word": word}))
-    confirmed = conversation.answer().word == word.casefold()
-    if not confirmed:
+    is_confirmed = conversation.read_line().word == word.casefold()
+    if not is_confirmed:
         conversation.say_texts("nothing_erased")
-    return confirmed
+    return is_confirmed
 
 
-def _take_note(adverse: bool, conversation: Conversation, note: Callable[[NoteAsked], None]) -> None:
-    """Ask for the text of a note, or of an adverse event, and store it; an empty line stores nothing."""
-    conversation.prompt(conversation.words["line_happened" if adverse else "line_note"])
-    text = printable(conversation.answer().text)
+def _take_note(is_adverse: bool, conversation: Conversation, store_note: Callable[[NoteAsked], None]) -> None:
+    """Ask for the text of a note, or of an adverse event where `is_adverse`, and store it; an empty line stores
+    nothing."""
+    conversation.prompt(conversation.words["line_happened" if is_adverse else "line_note"])
+    text = remove_control_characters(conversation.read_line().text)
     if not text:
         conversation.say_texts("nothing_written")
         return
-    note(NoteAsked("participant", text, adverse))
+    store_note(NoteAsked("participant", text, is_adverse))
     conversation.say_texts("line_noted")
 
 
 def _count_down(until_s: float, conversation: Conversation, sign_of_life: SignOfLife) -> bool:
-    """Write the remaining time every `COUNT_EVERY_S`, until `until_s` on the session's clock (s). False if the sign of
-    life ended the wait."""
-    next_say_s = float("-inf")
+    """Write the remaining time every `COUNTDOWN_INTERVAL_S`, until `until_s` on the session's clock (s). False if the
+    sign of life ended the wait."""
+    next_message_s = float("-inf")
     while (remaining_s := until_s - conversation.clock.now_s()) > 1e-9:  # tolerance for rounding of clock times
         now_s = conversation.clock.now_s()
-        if remaining_s > COUNT_EVERY_S and now_s >= next_say_s:
+        if remaining_s > COUNTDOWN_INTERVAL_S and now_s >= next_message_s:
             conversation.say(f"{remaining_s:.0f} s")
-            next_say_s = now_s + COUNT_EVERY_S
+            next_message_s = now_s + COUNTDOWN_INTERVAL_S
         conversation.clock.sleep(min(POLL_INTERVAL_S, remaining_s))
         if not sign_of_life():
             return False

@@ -28,7 +28,7 @@ PARTICIPANT_LEFT = Unanswered("the participant left", ends_sitting=True)
 
 def describe_answer_keys(keys: AnswerKeys, words: Words) -> str:
     """Describe the keys that answer 1 and 2 in one sentence."""
-    return words.fill("line_keys", {"keys": keys.choice(words)})
+    return words.fill("line_keys", {"keys": keys.describe_keys(words)})
 
 
 def draw_direction_picture(picture: DirectionPicture, words: Words) -> tuple[str, ...]:
@@ -54,15 +54,15 @@ def show_instructions(notice: Welcome, conversation: Conversation, keys: AnswerK
         describe_answer_keys(keys, words),
     )
     if not notice.device_moves:
-        conversation.say("", words.fill("not_felt", {"device": words.fact(notice.device)}))
+        conversation.say("", words.fill("not_felt", {"device": words.translate_fact(notice.device)}))
     conversation.say("", words["enter_begins"])
-    conversation.answer_or_leave()
+    conversation.read_line_or_leave()
 
 
 def ask_question(question: Question, conversation: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> Reply:
     """Ask the question of a trial until there is a reply, the time limit is over, or the stimulus ended early. Other
     lines are refused, and the question is asked again."""
-    words, key_names = conversation.words, {"keys": keys.choice(conversation.words)}
+    words, key_names = conversation.words, {"keys": keys.describe_keys(conversation.words)}
     conversation.discard_early_lines()
     conversation.say("", format_heading(question, words))
     deadline_s = conversation.clock.now_s() + question.time_limit_s if question.time_limit_s else float("inf")
@@ -97,7 +97,7 @@ def _explain_question(question: Question, words: Words) -> tuple[str, ...]:
 
 def parse_reply(line: Line, keys: AnswerKeys) -> Reply | None:
     """Parse the reply in a typed line: an answer, or q (leave), p (pause), r (repeat); None for any other line."""
-    answer = keys.answer(line.text)
+    answer = keys.parse_answer(line.text)
     if answer is not None:
         return Answered(answer, line.at_s)
     return {"q": PARTICIPANT_LEFT, "p": PAUSE, "r": REPEAT}.get(line.word)
@@ -110,4 +110,4 @@ def show_practice_result(result: PracticeResult, conversation: Conversation) -> 
         "", conversation.words.fill("line_practice", {"right": result.correct_count, "asked": result.answer_count})
     )
     conversation.say_texts("practice_enough" if result.passed else "practice_hard", "enter_goes_on")
-    conversation.answer_or_leave()
+    conversation.read_line_or_leave()

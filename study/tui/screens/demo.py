@@ -69,11 +69,11 @@ class DemoScreen(TranslatedScreen[DemoChoice]):
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        self._show(self.words.fill("demo_how", {"keys": self._keys.choice(self.words)}))
+        self._show(self.words.fill("demo_how", {"keys": self._keys.describe_keys(self.words)}))
 
     def on_key(self, event: Key) -> None:
         """Dismiss with the direction to play if an answer key was pressed."""
-        answer = self._keys.answer(event.character or event.key)
+        answer = self._keys.parse_answer(event.character or event.key)
         if answer is not None:
             event.stop()
             dismiss_screen(self, PlayDemo(self._vibration, answer))

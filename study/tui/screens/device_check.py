@@ -40,7 +40,9 @@ class DeviceCheckScreen(TranslatedScreen[bool]):
         report, words = self._report, self.words
         name_width = max((len(finding.name) for finding in report.findings), default=0)
         with Sheet():
-            yield LiteralText(words.fill("check_title", {"device": words.fact(report.device)}), classes="title")
+            yield LiteralText(
+                words.fill("check_title", {"device": words.translate_fact(report.device)}), classes="title"
+            )
             if report.simulated:
                 yield LiteralText(words["simulation"])
             yield LiteralText(words["for_experimenter"] if report.findings else "")

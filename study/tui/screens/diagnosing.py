@@ -11,7 +11,7 @@ from textual.screen import Screen
 from textual.widgets import Footer, ProgressBar, Static
 
 from study.tui.dismiss_screen import dismiss_screen
-from study.tui.screens.preparing import TICK_S, describe_elapsed
+from study.tui.screens.preparing import UPDATE_INTERVAL_S, describe_elapsed
 
 HELP = """\
 # Diagnosing
@@ -57,7 +57,7 @@ class DiagnosingScreen(Screen[bool]):
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        self.set_interval(TICK_S, self._tick)
+        self.set_interval(UPDATE_INTERVAL_S, self._tick)
 
     def show_progress(self, step: str, share: float) -> None:
         """Show the current step and progress. step: sentence without capital letter and full stop; share: 0 to 1."""
@@ -70,5 +70,5 @@ class DiagnosingScreen(Screen[bool]):
         dismiss_screen(self, True)
 
     def _tick(self) -> None:
-        """Draw the elapsed time; called every `TICK_S`."""
+        """Draw the elapsed time; called every `UPDATE_INTERVAL_S`."""
         self.query_one("#elapsed", Static).update(describe_elapsed(self._now_s() - self._started_s))

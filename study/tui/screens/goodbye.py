@@ -52,4 +52,4 @@ class GoodbyeScreen(TranslatedScreen[None]):
 
 def _stops(reason: str, words: Words) -> str:
     """Sentence on a sitting that stopped before the session was finished, with the reason if there is one."""
-    return words.fill("end_stops_because", {"reason": words.fact(reason)}) if reason else words["end_stops"]
+    return words.fill("end_stops_because", {"reason": words.translate_fact(reason)}) if reason else words["end_stops"]

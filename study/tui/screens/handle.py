@@ -50,7 +50,7 @@ class HandleScreen(TranslatedScreen[Unanswered | None]):
         self._view = view
         if self.query(HandleTarget):  # False before the first frame
             self.query_one(HandleTarget).view = view
-            self.query_one("#sentence", LiteralText).update(self.words.fact(view.sentence))
+            self.query_one("#sentence", LiteralText).update(self.words.translate_fact(view.sentence))
 
     def action_pause(self) -> None:
         dismiss_screen(self, PAUSE)

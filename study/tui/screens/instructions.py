@@ -46,11 +46,13 @@ class InstructionsScreen(TranslatedScreen[None]):
             with Horizontal(id="pictures"):
                 yield DirectionPanel(1, welcome.picture, words)
                 yield DirectionPanel(2, welcome.picture, words)
-            yield LiteralText(words.fill("how", {"keys": self._keys.choice(words)}))
+            yield LiteralText(words.fill("how", {"keys": self._keys.describe_keys(words)}))
             yield LiteralText(describe_plan(welcome, words))
             yield LiteralText(words["stop_any_time"])
             if not welcome.device_moves:
-                yield LiteralText(words.fill("not_felt", {"device": words.fact(welcome.device)}), classes="practice")
+                yield LiteralText(
+                    words.fill("not_felt", {"device": words.translate_fact(welcome.device)}), classes="practice"
+                )
             yield LiteralText(words["enter_begins"], classes="gap strong")
         yield Footer(show_command_palette=False)
 

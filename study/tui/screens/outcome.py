@@ -99,7 +99,7 @@ class OutcomeScreen(TranslatedScreen[Decision], ModalScreen[Decision]):
         self.set_class(not outcome.grave, "-good")
         self.query_one(Vertical).border_title = f"{'! ' if outcome.grave else ''}{outcome.title}"
         self.query_one("#told", Static).update(_outcome_text(outcome))
-        keys = [(key, self.words.key(words)) for key, words in map(KEYS.__getitem__, outcome.decisions)]
+        keys = [(key, self.words.translate_key(words)) for key, words in map(KEYS.__getitem__, outcome.decisions)]
         self.query_one("#offered", Static).update("\n".join(f"{key.capitalize():5}  {words}" for key, words in keys))
         self.refresh_bindings()
 

@@ -65,7 +65,9 @@ class PauseScreen(TranslatedScreen[AfterPause]):
         words = self.words
         with Card(words["pause_title"]):
             yield LiteralText(words["pause_free"], classes="strong")
-            yield LiteralText(words.fill("pause_reason", {"reason": words.fact(self._notice.reason)}), classes="gap")
+            yield LiteralText(
+                words.fill("pause_reason", {"reason": words.translate_fact(self._notice.reason)}), classes="gap"
+            )
             yield LiteralText(words.fill_count("saved", self._notice.answers))
             yield OptionList(*(Option(words[key], id=choice.value) for choice, key in CHOICES.items()), markup=False)
             yield LiteralText(id="message")

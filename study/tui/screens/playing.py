@@ -38,7 +38,7 @@ class PlayingScreen(TranslatedScreen[Unanswered | None]):
 
     def compose(self) -> ComposeResult:
         notice, words = self._notice, self.words
-        yield LiteralText(words.fact(notice.title), id="title")
+        yield LiteralText(words.translate_fact(notice.title), id="title")
         if notice.title and not notice.number:  # a probe, after which no question is asked
             yield LiteralText(words["playing_no_key"], id="message")
             yield Footer(show_command_palette=False)

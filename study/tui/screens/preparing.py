@@ -1,5 +1,5 @@
 """Screen that is shown while the device is prepared: current step and elapsed time. It has no progress bar, because the
-duration is unknown."""
+duration is unknown. Shown by `study.tui.app.sitting_screens`."""
 
 import time
 from collections.abc import Callable
@@ -11,9 +11,9 @@ from textual.widgets import Footer, Static
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.tui.translated_screen import TranslatedScreen
 
-TICK_S = 0.5
+UPDATE_INTERVAL_S = 0.5
 """Interval (s) at which the elapsed time is drawn."""
-NO_TEXT = "…"
+PLACEHOLDER_TEXT = "…"
 """Shown as long as there is no sentence."""
 
 
@@ -37,48 +37,51 @@ class PreparingScreen(TranslatedScreen[None]):
         super().__init__(words)
         self._sentence = sentence
         self._now_s = now_s
-        self._began_s = now_s()
+        self._start_s = now_s()
 
     def compose(self) -> ComposeResult:
         with Vertical() as box:
             box.border_title = self._sentence and self.words["preparing_title"]
-            yield Static(self._sentence or NO_TEXT, id="sentence", markup=False)
-            yield Static(self._wait_words(), id="elapsed", markup=False)
+            yield Static(self._sentence or PLACEHOLDER_TEXT, id="sentence", markup=False)
+            yield Static(self._describe_wait(), id="elapsed", markup=False)
         footer = Footer(show_command_palette=False)
         footer.display = bool(self._sentence)
         yield footer
 
     def on_mount(self) -> None:
-        self.set_interval(TICK_S, self._tick)
+        self.set_interval(UPDATE_INTERVAL_S, self._update_elapsed)
 
     def say(self, sentence: str, afresh: bool = False) -> None:
         """Show the current step. afresh: whether another wait begins, so that the elapsed time restarts."""
         self._sentence = sentence
         if afresh:
-            self._began_s = self._now_s()
+            self._start_s = self._now_s()
         if self.query("#sentence"):
             self.query_one("#sentence", Static).update(sentence)
             self.query_one(Footer).display = True
-            self._title_box()
+            self._set_box_title()
 
-    def speak(self, words: Words) -> None:
+    def set_language(self, words: Words) -> None:
         """Show the texts in this language from now on."""
         self.words = words
-        self._title_box()
+        self._set_box_title()
         self.refresh_bindings()
 
-    def _title_box(self) -> None:
+    def _set_box_title(self) -> None:
+        """Set the title of the box; none without a sentence."""
         for box in self.query(Vertical):
             box.border_title = self._sentence and self.words["preparing_title"]
 
-    def _tick(self) -> None:
-        self.query_one("#elapsed", Static).update(self._wait_words())
+    def _update_elapsed(self) -> None:
+        """Draw the elapsed time; called every `UPDATE_INTERVAL_S`."""
+        self.query_one("#elapsed", Static).update(self._describe_wait())
 
-    def _wait_words(self) -> str:
-        return describe_elapsed(self._now_s() - self._began_s, self.words) if self._sentence else ""
+    def _describe_wait(self) -> str:
+        """Elapsed time of the present wait in words; empty without a sentence."""
+        return describe_elapsed(self._now_s() - self._start_s, self.words) if self._sentence else ""
 
 
 def describe_elapsed(seconds: float, words: Words = ENGLISH_WORDS) -> str:
-    """Elapsed time in words: minutes and seconds, or seconds alone below a minute."""
+    """Describe an elapsed time (s) in words: minutes and seconds, or seconds alone below a minute."""
     minutes, remainder_s = divmod(int(seconds), 60)
     return words.fill("elapsed_min" if minutes else "elapsed_s", {"minutes": minutes, "seconds": remainder_s})

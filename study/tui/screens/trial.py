@@ -122,7 +122,7 @@ class TrialScreen(TranslatedScreen[None]):
         self._pending_request = None
 
     def disarm(self) -> None:
-        """Accept no further reply until `arm` is called again."""
+        """Accept no further reply until `arm` is called again, and stop the time limit."""
         self._armed_s = None
         self._stop_time_limit()
         if not self._accepted_answer:
@@ -148,8 +148,9 @@ class TrialScreen(TranslatedScreen[None]):
             self.query_one("#trouble", LiteralText).update(sentence)
 
     def on_key(self, event: Key) -> None:
+        """Take an answer, or explain why a key has no effect."""
         arrival_time_s = arrival_s(event)
-        answer = self._keys.answer(event.character or event.key)
+        answer = self._keys.parse_answer(event.character or event.key)
         if answer is not None:
             event.stop()
             self._take_answer(answer, arrival_time_s)
@@ -157,11 +158,14 @@ class TrialScreen(TranslatedScreen[None]):
             self._explain_refused_key(event)
 
     def on_paste(self, event: Paste) -> None:
+        """Refuse pasted text: it is no answer."""
         event.stop()
         if self._armed_s is not None:
             self._show_message(f"{self.words['pasted']} {self._describe_answer_keys()}")
 
     def action_reply(self, reply_name: str) -> None:
+        """Post a reply of `REPLIES`. A repetition beyond the allowed number is refused; a request to pause or leave
+        between two questions is kept for the next."""
         reply = REPLIES[reply_name]
         if self._armed_s is not None and reply is REPEAT and self._repeats_left == 0:
             self._show_message(f"{self.words['no_repeats']} {self._describe_answer_keys()}")
@@ -225,7 +229,8 @@ class TrialScreen(TranslatedScreen[None]):
         return "" if self._verdict is None else self.words["right" if self._verdict else "wrong"]
 
     def _show_question(self, feedback_text: str = "") -> None:
-        """Redraw the screen for the current question. last: feedback on the previous answer, put before the message."""
+        """Redraw the screen for the current question. feedback_text: on the previous answer,
+        put before the message."""
         if not self._is_composed:
             return
         self.query_one("#trouble", LiteralText).update(self._trouble)
@@ -253,7 +258,7 @@ class TrialScreen(TranslatedScreen[None]):
 
     def _describe_answer_keys(self) -> str:
         """Describe the keys that answer."""
-        return self.words.fill("press", {"keys": self._keys.choice(self.words)})
+        return self.words.fill("press", {"keys": self._keys.describe_keys(self.words)})
 
     def _show_message(self, sentence: str) -> None:
         """Show a sentence below the answers; nothing before the widgets exist."""

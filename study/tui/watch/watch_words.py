@@ -3,7 +3,7 @@
 Each function formats a value of a `WatchView` as words or as a number with its unit.
 """
 
-from study.local_clock import machine_zone
+from study.local_clock import convert_to_machine_zone
 from study.session.views.local_time import split_time_in_zone
 from study.session.watching.watch_view import ClosedTrial, Exposure, SittingStatus, WatchedRun, WatchView
 
@@ -29,7 +29,7 @@ NOT_MEASURED_LEGEND = "answered too early to measure; counts"
 def format_local_time(utc: str) -> str:
     """Local time of a UTC time stamp, without the date: "14:05:10 +01:00". A stamp that is no valid time is returned as
     it is."""
-    date, time, offset = split_time_in_zone(utc, machine_zone)
+    date, time, offset = split_time_in_zone(utc, convert_to_machine_zone)
     return f"{time} {offset}" if offset else date
 
 

@@ -16,16 +16,16 @@ from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.document.hashing import protocol_hash
 from study.devices.clock import RealClock
 from study.devices.device import Device, DeviceInfo
-from study.devices.opening import device_folder, find_accepted_baseline, needs_real_time, open_device
+from study.devices.opening import find_accepted_baseline, get_device_folder, needs_real_time, open_device
 from study.errors import DeviceError, StudyError, WrongUseError
-from study.local_clock import machine_zone
+from study.local_clock import convert_to_machine_zone
 from study.session.views.local_time import format_time_in_zone, split_time_in_zone
 from study.session.views.views import DeviceFinding
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.formats.daily_check_file import DailyCheck, read_daily_check, write_daily_check
 from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
-from study.workflows.checks.device_changes import change_findings
+from study.workflows.checks.device_changes import make_change_findings
 from study.workflows.recording.record_device import RecordingPlan, make_recording_settings, record_on_device
 
 if TYPE_CHECKING:
@@ -62,8 +62,8 @@ def compute_play_duration_s() -> float:
 
 
 def record_baseline(name: str, motion_callbacks: MotionCallbacks) -> tuple[str, str]:
-    """Record the baseline of the daily checks. Returns its name in `device_folder` and its SHA-256. Raises StudyError,
-    also where the recording is not good enough for a comparison."""
+    """Record the baseline of the daily checks. Returns its name in `get_device_folder` and its SHA-256. Raises
+    StudyError, also where the recording is not good enough for a comparison."""
     plan = _plan_recording(name, BASELINE_FOLDER)
     with contextlib.closing(_open_free_device(plan)) as device:
         return _record_baseline_on(device, plan, motion_callbacks)
@@ -90,13 +90,13 @@ def _record_baseline_on(device: Device, plan: RecordingPlan, motion_callbacks: M
     # A recording compared with itself does not differ: a finding means that it is too inaccurate to detect a later
     # change.
     inaccurate_findings = [
-        finding for finding in change_findings(compare_recordings(recording, recording)) if not finding.fine
+        finding for finding in make_change_findings(compare_recordings(recording, recording)) if not finding.fine
     ]
     problems += [f"Too inaccurate to compare with: {finding.name}, {finding.value}." for finding in inaccurate_findings]
     if problems:
         advice = "Look for what holds the handle, disturbs the sensor or shakes the table; then accept it again."
         raise DeviceError("The device was not accepted", " ".join(problems), advice, f"The recording is {plan.out}.")
-    return f"{BASELINE_FOLDER}/{plan.out.name}", sha256_of(plan.out)
+    return f"{BASELINE_FOLDER}/{plan.out.name}", compute_sha256(plan.out)
 
 
 def require_acceptable_device(name: str) -> None:
@@ -130,7 +130,7 @@ def check_on_device(device: Device, plan: RecordingPlan, motion_callbacks: Motio
                 reason = str(error) or type(error).__name__
                 _write_check(device.info, plan, digest, False, (f"It broke off: {reason}",), ())
         raise
-    findings = change_findings(changes)
+    findings = make_change_findings(changes)
     passed = all(finding.fine for finding in findings)
     sentences = tuple(f"{finding.name}: {finding.value}. {finding.advice}".strip() for finding in findings)
     return DailyCheckResult(findings, _write_check(device.info, plan, digest, passed, sentences, changes))
@@ -153,7 +153,7 @@ def _write_check(
         sentences=sentences,
         changes=tuple(_as_json(change) for change in changes),
         recording=plan.out.name if plan.out.exists() else "",
-        recording_sha256=sha256_of(plan.out) if plan.out.exists() else "",
+        recording_sha256=compute_sha256(plan.out) if plan.out.exists() else "",
         baseline_sha256=baseline_sha256,
     )
     file = plan.out.with_suffix(".json")
@@ -188,18 +188,18 @@ def judge_last_check(info: DeviceInfo, required: bool = False) -> DeviceFinding:
 
 def _find_last_check(info: DeviceInfo) -> DeviceFinding:
     """Find the newest check of this device and describe it as a finding; unreadable files are skipped."""
-    today = split_time_in_zone(datetime.now(UTC).isoformat(), machine_zone)[0]
+    today = split_time_in_zone(datetime.now(UTC).isoformat(), convert_to_machine_zone)[0]
     device_option = info.name.replace(".", "")
     advice = f"With no hand on the handle: hapteq doctor --device {device_option} --daily."
-    for path in sorted((device_folder() / CHECK_FOLDER).glob("*.json"), reverse=True):
+    for path in sorted((get_device_folder() / CHECK_FOLDER).glob("*.json"), reverse=True):
         try:
             check = read_daily_check(path)
         except StudyError:
             continue
         if (check.device, check.details) != (info.name, info.details):
             continue
-        time_and_path = f"{format_time_in_zone(check.utc, machine_zone)}, {path}"
-        if split_time_in_zone(check.utc, machine_zone)[0] != today:
+        time_and_path = f"{format_time_in_zone(check.utc, convert_to_machine_zone)}, {path}"
+        if split_time_in_zone(check.utc, convert_to_machine_zone)[0] != today:
             return DeviceFinding(
                 "Daily check", f"none today; the last one was {time_and_path}", False, advice, warning=True
             )
@@ -241,8 +241,8 @@ def _read_baseline(info: DeviceInfo, protocol: RecordingProtocol) -> tuple[Recor
             "The device was accepted without a recording (no accelerometer).",
             acceptance_advice,
         )
-    path = device_folder() / name
-    if not path.is_file() or sha256_of(path) != digest:
+    path = get_device_folder() / name
+    if not path.is_file() or compute_sha256(path) != digest:
         raise DeviceError(
             "There is nothing to compare with", f"{path} is gone, or is not what was accepted.", acceptance_advice
         )
@@ -261,7 +261,7 @@ def _make_not_comparable_error(refusal: "NotMeasurableError") -> DeviceError:
 
 def _plan_recording(name: str, folder: str) -> RecordingPlan:
     """Plan a recording by the shipped protocol, with a new file in this folder beside the acceptance."""
-    recording_folder = device_folder() / folder
+    recording_folder = get_device_folder() / folder
     recording_folder.mkdir(parents=True, exist_ok=True)
     return RecordingPlan(
         _read_protocol(), name, (0.0, 0.0, 0.0), 1, recording_folder / f"{name}_{_format_time_stamp()}.h5"

@@ -1,4 +1,4 @@
-"""Changes of a device since its acceptance, as findings with numbers and limits."""
+"""Changes of a device since its acceptance, as findings with numbers and limits. Called by `daily_check`."""
 
 import math
 from collections.abc import Sequence
@@ -10,58 +10,67 @@ from study.session.views.views import DeviceFinding
 if TYPE_CHECKING:
     from analysis.device_change.compare_devices import Change
 
-CAUSES = {
+CAUSE_ADVICE = {
     "friction": "Look for a cable that rubs and for dirt in the joints; let the device warm up.",
     "gain": "Look at what was added to the handle, at the power supply, and at the sensor's mounting and calibration.",
     "response": "Look for a loose screw at handle, sensor, base or table, and at the cable.",
     "noise": "Look at the sensor's plug, cable and shield, and at what shakes the table.",
 }
-"""What to look for, by the kind of change."""
-FRICTION_FIRST = "That may come from the friction: mend it first."
+"""What to look for after a change, by its kind."""
+FRICTION_ADVICE = "That may come from the friction: mend it first."
 """Advice where gain or response changed together with the friction."""
-TOO_NOISY = "It was measured too inaccurately: close other programs, keep the table still, and check again."
-"""Advice where a change could not be told."""
-IF_IT_STAYS = "If it persists, name the cause with `hapteq diagnose`, or accept the device anew."
-"""Added to the advice of `CAUSES`."""
+NOISE_ADVICE = "It was measured too inaccurately: close other programs, keep the table still, and check again."
+"""Advice where the measurement is too noisy to decide whether there was a change."""
+PERSISTENCE_ADVICE = "If it persists, name the cause with `hapteq diagnose`, or accept the device anew."
+"""Added to each advice of `CAUSE_ADVICE`."""
 
 
-def change_findings(changes: Sequence["Change"]) -> tuple[DeviceFinding, ...]:
-    """One for each kind, in the order in which they come."""
+def make_change_findings(changes: Sequence["Change"]) -> tuple[DeviceFinding, ...]:
+    """Make a finding for each kind of change, in the order in which the kinds first occur."""
     kinds = dict.fromkeys(change.kind for change in changes)
     friction_changed = any(change.changed for change in changes if change.kind == "friction")
     return tuple(
-        _finding(kind, [change for change in changes if change.kind == kind], friction_changed) for kind in kinds
+        _make_finding(kind, [change for change in changes if change.kind == kind], friction_changed) for kind in kinds
     )
 
 
-def _finding(kind: str, changes: Sequence["Change"], friction_changed: bool) -> DeviceFinding:
-    """The line on one kind of change. friction_changed: whether the friction changed, too, which also changes gain and
+def _make_finding(kind: str, changes: Sequence["Change"], friction_changed: bool) -> DeviceFinding:
+    """Make the finding on one kind of change, over all axes: wrong where one changed, a warning where one could not be
+    decided. friction_changed: whether the friction changed, too, which also changes gain and
     response."""
-    value = f"{'; '.join(_change_text(change) for change in changes)} ({_limit_words(changes[0])})"
+    change_text = f"{'; '.join(_format_change(change) for change in changes)} ({_format_limit(changes[0])})"
     axes = ", ".join(change.axis for change in changes if change.changed)
-    causes = FRICTION_FIRST if friction_changed and kind in ("gain", "response") else f"{CAUSES[kind]} {IF_IT_STAYS}"
-    advice = f"It changed ({axes}). {causes}"
+    cause_text = (
+        FRICTION_ADVICE
+        if friction_changed and kind in ("gain", "response")
+        else f"{CAUSE_ADVICE[kind]} {PERSISTENCE_ADVICE}"
+    )
+    advice = f"It changed ({axes}). {cause_text}"
     if axes:
-        return DeviceFinding(kind.capitalize(), value, fine=False, advice=advice)
+        return DeviceFinding(kind.capitalize(), change_text, fine=False, advice=advice)
     if unclear_axes := ", ".join(dict.fromkeys(change.axis for change in changes if change.unclear)):
-        return DeviceFinding(kind.capitalize(), value, False, f"Not told ({unclear_axes}). {TOO_NOISY}", warning=True)
-    return DeviceFinding(kind.capitalize(), value, fine=True)
+        return DeviceFinding(
+            kind.capitalize(), change_text, False, f"Not told ({unclear_axes}). {NOISE_ADVICE}", warning=True
+        )
+    return DeviceFinding(kind.capitalize(), change_text, fine=True)
 
 
-def _change_text(change: "Change") -> str:
+def _format_change(change: "Change") -> str:
+    """Axis and size of a change: percent for gain and response, else the present and the accepted value."""
     match change.kind:
         case "gain":
             return f"{change.axis} {format_signed(100 * (change.today - 1), 1)} %"
         case "response" if math.isnan(change.today):
-            return f"{change.axis} not measured{_place_words(change)}"
+            return f"{change.axis} not measured{_format_place(change)}"
         case "response":
-            return f"{change.axis} {100 * change.today:.1f} %{_place_words(change)}"
+            return f"{change.axis} {100 * change.today:.1f} %{_format_place(change)}"
         case _:
-            accepted_text, today_text = _number(change.accepted), _number(change.today)
+            accepted_text, today_text = _format_value(change.accepted), _format_value(change.today)
             return f"{change.axis} {today_text} {change.unit}, accepted {accepted_text}"
 
 
-def _place_words(change: "Change") -> str:
+def _format_place(change: "Change") -> str:
+    """Band (Hz) of a change of the response, and its strongest peaks; empty where no band is stated."""
     if change.band_hz is None:
         return ""
     peak_text = (
@@ -70,7 +79,8 @@ def _place_words(change: "Change") -> str:
     return f" at {change.band_hz[0]:g} to {change.band_hz[1]:g} Hz{peak_text}"
 
 
-def _limit_words(change: "Change") -> str:
+def _format_limit(change: "Change") -> str:
+    """Limit of a kind of change, in words."""
     match change.kind:
         case "friction":
             return f"may change by {change.limit:g} {change.unit}"
@@ -80,5 +90,6 @@ def _limit_words(change: "Change") -> str:
             return f"may change by {100 * change.limit:.0f} %"
 
 
-def _number(value: float) -> str:
+def _format_value(value: float) -> str:
+    """A measured value with three digits; words for NaN."""
     return "the handle did not move" if math.isnan(value) else f"{value:.3g}"

@@ -1,4 +1,5 @@
-"""All checks of a set-up before a study: installation, device, and timing of the 1 kHz force loop.
+"""All checks of a set-up before a study: installation, device, and timing of the 1 kHz force loop. Called by
+`hapteq doctor`.
 
 The timing of the device's loop is compared with that of a bare loop in a process of its own, which separates delays of
 the computer from those of this program. After a successful examination a device may be accepted for use with a hand.
@@ -11,7 +12,7 @@ from pathlib import Path
 
 from study.devices.clock import Clock, RealClock
 from study.devices.device import Device, DeviceSettings
-from study.devices.opening import accept_device, examine_device, limit_test_force_n, needs_real_time, open_device
+from study.devices.opening import accept_device, examine_device, get_limit_test_force_n, needs_real_time, open_device
 from study.errors import DeviceError, ExitCode, WrongUseError
 from study.session.stimulus.timing_verdict import judge_load
 from study.session.views.handle_notice import format_limit_test_notice
@@ -25,13 +26,13 @@ from study.workflows.checks.computer_load import load_per_processor
 from study.workflows.checks.daily_check import MotionCallbacks, record_baseline
 from study.workflows.device_settings import device_settings
 
-PROTOCOL = "direction_threshold"
+PROTOCOL_NAME = "direction_threshold"
 """Protocol whose safety limits and settings the device is opened with."""
 
 OPTIONAL_FINDINGS = ("Accelerometer",)
 """Names of findings that do not affect the force: they do not prevent the use of the device."""
 
-SPARE_S = 5.0
+HOLD_MARGIN_S = 5.0
 """Margin (s) by which the longest permitted hold exceeds the duration of the timing measurement."""
 
 
@@ -40,7 +41,9 @@ class Examination:
     """Findings about installation, device and timing of a computer."""
 
     installation: tuple[DeviceFinding, ...]
+    """Findings about the installation and the computer."""
     device: DeviceReport
+    """Findings of the device's driver and of the device check."""
     timing: Timing | None
     """None if no timing was requested, or if the device could not be used."""
 
@@ -68,8 +71,9 @@ class Examination:
 def examine_setup(
     device: str, data: Path, timing_s: float, terminal: Terminal | None, on_progress: Callable[[float], None]
 ) -> Examination:
-    """Run all checks in real time. timing_s: duration of the timing (s), 0 for none; on_progress: as for
-    `check_timing`. A device that cannot be opened, or is lost, results in a finding, not an error."""
+    """Run all checks in real time. device: its name; data: data folder; terminal: None outside a terminal. timing_s:
+    duration of the timing (s), 0 for none; on_progress: as for `check_timing`. A device that cannot be opened, or is
+    lost, results in a finding, not an error."""
     installation = check_installation(data, terminal)
     report, timing = _examine_device(device, timing_s, on_progress)
     return Examination(installation, report, timing)
@@ -79,45 +83,47 @@ def _examine_device(
     name: str, timing_s: float, on_progress: Callable[[float], None]
 ) -> tuple[DeviceReport, Timing | None]:
     """Findings about the device and its timing; a device with a wrong finding of its driver is not opened."""
-    clock, settings = RealClock(), _settings(name, timing_s)
-    driver = examine_device(name)
-    report = DeviceReport(name, simulated=False, findings=driver)
-    if any(finding.wrong and finding.name not in OPTIONAL_FINDINGS for finding in driver):
+    clock, settings = RealClock(), _make_settings(name, timing_s)
+    driver_findings = examine_device(name)
+    report = DeviceReport(name, simulated=False, findings=driver_findings)
+    if any(finding.wrong and finding.name not in OPTIONAL_FINDINGS for finding in driver_findings):
         return report, None
-    sensed = all(finding.fine for finding in driver if finding.name in OPTIONAL_FINDINGS)
-    settings = replace(settings, with_sensor=sensed)
+    has_sensor = all(finding.fine for finding in driver_findings if finding.name in OPTIONAL_FINDINGS)
+    settings = replace(settings, with_sensor=has_sensor)
     try:
         with contextlib.closing(open_device(name, settings, clock, seed=1)) as device:
-            total_cap_n, safety = settings.limits.total_cap_n, read_study_protocol(PROTOCOL).protocol.safety
-            report = check_device(device, clock, settings.place_m, total_cap_n, safety, sensed)
-            report = replace(report, findings=(*driver, *report.findings))
-            timing = _time(device, clock, timing_s, on_progress) if timing_s > 0 else None
+            total_cap_n, safety = settings.limits.total_cap_n, read_study_protocol(PROTOCOL_NAME).protocol.safety
+            report = check_device(device, clock, settings.place_m, total_cap_n, safety, has_sensor)
+            report = replace(report, findings=(*driver_findings, *report.findings))
+            timing = _measure_timing(device, clock, timing_s, on_progress) if timing_s > 0 else None
             return report, timing
     except DeviceError as error:
-        trouble = DeviceFinding("Device", f"{error.title}. {error.happened}", fine=False, advice=error.do_now)
-        return replace(report, findings=(*report.findings, trouble)), None
+        device_finding = DeviceFinding("Device", f"{error.title}. {error.happened}", fine=False, advice=error.do_now)
+        return replace(report, findings=(*report.findings, device_finding)), None
 
 
-def _time(device: Device, clock: Clock, seconds: float, on_progress: Callable[[float], None]) -> Timing:
-    """Measure the timing for `seconds`, and compare it with a bare loop that runs at the same time."""
-    load, simulated = load_per_processor(), device.info.simulated
-    with run_bare_loop_in_parallel(seconds, device.info.sample_rate_hz, raised_priority=not simulated) as run:
-        timing = check_timing(device, clock, seconds, on_progress, load)
+def _measure_timing(device: Device, clock: Clock, duration_s: float, on_progress: Callable[[float], None]) -> Timing:
+    """Measure the timing for `duration_s` (s), and compare it with a bare loop that runs at the same time."""
+    load, is_simulated = load_per_processor(), device.info.simulated
+    with run_bare_loop_in_parallel(
+        duration_s, device.info.sample_rate_hz, raised_priority=not is_simulated
+    ) as bare_loop_run:
+        timing = check_timing(device, clock, duration_s, on_progress, load)
     # The loop of a simulated device is never late: for such a device, the wake-ups of this program are compared.
-    late, ticks = timing.health.late_ticks + timing.health.missed_ticks, timing.health.ticks
-    if simulated:
-        ticks = round(seconds * device.info.sample_rate_hz)
-        late = round(timing.lateness.missing_a_tick * ticks)
-    comparison = compare_with_bare_loop(late, ticks, run)
+    late_ticks, ticks = timing.health.late_ticks + timing.health.missed_ticks, timing.health.ticks
+    if is_simulated:
+        ticks = round(duration_s * device.info.sample_rate_hz)
+        late_ticks = round(timing.lateness.missing_a_tick * ticks)
+    comparison = compare_with_bare_loop(late_ticks, ticks, bare_loop_run)
     return replace(timing, findings=(*timing.findings, comparison, judge_load(load)))
 
 
-def _settings(name: str, timing_s: float) -> DeviceSettings:
-    """Settings of a study without the centring spring, because nothing may move during the timing. timing_s: duration
-    (s) that a hold must permit."""
-    settings = device_settings(read_study_protocol(PROTOCOL).protocol)
-    longest_s = max(settings.limits.longest_hold_s, timing_s + SPARE_S)
-    limits = replace(settings.limits, longest_hold_s=longest_s)
+def _make_settings(name: str, timing_s: float) -> DeviceSettings:
+    """Settings of a study without the centring spring, because nothing may move during the timing; without a hand on a
+    real device. timing_s: duration (s) that a hold must permit."""
+    settings = device_settings(read_study_protocol(PROTOCOL_NAME).protocol)
+    longest_hold_s = max(settings.limits.longest_hold_s, timing_s + HOLD_MARGIN_S)
+    limits = replace(settings.limits, longest_hold_s=longest_hold_s)
     free_settings = replace(settings, limits=limits, spring_frequency_hz=0.0, spring_damping_n_s_per_m=0.0)
     return replace(free_settings, hand_on_handle=False) if needs_real_time(name) else free_settings
 
@@ -141,15 +147,17 @@ def accept(name: str, examination: Examination, operator: str, motion_callbacks:
     if not needs_real_time(name):
         raise WrongUseError("There is nothing to accept", f"{name!r} moves no hand.", "Leave --accept out.")
     timing = examination.timing
-    hinders = [finding for finding in examination.findings if finding.wrong and finding.name not in OPTIONAL_FINDINGS]
-    if timing is None or hinders:
-        problem_names = ", ".join(finding.name for finding in hinders) or "the timing was not measured"
+    blocking_findings = [
+        finding for finding in examination.findings if finding.wrong and finding.name not in OPTIONAL_FINDINGS
+    ]
+    if timing is None or blocking_findings:
+        problem_names = ", ".join(finding.name for finding in blocking_findings) or "the timing was not measured"
         raise DeviceError(
             "The device was not accepted", f"Not fine: {problem_names}.", "Mend that first, as said above."
         )
-    sensed = examination.sensed
-    baseline = record_baseline(name, motion_callbacks) if sensed else ("", "")
-    motion_callbacks.announce(format_limit_test_notice(name, limit_test_force_n()))
-    settings = replace(_settings(name, 0.0), with_sensor=sensed)
+    has_sensor = examination.sensed
+    baseline = record_baseline(name, motion_callbacks) if has_sensor else ("", "")
+    motion_callbacks.announce(format_limit_test_notice(name, get_limit_test_force_n()))
+    settings = replace(_make_settings(name, 0.0), with_sensor=has_sensor)
     sentence = accept_device(name, settings, RealClock(), operator, baseline)
-    return sentence if sensed else f"{sentence}. Without an accelerometer no daily check will be possible."
+    return sentence if has_sensor else f"{sentence}. Without an accelerometer no daily check will be possible."

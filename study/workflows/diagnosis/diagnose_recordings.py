@@ -203,17 +203,17 @@ def _make_settings(
         fitted=plan.model is None and not inputs.simulated,
         balances=balances,
         compared=plan.compare,
-        kept=_read_effects(plan.effect_files),
+        kept=_read_effects(plan.effect_files, inputs.recordings),
         discovery=plan.discovery,
     )
 
 
-def _read_effects(paths: Sequence[Path]) -> tuple[LawEntry, ...]:
+def _read_effects(paths: Sequence[Path], recordings: Sequence[Recording]) -> tuple[LawEntry, ...]:
     if not paths:
         return ()
-    from study.workflows.diagnosis.effect_file import read_entry
+    from study.workflows.diagnosis.effect_file import read_entries
 
-    return tuple(read_entry(path) for path in paths)
+    return read_entries(paths, recordings)
 
 
 def _check_compared(plan: DiagnosePlan, inputs: DiagnosisInput, model: MechanicalModel) -> None:

@@ -2,25 +2,28 @@
 
 A diagnosis compares a catalogue of known physical effects, and may discover a formula without a name. Saved under a
 name, the formula joins the catalogue's effects in diagnoses of other recordings. Loading a file runs its code: load
-only files from a trusted source.
+only files from a trusted source. Called by `hapteq effect` and, for the option --effect-file, by `diagnose_recordings`.
 """
 
 import importlib.util
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from analysis.diagnosis.document import Diagnosis
-from equalizer.effects.law_entry import LawEntry
+from equalizer.effects.law_entry import LawEntry, make_library_effects
 from equalizer.laws.law import Law, parse_law
+from equalizer.laws.parse import LawError
 from equalizer.plant.effect_vocabulary import DISCOVERED_LAW, EFFECTS_BY_NAME
+from equalizer.signals.recording import Recording
 from study.errors import StudyError
 from study.store.disk.text_file import write_text
 from study.store.formats.diagnosis_file import read_diagnosis
 from study.store.formats.mechanical_model_file import read_mechanical_model
 
-NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
+EFFECT_NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
 """Valid name of an effect, and of its file without `.py`."""
-TEXT = """\"\"\"{about}\"\"\"
+EFFECT_TEMPLATE = """\"\"\"{about}\"\"\"
 
 from equalizer.effects.law_entry import LawEntry
 from equalizer.laws.law import Law
@@ -46,16 +49,18 @@ ENTRY = LawEntry(
 def write_entry(source: Path, out_path: Path, number: int = 1) -> LawEntry:
     """Write a law of a diagnosis (folder or JSON) or of a model (TOML) as an effect file. number: which law, from 1.
     Raises StudyError if there is no such law, or if the name of `out_path` is not a new valid name."""
-    laws = _laws(source)
+    laws = _read_laws(source)
     if number > len(laws):
         content_text = f"holds {len(laws)} law{'s' if len(laws) > 1 else ''}" if laws else "holds no discovered law"
-        raise _refusal(f"{source} {content_text}.", "Give a diagnosis or model that has one, or another --number.")
+        raise _make_effect_error(
+            f"{source} {content_text}.", "Give a diagnosis or model that has one, or another --number."
+        )
     if (
         out_path.suffix != ".py"
-        or not NAME.fullmatch(out_path.stem)
+        or not EFFECT_NAME.fullmatch(out_path.stem)
         or out_path.stem in (*EFFECTS_BY_NAME, DISCOVERED_LAW)
     ):
-        raise _refusal(
+        raise _make_effect_error(
             f"'{out_path.name}' cannot be an effect's name.",
             "Choose a name of small letters, digits and _ that is not in the catalogue, such as my_effect.py.",
         )
@@ -65,7 +70,7 @@ def write_entry(source: Path, out_path: Path, number: int = 1) -> LawEntry:
     entry = LawEntry(out_path.stem, law, f"found by hapteq: {source.name}", signature)
     write_text(
         out_path,
-        TEXT.format(
+        EFFECT_TEMPLATE.format(
             # Escaped: the texts come from a file, and an unescaped quote would end the docstring and run as code.
             about=about.replace("\\", r"\\").replace('"', r"\""),
             name=entry.name, expression=law.expression, numbers=law.numbers, units=law.units, acts_on=law.acts_on,
@@ -75,29 +80,46 @@ def write_entry(source: Path, out_path: Path, number: int = 1) -> LawEntry:
     return entry
 
 
+def read_entries(paths: Sequence[Path], recordings: Sequence[Recording]) -> tuple[LawEntry, ...]:
+    """Load effect files for a diagnosis of these recordings. Raises StudyError for an invalid file, and for a law that
+    reads a signal that a recording lacks."""
+    entries = tuple(read_entry(path) for path in paths)
+    for path, entry in zip(paths, entries, strict=True):
+        for recording in recordings:
+            try:
+                make_library_effects((entry,), recording)
+            except LawError as error:
+                raise _make_effect_error(
+                    f"{path} does not fit the recordings: {error}.",
+                    "Diagnose recordings that have this signal, or leave --effect-file out.",
+                ) from error
+    return entries
+
+
 def read_entry(path: Path) -> LawEntry:
     """Load an effect file by running it. Raises StudyError if it does not exist, fails, or defines no ENTRY with a new
     valid name."""
     spec = importlib.util.spec_from_file_location(f"hapteq_effect_{path.stem}", path)
     if spec is None or spec.loader is None or not path.is_file():
-        raise _refusal(f"{path} is not there.", "Write one with `hapteq effect FOUND --out EFFECT.py`.")
+        raise _make_effect_error(f"{path} is not there.", "Write one with `hapteq effect FOUND --out EFFECT.py`.")
     module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
     except Exception as error:
-        raise _refusal(f"{path} fails: {error}.", "Correct it, or leave --effect-file out.") from error
+        raise _make_effect_error(f"{path} fails: {error}.", "Correct it, or leave --effect-file out.") from error
     entry = getattr(module, "ENTRY", None)
     catalogue_names = (*EFFECTS_BY_NAME, DISCOVERED_LAW)
-    if not isinstance(entry, LawEntry) or entry.name in catalogue_names or not NAME.fullmatch(entry.name):
-        raise _refusal(
+    if not isinstance(entry, LawEntry) or entry.name in catalogue_names or not EFFECT_NAME.fullmatch(entry.name):
+        raise _make_effect_error(
             f"{path} defines no ENTRY, or one by a name of the catalogue.",
             "Write one with `hapteq effect FOUND --out EFFECT.py`, and change that.",
         )
     return entry
 
 
-def _laws(source: Path) -> list[Law]:
-    """Discovered laws of a diagnosis (effects first, then candidates) or of a model file, in their order."""
+def _read_laws(source: Path) -> list[Law]:
+    """Read the discovered laws of a diagnosis (effects first, then candidates) or of a model file (.toml), in their
+    order. Raises StudyError."""
     if source.suffix == ".toml":
         return [effect.law for effect in read_mechanical_model(source).effects if effect.law is not None]
     document: Diagnosis = read_diagnosis(source / "diagnosis.json" if source.is_dir() else source)
@@ -105,6 +127,6 @@ def _laws(source: Path) -> list[Law]:
     return [parse_law(law.expression, law.acts_on, law.axis) for law in laws if law is not None]
 
 
-def _refusal(explanation: str, advice: str) -> StudyError:
+def _make_effect_error(explanation: str, advice: str) -> StudyError:
     """Error with what happened and what to do."""
     return StudyError("There is no effect of your own", explanation, advice, saved="Nothing was written.")

@@ -22,7 +22,7 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
 from study.errors import StudyError
 from study.session.facts.events import TrialMeasured
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.archive import SessionFolder, find_session
 from study.store.sessions.trial_recordings import PROBE_PREFIX
@@ -106,7 +106,7 @@ def _read_trial(path: Path, logged_hashes: Mapping[str, str | None]) -> _Trial |
     """Read a trial; None if samples are missing, if the recording has flags of a problem, if frequency, level or
     segments are not stated, or if the file's hash differs from the log. logged_hashes: SHA-256 by file name."""
     name = f"{path.parent.name}/{path.name}"
-    if name in logged_hashes and sha256_of(path) != logged_hashes[name]:
+    if name in logged_hashes and compute_sha256(path) != logged_hashes[name]:
         return None
     recording = read_recording(path)
     meta = recording.meta

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from study.session.facts.events import ProbeMeasured, ProbePlayed
 from study.session.watching.followed_session import apply_followed_event, begin_watching
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.sessions.archive import SessionFolder, find_session
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_drift import DriftReader
@@ -53,7 +53,7 @@ def find_references(session: Path) -> SessionReferences | None:
 def _is_as_logged(folder: SessionFolder, event: ProbeMeasured) -> bool:
     """Whether the recording exists and has the SHA-256 of the log."""
     path = folder.path / (event.recording or "")
-    return path.is_file() and sha256_of(path) == event.sha256
+    return path.is_file() and compute_sha256(path) == event.sha256
 
 
 def _drifts(folder: SessionFolder, folded_session: FoldedSession) -> tuple[str, ...]:

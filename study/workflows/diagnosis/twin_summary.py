@@ -26,7 +26,7 @@ def summarise_twin(twin: WrittenTwin) -> dict[str, Any]:
             "up_to_hz": twin.rigid_body.up_to_hz,
             "mass_kg": twin.rigid_body.mass.tolist(),
             "damping_n_s_per_m": twin.rigid_body.damping.tolist(),
-            "of_friction_n_s_per_m": twin.rigid_body.of_friction.tolist(),
+            "of_friction_n_s_per_m": twin.rigid_body.friction_damping.tolist(),
         },
         "modes_hz": _compute_modes_hz(twin),
         "tolerance": None if tolerance is None else asdict(tolerance),
@@ -45,7 +45,7 @@ def format_twin_lines(twin: WrittenTwin) -> tuple[str, ...]:
     lines = [
         f"As one rigid body, up to {rigid_body.up_to_hz:.3g} Hz: mass {_format_values(rigid_body.mass)} "
         f"kg{mass_tolerance_text}, damping {_format_values(rigid_body.damping)} N s/m, "
-        f"{_format_values(rigid_body.of_friction)} N s/m of it "
+        f"{_format_values(rigid_body.friction_damping)} N s/m of it "
         f"from friction and subtracted{_format_deviation(tolerance, 'damping_n_s_per_m')}",
     ]
     if modes_hz := _compute_modes_hz(twin):

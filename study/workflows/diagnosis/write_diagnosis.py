@@ -12,7 +12,7 @@ from analysis.diagnosis.result.findings import Findings
 from analysis.figures.diagnosis.diagnosis_pictures import list_drawings
 from analysis.figures.picture import Picture
 from analysis.reports.diagnosis_report import render_diagnosis_report
-from study.local_clock import local_now
+from study.local_clock import format_local_now
 from study.store.disk.provenance import Provenance, gather_provenance
 from study.store.disk.text_file import write_text
 from study.store.formats.diagnosis_file import DIAGNOSIS_NAME, MODEL_NAME, PAGE_NAME, write_diagnosis
@@ -37,7 +37,10 @@ def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Pat
     findings = replace(findings, remarks=(*guard.sentences, *findings.remarks))
     write_drawn(folder / "figures", drawn_pictures)
     page = render_diagnosis_report(
-        findings, [drawn_picture.picture for drawn_picture in drawn_pictures], _origin_entries(origin), local_now()
+        findings,
+        [drawn_picture.picture for drawn_picture in drawn_pictures],
+        _origin_entries(origin),
+        format_local_now(),
     )
     write_text(folder / PAGE_NAME, page)
     return findings

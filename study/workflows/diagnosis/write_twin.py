@@ -109,7 +109,7 @@ def write_twin(
             check_same_device(calibration, stronger.device, TITLE)
         weaker = _record_and_read(recording_plans[1], lambda share: on_progress(0.15 + 0.15 * share), before_moving)
     fit, rigid_body = _fit_models(plan, stronger, weaker, lambda share: on_progress(0.3 + 0.6 * share))
-    frictionless_model = remove_friction_damping(fit.model, rigid_body.of_friction)
+    frictionless_model = remove_friction_damping(fit.model, rigid_body.friction_damping)
     model = replace(
         frictionless_model,
         name=f"{stronger.device}, as identified",
@@ -237,7 +237,7 @@ def _describe_assumptions(stronger: Recording, fit: MechanicalFit, rigid_body: R
         "between the two sides of a cable: half on each side is assumed.",
         "Dry friction is no part of a linear model: it appears as additional damping, which decreases as the force "
         f"increases. From the change when the force was lowered to {WEAKER_AMPLITUDE_RATIO:.0%}, "
-        f"{', '.join(f'{damping:.3g}' for damping in rigid_body.of_friction)} N s/m were attributed to friction and "
-        "subtracted.",
+        f"{', '.join(f'{damping:.3g}' for damping in rigid_body.friction_damping)} N s/m were attributed to friction "
+        "and subtracted.",
         fit.reason,
     )

@@ -1,7 +1,7 @@
 """The band of an equalizer from a study: its upper end is the frequency up to which people tell directions apart.
 
 Above the direction limit a direction need not be right, so that a model need not be good there: the narrow band of the
-full equalizer ends at it, and a wider model renders the strength alone.
+full equalizer ends at it, and a wider model renders the strength alone. Called by `hapteq identify`.
 """
 
 import json
@@ -17,12 +17,12 @@ from study.store.disk.text_file import read_text
 FORMAT = "hapteq-anova"
 """Format of anova.json."""
 KIND = "analysis of a study"
-"""What messages call such a file."""
-ANALYSE = "Give the anova.json that `hapteq analyze` writes for a study with two participants or more."
+"""Name of such a file in messages."""
+ANALYSIS_ADVICE = "Give the anova.json that `hapteq analyze` writes for a study with two participants or more."
 
 
 @dataclass(frozen=True, slots=True)
-class BandOfStudy:
+class StudyBand:
     """A frequency band that ends at the direction limit found by a study."""
 
     band_hz: tuple[float, float]
@@ -30,38 +30,39 @@ class BandOfStudy:
     """Where the upper end comes from, in a sentence."""
 
 
-def band_of_study(path: Path, lowest_hz: float) -> BandOfStudy:
-    """The band from `lowest_hz` to the direction limit of an analysis. Raises CannotReadError, UnusableFileError."""
+def read_study_band(path: Path, lowest_hz: float) -> StudyBand:
+    """Read the band from `lowest_hz` to the direction limit of an analysis. path: its anova.json. Raises
+    CannotReadError, and UnusableFileError where it is no such file, has no limit, or one not above `lowest_hz`."""
     try:
         document = load_json(read_text(path))
     except ValueError as error:
-        raise UnusableFileError(path, KIND, (str(error),), ANALYSE) from error
+        raise UnusableFileError(path, KIND, (str(error),), ANALYSIS_ADVICE) from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise UnusableFileError(path, KIND, (f'"format" is not {json.dumps(FORMAT)}',), ANALYSE)
-    limit = _number(document, "frequency_hz")
-    if limit is None:
+        raise UnusableFileError(path, KIND, (f'"format" is not {json.dumps(FORMAT)}',), ANALYSIS_ADVICE)
+    limit_hz = _read_limit_value(document, "frequency_hz")
+    if limit_hz is None:
         problem = "it found no direction limit within the frequencies played"
         raise UnusableFileError(path, KIND, (problem,), "State the band with --band.")
-    if limit <= lowest_hz:
-        problem = f"its direction limit of {limit:.1f} Hz is not above the band's lower end of {lowest_hz:g} Hz"
+    if limit_hz <= lowest_hz:
+        problem = f"its direction limit of {limit_hz:.1f} Hz is not above the band's lower end of {lowest_hz:g} Hz"
         raise UnusableFileError(path, KIND, (problem,), "State a lower end below it with --band.")
-    lower, upper = _number(document, "lower_hz"), _number(document, "upper_hz")
-    interval = (
-        f"{f'{lower:.1f} Hz' if lower is not None else 'below what was played'} to "
-        f"{f'{upper:.1f} Hz' if upper is not None else 'above what was played'}"
+    lower_hz, upper_hz = _read_limit_value(document, "lower_hz"), _read_limit_value(document, "upper_hz")
+    interval_text = (
+        f"{f'{lower_hz:.1f} Hz' if lower_hz is not None else 'below what was played'} to "
+        f"{f'{upper_hz:.1f} Hz' if upper_hz is not None else 'above what was played'}"
     )
-    simulated = " Its participants were simulated." if document.get("population") != "people" else ""
-    return BandOfStudy(
-        (lowest_hz, limit),
-        f"The band ends at the direction limit of {path.name}, {limit:.1f} Hz (interval: {interval}), a limit of that "
-        f"device, cap and task.{simulated}",
+    simulated_text = " Its participants were simulated." if document.get("population") != "people" else ""
+    return StudyBand(
+        (lowest_hz, limit_hz),
+        f"The band ends at the direction limit of {path.name}, {limit_hz:.1f} Hz (interval: {interval_text}), a limit "
+        f"of that device, cap and task.{simulated_text}",
     )
 
 
-def _number(document: dict[str, Any], key: str) -> float | None:
-    """A positive value of the direction limit in the document; None where it is not given."""
+def _read_limit_value(document: dict[str, Any], key: str) -> float | None:
+    """Read a value of the direction limit in the document; None where it is missing or no positive, finite number."""
     primary = document.get("primary")
     limit = primary.get("limit") if isinstance(primary, dict) else None
     value = limit.get(key) if isinstance(limit, dict) else None
-    usable = isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value) and value > 0
-    return float(value) if usable and value is not None else None
+    is_usable = isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value) and value > 0
+    return float(value) if is_usable and value is not None else None

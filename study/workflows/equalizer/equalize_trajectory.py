@@ -1,4 +1,4 @@
-"""`hapteq equalize`: a table of forces from a table of wanted accelerations and identified models of the device.
+"""`hapteq equalize`: a table of forces from a table of target accelerations and identified models of the device.
 
 The forces are the feedforward of an LQR tracker (`equalizer.tracking.feedforward`) under the cap. With `--physics`, the
 forces of known nonlinear effects along the predicted motion are added. Each refusal names its cause and a remedy.
@@ -17,24 +17,24 @@ from equalizer.tracking.compensation.effect_compensation import Compensation, co
 from equalizer.tracking.feedforward.feedforward import Feedforward, FeedforwardSettings
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY, Trajectory, require_rate
 from equalizer.tracking.lqr.limits import ForceLimitError, ForcePeaks, require_under_cap
-from equalizer.tracking.workspace.feedforward_at_place import feedforward_at
+from equalizer.tracking.workspace.feedforward_at_place import compute_feedforward_at
 from study.errors import StudyError, WrongUseError
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.playback_models import PlaybackModels, Vector, compute_peak_gain, read_playback_models
 from study.workflows.free_name import require_free
 
-HIGHEST_MPS2 = 1e4
+MAX_ACCELERATION_MPS2 = 1e4
 """Largest accepted acceleration (m/s^2), a thousand times gravity: larger values indicate a wrong unit in the table."""
-LARGEST_ERROR = 0.5
+MAX_TRACKING_ERROR = 0.5
 """Predicted tracking error, relative to the wanted signal, above which forces are refused."""
-LEAST_WEIGHT_RATIO = 1e-7
+MIN_WEIGHT_RATIO = 1e-7
 """Ratio of the root of the force's weight to the model's peak gain below which the weight is lost in rounding."""
 
 
 @dataclass(frozen=True, slots=True)
 class EqualizePlan:
-    """Request of an equalization: files of identified models, table of wanted accelerations, table of forces to write.
+    """Request of an equalization: files of identified models, table of target accelerations, table of forces to write.
     at_m: place in the workspace (m). cap_n: largest force (N). constrain: keep the forces below the cap at the cost of
     accuracy, instead of refusing."""
 
@@ -43,7 +43,7 @@ class EqualizePlan:
     out: Path
     at_m: Vector | None = None
     weight: float = 1e-3
-    """Weight of the forces in the tracker's cost."""
+    """Weight of the forces in the tracker's cost, (m/s² per N)²."""
     cap_n: float = 3.0
     constrain: bool = False
     physics: Path | None = None
@@ -52,10 +52,11 @@ class EqualizePlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EqualizedTrajectory:
-    """Forces computed for a wanted trajectory, with the models and the solution behind them."""
+    """Forces computed for a target trajectory, with the models and the solution behind them."""
 
     plan: EqualizePlan
     reference: Trajectory
+    """Target accelerations (m/s²)."""
     forces: Trajectory
     """Forces to play in N, including those that compensate known effects."""
     models: PlaybackModels
@@ -64,11 +65,13 @@ class EqualizedTrajectory:
     peaks: ForcePeaks
     """Force peaks of `forces`."""
     bands: BandFacts | None
+    """Facts about the bands of a narrow and a wide model; None with a single band."""
     compensation: Compensation | None
+    """Compensation of known effects; None without `EqualizePlan.physics`."""
 
 
 def equalize_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
-    """Read, solve and write. Raises StudyError; nothing is written then."""
+    """Read the inputs, solve for the forces and write them. Raises StudyError; nothing is written then."""
     check_free(plan.out)
     equalized = solve_trajectory(plan)
     write_trajectory(plan.out, equalized.forces)
@@ -76,25 +79,25 @@ def equalize_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
 
 
 def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
-    """Read and solve without writing. Raises StudyError."""
+    """Read the inputs and solve for the forces, without writing. Raises StudyError."""
     reference = _read_reference(plan.trajectory)
     models = read_playback_models(plan.models, plan.at_m, plan.weight)
     physics = None if plan.physics is None else read_mechanical_model(plan.physics)
-    amplitude_n = None if physics is None else _amplitude_n(models.nearest)
+    amplitude_n = None if physics is None else _read_amplitude_n(models.nearest)
     try:
         require_rate(reference, models.most_weighted.sample_rate_hz)
-        feedforward, bands = _solve(plan, reference, models)
-    except ForceLimitError as limit:
+        feedforward, bands = _solve_feedforward(plan, reference, models)
+    except ForceLimitError as limit_error:
         raise StudyError(
             "The forces would be too strong",
-            f"{plan.trajectory.name}: {limit}.",
+            f"{plan.trajectory.name}: {limit_error}.",
             "Scale the accelerations, give --constrain, or raise --cap for a device that no hand holds.",
             saved="Nothing was written.",
-        ) from limit
+        ) from limit_error
     except ValueError as problem:
         _require_weight(plan, models)
-        raise _not_equalized(f"{plan.trajectory.name}: {problem}.") from problem
-    _require_reached(plan, feedforward, in_bands=bands is not None)
+        raise _make_table_error(f"{plan.trajectory.name}: {problem}.") from problem
+    _require_accuracy(plan, feedforward, in_bands=bands is not None)
     compensation = None
     if physics is not None:
         compensation = _compensate(plan, feedforward, models.most_weighted, physics, amplitude_n)
@@ -107,11 +110,13 @@ def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
 
 
 def check_free(out_path: Path, *further_paths: Path) -> None:
-    """Check the output paths before any work. Raises StudyError."""
+    """Check that no output path exists, before any work. Raises StudyError."""
     require_free(out_path, *further_paths, title="The forces were not computed", kind="tables")
 
 
 def _read_reference(path: Path) -> Trajectory:
+    """Read the table of target accelerations (m/s²). Raises StudyError for another table, or for a value that is NaN or
+    above `MAX_ACCELERATION_MPS2` in magnitude."""
     trajectory = read_trajectory(path)
     if trajectory.kind is not TRAJECTORY:
         raise WrongUseError(
@@ -120,19 +125,20 @@ def _read_reference(path: Path) -> Trajectory:
             "Give the wanted accelerations in m/s^2, as the last file.",
             saved="Nothing was written.",
         )
-    sizes = np.abs(trajectory.signal.samples)
-    if not sizes.max() <= HIGHEST_MPS2:
-        row, axis = np.unravel_index(int(sizes.argmax()), sizes.shape)
+    magnitudes = np.abs(trajectory.signal.samples)
+    if not magnitudes.max() <= MAX_ACCELERATION_MPS2:
+        row, axis = np.unravel_index(int(magnitudes.argmax()), magnitudes.shape)
         acceleration = trajectory.signal.samples[row, axis]
-        raise _not_equalized(
+        raise _make_table_error(
             f"{path.name} wants {acceleration:g} m/s^2 of {TRAJECTORY.header[1 + axis]} in line {row + 2}; the largest "
-            f"acceleration that is accepted is {HIGHEST_MPS2:g} m/s^2."
+            f"acceleration that is accepted is {MAX_ACCELERATION_MPS2:g} m/s^2."
         )
     return trajectory
 
 
 def _require_weight(plan: EqualizePlan, models: PlaybackModels) -> None:
-    if math.sqrt(plan.weight) < LEAST_WEIGHT_RATIO * max(compute_peak_gain(model) for model in models.all_models):
+    """Raise StudyError if the weight of the forces is lost in rounding, see `MIN_WEIGHT_RATIO`."""
+    if math.sqrt(plan.weight) < MIN_WEIGHT_RATIO * max(compute_peak_gain(model) for model in models.all_models):
         raise StudyError(
             "The forces were not computed",
             f"--weight {plan.weight:g} is too small to keep forces finite where the model hardly moves.",
@@ -141,11 +147,11 @@ def _require_weight(plan: EqualizePlan, models: PlaybackModels) -> None:
         )
 
 
-def _require_reached(plan: EqualizePlan, feedforward: Feedforward, in_bands: bool) -> None:
-    """Raise if the models cannot reproduce the wanted signal. Where the cap costs accuracy, the error without the
-    cap decides."""
+def _require_accuracy(plan: EqualizePlan, feedforward: Feedforward, in_bands: bool) -> None:
+    """Raise StudyError if the models cannot reproduce the target signal, see `MAX_TRACKING_ERROR`. Where the cap costs
+    accuracy, the error without the cap decides. in_bands: whether narrow and wide models were combined."""
     tracking_error = feedforward.error if feedforward.loss is None else feedforward.loss.error_free
-    if not tracking_error <= LARGEST_ERROR and in_bands:
+    if not tracking_error <= MAX_TRACKING_ERROR and in_bands:
         raise StudyError(
             "The forces were not computed",
             f"According to the model, the error of the best forces would be {100 * tracking_error:.0f} % of the wanted "
@@ -154,7 +160,7 @@ def _require_reached(plan: EqualizePlan, feedforward: Feedforward, in_bands: boo
             "Put 3 s of zeros before and after the motion, or give one model.",
             saved="Nothing was written.",
         )
-    if not tracking_error <= LARGEST_ERROR:
+    if not tracking_error <= MAX_TRACKING_ERROR:
         raise StudyError(
             "The forces were not computed",
             f"According to the model, the error of the best forces would be {100 * tracking_error:.0f} % of the wanted "
@@ -164,16 +170,21 @@ def _require_reached(plan: EqualizePlan, feedforward: Feedforward, in_bands: boo
         )
 
 
-def _solve(plan: EqualizePlan, reference: Trajectory, models: PlaybackModels) -> tuple[Feedforward, BandFacts | None]:
+def _solve_feedforward(
+    plan: EqualizePlan, reference: Trajectory, models: PlaybackModels
+) -> tuple[Feedforward, BandFacts | None]:
+    """Solve for the feedforward forces, with the facts about the bands where narrow and wide models are combined.
+    Raises ForceLimitError where the cap is exceeded, ValueError for unsuitable models."""
     settings = FeedforwardSettings(plan.weight, plan.cap_n, plan.constrain)
     if models.two_bands is None:
-        return feedforward_at(models.at_place, reference.signal, settings), None
+        return compute_feedforward_at(models.at_place, reference.signal, settings), None
     banded = solve_banded_feedforward(models.two_bands, reference.signal, settings)
     return banded.feedforward, banded.facts
 
 
-def _amplitude_n(model: IdentifiedModel) -> float | None:
-    """Force amplitude of the identification; None if the effects were removed from its recordings."""
+def _read_amplitude_n(model: IdentifiedModel) -> float | None:
+    """Read the force amplitude of the identification (N); None if the effects were removed from its recordings. Raises
+    StudyError where the model does not state it."""
     amplitude_n = model.provenance.get("amplitude_n", 0.0)
     if amplitude_n is None:
         return None
@@ -195,6 +206,8 @@ def _compensate(
     physics: MechanicalModel,
     amplitude_n: float | None,
 ) -> Compensation:
+    """Add the forces of the known effects along the predicted motion. amplitude_n: as from `_read_amplitude_n`. Raises
+    StudyError where the mechanical model does not fit."""
     try:
         compensation = compensate(
             feedforward.forces.samples, feedforward.reference, model, physics, amplitude_n, plan.cap_n
@@ -209,7 +222,8 @@ def _compensate(
     return compensation
 
 
-def _not_equalized(explanation: str) -> StudyError:
+def _make_table_error(explanation: str) -> StudyError:
+    """Error for a table that cannot be equalized with the model. explanation: a sentence."""
     return StudyError(
         "The forces were not computed",
         explanation,

@@ -1,4 +1,5 @@
-"""Summary of an identified device: lines for a person, a document for a program."""
+"""Summary of an identified device for `hapteq identify` and its report: lines for a person, a document for a
+program."""
 
 from typing import Any
 
@@ -6,15 +7,16 @@ from equalizer.plant.model_quality import convert_quality_to_json, write_quality
 from study.workflows.equalizer.identify_model import IdentifiedDevice
 
 
-def summary(device: IdentifiedDevice) -> dict[str, Any]:
-    """Quality, order, band and errors of the identified model as JSON values; errors are relative to the response."""
+def summarise_model(device: IdentifiedDevice) -> dict[str, Any]:
+    """Summarise quality, order, band (Hz) and errors of the identified model as JSON values; errors are relative to the
+    response (1 = 100 %), times in s."""
     model, held_out_test = device.model, device.held_out_test
-    low, high = model.band_hz
+    lowest_hz, highest_hz = model.band_hz
     return {
         "model": str(device.plan.out),
         "quality": convert_quality_to_json(model.quality),
         "order": model.order,
-        "band_hz": [low, high],
+        "band_hz": [lowest_hz, highest_hz],
         "spectral_radius": model.spectral_radius,
         "lines": device.identified.lines,
         "rms_relative_error": device.identified.rms_relative_error,
@@ -27,14 +29,14 @@ def summary(device: IdentifiedDevice) -> dict[str, Any]:
     }
 
 
-def summary_lines(device: IdentifiedDevice) -> tuple[str, ...]:
-    """The summary as lines for the terminal."""
-    values = summary(device)
-    low, high = values["band_hz"]
+def format_summary(device: IdentifiedDevice) -> tuple[str, ...]:
+    """Format the summary as lines for the terminal."""
+    values = summarise_model(device)
+    lowest_hz, highest_hz = values["band_hz"]
     lines = [
         write_quality_sentence(device.model.quality),
-        f"Order {values['order']}, {low:g} to {high:g} Hz, stable (slowest pole {values['spectral_radius']:.5f}), "
-        f"from {values['lines']} lines.",
+        f"Order {values['order']}, {lowest_hz:g} to {highest_hz:g} Hz, stable (slowest pole "
+        f"{values['spectral_radius']:.5f}), from {values['lines']} lines.",
         f"Model against estimate: {100 * values['rms_relative_error']:.2f} % rms, worst line "
         f"{100 * values['worst_relative_error']:.2f} %; both include the noise of the estimate.",
     ]

@@ -18,8 +18,8 @@ from equalizer.identification.frequency_response.transfer_estimate import Transf
 from equalizer.identification.state_space.held_out_validation import HeldOutValidation, validate_on_test
 from equalizer.identification.state_space.identify import Identified
 from equalizer.identification.state_space.identify_recordings import IdentifiedRecordings, identify_recordings
-from equalizer.identification.state_space.misfit import misfit_of_estimate
-from equalizer.identification.state_space.misfit_causes import held_out_remarks
+from equalizer.identification.state_space.misfit import compute_estimate_misfit
+from equalizer.identification.state_space.misfit_causes import describe_test_error_causes
 from equalizer.identification.state_space.refusals import IdentificationRefused
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.plant.identified_model import IdentifiedModel
@@ -134,8 +134,8 @@ def _assess_quality(
     """Quality of the model: misfit, scatter and held-out error. The misfit is computed against the estimated frequency
     response, even if the model was fitted to its local averages."""
     identified, estimate = identification.identified, identification.estimate
-    misfit = misfit_of_estimate(identified.model, estimate)
-    remarks = (*identified.remarks, *held_out_remarks(held_out_test, identified.cost, misfit, recordings))
+    misfit = compute_estimate_misfit(identified.model, estimate)
+    remarks = (*identified.remarks, *describe_test_error_causes(held_out_test, identified.cost, misfit, recordings))
     held_out_figures = (
         None if held_out_test is None else (held_out_test.error, held_out_test.noise, held_out_test.seconds)
     )

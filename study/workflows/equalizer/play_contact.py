@@ -1,8 +1,7 @@
 """`hapteq contact`: play a recorded transient along the normal of a contact.
 
 The causal tracking problem (`equalizer.tracking.lqr.contact`) is solved for each of the three axes before the contact.
-At the contact the normal n is known, and the forces are sum_i n_i F_i(t). For comparison the recording is also played
-without a model: as a force along the normal with a single gain.
+At the contact the normal n is known: the forces are sum_i n_i F_i(t). The comparison is a force along n with one gain.
 """
 
 import contextlib
@@ -15,13 +14,13 @@ import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.tracking.feedforward.band_part import band_part
-from equalizer.tracking.feedforward.baselines import static_gain
+from equalizer.tracking.feedforward.band_pass import filter_to_band
+from equalizer.tracking.feedforward.baselines import make_static_gain_inverse
 from equalizer.tracking.feedforward.trajectory import FORCES, TRAJECTORY, TRANSIENT, Trajectory, require_rate
 from equalizer.tracking.learning.model_inverse import compensate_spring
-from equalizer.tracking.lqr.contact import CausalStart, causal_start
+from equalizer.tracking.lqr.contact import CausalStart, prepare_causal_start
 from equalizer.tracking.lqr.limits import ForceLimitError, require_under_cap
-from equalizer.tracking.lqr.padding import Padding, band_error
+from equalizer.tracking.lqr.padding import Padding, compute_band_error
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, DeviceSettings, Fault
@@ -45,7 +44,7 @@ from study.workflows.equalizer.playback_models import PlaybackModels, Vector, re
 
 GAIN_LINES = 100
 """Number of frequencies in the band, in a geometric series, over which the gain of the comparison is averaged."""
-REST_PADDING = Padding(after_s=0.5)
+PADDING = Padding(after_s=0.5)
 """Time (s) that is played after the recording, in which the handle comes to rest."""
 FADE_S = 0.2
 """Fade-out (s) at the end: the last forces of a solution with a free end are useless, and would end with a step."""
@@ -56,16 +55,15 @@ SETTLE_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class ContactPlan:
-    """Arguments of `play_contact`. weight: of the forces in the cost, (m/s² per N)²; cap_n: largest force (N)."""
+    """Arguments of `play_contact`. normal: contact normal, of any length above zero; scale: factor on the recording;
+    weight: of the forces in the cost, (m/s² per N)²; cap_n: largest force (N); seed: of a simulated device."""
 
     model: Path
     transient: Path
     normal: Vector
-    """Contact normal, of any length above zero."""
     out: Path
     device: str = "simulated"
     scale: float = 1.0
-    """Factor by which the recording is multiplied."""
     weight: float = 1e-3
     cap_n: float = 3.0
     seed: int = 1
@@ -73,23 +71,21 @@ class ContactPlan:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlayedTransient:
-    """Forces and measured acceleration of a play of the transient."""
+    """Commands (N, 3), N, and measured acceleration (N, 3), m/s², in the model's band, of a play of the transient.
+    error: relative error in the band, as measured; noise included."""
 
     forces: FloatArray
-    """(N, 3), N: commands to the device."""
     measured: FloatArray
-    """(N, 3), m/s^2: measured acceleration in the model's band."""
     error: float
-    """Relative error in the band, as measured; noise included."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ContactPlay:
-    """A transient at a contact: as requested, as predicted by the model, and as played with and without the model."""
+    """A transient at a contact: as requested, as predicted by the model, and as played with and without the model.
+    normal: (3,), of length 1."""
 
     plan: ContactPlan
     normal: FloatArray
-    """(3,), of length 1."""
     sample_rate_hz: float
     band_hz: tuple[float, float]
     reference: FloatArray
@@ -114,19 +110,21 @@ def play_contact(
     try:
         require_rate(transient, rate_hz)
         recording = plan.scale * transient.signal.samples[:, 0]
-        start = causal_start(make_tracking_problem(model, TrackingWeights(plan.weight)), recording, REST_PADDING)
+        start = prepare_causal_start(make_tracking_problem(model, TrackingWeights(plan.weight)), recording, PADDING)
     except ValueError as problem:
-        raise _make_error(f"{plan.transient.name}: {problem}.", "Correct what is named.") from problem
-    feedforward = start.basis.forces(normal)
+        raise _make_play_error(f"{plan.transient.name}: {problem}.", "Correct what is named.") from problem
+    feedforward = start.basis.compute_forces(normal)
     reference = _extend_along_normal(recording, normal, len(feedforward))
     forces = (
         _require_cap(_fade_out(_subtract_spring_force(feedforward, reference, models), rate_hz), plan, rate_hz),
-        _require_cap(_single_gain_forces(model, reference), plan, rate_hz),
+        _require_cap(_compute_gain_forces(model, reference), plan, rate_hz),
     )
     measured = _play_both(plan, models, forces, on_progress, before_moving)
-    in_band = band_part(reference, rate_hz, band_hz)
+    in_band = filter_to_band(reference, rate_hz, band_hz)
     equalized, single_gain = (
-        PlayedTransient(force, band_part(response, rate_hz, band_hz), band_error(reference, response, rate_hz, band_hz))
+        PlayedTransient(
+            force, filter_to_band(response, rate_hz, band_hz), compute_band_error(reference, response, rate_hz, band_hz)
+        )
         for force, response in zip(forces, measured, strict=True)
     )
     play = ContactPlay(plan, normal, rate_hz, band_hz, in_band, start, equalized, single_gain)
@@ -167,12 +165,14 @@ def _subtract_spring_force(forces: FloatArray, reference: FloatArray, models: Pl
 
 def _fade_out(forces: FloatArray, rate_hz: float) -> FloatArray:
     remaining_s = np.arange(len(forces))[::-1] / rate_hz
-    share = np.clip(remaining_s / FADE_S, 0.0, 1.0)
-    return np.asarray(forces * (0.5 - 0.5 * np.cos(np.pi * share))[:, np.newaxis])
+    fade_share = np.clip(remaining_s / FADE_S, 0.0, 1.0)
+    return np.asarray(forces * (0.5 - 0.5 * np.cos(np.pi * fade_share))[:, np.newaxis])
 
 
-def _single_gain_forces(model: IdentifiedModel, reference: FloatArray) -> FloatArray:
-    return np.asarray(static_gain(model, np.geomspace(*model.band_hz, GAIN_LINES)).response[0, 0, 0].real * reference)
+def _compute_gain_forces(model: IdentifiedModel, reference: FloatArray) -> FloatArray:
+    return np.asarray(
+        make_static_gain_inverse(model, np.geomspace(*model.band_hz, GAIN_LINES)).response[0, 0, 0].real * reference
+    )
 
 
 def _require_cap(forces: FloatArray, plan: ContactPlan, rate_hz: float) -> FloatArray:
@@ -180,7 +180,7 @@ def _require_cap(forces: FloatArray, plan: ContactPlan, rate_hz: float) -> Float
         require_under_cap(forces, plan.cap_n, rate_hz)
     except ForceLimitError as limit:
         largest_scale = np.floor(1e3 * plan.scale * limit.peaks.largest_scale) / 1e3
-        raise _make_error(
+        raise _make_play_error(
             f"The forces would reach {limit.peaks.peak_n:.3g} N, above the cap of {plan.cap_n:g} N.",
             f"Give --scale {largest_scale:g} or less, or raise --cap for a device that no hand holds.",
         ) from limit
@@ -194,17 +194,17 @@ def _play_both(
     on_progress: Callable[[float], None],
     before_moving: BeforeMoving,
 ) -> list[FloatArray]:
-    """Measured accelerations, (N, 3) in m/s^2, of each of the forces."""
+    """Play each of the forces on one opened device; returns their measured accelerations, (N, 3) in m/s^2."""
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
     settings = _make_settings(plan, models, forces)
     measured: list[FloatArray] = []
 
-    def advance(share: float) -> None:
+    def report_share(share: float) -> None:
         on_progress((len(measured) + share) / len(forces))
 
     with contextlib.closing(open_device(plan.device, settings, clock, plan.seed)) as device:
         if device.info.sample_rate_hz != models.nearest.sample_rate_hz:
-            raise _make_error(
+            raise _make_play_error(
                 f"The model is at {models.nearest.sample_rate_hz:g} Hz, the device runs at "
                 f"{device.info.sample_rate_hz:g} Hz.",
                 "Identify a model from recordings of this device.",
@@ -213,7 +213,7 @@ def _play_both(
         try:
             announce_motion(device, plan.cap_n, total_s, before_moving)
             for command in forces:
-                measured.append(_play_transient(device, command, advance))
+                measured.append(_play_transient(device, command, report_share))
         except KeyboardInterrupt as interruption:
             if device.fault() is Fault.FORCE_LEFT:
                 raise DeviceError("The force may still be on", Fault.FORCE_LEFT.sentence, RESTART, UNSAVED) from None
@@ -231,10 +231,10 @@ def _make_settings(plan: ContactPlan, models: PlaybackModels, forces: tuple[Floa
 
 
 def _play_transient(device: Device, forces: FloatArray, on_share: Callable[[float], None]) -> FloatArray:
-    """Measured acceleration, (N, 3) in m/s^2, of the rows of forces (N, 3)."""
-    settle = round(SETTLE_S * device.info.sample_rate_hz)
-    padded = np.pad(forces, ((settle, settle), (0, 0)))
-    return read_measured_acceleration(play_forces(device, padded, on_share))[settle : settle + len(forces)]
+    """Play forces (N, 3), N, and return the measured acceleration, (N, 3) in m/s^2. on_share: called with 0 to 1."""
+    rest_rows = round(SETTLE_S * device.info.sample_rate_hz)
+    padded = np.pad(forces, ((rest_rows, rest_rows), (0, 0)))
+    return read_measured_acceleration(play_forces(device, padded, on_share))[rest_rows : rest_rows + len(forces)]
 
 
 def _write_play(play: ContactPlay, models: PlaybackModels) -> None:
@@ -243,12 +243,12 @@ def _write_play(play: ContactPlay, models: PlaybackModels) -> None:
 
     rate_hz = play.sample_rate_hz
     with new_folder(play.plan.out) as folder:
-        for name, samples, kind in (
+        for name, samples, table_kind in (
             ("forces.csv", play.equalized.forces, FORCES),
             ("wanted.csv", play.reference, TRAJECTORY),
             ("measured.csv", play.equalized.measured, TRAJECTORY),
         ):
-            signal = Signal(samples, rate_hz, kind.quantity, kind.unit, kind.header[1:])
+            signal = Signal(samples, rate_hz, table_kind.quantity, table_kind.unit, table_kind.header[1:])
             write_trajectory(folder / name, Trajectory(signal))
         write_pictures(folder, [contact_picture(play.normal, rate_hz, play.reference, *_list_plays(play))])
         provenance = gather_provenance(seeds={"device": play.plan.seed}).as_dict()
@@ -269,8 +269,8 @@ def summarise_contact(play: ContactPlay) -> dict[str, Any]:
         "out": str(play.plan.out),
         "normal": play.normal.tolist(),
         "band_hz": list(play.band_hz),
-        "predicted_error": play.start.error(play.normal),
-        "early_error": play.start.early_error(play.normal),
+        "predicted_error": play.start.compute_error(play.normal),
+        "early_error": play.start.compute_early_error(play.normal),
         "worst_error": play.start.worst_error,
         "measured_error": play.equalized.error,
         "plain_error": play.single_gain.error,
@@ -281,20 +281,20 @@ def summarise_contact(play: ContactPlay) -> dict[str, Any]:
 def format_contact(play: ContactPlay) -> tuple[str, ...]:
     """Lines for the terminal: errors by the model and as measured (%), and the largest force (N)."""
     values = summarise_contact(play)
-    low, high = play.band_hz
+    low_hz, high_hz = play.band_hz
     return (
-        f"By the model: error {_percent(values['predicted_error'])} between {low:g} and {high:g} Hz, "
-        f"{_percent(values['worst_error'])} at most for any normal; {_percent(values['early_error'])} if forces might "
-        "begin before the contact.",
-        f"As measured: error {_percent(values['measured_error'])}; as a force along the normal with one gain "
-        f"{_percent(values['plain_error'])}.",
+        f"By the model: error {_to_percent(values['predicted_error'])} between {low_hz:g} and {high_hz:g} Hz, "
+        f"{_to_percent(values['worst_error'])} at most for any normal; {_to_percent(values['early_error'])} if forces "
+        "might begin before the contact.",
+        f"As measured: error {_to_percent(values['measured_error'])}; as a force along the normal with one gain "
+        f"{_to_percent(values['plain_error'])}.",
         f"The highest force is {values['peak_n']:.3g} N.",
     )
 
 
-def _percent(share: float) -> str:
-    return f"{100 * share:.1f} %"
+def _to_percent(ratio: float) -> str:
+    return f"{100 * ratio:.1f} %"
 
 
-def _make_error(explanation: str, advice: str) -> StudyError:
+def _make_play_error(explanation: str, advice: str) -> StudyError:
     return StudyError("The transient was not played", explanation, advice, saved="Nothing moved.")

@@ -26,8 +26,8 @@ spring."""
 SPRING_RESERVE_N = 1.5
 """Force (N) that the centring spring may add to the cap of the commanded forces."""
 LONGEST_HOLD_S = 600.0
-"""Longest duration (s) of a stimulus, the largest allowed (`admission.HIGHEST`): played forces have an end of their
-own."""
+"""Longest duration (s) of a stimulus, the largest allowed (`admission.MAX_SETTINGS`): played forces have an end of
+their own."""
 WATCHDOG_S = 0.5
 """Time (s) without a keep-alive call from this program after which the device releases the force."""
 RELEASE_S = 0.05

@@ -21,10 +21,10 @@ from equalizer.tracking.feedforward.trajectory import FORCES, TRAJECTORY
 from equalizer.tracking.workspace.feedforward_at_place import select_used_models
 from equalizer.tracking.workspace.interpolation_choice import InterpolationChoice, PlaceCheck, choose_interpolation
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
-from equalizer.tracking.workspace.place_weights import place_weights
+from equalizer.tracking.workspace.place_weights import compute_place_weights
 from equalizer.tracking.workspace.workspace_models import WorkspaceError, WorkspaceModels
 from study.errors import StudyError, WrongUseError
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.formats.identified_model_file import read_identified_model
 
 SAME_PLACE_M = 0.001
@@ -162,9 +162,9 @@ def _combine_places(
     if len({model.provenance.get("input", "command") for model in workspace.models}) > 1:
         raise WorkspaceError("some models include the spring they were recorded under and some do not")
     choice = choose_interpolation(workspace, weight=weight)
-    models_at_place = choice.at(at_m)
+    models_at_place = choice.find_models_at(at_m)
     remarks = [format_sentence(choice.reason)]
-    outside_remark = place_weights(workspace.places_m, at_m).remark
+    outside_remark = compute_place_weights(workspace.places_m, at_m).remark
     remarks += [
         format_sentence(remark)
         for remark in dict.fromkeys((*models_at_place.remarks, *([outside_remark] if outside_remark else [])))
@@ -259,7 +259,7 @@ def _warn_of_distance(path: Path, model: IdentifiedModel, at_m: Vector | None) -
 def _compute_sha256(paths: tuple[Path, ...], at_m: Vector | None = None) -> str:
     """SHA-256 of the files in any order, and of the place of playback. Of a single file it is the plain hash of the
     file, without the place, so that it can be compared with the output of other programs."""
-    digests = [sha256_of(path) for path in paths]
+    digests = [compute_sha256(path) for path in paths]
     if len(digests) == 1:
         return digests[0]
     return hashlib.sha256(" ".join([*sorted(digests), repr(at_m)]).encode()).hexdigest()

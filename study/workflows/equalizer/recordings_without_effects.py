@@ -12,7 +12,7 @@ import numpy as np
 
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
-from equalizer.tracking.compensation.effect_roles import reason_not_compensated
+from equalizer.tracking.compensation.effect_roles import explain_not_compensated
 from equalizer.tracking.compensation.subtract_effects import subtract_effects
 from study.errors import StudyError
 
@@ -40,13 +40,13 @@ def list_removable_effects(physics: MechanicalModel) -> list[str]:
     return [
         f"{effect.kind}{f' on {effect.axis}' if effect.axis else ''} ({_describe_parameters(effect)})"
         for effect in physics.effects
-        if not reason_not_compensated(effect)
+        if not explain_not_compensated(effect)
     ]
 
 
 def explain_unremovable_effects(physics: MechanicalModel) -> tuple[str, ...]:
     """A sentence for each effect that stays in the recordings."""
-    reasons = ((effect.kind, reason_not_compensated(effect)) for effect in physics.effects)
+    reasons = ((effect.kind, explain_not_compensated(effect)) for effect in physics.effects)
     return tuple(f"{kind}: {reason}." for kind, reason in reasons if reason)
 
 

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.wording import capitalise
-from equalizer.tracking.feedforward.band_part import band_part
+from equalizer.tracking.feedforward.band_pass import filter_to_band
 from equalizer.tracking.learning.iteration import (
     IterationState,
     Repetition,
     Verdict,
-    next_forces,
-    noise_of_rest,
+    estimate_rest_noise,
     start_iteration,
+    update_forces,
 )
 from equalizer.tracking.learning.model_inverse import compensate_spring
 from equalizer.tracking.lqr.padding import CAUSAL
@@ -106,7 +106,7 @@ def _play_all(
     zeros_n = np.zeros((round(REST_S * device.info.sample_rate_hz), 3))
     rest_acceleration = read_measured_acceleration(play_forces(device, zeros_n, lambda _: None))
     repetition = replace(
-        initial_state.repetition, noise_floor=noise_of_rest(rest_acceleration, initial_state.repetition)
+        initial_state.repetition, noise_floor=estimate_rest_noise(rest_acceleration, initial_state.repetition)
     )
     states.append(replace(initial_state, repetition=repetition, noise_floor=repetition.noise_floor))
     while states[-1].verdict is Verdict.CONTINUE and len(plays) <= plan.repeats:
@@ -114,7 +114,7 @@ def _play_all(
         play = play_forces(device, states[-1].forces, lambda share: on_progress(number, share))  # noqa: B023
         measured = read_measured_acceleration(play)
         plays.append(play)
-        states.append(next_forces(states[-1], measured))
+        states.append(update_forces(states[-1], measured))
 
 
 def _start_iteration(plan: RepeatPlan, device: Device) -> IterationState:
@@ -124,18 +124,18 @@ def _start_iteration(plan: RepeatPlan, device: Device) -> IterationState:
             f"The trajectory is at {signal.sample_rate_hz:g} Hz, the device runs at {rate_hz:g} Hz.",
             "Resample the trajectory to the device's rate.",
         )
-    padding_rows = CAUSAL.samples(rate_hz)[1]
+    padding_rows = CAUSAL.count_rows(rate_hz)[1]
     reference = np.pad(signal.samples, ((0, padding_rows), (0, 0)))
     invert = compensate_spring(plan.inverse(len(reference)), plan.spring, rate_hz, plan.band_hz)
-    reference_in_band, limits = band_part(reference, rate_hz, plan.band_hz), plan.settings.limits
+    reference_in_band, limits = filter_to_band(reference, rate_hz, plan.band_hz), plan.settings.limits
     repetition = Repetition(
         reference=reference_in_band,
         invert=invert,
         sample_rate_hz=rate_hz,
         band_hz=plan.band_hz,
         first_gain=plan.first_gain,
-        cap=limits.stimulus_cap_n,
-        slew=max(0.0, limits.slew_n_per_s - SPRING_SLEW_N_PER_S),
+        cap_n=limits.stimulus_cap_n,
+        slew_n_per_s=max(0.0, limits.slew_n_per_s - SPRING_SLEW_N_PER_S),
         judged_rows=(0, len(signal)),
     )
     try:

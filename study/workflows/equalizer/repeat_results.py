@@ -85,7 +85,7 @@ def make_result(plan: RepeatPlan, state: IterationState, plays: list[PlaybackRes
 def _make_force_table(plan: RepeatPlan, state: IterationState) -> Trajectory:
     """The best forces as a trajectory of the length of the reference."""
     rows, rate_hz = len(plan.reference.signal), plan.reference.signal.sample_rate_hz
-    signal = Signal(state.best[:rows], rate_hz, FORCES.quantity, FORCES.unit, FORCES.header[1:])
+    signal = Signal(state.best_forces[:rows], rate_hz, FORCES.quantity, FORCES.unit, FORCES.header[1:])
     return Trajectory(signal, plan.reference.start_s)
 
 
@@ -113,7 +113,7 @@ def write_best_forces(plan: RepeatPlan, state: IterationState, interrupted: bool
         kept=int(np.argmin(state.residuals)),
         noise_floor=_relative_noise_floor(state),
         gains=state.gains,
-        fitted=state.fitted,
+        fitted=state.scales,
         verdict=verdict.name.lower(),
         remark=state.remark,
         interrupted=interrupted,

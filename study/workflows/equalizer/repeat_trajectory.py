@@ -13,13 +13,13 @@ import numpy as np
 
 from analysis.wording import capitalise
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.feedforward.band_part import band_part
+from equalizer.tracking.feedforward.band_pass import filter_to_band
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from equalizer.tracking.learning.convergence import Convergence
-from equalizer.tracking.learning.iteration import LOWEST_GAIN, Verdict, largest_share
+from equalizer.tracking.learning.iteration import LOWEST_GAIN, Verdict, find_largest_share
 from equalizer.tracking.learning.model_inverse import compensate_spring
 from equalizer.tracking.workspace.convergence_at_place import convergence_at
-from equalizer.tracking.workspace.feedforward_at_place import inverse_at
+from equalizer.tracking.workspace.feedforward_at_place import make_inverse_at
 from study.session.views.handle_notice import BeforeMoving, refuse_unannounced
 from study.store.formats.repeats_file import repeats_path
 from study.workflows.equalizer.equalize_trajectory import (
@@ -90,7 +90,7 @@ def repeat_trajectory(
     gain, convergence = _test_gain(equalized, spring)
     repeat_plan = RepeatPlan(
         reference=equalized.reference,
-        inverse=inverse_at(equalized.models.at_place, plan.weight),
+        inverse=make_inverse_at(equalized.models.at_place, plan.weight),
         band_hz=equalized.models.band_hz,
         model_sha256=equalized.models.sha256,
         settings=make_playback_settings(plan.cap_n, equalized.models),
@@ -210,8 +210,8 @@ def _choose_initial_forces(
         return None
     rate_hz, band_hz = equalized.reference.signal.sample_rate_hz, equalized.models.band_hz
     forces = equalized.forces.signal.samples
-    reference = band_part(equalized.reference.signal.samples, rate_hz, band_hz)
+    reference = filter_to_band(equalized.reference.signal.samples, rate_hz, band_hz)
     spring_compensation = compensate_spring(lambda _: np.zeros_like(forces), spring, rate_hz, band_hz)(reference)
     # Where the cap does not allow the whole compensation of the spring, a share of it is added; repeats correct the
     # rest.
-    return forces + largest_share(forces, spring_compensation, equalized.plan.cap_n) * spring_compensation
+    return forces + find_largest_share(forces, spring_compensation, equalized.plan.cap_n) * spring_compensation

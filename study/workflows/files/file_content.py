@@ -1,7 +1,7 @@
 """Content of a file, read and parsed once, in the forms that the recognisers of `hapteq validate` need.
 
 A file is a folder, an HDF5 file (only its format attribute is read here), or text, which is also parsed as JSON and as
-TOML. Text above a size limit is not parsed.
+TOML. Text above a size limit is not parsed. Called by `validate`.
 """
 
 import csv
@@ -20,7 +20,7 @@ from study.store.disk.text_file import TOML_BYTES, read_text, too_long_key
 
 @dataclass(frozen=True, slots=True)
 class FileContent:
-    """Content of a file; None in each field for a form in which it cannot be read."""
+    """Content of a file; None in each field of a form in which it cannot be read."""
 
     path: Path
     is_folder: bool = False
@@ -34,8 +34,8 @@ class FileContent:
     @property
     def json_format(self) -> str | None:
         """The `format` entry of a JSON object; None for other files."""
-        name = self.json.get("format") if isinstance(self.json, dict) else None
-        return name if isinstance(name, str) else None
+        format_name = self.json.get("format") if isinstance(self.json, dict) else None
+        return format_name if isinstance(format_name, str) else None
 
     @property
     def header(self) -> tuple[str, ...]:
@@ -48,8 +48,8 @@ class FileContent:
 
 
 def open_content(path: Path) -> FileContent:
-    """Read a file or folder. Raises CannotReadError where it cannot be read, UnusableFileError where its name ends as
-    an HDF5 file's but its content is none."""
+    """Read the content of a file or folder. Raises CannotReadError where it cannot be read, UnusableFileError where its
+    name ends as an HDF5 file's but its content is none."""
     try:
         if path.is_dir():
             return FileContent(path, is_folder=True)
@@ -60,19 +60,19 @@ def open_content(path: Path) -> FileContent:
     if path.is_file() and path.suffix.lower() in (".h5", ".hdf5"):
         raise UnusableFileError(path, "HDF5 file", ("it does not begin as HDF5 files do",))
     text = read_text(path)
-    return FileContent(path, text=text, json=_json(text), toml=_toml(text))
+    return FileContent(path, text=text, json=_parse_json(text), toml=_parse_toml(text))
 
 
-def _json(text: str) -> Any:
-    """The parsed JSON document; None if the text is longer than `DOCUMENT_BYTES` or not JSON."""
+def _parse_json(text: str) -> Any:
+    """Parse a JSON document; None if the text is longer than `DOCUMENT_BYTES` or not JSON."""
     try:
         return load_json(text) if len(text) <= DOCUMENT_BYTES else None
     except ValueError:
         return None
 
 
-def _toml(text: str) -> dict[str, Any] | None:
-    """The parsed TOML document; None if it is not TOML, or if text or a key is too long: parsing would take minutes."""
+def _parse_toml(text: str) -> dict[str, Any] | None:
+    """Parse a TOML document; None if it is not TOML, or if text or a key is too long: parsing would take minutes."""
     if len(text) > TOML_BYTES or too_long_key(text):
         return None
     try:

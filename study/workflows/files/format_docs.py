@@ -20,7 +20,7 @@ from analysis.psychophysics.thresholds import Threshold
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EffectParameter
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL
 from equalizer.tracking.feedforward.trajectory import TABLE_KINDS
-from protocols.document.schema import protocol_schema
+from protocols.document.schema import make_protocol_schema
 from protocols.trial import Trial
 from study.session.facts import log_chain
 from study.session.facts.events import EVENTS
@@ -83,14 +83,14 @@ def make_request_schema() -> dict[str, Any]:
 
 
 SCHEMAS: tuple[Schema, ...] = (
-    Schema("study_protocol.json", "study protocols, read from TOML", lambda: protocol_schema("study")),
+    Schema("study_protocol.json", "study protocols, read from TOML", lambda: make_protocol_schema("study")),
     Schema("session_event.json", "one line of `events.jsonl`", make_event_schema),
     Schema(
         "seal.json",
         "`seal.json`, next to the log of a closed session",
         lambda: make_document_schema(log_seal.SEAL.json_schema(), log_seal.SEAL_FORMAT, log_seal.SEAL_VERSION),
     ),
-    Schema("recording_protocol.json", "recording protocols, read from TOML", lambda: protocol_schema("recording")),
+    Schema("recording_protocol.json", "recording protocols, read from TOML", lambda: make_protocol_schema("recording")),
     Schema(
         "diagnosis.json",
         "`diagnosis.json`",

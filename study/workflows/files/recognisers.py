@@ -16,7 +16,7 @@ from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, 
 from equalizer.tracking.feedforward.trajectory import TRAJECTORY
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.document.loading import ProtocolError
-from protocols.document.schema import ADAPTERS, protocol_schema
+from protocols.document.schema import ADAPTERS, make_protocol_schema
 from study.importing.map_format.import_map import ChannelMap, ComputedMap
 from study.importing.map_format.map_toml import KIND as MAP_KIND
 from study.importing.map_format.map_toml import is_map, parse_map
@@ -131,7 +131,7 @@ def _unit_problem(channel: ChannelMap | ComputedMap) -> str:
     return ""
 
 
-_PROTOCOL_KEYS = {key for kind in ADAPTERS for key in protocol_schema(kind)["properties"]}
+_PROTOCOL_KEYS = {key for kind in ADAPTERS for key in make_protocol_schema(kind)["properties"]}
 """Top-level keys of all kinds of protocols: a TOML file with any of them is taken for a protocol."""
 
 

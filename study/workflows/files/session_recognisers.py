@@ -10,13 +10,13 @@ from pathlib import Path
 from protocols.document.lock import FORMAT as LOCK_FORMAT
 from protocols.document.lock import LockError, lock_from_json
 from study.errors import StudyError
-from study.local_clock import machine_zone
+from study.local_clock import convert_to_machine_zone
 from study.session.facts.events import SESSION_FORMAT, TrialMeasured
 from study.session.views.local_time import format_time_in_zone
 from study.session.watching.live import Live
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.json_document import read_json
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import LOG_NAME
 from study.store.sessions.live_file import LIVE_FORMAT
@@ -89,7 +89,7 @@ def recognise_lock(content: FileContent) -> str | None:
         lock = lock_from_json(content.text or "")
     except LockError as error:
         raise UnusableFileError(content.path, "protocol lock", (str(error),)) from error
-    return f"lock of protocol '{lock.name}', {format_time_in_zone(lock.locked_utc, machine_zone)}"
+    return f"lock of protocol '{lock.name}', {format_time_in_zone(lock.locked_utc, convert_to_machine_zone)}"
 
 
 def _check_session(folder: SessionFolder, path: Path) -> str:
@@ -128,7 +128,7 @@ def _check_recording_file(folder: SessionFolder, folded_session: FoldedSession) 
         path = folder.path / event.recording
         if not path.is_file():
             problems.append(f"{event.recording} is missing")
-        elif sha256_of(path) != event.sha256:
+        elif compute_sha256(path) != event.sha256:
             problems.append(f"{event.recording} is not the file that was written (its SHA-256 differs from the log)")
     return problems
 
@@ -149,7 +149,8 @@ def _describe(folded_session: FoldedSession) -> str:
     participant = f"simulated participant '{state.opened.observer}'" if state.opened.observer else "a person"
     end = state.sitting.ineligibility or ("finished" if state.closed else "not finished")
     steps = "".join(
-        f". Before {format_time_in_zone(step.utc, machine_zone)}: {step.sentence}" for step in state.sitting.clock_steps
+        f". Before {format_time_in_zone(step.utc, convert_to_machine_zone)}: {step.sentence}"
+        for step in state.sitting.clock_steps
     ).rstrip(".")
     sealed = f", sealed to line {folded_session.sealed_lines}" if folded_session.sealed_lines else ""
     kind = f"session {state.opened.session} of {participant}, {state.protocol.name}, {state.answers} answers, {end}"

@@ -1,4 +1,5 @@
-"""Validate files in a separate process: a damaged HDF5 file can crash or hang the library that reads it."""
+"""Validate files in a separate process, for `hapteq validate`: a damaged HDF5 file can crash or hang the library that
+reads it."""
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -16,19 +17,20 @@ START_TIMEOUT_S = 300.0
 
 
 def validate_files(paths: Sequence[Path], timeout_s: float = FILE_TIMEOUT_S) -> Iterator[Validation]:
-    """Validation of each file, in order. timeout_s: longest wait for one file (s). One worker process validates all
-    files and is replaced when a file crashes it or takes too long. Raises StudyError where no worker starts."""
+    """Validate each file, in order, and yield its result. timeout_s: longest wait for one file (s). One worker process
+    validates all files and is replaced when a file crashes it or takes too long. Raises StudyError where no worker
+    starts."""
     worker = _start_worker()
     try:
         for path in paths:
             try:
                 yield worker.submit(_validate_safely, path).result(timeout=timeout_s)
             except BrokenProcessPool:
-                yield _damage_report(path, "reading it crashes the HDF5 library")
+                yield _make_damage_report(path, "reading it crashes the HDF5 library")
                 worker = _start_worker()
             except TimeoutError:
-                yield _damage_report(path, f"reading it does not end within {timeout_s:g} s")
-                _kill(worker)
+                yield _make_damage_report(path, f"reading it does not end within {timeout_s:g} s")
+                _kill_worker(worker)
                 worker = _start_worker()
     finally:
         worker.shutdown(wait=False, cancel_futures=True)
@@ -43,34 +45,34 @@ def _validate_safely(path: Path) -> Validation:
 
 
 def _start_worker() -> ProcessPoolExecutor:
-    """A worker process whose imports are done. Raises StudyError where it does not start."""
+    """Start a worker process, and wait until its imports are done. Raises StudyError where it does not start."""
     # Spawned, not forked: a forked process would inherit locks of the HDF5 library.
     worker = ProcessPoolExecutor(max_workers=1, mp_context=get_context("spawn"))
     # Started before the first file, so that a slow start is not counted against that file's time.
     try:
-        worker.submit(_ready).result(timeout=START_TIMEOUT_S)
-    except (BrokenProcessPool, TimeoutError) as trouble:
-        _kill(worker)
+        worker.submit(_confirm_start).result(timeout=START_TIMEOUT_S)
+    except (BrokenProcessPool, TimeoutError) as error:
+        _kill_worker(worker)
         raise StudyError(
             "Files cannot be validated",
             "The process that reads them does not start.",
             "Close other programs, and validate again.",
             saved="Nothing was written.",
-        ) from trouble
+        ) from error
     return worker
 
 
-def _ready() -> None:
+def _confirm_start() -> None:
     """Empty first task: its result shows that the worker's imports are done."""
 
 
-def _kill(worker: ProcessPoolExecutor) -> None:
+def _kill_worker(worker: ProcessPoolExecutor) -> None:
     """End the worker process at once, even if it hangs in a library."""
     for process in list(worker._processes.values()):  # noqa: SLF001 - the executor offers no other way before 3.14
         process.kill()
     worker.shutdown(wait=False, cancel_futures=True)
 
 
-def _damage_report(path: Path, failure: str) -> Validation:
+def _make_damage_report(path: Path, failure: str) -> Validation:
     """Validation of a file on which the worker crashed or did not end. failure: what happened, as a clause."""
     return Validation(path, "damaged file", (f"The file is damaged: {failure}. Restore it from a copy.",))

@@ -1,6 +1,7 @@
 """Validation of files against each other: the effects of mechanical models against the channels of recordings.
 
-An effect may name the axes and channels on which it acts; a recording without these contradicts the model.
+An effect may name the axes and channels on which it acts; a recording without these contradicts the model. Called by
+`hapteq validate` after the files were validated one by one.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,33 +15,37 @@ from study.store.formats.recording_file import read_recording
 from study.workflows.files.validate import Validation
 
 
-def check_together(validations: Sequence[Validation]) -> tuple[Validation, ...]:
-    """The validations, with further problems of each mechanical model whose effects do not fit a recording. Only valid
-    files are compared, and only a model and a recording with the same numbers of commands and responses."""
+def check_model_channels(validations: Sequence[Validation]) -> tuple[Validation, ...]:
+    """Check the mechanical models against the recordings: returns the validations, in the same order, with further
+    problems of each model whose effects do not fit a recording. Only valid files are compared, and only a model and a
+    recording with the same numbers of commands and responses."""
     recordings = [
-        (validation.path, read_recording(validation.path)) for validation in _valid_of_kind(validations, "recording, ")
+        (validation.path, read_recording(validation.path)) for validation in _select_valid(validations, "recording, ")
     ]
     if not recordings:
         return tuple(validations)
     models = {
         validation.path: read_mechanical_model(validation.path)
-        for validation in _valid_of_kind(validations, "mechanical model ")
+        for validation in _select_valid(validations, "mechanical model ")
     }
     return tuple(
-        replace(validation, problems=(*validation.problems, *_problems(models[validation.path], recordings)))
+        replace(validation, problems=(*validation.problems, *_find_problems(models[validation.path], recordings)))
         if validation.path in models
         else validation
         for validation in validations
     )
 
 
-def _valid_of_kind(validations: Sequence[Validation], kind: str) -> Iterator[Validation]:
-    """Validations without problems whose kind begins with `kind`."""
-    return (validation for validation in validations if validation.kind.startswith(kind) and not validation.problems)
+def _select_valid(validations: Sequence[Validation], kind_prefix: str) -> Iterator[Validation]:
+    """Validations without problems whose kind begins with `kind_prefix`."""
+    return (
+        validation for validation in validations if validation.kind.startswith(kind_prefix) and not validation.problems
+    )
 
 
-def _problems(model: MechanicalModel, recordings: Sequence[tuple[Path, Recording]]) -> Iterator[str]:
-    """Sentences on effects that cannot be placed on the axes and channels of a recording."""
+def _find_problems(model: MechanicalModel, recordings: Sequence[tuple[Path, Recording]]) -> Iterator[str]:
+    """Sentences on effects that cannot be placed on the axes and channels of a recording: the first such effect per
+    recording."""
     # Imported here: loading the catalogue of effects takes longer than checking most files.
     from equalizer.effects.placing import PlacingError, place_recorded_effects
 

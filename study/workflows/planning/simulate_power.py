@@ -20,7 +20,7 @@ from analysis.psychophysics.power.power_curve import (
     summarise_power,
 )
 from analysis.psychophysics.power.simulated_study import Crowd
-from analysis.threshold_words import REVERSALS, threshold_words
+from analysis.threshold_words import REVERSAL_WORDS, select_threshold_words
 from protocols.definition.staircase_rule import StaircaseRule
 from study.errors import StudyError, WrongUseError
 from study.store.disk.file_errors import CannotWriteError
@@ -115,14 +115,14 @@ def simulate_power(
 def _write_figure(folder: Path, plan: PowerPlan, points: Sequence[PowerPoint]) -> None:
     """Draw the power curves and write them into `folder`. Raises CannotWriteError."""
     # Imported here: workers, which draw nothing, would take as long to load Matplotlib as to simulate ten studies.
-    from analysis.figures.power_curves import power_picture
+    from analysis.figures.power_curves import make_power_picture
     from study.workflows.picture_files import write_pictures
 
     effect_db, threshold_name = (
         compute_true_difference_db(plan.crowd, plan.contrast_hz),
-        threshold_words(plan.rule).means,
+        select_threshold_words(plan.rule).means,
     )
-    write_pictures(folder, (power_picture(points, effect_db, plan.pair_hz, threshold_name),))
+    write_pictures(folder, (make_power_picture(points, effect_db, plan.pair_hz, threshold_name),))
 
 
 def judge_chunk(plan: PowerPlan, chunk: StudyChunk) -> list[StudyVerdict]:
@@ -199,7 +199,7 @@ def _append_line(path: Path, row: dict[str, object]) -> None:
         raise CannotWriteError(path, problem) from problem
 
 
-def format_power_lines(points: Sequence[PowerPoint], threshold_name: str = REVERSALS.means) -> list[str]:
+def format_power_lines(points: Sequence[PowerPoint], threshold_name: str = REVERSAL_WORDS.means) -> list[str]:
     """Table for the terminal: power in percent with its 95 % interval, by sample size and analysis; coverage of the 95
     % interval of the difference; bias in dB. threshold_name: name of the thresholds of single runs, in the plural."""
     paired_heading = f"{threshold_name}, paired"

@@ -155,7 +155,7 @@ def _read_grid(
     problems: list[str] = []
     grid_m = make_symmetric_grid(azimuths, plan.radius_m, plan.depth_m)
     for index, position_m in enumerate(grid_m):
-        reading = linkage.at(position_m)
+        reading = linkage.compute_reading_at(position_m)
         if reading is None:
             unread_positions_m.append(position_m)
         else:
@@ -189,7 +189,7 @@ def _read_grid(
 def _read_centre_jacobian(linkage: "LinkageSource") -> FloatArray:
     """(3, 3): the checked Jacobian at the centre, from which the azimuths of the arms are computed. Raises
     CalibrationError, DeviceError."""
-    centre = linkage.at(np.zeros(3))
+    centre = linkage.compute_reading_at(np.zeros(3))
     if centre is None:
         raise CalibrationError(("the centre of the workspace is out of its reach",))
     problems = tuple(check_reading(centre)) or tuple(check_difference(_compute_difference_error(linkage, centre)))
@@ -203,7 +203,9 @@ def _compute_difference_error(linkage: "LinkageSource", reading: LinkageReading)
     largest entry of the latter. 0 where a neighbouring position is out of reach, or where a value is not finite, which
     `check_reading` rejects."""
     positions_m = list_difference_positions(reading.position_m)
-    angle_rows = [angle_row for position_m in positions_m if (angle_row := linkage.angles_at(position_m)) is not None]
+    angle_rows = [
+        angle_row for position_m in positions_m if (angle_row := linkage.compute_angles_at(position_m)) is not None
+    ]
     angles_rad = np.array(angle_rows)
     if (
         len(angle_rows) < len(positions_m)

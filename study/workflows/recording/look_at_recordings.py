@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from analysis.look.overview import Overview, make_overview
-from analysis.reports.look_report import pictures_of, render_look_report
-from study.local_clock import local_now
+from analysis.reports.look_report import make_recording_pictures, render_look_report
+from study.local_clock import format_local_now
 from study.store.disk.text_file import write_text
 from study.workflows.picture_files import write_pictures
 from study.workflows.recording.read_any_recording import read_any_recording
@@ -42,10 +42,12 @@ def inspect_recordings(paths: Sequence[Path], on_progress: Progress = lambda sha
 def write_look_page(overviews: Sequence[Overview], folder: Path) -> Path:
     """Write report.html and figures/ in `folder`, replacing earlier files; returns the page's path. Raises
     CannotWriteError."""
-    pictures = pictures_of(overviews)
+    pictures = make_recording_pictures(overviews)
     write_pictures(folder / "figures", [picture for recording_pictures in pictures for picture in recording_pictures])
     provenance = {"recordings": ", ".join(entry.name for entry in overviews)}
-    write_text(folder / PAGE_NAME, render_look_report(overviews, pictures, provenance, local_now()), overwrite=True)
+    write_text(
+        folder / PAGE_NAME, render_look_report(overviews, pictures, provenance, format_local_now()), overwrite=True
+    )
     return folder / PAGE_NAME
 
 

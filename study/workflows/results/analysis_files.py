@@ -7,7 +7,7 @@ from pathlib import Path
 
 from study.errors import StudyError
 from study.store.disk.json_document import read_json
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.disk.real_folder import is_real_folder
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
 
@@ -32,7 +32,7 @@ def is_analysis_of(folder: Path, log: Path) -> bool:
     try:
         origin = read_json(folder / STATISTICS_NAME, "hapteq-anova", 1).get("provenance")
         parents = origin.get("parents") if isinstance(origin, dict) else None
-        return isinstance(parents, list) and {"file": log.name, "sha256": sha256_of(log)} in parents
+        return isinstance(parents, list) and {"file": log.name, "sha256": compute_sha256(log)} in parents
     except StudyError:
         return False
 

@@ -13,10 +13,10 @@ from analysis.psychophysics.ellipsoid import EllipsoidResult, compute_ellipsoids
 from analysis.psychophysics.study_analysis import StudyAnalysis, analyse_study, make_anova_document
 from analysis.psychophysics.threshold_table import ThresholdTable
 from analysis.reports.declared_section import describe_declared
-from analysis.reports.primary_tables import interval_words, limit_words
+from analysis.reports.primary_tables import describe_direction_limit, format_median_interval
 from analysis.reports.study_report import render_study_report
 from study.errors import StudyError
-from study.local_clock import local_now
+from study.local_clock import format_local_now
 from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.json_document import write_json
 from study.store.disk.privacy import close_to_others, make_folder
@@ -100,9 +100,9 @@ def _format_model_lines(analysis: StudyAnalysis) -> list[str]:
     for median in analysis.primary.medians:
         median_text = "above cap" if median.above_cap else f"{median.newton:.3f} N"
         unit_text = " N" if median.lower_n is not None else ""
-        interval_text = interval_words(median.lower_n, median.upper_n, median.above_cap, 3) + unit_text
+        interval_text = format_median_interval(median.lower_n, median.upper_n, median.above_cap, 3) + unit_text
         lines.append(f"{median.frequency_hz:7g} Hz  {median_text:>10}  {interval_text}")
-    return [*lines, limit_words(analysis.primary), analysis.compared]
+    return [*lines, describe_direction_limit(analysis.primary), analysis.compared]
 
 
 def _compute_ellipses(path: Path | None) -> tuple[EllipsoidResult, ...]:
@@ -162,7 +162,9 @@ def _write_files(
     write_json(folder / "anova.json", format_name, version, document, provenance, overwrite=True)
     write_pictures(figure_folder, pictures)
     origin = _list_origin(provenance, collected)
-    report_html = render_study_report(analysis, pictures, origin, local_now(), ellipses, collected.model_qualities)
+    report_html = render_study_report(
+        analysis, pictures, origin, format_local_now(), ellipses, collected.model_qualities
+    )
     write_text(folder / PAGE_NAME, report_html, overwrite=True)
 
 

@@ -96,7 +96,7 @@ class DriftReader:
 
     def _make_drift_records(self, kind: str, present_drifts: tuple[Drift, ...]) -> Iterator[DriftRecord]:
         """Drifts as sentences for the experimenter, each with the time (s) at which it was first found."""
-        drifts_by_key = {(kind, drift.number, drift.axis): drift for drift in present_drifts}
+        drifts_by_key = {(kind, drift.parameter, drift.axis): drift for drift in present_drifts}
         # A drift that has disappeared is forgotten: if it returns, its time is that of its return.
         self._since_s = {
             key: found_s for key, found_s in self._since_s.items() if key[0] != kind or key in drifts_by_key
@@ -134,17 +134,17 @@ def describe_drift(drift: Drift) -> str:
             f"friction{axis_text} {drift.initial_value:.2f} -> {max(0.0, drift.initial_value + drift.change):.2f} N "
             f"{minute_text}{rivals_text}"
         )
-    if drift.number == "gain":
+    if drift.parameter == "gain":
         return f"gain{axis_text} {100 * drift.change:+.0f} % {minute_text}{rivals_text}"
-    if drift.number == "delay":
+    if drift.parameter == "delay":
         return f"delay {1000 * drift.change:+.2f} ms {minute_text}{rivals_text}"
-    quantity = "friction" if drift.number == "friction" else f"grip: {drift.number}"
+    quantity = "friction" if drift.parameter == "friction" else f"grip: {drift.parameter}"
     return f"{quantity}{axis_text} {drift.change:+.3g} {drift.unit} {minute_text}{rivals_text}"
 
 
 def exceeds_limit(drift: Drift) -> bool:
     """Whether the absolute change exceeds its limit in `MAX_CHANGES`."""
-    return abs(drift.change) > MAX_CHANGES[drift.number]
+    return abs(drift.change) > MAX_CHANGES[drift.parameter]
 
 
 def _split_reference(recording: Recording) -> tuple[Recording, Recording]:

@@ -128,7 +128,7 @@ def _pulses(clock: Clock) -> Iterator[Callable[[], Pulse | None]]:
     """Trigger line of the lab; none in virtual time, which passes faster than a recorder's."""
     line = None if clock.virtual else find_onset_line()
     try:
-        yield send_no_pulse if line is None else line.pulse
+        yield send_no_pulse if line is None else line.send_pulse
     finally:
         if line is not None:
             line.close()

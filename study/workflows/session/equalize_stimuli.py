@@ -23,10 +23,10 @@ from study.errors import StudyError
 from study.regular_file import read_regular
 from study.session.facts.level_scale import EqualizedFacts, LevelScale
 from study.session.state.state import SessionState
-from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, highest_level_n, make_study_limits
+from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, compute_highest_level_n, make_study_limits
 from study.session.stimulus.stimulus import compute_direction_vector, make_held_stimulus
 from study.store.disk.atomic_write import write_atomically
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.sessions.archive import SessionFolder
 from study.workflows.equalizer.spring_to_compensate import find_spring_to_compensate
@@ -98,7 +98,7 @@ def equalize_stimuli(protocol: StudyProtocol, model: Path | None, info: DeviceIn
         scales = compute_level_scales(protocol, equalizer, info.sample_rate_hz)
     except (ValueError, ArithmeticError) as error:  # numerical failure on an invalid model
         raise _make_refusal(f"The onset of a stimulus cannot be computed ({error}).", IDENTIFY_AGAIN) from error
-    facts = EqualizedFacts(MODEL_NAME, sha256_of(model), scales, write_quality_sentence(identified.quality))
+    facts = EqualizedFacts(MODEL_NAME, compute_sha256(model), scales, write_quality_sentence(identified.quality))
     return SessionEqualizer(equalizer, facts, model)
 
 
@@ -115,7 +115,7 @@ def reload_equalizer(folder: SessionFolder, state: SessionState, info: DeviceInf
     if facts is None:
         return NO_EQUALIZER
     path = folder.path / facts.model
-    if not path.exists() or sha256_of(path) != facts.sha256:
+    if not path.exists() or compute_sha256(path) != facts.sha256:
         raise StudyError(
             "This session's model is not the one it was begun with",
             f"{path} is {'changed' if path.exists() else 'missing'}, and levels would no longer mean the same.",
@@ -157,7 +157,7 @@ def _compute_level_per_acceleration(
         _find_largest_norm(force_steps)
         * rate_hz
         / (limits.slew_n_per_s - SPRING_SLEW_N_PER_S)
-        * highest_level_n(protocol)
+        * compute_highest_level_n(protocol)
     )
     return max(_find_largest_norm(forces), slew_limited_n)
 
@@ -226,12 +226,14 @@ def _check_predicted_response(model: IdentifiedModel, protocol: StudyProtocol, p
     """Raise StudyError where the predicted acceleration G H w differs from w by more than `LARGEST_RESPONSE_ERROR` at a
     frequency of the protocol. w: unit vector of a direction; G: response of the model; H: its regularised inverse."""
     from equalizer.plant.model_response import model_response
-    from equalizer.tracking.feedforward.periodic_inverse import inverse_response
+    from equalizer.tracking.feedforward.periodic_inverse import compute_regularised_inverse
 
     frequency_hz = np.array(protocol.all_frequencies_hz)
     unit_vectors = np.stack([compute_direction_vector(protocol.directions, direction) for direction in (1, 2)], axis=1)
     with np.errstate(all="ignore"):
-        predicted = model_response(model, frequency_hz) @ inverse_response(model, frequency_hz) @ unit_vectors
+        predicted = (
+            model_response(model, frequency_hz) @ compute_regularised_inverse(model, frequency_hz) @ unit_vectors
+        )
         errors = np.linalg.norm(predicted - unit_vectors, axis=1).max(axis=1)
     unreachable = [
         f"{f:g}" for f, error in zip(frequency_hz, errors, strict=True) if not error <= LARGEST_RESPONSE_ERROR

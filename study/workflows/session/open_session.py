@@ -22,7 +22,7 @@ from study.store.sessions.event_log import EventLog
 from study.store.sessions.session_lock import hold_session_lock
 from study.workflows.session.equalize_stimuli import SessionEqualizer, copy_model
 from study.workflows.session.other_sessions import dose_before
-from study.workflows.session.participant_number import participant_number
+from study.workflows.session.participant_number import find_participant_number
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ def open_session(
     the log open, while the context lasts."""
     number = plan.participant_number
     if number is None:
-        number = participant_number(plan.data, plan.subject, plan.protocol.name, plan.observer is not None)
+        number = find_participant_number(plan.data, plan.subject, plan.protocol.name, plan.observer is not None)
     folder = create_session_folder(plan.data, plan.subject)
     utc = clock.utc()
     session_opened = SessionOpened(

@@ -1,7 +1,8 @@
 """Participant number within a protocol: it selects the row of the balanced order, and which direction is labelled 1.
 
 The number is assigned after the preparation, so that persons who refuse or are excluded take no row. Logs are searched
-as raw bytes where possible, because a data folder may hold many long logs, some of them damaged.
+as raw bytes where possible, because a data folder may hold many long logs, some of them damaged. Called by
+`open_session`, `run_session`, `plan_sitting`, `withdraw_participant` and `views.plan_study`.
 """
 
 import re
@@ -22,18 +23,19 @@ from study.workflows.trial.sitting import Sitting, log_and_apply
 
 PLACE_TAKEN = b'"event":"place_taken"'
 """Bytes of a log line whose event assigns the participant number."""
-NUMBER = re.compile(rb'"participant_number":(\d{1,6})\b')
+NUMBER_PATTERN = re.compile(rb'"participant_number":(\d{1,6})\b')
 """Participant number in a log: in the first line, or in the event that replaces it. The last occurrence counts."""
-PROTOCOL_NAME = re.compile(rb'(?:\\n|")name = \\"([^"\\]*)\\"')
+PROTOCOL_NAME_PATTERN = re.compile(rb'(?:\\n|")name = \\"([^"\\]*)\\"')
 """Name of the protocol in the first line of a log, which contains the protocol's TOML text as a JSON string."""
-OF_A_PERSON = b'"observer":null'
+PERSON_OBSERVER = b'"observer":null'
 """Bytes in the first line of the log of a person's session."""
-PRESENTED = b'"event":"trial_presented"'
+TRIAL_PRESENTED = b'"event":"trial_presented"'
 """Bytes of a log line that presents a trial; the first such line ends the preparation."""
 
 
-def participant_number(data: Path, subject: str, protocol: str, simulated: bool) -> int:
-    """Number of the participant in this protocol, from 0. A returning participant keeps it; otherwise the next is free.
+def find_participant_number(data: Path, subject: str, protocol: str, simulated: bool) -> int:
+    """Find the number of a participant in this protocol, from 0: a returning participant keeps it, a new one gets the
+    number after the largest taken one. data: data folder; subject: participant code; protocol: its name.
 
     People and simulated participants are counted separately. A person who refused, was excluded, or left before the
     number was assigned has none. Numbers of withdrawn participants, and of damaged logs as far as they are readable,
@@ -55,8 +57,8 @@ def participant_number(data: Path, subject: str, protocol: str, simulated: bool)
 
 
 def read_begun_participant(folder: SessionFolder) -> SessionParticipant | None:
-    """Protocol, kind and number of a session's participant, from its tombstone, a withdrawal that was begun, or its
-    log. None if no session was begun or nothing can be read."""
+    """Read protocol, kind and number of a session's participant, from its tombstone, a withdrawal that was begun, or
+    its log. None if no session was begun or nothing can be read."""
     if folder.tombstone.exists():
         return read_participant(folder)
     intent = read_intent(folder.path.parent, folder.subject)
@@ -68,33 +70,34 @@ def read_begun_participant(folder: SessionFolder) -> SessionParticipant | None:
             return None
         name = tomllib.loads(session_opened.protocol_text).get("name", "")
     except (StudyError, OSError, TypeError, ValueError, RecursionError):
-        return _begun_in_damaged(folder)
+        return _read_damaged_log(folder)
     return SessionParticipant(name, session_opened.observer is not None, _read_place(folder, session_opened))
 
 
-def _begun_in_damaged(folder: SessionFolder) -> SessionParticipant | None:
-    """Participant of a damaged log, from its bytes. A number that stays taken wrongly costs a row of the balanced
-    order; a number assigned twice would destroy the balance."""
+def _read_damaged_log(folder: SessionFolder) -> SessionParticipant | None:
+    """Read the participant of a damaged log from its bytes; None where name or number are not found. A number that
+    stays taken wrongly costs a row of the balanced order; a number assigned twice would destroy the balance."""
     try:
         content = read_regular(folder.log)
     except OSError:
         return None
     first_line = content.partition(b"\n")[0]
-    name, numbers = PROTOCOL_NAME.search(first_line), NUMBER.findall(content)
+    name, numbers = PROTOCOL_NAME_PATTERN.search(first_line), NUMBER_PATTERN.findall(content)
     if name is None or not numbers:
         return None
-    return SessionParticipant(name[1].decode(errors="replace"), OF_A_PERSON not in first_line, int(numbers[-1]))
+    return SessionParticipant(name[1].decode(errors="replace"), PERSON_OBSERVER not in first_line, int(numbers[-1]))
 
 
 def _read_place(folder: SessionFolder, session_opened: SessionOpened) -> int | None:
-    """Participant number from the lines before the first trial, so that the rest of a long log is not parsed. None if
-    it was not assigned yet, or the log cannot be read."""
+    """Read the participant number from the lines before the first trial, so that the rest of a long log is not parsed;
+    the number expected at the opening where a trial comes first or a line is damaged. None if it was not assigned yet,
+    or the log cannot be read."""
     if not is_place_assigned_later(session_opened):
         return session_opened.participant_number
     chain = Chain()
     try:
         for line in read_regular(folder.log).split(b"\n")[:-1]:
-            if PRESENTED in line:
+            if TRIAL_PRESENTED in line:
                 return session_opened.participant_number
             chain, event = read_chained(chain, line)
             if PLACE_TAKEN in line and isinstance(place := parse_event(event), PlaceTaken):
@@ -106,12 +109,12 @@ def _read_place(folder: SessionFolder, session_opened: SessionOpened) -> int | N
     return None
 
 
-def take_place(state: SessionState, sitting: Sitting) -> SessionState:
+def assign_place(state: SessionState, sitting: Sitting) -> SessionState:
     """Assign the participant number and log it, once, after the preparation was passed; otherwise the state is
     unchanged. A lock of the data folder prevents that two programs assign the same number. Raises StudyError."""
     if not is_place_assigned_later(state.opened) or state.has_final_place:
         return state
     data = sitting.folder.path.parent
     with hold_places_lock(data):
-        number = participant_number(data, state.opened.subject, state.protocol.name, simulated=False)
+        number = find_participant_number(data, state.opened.subject, state.protocol.name, simulated=False)
         return log_and_apply(state, PlaceTaken(utc=sitting.clock.utc(), participant_number=number), sitting)

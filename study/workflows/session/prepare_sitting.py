@@ -1,14 +1,14 @@
 """Preparation of each sitting: consent, exclusion criteria, set-up, and the check of device and computer.
 
-The state decides which step is due (`next_preparation`) and each result is logged at once. A participant who refuses or
-is excluded leaves only that outcome.
+The state decides which step is due (`find_next_preparation`) and each result is logged at once. A participant who
+refuses or is excluded leaves only that outcome.
 """
 
 from dataclasses import replace
 
 from study.errors import StudyError
 from study.session.facts.events import DeviceChecked, FormFilled, SessionClosed
-from study.session.state.machine import CheckDevice, EndSitting, FillIn, next_preparation
+from study.session.state.machine import CheckDevice, EndSitting, FillIn, find_next_preparation
 from study.session.state.state import SessionState
 from study.session.views.archive_views import INELIGIBILITY_REASONS
 from study.session.views.form_views import Form, FormKind
@@ -25,7 +25,7 @@ from study.workflows.trial.sitting import Sitting, log_and_apply, write_notes
 def prepare_sitting(state: SessionState, sitting: Sitting) -> tuple[SessionState, str]:
     """Run all steps of the preparation that are due. Returns the new state, and the reason why the sitting ends before
     the first trial; empty if it continues."""
-    while (due_step := next_preparation(state)) is not None:
+    while (due_step := find_next_preparation(state)) is not None:
         match due_step:
             case EndSitting(reason=reason):
                 return state, reason

@@ -19,7 +19,7 @@ from study.participants.population import KINDS, make_member
 from study.store.disk.folder_contents import Files, read_file, read_files, write_files
 from study.store.disk.new_folder import new_folder
 from study.store.disk.privacy import make_folder
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.sessions.archive import SessionFolder, list_session_folders
 from study.workflows.results.fold_session import fold_session
 from study.workflows.results.session_results import finish_tables, write_tables
@@ -211,7 +211,8 @@ def _require_same_rehearsal(rehearsal: Rehearsal) -> None:
             "Choose another folder with --out, or at least as many --subjects as were begun.",
             saved="Nothing was changed.",
         )
-    model_sha256 = sha256_of(rehearsal.model) if rehearsal.model is not None and rehearsal.model.is_file() else None
+    model_path = rehearsal.model
+    model_sha256 = compute_sha256(model_path) if model_path is not None and model_path.is_file() else None
     for number in range(rehearsal.subjects):
         folder = _find_begun_session(rehearsal.data, make_subject_code(number))
         if folder is None:

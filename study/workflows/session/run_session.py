@@ -13,7 +13,7 @@ from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.facts.events import RestTaken, SessionClosed, SessionInterrupted
 from study.session.facts.void_reasons import describe_busy_voids, explain_many_voids
 from study.session.state.due_trial import PresentTrial, has_swapped_labels
-from study.session.state.machine import Action, Demonstrate, EndSitting, FillIn, Finish, TakeRest, next_action
+from study.session.state.machine import Action, Demonstrate, EndSitting, FillIn, Finish, TakeRest, find_next_action
 from study.session.state.probe_state import Probe, Reference
 from study.session.state.progress import estimate_progress
 from study.session.state.state import SessionState, is_felt_by_person
@@ -22,7 +22,7 @@ from study.session.views.count_text import answers_are
 from study.session.views.views import Goodbye, PracticeResult, RestNotice, Welcome, make_direction_picture
 from study.store.sessions.log_seal import seal_log
 from study.workflows.results.fold_session import fold_session
-from study.workflows.session.participant_number import take_place
+from study.workflows.session.participant_number import assign_place
 from study.workflows.session.prepare_sitting import prepare_sitting, present_form, turn_away
 from study.workflows.trial.after_trial import AfterTrial
 from study.workflows.trial.demonstrate import demonstrate
@@ -89,7 +89,7 @@ def _run_sitting(state: SessionState, sitting: Sitting) -> SessionEnd:
         return SessionEnd(turn_away(state, sitting), refused)
     if refused:
         return _end_sitting(AfterTrial(state, end_reason=refused), sitting)
-    state = start_masking(take_place(state, sitting), sitting)
+    state = start_masking(assign_place(state, sitting), sitting)
     sitting.supervisor.start_activity("instructions")
     sitting.display.welcome(_make_welcome(state, sitting))
     return _run_actions(state, sitting)
@@ -140,7 +140,7 @@ def _run_actions(state: SessionState, sitting: Sitting) -> SessionEnd:
     voids: tuple[str, ...] = ()
     while True:
         state = write_notes(state, sitting)
-        action = next_action(state, sitting.clock.utc(), sitting.clock.now_s())
+        action = find_next_action(state, sitting.clock.utc(), sitting.clock.now_s())
         if isinstance(action, Finish):
             state = stop_masking(_report_busy_voids(state, sitting), sitting)
             closing_event = SessionClosed(utc=sitting.clock.utc(), outcome="completed")

@@ -1,7 +1,7 @@
 """Simulated participant at a session: implements the protocols `Display` and `Hand` of `workflows.trial.display`.
 
 Questions are answered by an `Observer` after its response time; all waiting is done on the given clock, so that a
-session can run in virtual time. Methods that only return None continue at once.
+session can run in virtual time. Methods that only return None continue at once. Made by `simulated_participant`.
 """
 
 from collections.abc import Callable
@@ -101,9 +101,9 @@ class SimulatedDisplay:
 
     def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
         """Wait until the handle is at its place; ends the sitting after `LONGEST_HANDLE_WAIT_S`."""
-        until_s = self._clock.now_s() + LONGEST_HANDLE_WAIT_S
+        deadline_s = self._clock.now_s() + LONGEST_HANDLE_WAIT_S
         while not look().ready:
-            if self._clock.now_s() > until_s:
+            if self._clock.now_s() > deadline_s:
                 return Unanswered("the handle did not come back", ends_sitting=True)
             if not self._wait(KEEPALIVE_INTERVAL_S, sign_of_life):
                 return ENDED_EARLY
@@ -118,12 +118,14 @@ class SimulatedDisplay:
         if self._perceived is None:
             raise RuntimeError("a simulated participant was asked before anything was felt")
         # The response time depends on the trial's random numbers alone; the answer may depend on what was delivered.
-        seconds = self._observer.reply(self._perceived, self._seed).response_time_s
-        too_slow = 0 < question.time_limit_s < seconds
-        perceived = self._wait_and_feel(self._perceived, question.time_limit_s if too_slow else seconds, sign_of_life)
+        response_time_s = self._observer.reply(self._perceived, self._seed).response_time_s
+        exceeds_limit = 0 < question.time_limit_s < response_time_s
+        perceived = self._wait_and_feel(
+            self._perceived, question.time_limit_s if exceeds_limit else response_time_s, sign_of_life
+        )
         if perceived is None:
             return ENDED_EARLY
-        if too_slow:
+        if exceeds_limit:
             return Unanswered("no answer within the time limit", ends_sitting=False, cause=VoidCause.LATE)
         reply = self._observer.reply(perceived, self._seed)
         if reply.ask_again and question.repeats_left != 0:
@@ -172,8 +174,8 @@ class SimulatedDisplay:
     def _wait(self, seconds: float, sign_of_life: SignOfLife) -> bool:
         """Wait for `seconds` on the clock, calling `sign_of_life` every `KEEPALIVE_INTERVAL_S`; False if that ended
         the wait."""
-        until_s = self._clock.now_s() + seconds
-        while (remaining_s := until_s - self._clock.now_s()) > 1e-9:
+        end_s = self._clock.now_s() + seconds
+        while (remaining_s := end_s - self._clock.now_s()) > 1e-9:
             self._clock.sleep(min(KEEPALIVE_INTERVAL_S, remaining_s))
             if not sign_of_life():
                 return False
@@ -181,7 +183,8 @@ class SimulatedDisplay:
 
 
 def _choose_first_answer(field: FormField) -> str:
-    """First choice, lowest number, or a placeholder text where an answer is required; empty for an optional text."""
+    """The first choice of a field with choices, the lowest number of a field with limits; else a placeholder text where
+    an answer is required, empty for an optional text."""
     if field.choices:
         return field.choices[0]
     if field.limits is not None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from study.errors import StudyError, WrongUseError
-from study.store.disk.real_folder import RealFolder, is_real_file, is_real_folder, open_folder
+from study.store.disk.real_folder import OpenedFolder, is_real_file, is_real_folder, open_folder
 from study.store.sessions.archive import FOLDER_PATTERN, TOMBSTONE_NAME, SessionFolder, locate_withdrawal_record
 from study.store.sessions.event_log import LOG_NAME, hold_log_lock
 from study.store.sessions.session_lock import LOCK_NAME, hold_session_lock
@@ -127,11 +127,11 @@ def _lock_for_erasing(folder: SessionFolder, locks: ExitStack) -> None:
         locks.enter_context(hold_log_lock(folder.log))
 
 
-def _erase_session(data: RealFolder, folder: SessionFolder) -> None:
+def _erase_session(data: OpenedFolder, folder: SessionFolder) -> None:
     """Erase all files of the session except its lock and tombstone; the log last, after the other changes were synced
     to the disk."""
     with open_folder(data, folder.name) as session_folder:
-        for name in session_folder.names():
+        for name in session_folder.list_names():
             if name not in (TOMBSTONE_NAME, LOCK_NAME, LOG_NAME):
                 session_folder.erase(name)
         session_folder.sync()
@@ -139,7 +139,7 @@ def _erase_session(data: RealFolder, folder: SessionFolder) -> None:
         session_folder.sync()
 
 
-def _erase_derived(data: RealFolder, name: str) -> None:
+def _erase_derived(data: OpenedFolder, name: str) -> None:
     """Erase a file or folder, and those of its parent folders below the data folder that become empty. name: path
     relative to the data folder."""
     *parents, last_part = PurePosixPath(name).parts

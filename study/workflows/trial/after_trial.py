@@ -1,4 +1,5 @@
-"""Result of a trial, a demonstration, a probe or a wait for the handle: how the sitting continues."""
+"""Result of a trial, a demonstration, a probe or a wait for the handle: how the sitting continues. Used by
+`present_trial`, `demonstrate`, `play_probe` and the session's loop."""
 
 from __future__ import annotations
 
@@ -18,6 +19,7 @@ class AfterTrial:
     """State of the session after a trial or a wait, and how the sitting continues."""
 
     state: SessionState
+    """State of the session after all events of the trial."""
     correct: bool | None = None
     """Whether the answer was right; None for a void trial, and where there was no question."""
     end_reason: str = ""
@@ -30,9 +32,9 @@ class AfterTrial:
     """Fault of the device during the trial."""
 
 
-def early_end_result(state: SessionState, reply: Unanswered) -> AfterTrial:
-    """Result of a wait or stimulus that ended without an answer. reply: why it ended (leaving, a pause, another
-    reason)."""
+def make_early_end_result(state: SessionState, reply: Unanswered) -> AfterTrial:
+    """Make the result of a wait or stimulus that ended without an answer. reply: why it ended (leaving, a pause,
+    another reason)."""
     if reply.ends_sitting:
         return AfterTrial(state, end_reason=reply.reason)
     if reply.pause:
@@ -41,16 +43,17 @@ def early_end_result(state: SessionState, reply: Unanswered) -> AfterTrial:
 
 
 def check_end_request(state: SessionState, sitting: Sitting) -> AfterTrial | None:
-    """Result of a stop or pause that was requested while no stimulus was played; None without a request."""
+    """Take requests that arrived while no stimulus was played: returns the result of a stop or pause, None without."""
     sitting.supervisor.listen()
     reply = sitting.supervisor.resolve(Unanswered("", ends_sitting=False, repeat_requested=True))
     return (
-        early_end_result(state, reply)
+        make_early_end_result(state, reply)
         if isinstance(reply, Unanswered) and (reply.ends_sitting or reply.pause)
         else None
     )
 
 
-def reason_to_leave(fault: Fault) -> str:
-    """Text of a fault after which the sitting ends, because the device must be opened again; empty for other faults."""
+def find_leaving_reason(fault: Fault) -> str:
+    """Find the text of a fault after which the sitting ends, because the device must be opened again; empty for other
+    faults."""
     return fault.value if fault in (Fault.STOPPED, Fault.LOST, Fault.FORCE_LEFT) else ""

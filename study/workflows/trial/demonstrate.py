@@ -4,12 +4,12 @@ as often as wanted. Every stimulus is logged before it is played."""
 from protocols.procedure.schedule import draw_demo_level_n, label_direction
 from study.devices.device import Fault
 from study.session.facts.events import DemoFinished, DemoPlayed
-from study.session.facts.level_scale import equalizer_amplitude
+from study.session.facts.level_scale import convert_level_to_amplitude
 from study.session.state.due_trial import has_swapped_labels
 from study.session.state.state import SessionState, is_felt_by_person
 from study.session.stimulus.stimulus import compute_direction_angle_deg, compute_direction_vector, make_held_stimulus
 from study.session.views.views import DemoDone, DemoMenu, PlayDemo, PlayingNotice, Unanswered, make_direction_picture
-from study.workflows.trial.after_trial import AfterTrial, check_end_request, early_end_result, reason_to_leave
+from study.workflows.trial.after_trial import AfterTrial, check_end_request, find_leaving_reason, make_early_end_result
 from study.workflows.trial.sitting import Sitting, log_and_apply
 
 
@@ -67,7 +67,7 @@ def _play_demonstration(state: SessionState, choice: PlayDemo, sitting: Sitting)
             protocol.stimulus,
             compute_direction_vector(protocol.directions, direction),
             frequency_hz,
-            equalizer_amplitude(state.opened.equalized, level_n, frequency_hz),
+            convert_level_to_amplitude(state.opened.equalized, level_n, frequency_hz),
             sitting.equalizer,
             sitting.device.info.sample_rate_hz,
         )
@@ -76,11 +76,11 @@ def _play_demonstration(state: SessionState, choice: PlayDemo, sitting: Sitting)
     notice = PlayingNotice(f"Direction {choice.number}", choice.number, protocol.demo.seconds, picture)
     reply = sitting.display.show_playing(notice, sitting.supervisor.keep_alive)
     fault = sitting.device.release().health.fault
-    if end_reason := reason_to_leave(fault):
+    if end_reason := find_leaving_reason(fault):
         return AfterTrial(state, end_reason=end_reason, fault=fault)
     resolved = sitting.supervisor.resolve(reply or Unanswered("", ends_sitting=False, repeat_requested=True))
     if isinstance(resolved, Unanswered):
-        outcome = early_end_result(state, resolved)
+        outcome = make_early_end_result(state, resolved)
         return (
             outcome if fault is Fault.NONE or outcome.end_reason else AfterTrial(state, void=fault.value, fault=fault)
         )

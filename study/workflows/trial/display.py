@@ -45,7 +45,7 @@ class Display(Protocol):
         ...
 
     def device_checked(self, report: DeviceReport) -> bool:
-        """Show the findings of the device check. Returns True to continue, False to repeat the check."""
+        """Show the findings of the device check, and wait. Returns True to continue, False to repeat the check."""
         ...
 
     def welcome(self, notice: Welcome) -> None:

@@ -22,7 +22,7 @@ from study.session.views.forms import judge_form, make_form, make_take_handle_fo
 from study.session.views.views import PlayingNotice, Unanswered
 from study.store.disk.provenance import list_versions
 from study.store.sessions.trial_recordings import probe_name, save_trial_recording
-from study.workflows.trial.after_trial import AfterTrial, check_end_request, early_end_result, reason_to_leave
+from study.workflows.trial.after_trial import AfterTrial, check_end_request, find_leaving_reason, make_early_end_result
 from study.workflows.trial.present_trial import await_handle
 from study.workflows.trial.sitting import Sitting, log_and_apply, notify_experimenter, release_device
 
@@ -57,7 +57,7 @@ def play_probe(state: SessionState, probe: Probe, sitting: Sitting) -> AfterTria
     """Play a probe with the hand on the handle, after waiting for the hand as a trial does."""
     hindrance = await_handle(state, sitting)
     if hindrance is not None:
-        return early_end_result(state, hindrance)
+        return make_early_end_result(state, hindrance)
     if (early_end := check_end_request(state, sitting)) is not None:
         return early_end
     measured = _play_and_measure(state, "hand", probe.level_n, sitting)
@@ -137,12 +137,12 @@ def _play_reference_commands(state: SessionState, sitting: Sitting) -> AfterTria
         reply = sitting.supervisor.resolve(
             Unanswered("the reference was cut short", ends_sitting=False, repeat_requested=True)
         )
-        outcome = early_end_result(state, reply) if isinstance(reply, Unanswered) else AfterTrial(state)
-        return replace(outcome, end_reason=outcome.end_reason or reason_to_leave(fault), fault=fault)
+        outcome = make_early_end_result(state, reply) if isinstance(reply, Unanswered) else AfterTrial(state)
+        return replace(outcome, end_reason=outcome.end_reason or find_leaving_reason(fault), fault=fault)
     recording = None if play_result.recording is None else replace(play_result.recording, segments=segments)
     trouble = "" if recording is not None else play_result.health.fault.value
     state = _save_and_log_measurement(state, recording, commands.duration_s, trouble, sitting).state
-    return AfterTrial(state, end_reason=reason_to_leave(play_result.health.fault), fault=play_result.health.fault)
+    return AfterTrial(state, end_reason=find_leaving_reason(play_result.health.fault), fault=play_result.health.fault)
 
 
 def _play_and_measure(state: SessionState, kind: ProbeKind, level_n: float, sitting: Sitting) -> _MeasuredProbe:
@@ -234,8 +234,8 @@ def _conclude_probe(
     """Result of a probe for the session. It ends a sitting only where a trial would too: on request, or when the device
     is lost."""
     fault = play_result.health.fault
-    if end_reason := reason_to_leave(fault):
+    if end_reason := find_leaving_reason(fault):
         return AfterTrial(state, end_reason=end_reason, fault=fault)
     resolved = sitting.supervisor.resolve(reply or Unanswered("", ends_sitting=False, repeat_requested=True))
-    outcome = early_end_result(state, resolved) if isinstance(resolved, Unanswered) else AfterTrial(state)
+    outcome = make_early_end_result(state, resolved) if isinstance(resolved, Unanswered) else AfterTrial(state)
     return replace(outcome, void="", fault=fault)

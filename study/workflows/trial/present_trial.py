@@ -21,7 +21,7 @@ from study.session.state.state import SessionState, count_repeats_left
 from study.session.stimulus.delivered import has_hardly_moved, measure_delivered
 from study.session.stimulus.stimulus import PLANE_AXES, compute_direction_vector
 from study.session.views.views import HandleView, Question, Task, Unanswered, make_direction_picture
-from study.workflows.trial.after_trial import AfterTrial, early_end_result, reason_to_leave
+from study.workflows.trial.after_trial import AfterTrial, find_leaving_reason, make_early_end_result
 from study.workflows.trial.ask_participant import StimulusReply, ask_participant
 from study.workflows.trial.judge_trial import get_void_cause, judge_trial
 from study.workflows.trial.masking import was_masked
@@ -116,7 +116,7 @@ def present_trial(state: SessionState, due_trial: PresentTrial, sitting: Sitting
     """Run and log one trial: presentation, answer and measurement, or the reason why it is void."""
     early_end = await_handle(state, sitting)
     if early_end is not None:
-        return early_end_result(state, early_end)
+        return make_early_end_result(state, early_end)
     question = make_question(state, due_trial)
     state = log_and_apply(state, make_presented_event(due_trial, sitting), sitting)
     stimulus_reply = ask_participant(state, due_trial, question, sitting)
@@ -177,7 +177,7 @@ def _log_answered_trial(
     recording = play_result.recording if verdict.measured else None
     values = measure_delivered(recording, vector, due_trial.frequency_hz) if recording is not None else None
     fault = play_result.health.fault
-    end_reason = reason_to_leave(fault)
+    end_reason = find_leaving_reason(fault)
     if verdict.void_reason:
         state = log_and_apply(
             state,
@@ -209,7 +209,7 @@ def _log_void_trial(
     state = log_and_apply(state, make_void_event(due_trial, (reason, cause), health, sitting), sitting)
     if reply.ends_sitting:
         return AfterTrial(state, end_reason=reply.reason, fault=Fault.NONE if fault is Fault.STOPPED else fault)
-    if end_reason := reason_to_leave(fault):
+    if end_reason := find_leaving_reason(fault):
         return AfterTrial(state, end_reason=end_reason, void=reason, fault=fault)
     if reply.pause:
         return AfterTrial(state, pause=reply.reason)

@@ -22,7 +22,9 @@ class StreamDescription:
 
     name: str
     kind: str
+    """Content type of the stream, in LSL's vocabulary."""
     channels: tuple[str, ...]
+    """Label of each channel."""
     units: tuple[str, ...]
 
 
@@ -35,8 +37,8 @@ class SignalOutlet(Protocol):
 
 
 class MarkerOutlet:
-    """Outlet for the markers of one session. Raises StudyError where the library is not installed or the log cannot be
-    read."""
+    """Outlet for the markers of one session, a `stream_session.Outlet`. log: the session's log. The constructor raises
+    StudyError where the library is not installed or the log cannot be read."""
 
     def __init__(self, log: Path) -> None:
         self._library = _import_pylsl()
@@ -52,8 +54,8 @@ class MarkerOutlet:
         """Send a marker with its time by LSL's clock (s)."""
         self._outlet.push_sample([marker], at_s)
 
-    def signal_outlet(self, stream: StreamDescription, rate_hz: float) -> SignalOutlet:
-        """Outlet for a stream of signals of the same session. rate_hz: its nominal sample rate."""
+    def make_signal_outlet(self, stream: StreamDescription, rate_hz: float) -> SignalOutlet:
+        """Make an outlet for a stream of signals of the same session. rate_hz: its nominal sample rate (Hz)."""
         return _PylslSignalOutlet(self._library, f"{self._source} {stream.name}", stream, rate_hz)
 
 
@@ -74,8 +76,8 @@ class _PylslSignalOutlet:
 
 
 def make_source_id(log: Path) -> str:
-    """Identifier by which a recorder finds the stream again after a restart: 64 bits of the SHA-256 of the log's first
-    line. It does not depend on the folder and reveals nothing about the session. Raises StudyError."""
+    """Make the identifier by which a recorder finds the stream again after a restart: 64 bits of the SHA-256 of the
+    log's first line. It does not depend on the folder and reveals nothing about the session. Raises StudyError."""
     try:
         with open_regular(log) as file:
             first_line = file.readline(LONGEST_FIRST_LINE_BYTES)
@@ -95,7 +97,7 @@ def make_unreadable_log_error(log: Path, problem: Exception) -> StudyError:
 
 
 def _import_pylsl() -> Any:
-    """The module pylsl. Raises StudyError where it, or its C library, is not installed."""
+    """Import the module pylsl. Raises StudyError where it, or its C library, is not installed."""
     try:
         import pylsl
     except (ImportError, RuntimeError, OSError) as problem:  # installed, but without the C library

@@ -21,7 +21,7 @@ from study.session.views.participant_codes import suggest_code
 from study.store.formats.protocol_files import read_study_protocol
 from study.store.sessions.archive import SessionFolder, list_session_folders
 from study.store.sessions.event_log import read_opening
-from study.workflows.session.participant_number import participant_number, read_begun_participant
+from study.workflows.session.participant_number import find_participant_number, read_begun_participant
 from study.workflows.views.session_line import make_session_line
 
 PROGRESS_BY_STANDING: dict[str, Progress] = {"finished": "done", "unfinished": "begun", "running": "begun"}
@@ -123,7 +123,7 @@ def _plan_from_sessions(
     for session in sorted(started_sessions, key=_make_sort_key):
         sessions_by_code.setdefault(session.folder.subject, []).append(session)
     # The number that a new participant would receive: the empty code belongs to no session folder.
-    number = participant_number(data, "", protocol.name, simulated)
+    number = find_participant_number(data, "", protocol.name, simulated)
     plan = plan_study(
         protocol, [_make_participant(code, sessions) for code, sessions in sessions_by_code.items()], number
     )

@@ -33,7 +33,7 @@ def send_request(folder: SessionFolder, request: Request, clock: Clock) -> bool:
     inbox = RequestInbox(folder.path)
     name = inbox.send(request)
     deadline_s = clock.now_s() + RECEIVE_TIMEOUT_S
-    while inbox.unread(name):
+    while inbox.is_unread(name):
         if clock.now_s() >= deadline_s:
             return _handle_timeout(folder, request, inbox, name)
         clock.sleep(POLL_INTERVAL_S)

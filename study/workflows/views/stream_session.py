@@ -1,4 +1,5 @@
 """Streaming of a session's events as markers of the lab streaming layer (LSL), with the time at which they happened.
+Called by `hapteq stream`.
 
 A separate program follows the log, so that streaming cannot delay or end the session. Every event in the log carries
 the time t by the session's monotonic clock; its marker gets the time t + offset on LSL's clock. The offset between the
@@ -21,7 +22,7 @@ POLL_INTERVAL_S = 0.02
 """Interval (s) between two readings of the log: markers are sent up to this much later, with correct times."""
 OFFSET_INTERVAL_S = 10.0
 """Interval at which the offset of the two clocks is measured (s)."""
-OFFSET_TRIES = 10
+OFFSET_READINGS = 10
 """Number of pairs of clock readings in a measurement of the offset. The pair read in the shortest time is used: longer
 ones were interrupted between the readings."""
 REPORTED_CHANGE_S = 0.001
@@ -76,9 +77,9 @@ class LogFollower:
         self._log = log
         self._offset = 0
 
-    def lines(self) -> list[bytes]:
-        """New complete lines; an incomplete last line is returned once it is complete. Raises OSError, and ValueError
-        where the log became shorter or grew by more than `TABLE_BYTES`."""
+    def read_new_lines(self) -> list[bytes]:
+        """Read the new complete lines; an incomplete last line is returned once it is complete. Raises OSError, and
+        ValueError where the log became shorter or grew by more than `TABLE_BYTES`."""
         with open_regular(self._log) as file:
             new_byte_count = os.fstat(file.fileno()).st_size - self._offset
             if not 0 <= new_byte_count <= TABLE_BYTES:
@@ -100,13 +101,14 @@ def stream_session(
     side_tasks: SideTasks = NO_SIDE_TASKS,
 ) -> int:
     """Follow the log until the session is closed, and send the events that are logged after the start. Of a session
-    that is already closed nothing is sent. Returns the number of events sent. Raises StudyError where the log cannot be
-    read."""
+    that is already closed nothing is sent. now_s: the session's monotonic clock (s). Returns the number of events sent.
+    Raises StudyError where the log cannot be read."""
     reported_offset_s = math.inf
     try:
         follower, sent_count, offset_s, next_offset_s = LogFollower(log), 0, 0.0, now_s()
         if any(
-            LAST_EVENT.encode() in line and _parse_event(line).get("event") == LAST_EVENT for line in follower.lines()
+            LAST_EVENT.encode() in line and _parse_event(line).get("event") == LAST_EVENT
+            for line in follower.read_new_lines()
         ):
             return 0
         while True:
@@ -118,7 +120,7 @@ def stream_session(
                     side_tasks.on_offset(offset_s)
             if lost_ticks := side_tasks.push_signals(offset_s):
                 outlet.push(_format_marker({"event": "signals_lost", "ticks": lost_ticks}), outlet.clock_s())
-            for line in follower.lines():
+            for line in follower.read_new_lines():
                 event = _parse_event(line)
                 _send_event(event, outlet, offset_s, now_s(), on_marker)
                 sent_count += 1
@@ -130,19 +132,19 @@ def stream_session(
 
 
 def measure_offset_s(outlet: Outlet, now_s: Callable[[], float]) -> float:
-    """Offset (s): LSL's clock minus the session's, from the pair of readings that took the least time. LSL's reading is
-    compared with the mean of the session's clock before and after it."""
-    pairs = []
-    for _ in range(OFFSET_TRIES):
+    """Measure the offset (s): LSL's clock minus the session's, from the pair of readings that took the least time.
+    LSL's reading is compared with the mean of the session's clock before and after it."""
+    readings = []
+    for _ in range(OFFSET_READINGS):
         before_s = now_s()
         lsl_s = outlet.clock_s()
         after_s = now_s()
-        pairs.append((after_s - before_s, lsl_s - (before_s + after_s) / 2))
-    return min(pairs)[1]
+        readings.append((after_s - before_s, lsl_s - (before_s + after_s) / 2))
+    return min(readings)[1]
 
 
 def _parse_event(line: bytes) -> dict[str, Any]:
-    """The event in a line of the log. Raises ValueError where it is not a JSON object."""
+    """Parse the event in a line of the log. Raises ValueError where it is not a JSON object."""
     event = json.loads(line)
     if not isinstance(event, dict):
         raise ValueError(f"a line of it is no fact: {line[:40]!r}")
@@ -152,7 +154,8 @@ def _parse_event(line: bytes) -> dict[str, Any]:
 def _send_event(
     event: dict[str, Any], outlet: Outlet, offset_s: float, now_s: float, on_marker: Callable[[str], None]
 ) -> None:
-    """Send the streamed fields of an event, with the time of the event if it is recent, else the time of sending."""
+    """Send the streamed fields of an event, with its time if it is at most `LARGEST_EVENT_AGE_S` old, else with the
+    time of sending."""
     fields = {name: event[name] for name in STREAMED_FIELDS if event.get(name) is not None}
     event_s = event.get("monotonic_s")
     if isinstance(event_s, float) and 0 <= now_s - event_s <= LARGEST_EVENT_AGE_S:
@@ -166,5 +169,5 @@ def _send_event(
 
 
 def _format_marker(fields: dict[str, Any]) -> str:
-    """A marker: the fields as compact JSON."""
+    """Format a marker: the fields as compact JSON."""
     return json.dumps(fields, separators=(",", ":"))

@@ -34,7 +34,7 @@ THRESHOLD_HEADER = ("run", "phase", "at", "threshold", "delivered", "rev.", "tri
 
 def make_session_view(path: Path, zone: Zone = to_utc) -> SessionView:
     """The view of the session in the folder `path`. zone: time zone of the displayed times, UTC by default; a screen
-    for a person takes `study.local_clock.machine_zone`."""
+    for a person takes `study.local_clock.convert_to_machine_zone`."""
     folder = SessionFolder(path.absolute())
     try:
         folded_session = None if folder.withdrawn else fold_session(folder)

@@ -77,7 +77,7 @@ def test_a_millisecond_of_delay_is_a_delay_and_nothing_else(session):
 @pytest.mark.slow
 def test_a_lighter_grip_is_named_by_its_mass(session):
     found = find_drifts(session(1, hand_kg=0.045, hand_n_s_per_m=2.0, hand_n_per_m=60.0), 1000)
-    masses = {each.axis: each.change for each in found if each.number == "mass"}
+    masses = {each.axis: each.change for each in found if each.parameter == "mass"}
     assert {each.cause for each in found} == {"grip"}
     assert masses == pytest.approx({axis: -0.045 for axis in "xyz"}, abs=0.01)
 

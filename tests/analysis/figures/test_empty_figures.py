@@ -5,7 +5,7 @@ from analysis.figures.ellipsoids import draw_ellipsoids
 from analysis.figures.staircases import draw_staircases
 from analysis.figures.thresholds import draw_thresholds
 from analysis.psychophysics.anova import compute_one_way_anova
-from analysis.psychophysics.comparisons import compare_all
+from analysis.psychophysics.comparisons import compare_group_means
 from analysis.psychophysics.threshold_table import tabulate_thresholds
 
 
@@ -13,7 +13,9 @@ from analysis.psychophysics.threshold_table import tabulate_thresholds
     ("draw", "sentence"),
     [
         (
-            lambda rule: draw_thresholds(tabulate_thresholds((), (5.0,)), compare_all(compute_one_way_anova({})), 3.0),
+            lambda rule: draw_thresholds(
+                tabulate_thresholds((), (5.0,)), compare_group_means(compute_one_way_anova({})), 3.0
+            ),
             "There is no completed run to draw.",
         ),
         (lambda rule: draw_staircases((), rule), "There is no run to draw."),

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from analysis.figures.frequency_bands import draw_frequency_bands, frequency_bands_picture
-from equalizer.identification.frequency_response.coupling_onset import CouplingOnset, coupling_onset
+from equalizer.identification.frequency_response.coupling_onset import CouplingOnset, find_coupling_onset
 from equalizer.identification.frequency_response.frequency_bands import frequency_bands
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 
@@ -25,7 +25,7 @@ def figure_texts(figure) -> list[str]:
 
 
 def test_device_person_and_methods_stand_below_each_other(response):
-    onset = coupling_onset(response)
+    onset = find_coupling_onset(response)
     figure = draw_frequency_bands(response, onset, frequency_bands(onset.frequency_hz), 35.0)
     words = figure_texts(figure)
     for expected in ("25 %", "coupling begins: 12.0 Hz", "axes couple", "directions are felt", "hardly felt"):
@@ -35,7 +35,7 @@ def test_device_person_and_methods_stand_below_each_other(response):
 
 
 def test_the_mark_lies_where_the_curve_passes_the_threshold(response):
-    onset = coupling_onset(response)
+    onset = find_coupling_onset(response)
     axes = draw_frequency_bands(response, onset, frequency_bands(onset.frequency_hz), 35.0).axes[0]
     curve = axes.lines[0]
     (mark,) = [line for line in axes.lines if line.get_marker() == "o"]
@@ -56,7 +56,7 @@ def test_coupled_from_the_start_is_written(response):
 
 
 def test_the_caption_states_the_rule_and_why_each_band_is_driven_so(response):
-    onset = coupling_onset(response)
+    onset = find_coupling_onset(response)
     picture = frequency_bands_picture(response, onset, frequency_bands(onset.frequency_hz), 35.0)
     assert onset.rule in picture.caption
     assert "Middle: Directions are felt, but the device mixes its axes." in picture.caption

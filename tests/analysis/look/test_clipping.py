@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.look.channels import channels_of
+from analysis.look.channels import list_channels
 from analysis.look.clipping import check_clipping, count_clipped_samples
 
 T = np.arange(20_000) / 1000
@@ -58,7 +58,7 @@ def test_a_place_where_it_comes_to_rest_is_not_cut_off():
 
 def test_a_clipped_sensor_is_wrong_and_a_limited_command_is_reported(make_recording):
     samples = make_signals()["noise"]
-    found = check_clipping(channels_of(make_recording(np.clip(samples, -1, 1), np.clip(samples, -2, 9))))
+    found = check_clipping(list_channels(make_recording(np.clip(samples, -1, 1), np.clip(samples, -2, 9))))
     assert [(check.level, check.name) for check in found] == [("notice", "clipping"), ("wrong", "clipping")]
     assert found[0].seen.startswith("command 'f1' is cut off at 1 N and −1 N: ")
     assert found[1].seen.startswith("response 'a1' is cut off at −2 m/s^2: ")
@@ -66,5 +66,5 @@ def test_a_clipped_sensor_is_wrong_and_a_limited_command_is_reported(make_record
 
 def test_a_binary_command_is_meant_so(make_recording):
     binary = np.sign(make_signals()["noise"])
-    found = check_clipping(channels_of(make_recording(binary, make_signals()["sine"])))
+    found = check_clipping(list_channels(make_recording(binary, make_signals()["sine"])))
     assert [check.level for check in found] == ["fine"]

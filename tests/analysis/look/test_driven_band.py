@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import signal as sg
 
-from analysis.look.channels import channels_of
+from analysis.look.channels import list_channels
 from analysis.look.cross_spectra import estimate_cross_spectra
 from analysis.look.driven_band import (
     check_coherences,
@@ -17,7 +17,7 @@ RATE_HZ = 1000.0
 
 
 def analyse_drive(found):
-    channels = channels_of(found)
+    channels = list_channels(found)
     spectra = estimate_cross_spectra(channels, [(0, len(found))], RATE_HZ)
     bands = find_driven_bands(spectra, channels)
     return bands, estimate_coherences(spectra, channels, bands), spectra

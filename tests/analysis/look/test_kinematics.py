@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.look.channels import channels_of
+from analysis.look.channels import list_channels
 from analysis.look.cross_spectra import estimate_cross_spectra
 from analysis.look.gain_and_lag import GainAndLag
 from analysis.look.kinematics import KinematicPair, check_kinematics, check_lags, find_kinematic_pairs
@@ -17,7 +17,7 @@ def motion(make_noise, simulate_motion):
 
 
 def find_pairs(found: Recording):
-    return find_kinematic_pairs(channels_of(found), [(0, len(found))], RATE_HZ)
+    return find_kinematic_pairs(list_channels(found), [(0, len(found))], RATE_HZ)
 
 
 def delay(samples, lag):
@@ -85,7 +85,7 @@ def test_of_a_rounded_position_the_factor_is_still_found(make_recording, motion)
 
 
 def find_lags(found: Recording):
-    channels = channels_of(found)
+    channels = list_channels(found)
     spectra = estimate_cross_spectra(channels, [(0, len(found))], RATE_HZ)
     assert spectra is not None
     return check_lags(channels, spectra, RATE_HZ)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.look.channels import channels_of
+from analysis.look.channels import list_channels
 from analysis.look.levels import check_proportionality, compute_segment_levels
 from analysis.look.overview import check_resolution
 from analysis.look.plausibility import check_offsets, check_units
@@ -11,7 +11,7 @@ TWO = (Segment(0, 10_000, "noise", 1.0), Segment(10_000, 20_000, "noise", 2.0))
 
 
 def check_levels(found):
-    channels = channels_of(found)
+    channels = list_channels(found)
     return check_proportionality(compute_segment_levels(found, channels), channels)
 
 
@@ -52,34 +52,34 @@ def test_axes_that_are_driven_in_turn_are_not_compared(make_recording, two_level
     ],
 )  # fmt: skip
 def test_sizes_that_no_device_has_are_doubted(make_recording, make_noise, samples, quantity, unit, level):
-    found = check_units(channels_of(make_recording(make_noise(), (samples * make_noise(seed=2), quantity, unit))))
+    found = check_units(list_channels(make_recording(make_noise(), (samples * make_noise(seed=2), quantity, unit))))
     assert [check.level for check in found] == [level]
 
 
 @pytest.mark.parametrize(("rest", "level"), [(1.0, "wrong"), (9.81, "fine"), (0.0, "fine")])
 def test_an_accelerometer_in_g_is_recognised_by_gravity(make_recording, make_noise, rest, level):
-    found = check_units(channels_of(make_recording(make_noise(), rest + 0.1 * make_noise(seed=2))))
+    found = check_units(list_channels(make_recording(make_noise(), rest + 0.1 * make_noise(seed=2))))
     assert [check.level for check in found] == [level]
 
 
 def test_offsets_are_reported_and_gravity_is_known(make_recording, make_noise):
     found = check_offsets(
-        channels_of(make_recording(make_noise() - make_noise().mean() + 2.0, 9.81 + make_noise(seed=2)))
+        list_channels(make_recording(make_noise() - make_noise().mean() + 2.0, 9.81 + make_noise(seed=2)))
     )
     assert [check.level for check in found] == ["notice", "fine"]
     assert "The mean of command 'f1' is 2 N (" in found[0].seen
     assert "gravity" in found[1].seen
-    assert check_offsets(channels_of(make_recording(make_noise(), make_noise(seed=2))))[0].level == "fine"
+    assert check_offsets(list_channels(make_recording(make_noise(), make_noise(seed=2))))[0].level == "fine"
 
 
 @pytest.mark.parametrize(("steps", "level"), [(0.8, "wrong"), (10.0, "notice"), (200.0, "fine")])
 def test_the_step_of_a_converter_is_found(make_recording, make_noise, steps, level):
     step = 1.0 / steps
-    (check,) = check_resolution(channels_of(make_recording(make_noise(), np.round(make_noise(seed=2) / step) * step)))
+    (check,) = check_resolution(list_channels(make_recording(make_noise(), np.round(make_noise(seed=2) / step) * step)))
     assert check.level == level
     assert f"has a resolution of {step:.3g} m/s^2" in check.seen
 
 
 def test_an_analog_channel_has_no_step(make_recording, make_noise):
-    (check,) = check_resolution(channels_of(make_recording(make_noise(), make_noise(seed=2))))
+    (check,) = check_resolution(list_channels(make_recording(make_noise(), make_noise(seed=2))))
     assert (check.level, check.seen) == ("fine", "No sensor is limited by the resolution of its converter.")

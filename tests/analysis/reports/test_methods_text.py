@@ -45,7 +45,7 @@ def test_the_numbers_of_the_protocol_are_in_the_text(protocol):
             "Stimuli were accelerations of the handle, equal for both directions",
         ),
         ("schedule", {"order": "williams"}, "balanced for carry-over"),
-        ("schedule", {"directions": "balanced"}, "equally often within every eight trials"),
+        ("schedule", {"directions": "balanced"}, "equally often within every 8 trials"),
         ("training", {"frequencies_hz": (5.0,)}, "Training came first (5 Hz) and enters no result."),
         ("rests", {"after_run_s": 0.0}, "in random order. "),
         ("demo", {"level_n": 2.0}, "labelled, for 2 s each at 2 N."),

@@ -15,7 +15,7 @@ from analysis.figures.study_pictures import study_pictures
 from analysis.psychophysics.ellipsoid import EllipsoidResult, compute_moment_ellipsoid, compute_phasor_ellipse
 from analysis.psychophysics.study_analysis import analyse_study
 from analysis.reports.diagnosis_report import render_diagnosis_report
-from analysis.reports.real_report import parameter_sentence
+from analysis.reports.real_report import describe_parameter
 from analysis.reports.reproduction_report import render_reproduction_report
 from analysis.reports.study_report import render_study_report
 from analysis.wording import format_number, format_signed, typeset
@@ -93,8 +93,11 @@ def test_on_the_page_of_the_published_figures():
 
 def test_in_sentences():
     said = [
-        parameter_sentence(OwnParameter("mass", "kg", 0.9, 0.8, 1.0, 1.0)),
-        describe_region("position", "x", "m", (1, 1, 4), -0.012, one_stratum=True),
+        describe_parameter(OwnParameter("mass", "kg", 0.9, 0.8, 1.0, 1.0)),
+        describe_region("position", "x", "m", (1, 1, 4), -0.012, is_one_stratum=True),
     ]
     assert said[1] == "near x = −12 mm"
+    assert describe_parameter(OwnParameter("offset", "N", 0.1, -0.1, 0.3, 0.0)).endswith(
+        "known by other means is 0.00 N, and the interval holds it."
+    )
     assert_one_spelling(said)

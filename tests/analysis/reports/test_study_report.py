@@ -10,7 +10,7 @@ from analysis.figures.study_pictures import study_pictures
 from analysis.psychophysics.ellipsoid import EllipsoidResult, compute_moment_ellipsoid, compute_phasor_ellipse
 from analysis.psychophysics.study_analysis import analyse_study
 from analysis.psychophysics.thresholds import RunEnd
-from analysis.reports.side_tables import detection_table, practice_table
+from analysis.reports.side_tables import make_detection_table, make_practice_table
 from analysis.reports.study_report import render_study_report
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.staircase_rule import BayesianPlacement
@@ -177,7 +177,7 @@ def test_without_such_trials_there_is_no_such_section(render_without_figures, si
 
 @pytest.mark.slow
 def test_detection_is_compared_with_direction_only_where_both_are_thresholds(all_trial_kinds, full_protocol):
-    table = detection_table(analyse_study(all_trial_kinds, full_protocol))
+    table = make_detection_table(analyse_study(all_trial_kinds, full_protocol))
     for _, _, felt, told, above in table.rows:
         assert (above == "–") == ("cut" in felt + told)
     assert {row[4][0] for row in table.rows} == {"+", "–"}
@@ -194,7 +194,7 @@ def test_detection_alone_is_a_report_too(render_report, all_trial_kinds, full_pr
 def test_practice_says_how_it_ended(all_trial_kinds, full_protocol, answers, outcome):
     template = next(t for t in all_trial_kinds if t.phase is Phase.TRAINING and t.run == 1)
     trials = [replace(template, trial=number, correct=False) for number in range(answers)]
-    (row,) = practice_table(analyse_study(trials, full_protocol)).rows
+    (row,) = make_practice_table(analyse_study(trials, full_protocol)).rows
     assert row[-1] == outcome
 
 

@@ -10,9 +10,9 @@ import pytest
 from scipy.signal import butter, cont2discrete, dlsim, sosfilt
 
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.discovered_law import Channels, law_effect, law_parameters, law_values
+from equalizer.effects.discovered_law import Channels, get_law_values, make_law_effect, make_law_parameters
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.simulation.forces_along_motion import effect_forces_along_motion
+from equalizer.effects.simulation.forces_along_motion import compute_effect_forces_along_motion
 from equalizer.effects.simulation.mechanism_kernel import MAX_LAWS
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.laws.evaluate import evaluate
@@ -29,7 +29,7 @@ COMMANDS = sosfilt(
 
 def at_y(text: str, acts_on: str = "force") -> PlacedEffect:
     law = parse_law(text, acts_on, "y")
-    return PlacedEffect(law_effect(law), (1,), law_values(law))
+    return PlacedEffect(make_law_effect(law), (1,), get_law_values(law))
 
 
 def apart(bench, effects, others) -> list[float]:
@@ -127,7 +127,7 @@ def test_a_relaxing_spring_is_that_of_a_linear_system():
     law = parse_law("-1500.0*(x - lag(x, 0.02))", "force", "x")
     channels = Channels(("u",), ("a",))
     played = simulate_mechanism(
-        one_body(), COMMANDS[:, :1], RATE_HZ, [PlacedEffect(law_effect(law, channels), (0,), law_values(law))]
+        one_body(), COMMANDS[:, :1], RATE_HZ, [PlacedEffect(make_law_effect(law, channels), (0,), get_law_values(law))]
     )
     a = np.array([[0.0, 1.0, 0.0], [-(2000.0 + 1500.0) / 0.2, -3.0 / 0.2, 1500.0 / 0.2], [1 / 0.02, 0.0, -1 / 0.02]])
     whole = (a, np.array([[0.0], [1 / 0.2], [0.0]]), np.eye(3)[:1], np.zeros((1, 1)))
@@ -137,7 +137,7 @@ def test_a_relaxing_spring_is_that_of_a_linear_system():
 
 def test_the_force_is_what_the_formula_gives_along_the_motion(bench):
     law = parse_law("-40.0*abs(vy)**1.5*sign(vy) + 200.0*x*vy + 0.1*fx*tanh(y/0.001)", "force", "y")
-    effect = PlacedEffect(law_effect(law), (1,), law_values(law))
+    effect = PlacedEffect(make_law_effect(law), (1,), get_law_values(law))
     played = simulate_mechanism(bench.three_axes(), COMMANDS, RATE_HZ, [effect])
     columns = {
         **{name: played.axis_position[:, axis] for axis, name in enumerate("xyz")},
@@ -148,7 +148,9 @@ def test_the_force_is_what_the_formula_gives_along_the_motion(bench):
     expected = evaluate(law, columns, RATE_HZ)
     assert np.std(played.axis_force[:, 1] - expected) < 1e-6 * np.std(expected)
     motion = played.axis_position, played.axis_velocity, np.gradient(played.axis_velocity, 1 / RATE_HZ, axis=0)
-    along = effect_forces_along_motion(bench.three_axes(), [effect], motion, (COMMANDS, played.axis_force), RATE_HZ)
+    along = compute_effect_forces_along_motion(
+        bench.three_axes(), [effect], motion, (COMMANDS, played.axis_force), RATE_HZ
+    )
     step_ahead = evaluate(law, {**columns, "fx": COMMANDS[:, 0]}, RATE_HZ)
     assert np.std(along[:-1, 1] - (step_ahead[:-1] + expected[1:]) / 2) < 0.05 * np.std(expected)
 
@@ -165,7 +167,7 @@ def test_commands_may_be_read_only(bench):
     held = COMMANDS[:50].copy()
     held.flags.writeable = False
     simulate_mechanism(bench.three_axes(), held, RATE_HZ, [at_y("-2.0*vy")])
-    along = effect_forces_along_motion(
+    along = compute_effect_forces_along_motion(
         bench.three_axes(), [at_y("-2.0*vy")], (COMMANDS[:50],) * 3, (held, held), RATE_HZ
     )
     assert along[:-1, 1] == pytest.approx(-(held[:-1, 1] + held[1:, 1]), rel=0.05)
@@ -180,18 +182,18 @@ def test_a_law_of_nothing_changes_nothing(bench):
 def test_signals_are_called_by_axis_or_as_the_recording_calls_them():
     channels = Channels(("motor",), ("encoder",), "position")
     for text in ("-3.0*vx + 2.0*motor", "-3.0*vx + 2.0*fx", "-1.0*encoder"):
-        law_effect(parse_law(text, "force", "motor"), channels)
+        make_law_effect(parse_law(text, "force", "motor"), channels)
     with pytest.raises(LawError, match="needs the signal 'vy'; there are t, x, vx, ax, fx, encoder, motor"):
-        law_effect(parse_law("-3.0*vy", "force", "motor"), channels)
+        make_law_effect(parse_law("-3.0*vy", "force", "motor"), channels)
     with pytest.raises(LawError, match="needs the signal 'vx'; there are fx, motor, t"):
-        law_effect(parse_law("fx - 3.0*vx", "command", "motor"), channels)
+        make_law_effect(parse_law("fx - 3.0*vx", "command", "motor"), channels)
 
 
 def test_a_law_for_other_axes_than_the_model_has_is_refused():
     law = parse_law("-3.0*vx", "force", "x")
     with pytest.raises(ValueError, match="is for 3 axes; the model has 1"):
         simulate_mechanism(
-            one_body(), np.zeros((9, 1)), RATE_HZ, [PlacedEffect(law_effect(law), (0,), law_values(law))]
+            one_body(), np.zeros((9, 1)), RATE_HZ, [PlacedEffect(make_law_effect(law), (0,), get_law_values(law))]
         )
 
 
@@ -200,7 +202,7 @@ def test_a_fit_may_move_each_number_as_its_role_allows():
         "-p0*abs(vy)**p1*sign(vy) + p2*sin(y/p3 + p4) - p5*lag(maximum(x - p6, 0), p7)",
         (4.1, 1.5, 0.2, 0.01, 0.3, 2.0, -0.1, 0.02), (), "force", "y",
     )  # fmt: skip
-    parameters = law_parameters(law)
+    parameters = make_law_parameters(law)
     scales = [parameter.scale for parameter in parameters]
     assert scales == ["signed", "log", "signed", "log", "linear", "signed", "signed", "log"]
     assert [parameter.none for parameter in parameters] == [0.0, None, 0.0, None, None, 0.0, None, None]

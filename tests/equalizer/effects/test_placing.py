@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from equalizer.effects.catalogue import CATALOGUE
-from equalizer.effects.discovered_law import Channels, law_effect, law_values
+from equalizer.effects.discovered_law import Channels, get_law_values, make_law_effect
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.placing import PlacingError, axis_letter, model_effects, place_effects
+from equalizer.effects.placing import PlacingError, place_effects, shorten_axis_name, to_model_effects
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.laws.law import parse_law
 from equalizer.plant.effect_vocabulary import EFFECT_NAMES, EFFECTS_BY_NAME
@@ -46,7 +46,7 @@ def test_what_was_fitted_is_written_and_read_back_the_same(bench, effect):
     fitted = type(placed(bench.three_axes(), written("force_gain", "x", False))[0])(
         effect, (1,) if one else (0, 1, 2), values
     )
-    model = replace(bench.three_axes(), effects=model_effects((fitted,), INPUTS, OUTPUTS))
+    model = replace(bench.three_axes(), effects=to_model_effects((fitted,), INPUTS, OUTPUTS))
     assert [each.axis for each in model.effects] == (["y"] if one else [None])
     (again,) = place_effects(parse_mechanical_model(format_mechanical_model(model)), Channels(INPUTS, OUTPUTS))
     assert again.effect is effect
@@ -74,7 +74,7 @@ def test_a_letter_that_two_channels_end_with_is_refused(bench):
 def test_an_effect_beyond_the_channels_cannot_be_written(bench):
     (one,) = placed(bench.three_axes(), written("coulomb_friction", "z", False))
     with pytest.raises(PlacingError, match="coulomb_friction is placed at number 3, but there are 2"):
-        model_effects((one,), INPUTS[:2], OUTPUTS)
+        to_model_effects((one,), INPUTS[:2], OUTPUTS)
 
 
 @pytest.mark.parametrize(
@@ -82,7 +82,7 @@ def test_an_effect_beyond_the_channels_cannot_be_written(bench):
     [(("fx", "fy"), "y"), (("f1", "f2"), "f2"), (("left x", "right x"), "right x"), (("rate", "force"), "force")],
 )
 def test_a_channel_is_named_by_its_letter_where_that_is_enough(channels, letter):
-    assert axis_letter(channels[1], channels) == letter
+    assert shorten_axis_name(channels[1], channels) == letter
 
 
 @pytest.mark.parametrize(
@@ -95,12 +95,12 @@ def test_a_channel_is_named_by_its_letter_where_that_is_enough(channels, letter)
 )
 def test_a_discovered_law_is_written_and_read_back_the_same(bench, text, acts_on):
     law = parse_law(text, acts_on, "y")
-    fitted = PlacedEffect(law_effect(law), (1,), law_values(law))
-    model = replace(bench.three_axes(), effects=model_effects((fitted,), INPUTS, OUTPUTS))
+    fitted = PlacedEffect(make_law_effect(law), (1,), get_law_values(law))
+    model = replace(bench.three_axes(), effects=to_model_effects((fitted,), INPUTS, OUTPUTS))
     again = parse_mechanical_model(format_mechanical_model(model))
     assert again.effects == (ModelEffect("discovered_law", "y", {}, law),)
     (placed_again,) = place_effects(again, Channels(INPUTS, OUTPUTS))
-    assert (placed_again.sites, placed_again.values) == ((1,), law_values(law))
+    assert (placed_again.sites, placed_again.values) == ((1,), get_law_values(law))
     commands = 0.1 * bench.commands(3)[:500]
     one, other = (simulate_mechanism(again, commands, 1000.0, [each]).response for each in (fitted, placed_again))
     assert np.array_equal(one, other)

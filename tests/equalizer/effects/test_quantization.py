@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.starts.lattice import lattice_offset, lattice_step, staircase_step
+from equalizer.effects.starts.lattice import find_lattice_offset, find_lattice_step, find_step_under_noise
 
 EFFECT = EFFECTS["quantization"]
 NOISE = 0.042
@@ -19,35 +19,35 @@ def signal(seed: int, n: int = 20_000) -> tuple[np.ndarray, np.random.Generator]
 def test_the_step_of_a_lattice_is_read_off_exactly(step):
     truth, generator = signal(1)
     rounded = (step * np.round((truth + NOISE * generator.standard_normal(len(truth))) / step)).astype(np.float32)
-    assert lattice_step(rounded.astype(np.float64)) == pytest.approx(step, rel=1e-5)
+    assert find_lattice_step(rounded.astype(np.float64)) == pytest.approx(step, rel=1e-5)
 
 
 def test_a_lattice_that_misses_zero_is_one():
     values = 0.5 * np.round(signal(1)[0] / 0.5) + 0.13
-    assert lattice_step(values) == pytest.approx(0.5)
-    assert lattice_offset(values, 0.5) == pytest.approx(0.13)
+    assert find_lattice_step(values) == pytest.approx(0.5)
+    assert find_lattice_offset(values, 0.5) == pytest.approx(0.13)
 
 
 def test_values_that_lie_anywhere_make_no_lattice():
     truth, generator = signal(2)
     values = truth + NOISE * generator.standard_normal(len(truth))
-    assert lattice_step(values) is None
-    assert lattice_step(values.astype(np.float32).astype(np.float64)) is None
-    assert lattice_offset(values, 0.25) is None
-    assert lattice_step(np.zeros(100)) is None
+    assert find_lattice_step(values) is None
+    assert find_lattice_step(values.astype(np.float32).astype(np.float64)) is None
+    assert find_lattice_offset(values, 0.25) is None
+    assert find_lattice_step(np.zeros(100)) is None
 
 
 @pytest.mark.parametrize("step", [0.25, 0.6])
 def test_steps_under_noise_leave_a_staircase(step):
     truth, generator = signal(3)
     values = step * np.round(truth / step) + NOISE * generator.standard_normal(len(truth))
-    assert staircase_step(values, NOISE) == pytest.approx(step, rel=0.02)
+    assert find_step_under_noise(values, NOISE) == pytest.approx(step, rel=0.02)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_without_steps_there_is_no_staircase(seed):
     truth, generator = signal(seed)
-    assert staircase_step(truth + NOISE * generator.standard_normal(len(truth)), NOISE) is None
+    assert find_step_under_noise(truth + NOISE * generator.standard_normal(len(truth)), NOISE) is None
 
 
 @pytest.mark.parametrize("share", [0.5, 3.0, 20.0])

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 from scipy.signal import lsim, lti
 
-from equalizer.effects.simulation.command_path import delay_mean, lag_mean
+from equalizer.effects.simulation.command_path import compute_delayed_mean, compute_lagged_mean
 from equalizer.laws.evaluate import evaluate, evaluate_held
 from equalizer.laws.law import parse_law
 
@@ -54,8 +54,8 @@ def test_held_signals_are_delayed_and_lagged_as_commands_are():
     """From zero before the first; a jump within a step is a ramp."""
     steps = np.sign(np.sin(2 * np.pi * 7 * TIME_S + 1))
     for text, expected, off in (
-        ("delay(fx, 0.05)", delay_mean(steps, 1 / RATE_HZ, 0.05), 1e-12),
-        ("lag(fx, 0.05)", lag_mean(steps, 1 / RATE_HZ, 0.05), 1e-4),
+        ("delay(fx, 0.05)", compute_delayed_mean(steps, 1 / RATE_HZ, 0.05), 1e-12),
+        ("lag(fx, 0.05)", compute_lagged_mean(steps, 1 / RATE_HZ, 0.05), 1e-4),
     ):
         held = evaluate_held(parse_law(text, "command", "x"), {"fx": steps}, RATE_HZ)
         assert held.mean(axis=0) == pytest.approx(expected, abs=off)

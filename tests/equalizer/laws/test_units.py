@@ -2,7 +2,7 @@
 
 import pytest
 
-from equalizer.effects.discovered_law import Channels, law_units
+from equalizer.effects.discovered_law import Channels, derive_law_units
 from equalizer.laws.law import Law, parse_law
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL
 
@@ -23,16 +23,16 @@ from equalizer.signals.unit_system import LINEAR, ROTATIONAL
     ],
 )
 def test_units_of_a_force(text: str, units: tuple[str, ...]):
-    assert law_units(parse_law(text, "force", "y"), Channels(), LINEAR) == units
+    assert derive_law_units(parse_law(text, "force", "y"), Channels(), LINEAR) == units
 
 
 def test_units_of_a_torque_and_of_a_response():
-    assert law_units(parse_law("-4.1*vx*abs(vx)", "force", "x"), Channels(("u",), ("q",), "angle"), ROTATIONAL) == (
-        "N m s^2/rad^2",
-    )
-    assert law_units(parse_law("ax + 0.2*ax**3", "response", "x"), Channels(), LINEAR) == ("s^4/m^2",)
+    assert derive_law_units(
+        parse_law("-4.1*vx*abs(vx)", "force", "x"), Channels(("u",), ("q",), "angle"), ROTATIONAL
+    ) == ("N m s^2/rad^2",)
+    assert derive_law_units(parse_law("ax + 0.2*ax**3", "response", "x"), Channels(), LINEAR) == ("s^4/m^2",)
 
 
 def test_a_sum_with_a_signal_tells_units_where_its_factor_is_part_of_the_form():
     threshold = Law("0.93*sign(fx)*maximum(abs(fx) - p0, 0)**p1", (0.1, 0.4), (), "command", "x")
-    assert law_units(threshold, Channels(), LINEAR) == ("N", "1")
+    assert derive_law_units(threshold, Channels(), LINEAR) == ("N", "1")

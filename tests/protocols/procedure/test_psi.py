@@ -12,11 +12,11 @@ from protocols.definition.staircase_rule import BayesianPlacement
 from protocols.procedure.psi import (
     LAPSE_RATE,
     SLOPES,
+    choose_level_db,
     compute_posterior,
     estimate_threshold,
-    levels_db,
-    next_level_db,
-    thresholds_db,
+    list_levels_db,
+    list_thresholds_db,
 )
 from protocols.procedure.staircase import begin_staircase, is_complete, is_finished, level_n, step, to_db
 from tests.analysis.conftest import PUBLISHED
@@ -34,7 +34,7 @@ def chance_right(level_db: float, threshold_db: float, slope: float) -> float:
 
 def brute_force(answers) -> dict[tuple[float, float], float]:
     weight = {}
-    for threshold_db in thresholds_db(CAP_DB):
+    for threshold_db in list_thresholds_db(CAP_DB):
         for slope in SLOPES:
             p = 1.0
             for level_db, right in answers:
@@ -50,7 +50,7 @@ ANSWERS = ((0.0, True), (-6.0, True), (-12.0, False), (-8.0, True), (-10.0, Fals
 
 def test_the_posterior_is_bayes_rule_by_brute_force():
     found, expected = compute_posterior(ANSWERS, CAP_DB), brute_force(ANSWERS)
-    for i, threshold_db in enumerate(thresholds_db(CAP_DB)):
+    for i, threshold_db in enumerate(list_thresholds_db(CAP_DB)):
         for j, slope in enumerate(SLOPES):
             assert found[i, j] == pytest.approx(expected[threshold_db, slope], rel=1e-9, abs=1e-14)
     got = estimate_threshold(found, CAP_DB)
@@ -76,8 +76,8 @@ def test_the_next_level_leaves_the_least_entropy_by_brute_force(count):
             total -= sum(j * math.log(j / chance) for j in joint if j > 0)
         return total
 
-    best = min(levels_db(CAP_DB), key=expected_entropy)
-    chosen = next_level_db(compute_posterior(ANSWERS[:count], CAP_DB), CAP_DB)
+    best = min(list_levels_db(CAP_DB), key=expected_entropy)
+    chosen = choose_level_db(compute_posterior(ANSWERS[:count], CAP_DB), CAP_DB)
     assert expected_entropy(chosen) == pytest.approx(expected_entropy(best), abs=1e-8)
 
 

@@ -77,14 +77,14 @@ def test_every_missing_key_is_named_with_its_english_text():
 
 def test_a_fact_is_recognised_and_its_parts_too():
     words = Words({key: f"<{text}>" for key, text in FACTS.items()})
-    assert words.fact("Direction 2") == "<Direction 2>"
-    assert words.fact("3 trials in a row were void, the last because the device stopped answering") == (
+    assert words.translate_fact("Direction 2") == "<Direction 2>"
+    assert words.translate_fact("3 trials in a row were void, the last because the device stopped answering") == (
         "<3 trials in a row were void, the last because <the device stopped answering>>"
     )
-    assert words.fact("The set-up is not the protocol's: the device can be heard, the hand can be seen.") == (
+    assert words.translate_fact("The set-up is not the protocol's: the device can be heard, the hand can be seen.") == (
         "<The set-up is not the protocol's: <the device can be heard>, <the hand can be seen>.>"
     )
-    assert words.fact("A probe is not used: too little.") == "A probe is not used: too little."
+    assert words.translate_fact("A probe is not used: too little.") == "A probe is not used: too little."
 
 
 def test_a_text_whose_braces_do_not_fit_is_shown_in_english():

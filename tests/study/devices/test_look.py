@@ -11,7 +11,7 @@ import pytest
 
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Fault
-from study.devices.drive.realtime_drive import PATIENCE_S, ReadingRequests
+from study.devices.drive.realtime_drive import READING_TIMEOUT_S, ReadingRequests
 from study.devices.rig import READING_SIZE
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
@@ -79,8 +79,8 @@ def test_a_driver_that_hangs_while_idle_makes_one_caller_wait_and_no_other(rigs,
         return np.zeros(READING_SIZE)
 
     rig.instead_of_sensing = hangs
-    assert PATIENCE_S * 0.9 < seconds_for(device.look) < PATIENCE_S + 0.3
-    assert seconds_for(lambda: [device.look() for _ in range(20)]) < 5 * PATIENCE_S
+    assert READING_TIMEOUT_S * 0.9 < seconds_for(device.look) < READING_TIMEOUT_S + 0.3
+    assert seconds_for(lambda: [device.look() for _ in range(20)]) < 5 * READING_TIMEOUT_S
     assert device.look().position_m is None
     hang.set()
     time.sleep(0.05)
@@ -209,7 +209,7 @@ class StillClock(RealClock):
 def test_concurrent_requests_get_the_same_reading():
     clock, served = StillClock(), []
     glances = ReadingRequests(clock, wake=lambda: None)
-    askers = [threading.Thread(target=lambda: served.append(glances.ask())) for _ in range(2)]
+    askers = [threading.Thread(target=lambda: served.append(glances.request_reading())) for _ in range(2)]
     for asker in askers:
         asker.start()
     while not glances.is_pending:
@@ -225,8 +225,8 @@ def test_concurrent_requests_get_the_same_reading():
 def test_a_late_request_is_not_waited_for_again_until_it_is_served():
     clock = StillClock()
     glances = ReadingRequests(clock, wake=lambda: None)
-    assert not glances.ask()
+    assert not glances.request_reading()
     clock.seconds = 1.0
-    assert seconds_for(glances.ask) < 0.05
+    assert seconds_for(glances.request_reading) < 0.05
     glances.mark_taken()
-    assert seconds_for(glances.ask) > PATIENCE_S * 0.9
+    assert seconds_for(glances.request_reading) > READING_TIMEOUT_S * 0.9

@@ -18,7 +18,7 @@ from study.devices.device import Fault
 from study.devices.drive import real_time_class
 from study.devices.force_dimension import library
 from study.devices.loop_process import serve, start
-from study.devices.native import CLOCK, MONOTONIC, SLEEP, SharedLock, now_s, system_calls
+from study.devices.native import CLOCK, MONOTONIC, SLEEP, SharedLock, collect_system_calls, read_clock_s
 from study.devices.safe import SafeDevice
 
 NOT_THERE = ("fcntl", "resource", "termios", "tty", "pty", "grp", "pwd", "syslog", "posix_ipc")
@@ -54,11 +54,11 @@ def windows(monkeypatch) -> Windows:
 
 
 def test_the_loop_takes_python_s_clock_and_sleep_there(windows):
-    calls = system_calls(SharedLock())
+    calls = collect_system_calls(SharedLock())
     assert (calls[CLOCK], calls[SLEEP]) == (0, 0)
     assert calls[MONOTONIC] != 0
     before_s = time.monotonic()
-    assert before_s <= now_s(calls) <= time.monotonic()
+    assert before_s <= read_clock_s(calls) <= time.monotonic()
 
 
 @pytest.mark.real_time
@@ -95,7 +95,7 @@ def test_the_loop_s_process_inherits_its_pipes_by_handle_and_has_a_group_of_its_
     monkeypatch.setattr(start.os, "set_handle_inheritable", lambda *given: inheritable.append(given), raising=False)
     monkeypatch.setattr(start.subprocess, "CREATE_NEW_PROCESS_GROUP", 0x200, raising=False)
     monkeypatch.setattr(start.subprocess, "Popen", lambda *given, **named: made.append((given, named)))
-    start._start([404, 408], [])
+    start._start_process([404, 408], [])
     ((command,), named) = made[0]
     assert inheritable == [(404, True), (408, True)]
     assert (named["close_fds"], named["creationflags"]) == (False, 0x200)

@@ -19,7 +19,7 @@ NAMED_IN = {
     "make_simulated_rig": set(),
     "make_replay_rig": {"study/devices/rigs_by_name.py"},
     "build_omega3": {"study/devices/rigs_by_name.py"},
-    "force_dimension_rig": {"study/devices/rigs_by_name.py"},
+    "open_force_dimension_rig": {"study/devices/rigs_by_name.py"},
     "ForceDimensionRig": {"study/devices/force_dimension/rigs.py"},
     "set_force": {
         "study/devices/force_dimension/handle.py",

@@ -56,7 +56,7 @@ def pulses(line):
 
 def test_a_pulse_goes_up_and_down_and_is_stamped_in_between(line, pulses, patient):
     before_s = time.monotonic()
-    pulse = pulses.pulse()
+    pulse = pulses.send_pulse()
     assert before_s <= pulse.at_s <= time.monotonic()
     assert (pulse.line, pulse.trouble) == ("byte 7 of /dev/ttyUSB0", "")
     pulses.close()
@@ -65,21 +65,21 @@ def test_a_pulse_goes_up_and_down_and_is_stamped_in_between(line, pulses, patien
 
 def test_a_line_that_breaks_loses_its_pulse_and_is_opened_anew_for_the_next(line, pulses, patient):
     line.broken = OSError(5, "Input/output error")
-    lost = pulses.pulse()
+    lost = pulses.send_pulse()
     assert lost.at_s is None and "Input/output error" in lost.trouble
     line.broken = None
     wait_until_free(pulses)
-    assert pulses.pulse().at_s is not None
+    assert pulses.send_pulse().at_s is not None
     assert line.told.count("open") == 2 and "close" in line.told
 
 
 def test_a_line_that_hangs_holds_up_nothing_and_serves_again(line, pulses):
     line.hangs.clear()
-    lost = [pulses.pulse() for _ in range(3)]
+    lost = [pulses.send_pulse() for _ in range(3)]
     assert all(pulse.at_s is None and pulse.trouble for pulse in lost)
     assert lost[1].trouble == "the previous pulse has not been finished"
     line.hangs.set()
-    while (pulse := pulses.pulse()).at_s is None:
+    while (pulse := pulses.send_pulse()).at_s is None:
         time.sleep(0.01)
     assert pulse.trouble == ""
 
@@ -88,19 +88,19 @@ def test_the_line_that_was_opened_before_a_session_serves_its_first_pulse(line, 
     monkeypatch.setattr(module, "open_port", line.open)
     with contextlib.closing(open_onset_line(BYTE)) as pulses:
         assert line.told == ["open"]
-        assert pulses.pulse().at_s is not None
+        assert pulses.send_pulse().at_s is not None
     assert line.told == ["open", "high", "low", "low", "close"]
 
 
 def test_an_error_without_words_is_named_by_its_kind(line, pulses, patient):
     line.broken = ValueError()
-    assert pulses.pulse().trouble == "ValueError"
+    assert pulses.send_pulse().trouble == "ValueError"
 
 
 @pytest.fixture
 def patient(monkeypatch):
     """A busy computer may take longer than a line may."""
-    monkeypatch.setattr(module, "PATIENCE_S", 20.0)
+    monkeypatch.setattr(module, "PULSE_TIMEOUT_S", 20.0)
 
 
 def wait_until_free(pulses: OnsetLine) -> None:
@@ -124,7 +124,7 @@ def test_bytes_over_a_serial_line(terminal, patient):
     (master, _), path = terminal
     with contextlib.closing(open_onset_line(PulseSettings("serial-byte", path, code=7))) as pulses:
         for _ in range(3):
-            assert pulses.pulse().at_s is not None
+            assert pulses.send_pulse().at_s is not None
             wait_until_free(pulses)
     came = b""
     while len(came) < 7:
@@ -136,11 +136,11 @@ def test_bytes_over_a_serial_line(terminal, patient):
 def test_a_serial_line_that_is_unplugged_loses_pulses(terminal, patient):
     ends, path = terminal
     with contextlib.closing(open_onset_line(PulseSettings("serial-byte", path))) as pulses:
-        assert pulses.pulse().at_s is not None
+        assert pulses.send_pulse().at_s is not None
         while ends:
             os.close(ends.pop())
         wait_until_free(pulses)
-        assert pulses.pulse().trouble
+        assert pulses.send_pulse().trouble
 
 
 class Control:
@@ -181,7 +181,7 @@ def test_a_parallel_port_is_claimed_shows_the_code_and_is_given_back(monkeypatch
     port.write_bytes(b"")
     monkeypatch.setattr(fcntl, "ioctl", lambda file, request, value: asked.append((request, value)))
     with contextlib.closing(OnsetLine(PulseSettings("parallel", str(port), code=9), open_port)) as pulses:
-        assert pulses.pulse().line == f"data lines 9 of {port}"
+        assert pulses.send_pulse().line == f"data lines 9 of {port}"
     high, low = (module.WRITE_DATA, b"\x09"), (module.WRITE_DATA, b"\x00")
     assert asked == [(module.CLAIM_PORT, 0), high, low, low, (module.RELEASE_PORT, 0)]
 

@@ -18,7 +18,7 @@ from study.participants.psychometric_curve import WeibullCurve
 from study.session.facts.events import AnswerGiven, TrialMeasured, TrialSpoiled
 from study.session.state.draw_check import LogContradiction
 from study.session.state.fold import apply_event
-from study.session.state.machine import next_action
+from study.session.state.machine import find_next_action
 from study.session.state.state import begin_session, count_repeats_left
 from study.store.formats.protocol_files import read_study_protocol
 
@@ -46,7 +46,7 @@ def run_of(facts, protocol, seed: int, rules: int, cause: VoidCause, unsure: flo
     luck = np.random.default_rng([seed, 14])
     evidence, looks = 0.0, 0
     while not state.finished:
-        action = next_action(state)
+        action = find_next_action(state)
         state = apply_event(state, facts.presented(action))
         side = 1.0 if action.label == 1 else -1.0
         fresh = side * CURVE.compute_d_prime(action.level_n) / 2 + luck.normal()
@@ -118,9 +118,9 @@ def test_every_void_trial_comes_again_with_the_same_stimulus_and_under_the_first
     for seed in seeds:
         state = begin_session(facts.opened(protocol, "", seed=seed, rules=rules), protocol)
         state = replace(state, sitting=replace(state.sitting, demo_done=True))
-        first = next_action(state)
+        first = find_next_action(state)
         state = apply_event(apply_event(state, facts.presented(first)), spoiled(first, cause))
-        again = next_action(state)
+        again = find_next_action(state)
         assert (again.trial, again.attempt, again.level_n) == (0, 1, first.level_n)
         kept += (again.label, again.angle_deg, again.polarity) == (first.label, first.angle_deg, first.polarity)
         assert (state.trials[0].void_cause, state.trials[0].status) == (cause, TrialStatus.SPOILED)
@@ -133,9 +133,11 @@ def test_in_a_detection_run_interval_and_direction_stay_too(facts, protocol):
     detecting = replace(detecting, stimulus=replace(detecting.stimulus, frequencies_hz=()))
     for seed in range(20):
         state = begin_session(facts.opened(detecting, "", seed=seed, rules=2, observer="attack"), detecting)
-        first = next_action(state)
+        first = find_next_action(state)
         assert first.phase is Phase.DETECTION
-        again = next_action(apply_event(apply_event(state, facts.presented(first)), spoiled(first, VoidCause.EARLY)))
+        again = find_next_action(
+            apply_event(apply_event(state, facts.presented(first)), spoiled(first, VoidCause.EARLY))
+        )
         assert replace(again, attempt=0) == first
 
 
@@ -145,10 +147,10 @@ def test_the_number_of_repeats_in_a_run_is_limited_by_the_protocol(facts, protoc
     state = begin_session(facts.opened(limited, "", rules=2, observer="attack"), limited)
     for asked in range(limit):
         assert count_repeats_left(state) == limit - asked
-        action = next_action(state)
+        action = find_next_action(state)
         state = apply_event(apply_event(state, facts.presented(action)), spoiled(action, VoidCause.ASKED))
     assert count_repeats_left(state) == 0
-    action = next_action(state)
+    action = find_next_action(state)
     state = apply_event(state, facts.presented(action))
     with pytest.raises(LogContradiction, match="no repeat of this run remained"):
         apply_event(state, spoiled(action, VoidCause.ASKED))

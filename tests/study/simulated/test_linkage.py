@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from study.devices.simulated.compiled import pose
+from study.devices.simulated.compiled import solve_pose
 from study.devices.simulated.layout import PLATFORM_DEPTH
-from study.devices.simulated.linkage import forward_kinematics
+from study.devices.simulated.linkage import solve_forward_kinematics
 from study.devices.simulated.packing import compute_isotropic_depth_m, pack_parameters
 from study.devices.simulated.parameters import Linkage, Omega3Parameters
 
@@ -16,13 +16,13 @@ places = st.tuples(coordinate, coordinate, coordinate).filter(lambda p: np.linal
 
 def inverse(position):
     angles, jacobian = np.empty(3), np.empty((3, 3))
-    pose(PARAMETERS, np.array(position, float), angles, jacobian)
+    solve_pose(PARAMETERS, np.array(position, float), angles, jacobian)
     return angles, jacobian
 
 
 def forward(angles):
     position = np.empty(3)
-    forward_kinematics(PARAMETERS, angles, position)
+    solve_forward_kinematics(PARAMETERS, angles, position)
     return position
 
 

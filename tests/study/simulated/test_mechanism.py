@@ -7,7 +7,7 @@ import pytest
 
 from study.devices.rig import POSITION, TRUE_ACCELERATION
 from study.devices.simulated import layout
-from study.devices.simulated.compiled import pose
+from study.devices.simulated.compiled import solve_pose
 from study.devices.simulated.layout import MODES, MOUNTS
 from study.devices.simulated.omega3 import build_omega3
 from study.devices.simulated.parameters import Hand, HandleModes, Mount, Omega3Parameters
@@ -39,7 +39,7 @@ def energy(rig):
     """Joule, from the state alone, by the formulas of docs/simulated_omega3.md."""
     state, p = rig.state, rig.parameters
     angles, jacobian = np.empty(3), np.empty((3, 3))
-    pose(p, state[:3].copy(), angles, jacobian)
+    solve_pose(p, state[:3].copy(), angles, jacobian)
     velocity, rocking, rocking_speed = state[3:6], state[12:14], state[14:16]
     bending, bending_speed = state[16 : 16 + MODES], state[16 + MODES : 16 + 2 * MODES]
     bristle = state[layout.BRISTLE : layout.BRISTLE + 3]
@@ -149,7 +149,7 @@ def linear_response(parameters, frequency_hz):
         matrix += rows.T @ np.diag(weights) @ rows
 
     jacobian, everything = np.empty((3, 3)), np.eye(size)
-    pose(p, np.zeros(3), np.empty(3), jacobian)
+    solve_pose(p, np.zeros(3), np.empty(3), jacobian)
     normals = p[layout.MOUNT_DIRECTION :][: 3 * MOUNTS].reshape(MOUNTS, 3)
     shapes = p[layout.MODE_DIRECTION :][: 3 * MODES].reshape(MODES, 3)
     handle, motors, base, modes = everything[:3], everything[3:6], everything[6 : 6 + MOUNTS], everything[6 + MOUNTS :]

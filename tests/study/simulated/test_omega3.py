@@ -3,7 +3,7 @@ import pytest
 
 from study.devices.rig import POSITION, READING_SIZE
 from study.devices.simulated import layout
-from study.devices.simulated.compiled import pose
+from study.devices.simulated.compiled import solve_pose
 from study.devices.simulated.inertia import fill_mass_matrix
 from study.devices.simulated.omega3 import build_omega3
 
@@ -11,7 +11,7 @@ from study.devices.simulated.omega3 import build_omega3
 def masses_at(rig, place):
     """Inertia (3, 3) that a slow push at the handle meets."""
     jacobian, mass = np.empty((3, 3)), np.empty((5, 5))
-    pose(rig.parameters, np.array(place, float), np.empty(3), jacobian)
+    solve_pose(rig.parameters, np.array(place, float), np.empty(3), jacobian)
     fill_mass_matrix(rig.parameters, jacobian, mass)
     modes = rig.parameters[layout.MODE_DIRECTION :][: 3 * layout.MODES].reshape(-1, 3)
     weights = rig.parameters[layout.MODE_MASS :][: layout.MODES]
@@ -44,7 +44,7 @@ def test_mirrored_test_directions_meet_the_same_mass_and_friction_in_the_upright
     rig = build_omega3(1, hand=False)
     jacobian = np.empty((3, 3))
     for place in [(0, 0, 0), (0.02, 0, -0.03)]:
-        pose(rig.parameters, np.array(place, float), np.empty(3), jacobian)
+        solve_pose(rig.parameters, np.array(place, float), np.empty(3), jacobian)
         other = direction * [1, -1, 1]
         assert np.abs(jacobian @ direction).sum() == pytest.approx(np.abs(jacobian @ other).sum())
         mass = masses_at(rig, place)

@@ -22,21 +22,21 @@ OTHER = replace(
 def told(parameters=OTHER, spoil=lambda reading: reading):
     linkage = SimulatedLinkage(parameters, make_simulated_linkage().info)
     places = np.array(np.meshgrid(*3 * [[-0.04, -0.02, 0.0, 0.02, 0.04]], indexing="ij")).reshape(3, -1).T
-    return calibration([spoil(linkage.at(place)) for place in places])
+    return calibration([spoil(linkage.compute_reading_at(place)) for place in places])
 
 
 def test_its_jacobian_is_the_derivative_of_its_own_positions():
     linkage = make_simulated_linkage()
     for place in ([0.0, 0, 0], [0.03, -0.02, 0.04]):
         places = list_difference_positions(np.array(place))
-        angles = np.array([linkage.angles_at(each) for each in places])
-        assert compute_difference_error(linkage.at(np.array(place)).jacobian, places, angles) < 1e-3
+        angles = np.array([linkage.compute_angles_at(each) for each in places])
+        assert compute_difference_error(linkage.compute_reading_at(np.array(place)).jacobian, places, angles) < 1e-3
 
 
 def test_its_inertia_at_the_centre_is_what_it_says_as_a_device():
     linkage = make_simulated_linkage()
     np.testing.assert_allclose(
-        linkage.at(np.zeros(3)).inertia_kg, linkage.info.effective_mass_kg * np.eye(3), atol=1e-9
+        linkage.compute_reading_at(np.zeros(3)).inertia_kg, linkage.info.effective_mass_kg * np.eye(3), atol=1e-9
     )
 
 
@@ -45,15 +45,22 @@ def test_slopes_of_its_inertia_are_found_from_the_grid(place_m):
     """Oracle: differences of the linkage's own equations. The grid knows nothing between its positions."""
     linkage, place, step = make_simulated_linkage(), np.array(place_m), 1e-4
     grid = make_symmetric_grid(np.radians([90.0, 210.0, 330.0]), 0.05, 0.04)
-    slopes = estimate_local_inertia(calibration([linkage.at(each) for each in grid]), place)[1]
+    slopes = estimate_local_inertia(calibration([linkage.compute_reading_at(each) for each in grid]), place)[1]
     asides = step * np.eye(3)
-    true = [(linkage.at(place + a).inertia_kg - linkage.at(place - a).inertia_kg) / (2 * step) for a in asides]
+    true = [
+        (linkage.compute_reading_at(place + a).inertia_kg - linkage.compute_reading_at(place - a).inertia_kg)
+        / (2 * step)
+        for a in asides
+    ]
     np.testing.assert_allclose(slopes, true, atol=0.02 * np.abs(true).max())
 
 
 def test_in_the_stops_it_tells_nothing():
     linkage = make_simulated_linkage()
-    assert linkage.at(np.array([0.08, 0, 0])) is None and linkage.angles_at(np.array([0.08, 0, 0])) is None
+    assert (
+        linkage.compute_reading_at(np.array([0.08, 0, 0])) is None
+        and linkage.compute_angles_at(np.array([0.08, 0, 0])) is None
+    )
 
 
 def test_lengths_and_masses_of_another_device_are_found():

@@ -12,7 +12,13 @@ import numpy as np
 
 from analysis.diagnosis.result.curves.signature_bins import bin_law_means, bin_means, compute_correlation_ratio
 from analysis.diagnosis.result.findings import Signature
-from equalizer.effects.discovered_law import COMMAND, DERIVATIVES, axis_names, has_memory, law_with_values
+from equalizer.effects.discovered_law import (
+    COMMAND_PREFIX,
+    DERIVATIVE_PREFIXES,
+    derive_axis_letters,
+    has_memory,
+    with_law_values,
+)
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.laws.evaluate import evaluate
@@ -46,9 +52,9 @@ def compute_law_signature(
     names."""
     if placed_effect.effect.law is None or placed_effect.effect.law.acts_on == "response":
         return None
-    law = law_with_values(placed_effect.effect.law, placed_effect.values)
+    law = with_law_values(placed_effect.effect.law, placed_effect.values)
     if law.acts_on == "command":
-        command = COMMAND + axis_names(axes)[placed_effect.sites[0]]
+        command = COMMAND_PREFIX + derive_axis_letters(axes)[placed_effect.sites[0]]
         law = replace(law, expression=f"({law.expression}) - {command}", acts_on="force", units=())
     variables = _list_variables(evidence, axes, system)
     if not law.variables or not set(law.variables) <= variables.keys():
@@ -88,13 +94,15 @@ def _list_variables(evidence: Evidence, axes: tuple[str, ...], system: UnitSyste
     axis."""
     rate_hz, length = evidence.sample_rate_hz, system.length
     variables = {"t": _Variable("time (s)", np.arange(len(evidence.command)) / rate_hz)}
-    for index, (axis, letter) in enumerate(zip(axes, axis_names(axes), strict=True)):
+    for index, (axis, letter) in enumerate(zip(axes, derive_axis_letters(axes), strict=True)):
         velocity = evidence.axis_velocity[:, index]
         motions = (evidence.axis_position[:, index], velocity, np.gradient(velocity) * rate_hz)
         kinds = (("position", length), ("velocity", f"{length}/s"), ("acceleration", f"{length}/s^2"))
-        for prefix, values, (kind, unit) in zip(DERIVATIVES, motions, kinds, strict=True):
+        for prefix, values, (kind, unit) in zip(DERIVATIVE_PREFIXES, motions, kinds, strict=True):
             variables[prefix + letter] = _Variable(f"{kind} of {axis} ({unit})", np.asarray(values))
-        variables[COMMAND + letter] = _Variable(f"command of {axis} ({system.force})", evidence.command[:, index])
+        variables[COMMAND_PREFIX + letter] = _Variable(
+            f"command of {axis} ({system.force})", evidence.command[:, index]
+        )
     return variables
 
 

@@ -15,11 +15,11 @@ import numpy as np
 from analysis.diagnosis.document import Diagnosis
 from analysis.diagnosis.result.curves.signature_bins import bin_means
 from analysis.diagnosis.types import Mask
-from equalizer.effects.placing import axis_letter
+from equalizer.effects.placing import shorten_axis_name
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
-from equalizer.signals.unit_system import system_of
+from equalizer.signals.unit_system import determine_unit_system
 
 if TYPE_CHECKING:
     from analysis.diagnosis.balance.judge_laws import Balance
@@ -112,9 +112,9 @@ def compute_state_maps(
     """Maps of all axes, in the order of drawing: the axis of the first named effect, then by missing force. From the
     force balances where there are any; else from the evidence of the re-tuned model."""
     channels = recording.command.channels
-    letters = tuple(axis_letter(channel, channels) for channel in channels)
+    letters = tuple(shorten_axis_name(channel, channels) for channel in channels)
     units = recording.command.units
-    length_unit = system_of(units, recording.response.units).length
+    length_unit = determine_unit_system(units, recording.response.units).length
     maps = []
     for axis, letter in enumerate(letters):
         if balances:

@@ -15,12 +15,18 @@ from analysis.evaluation.laws.law_error import compute_law_error
 from analysis.evaluation.laws.law_outcome import LawOutcome, TrueLaw
 from analysis.evaluation.laws.law_score import LawScore, compute_law_score
 from study.errors import resumable
-from study.evaluation.bank.ask_engine import ask_and_count, is_answered
+from study.evaluation.bank.ask_engine import diagnose_and_count, is_answered
 from study.evaluation.bank.laws.seal_laws import fresh_motions_path, read_fresh_motions, seal_laws
 from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, open_proof_folder
 from study.evaluation.bank.seal_cases import BankPlan, read_case_names
-from study.evaluation.bank.sealed_bank import BankOptions, Progress, answered_fields, engines, reveal_bank
-from study.store.disk.provenance import sha256_of
+from study.evaluation.bank.sealed_bank import (
+    BankOptions,
+    Progress,
+    collect_answered_fields,
+    list_engine_digests,
+    reveal_bank,
+)
+from study.store.disk.provenance import compute_sha256
 
 LAWS = "laws"
 """Kind of bank in bank.json: laws are concealed."""
@@ -51,7 +57,7 @@ def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Pr
         diagnosable = [
             name for name in names if is_answered(folder.open / name) or (folder.open / name / RECORDING).exists()
         ]
-        ask_and_count(
+        diagnose_and_count(
             folder,
             names,
             options.answering,
@@ -60,7 +66,7 @@ def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Pr
             diagnosable=diagnosable,
         )
     outcomes = reveal_laws(folder, plan.cases)
-    return LawBlindTest(folder, plan, seal, outcomes, compute_law_score(outcomes), engines(folder, names))
+    return LawBlindTest(folder, plan, seal, outcomes, compute_law_score(outcomes), list_engine_digests(folder, names))
 
 
 def reveal_laws(folder: ProofFolder, cases: int) -> tuple[LawOutcome, ...]:
@@ -68,7 +74,7 @@ def reveal_laws(folder: ProofFolder, cases: int) -> tuple[LawOutcome, ...]:
     motion differs from its seal."""
 
     def is_unchanged(label: Mapping[str, Any]) -> bool:
-        return sha256_of(fresh_motions_path(folder, label["number"])) == str(label["fresh_sha256"])
+        return compute_sha256(fresh_motions_path(folder, label["number"])) == str(label["fresh_sha256"])
 
     def outcome_of(label: Mapping[str, Any], answer: Mapping[str, Any]) -> LawOutcome:
         return _make_outcome(label, answer, fresh_motions_path(folder, label["number"]))
@@ -80,7 +86,7 @@ def _make_outcome(label: Mapping[str, Any], answer: Mapping[str, Any], fresh_pat
     """One case with its true law (None where the case has none), and the error of the found laws on
     each fresh test motion in the file `fresh_path`."""
     truth = None if label["truth"] is None else _read_true_law(label["truth"])
-    outcome = LawOutcome(concealed=label["concealed"], truth=truth, **answered_fields(label, answer))
+    outcome = LawOutcome(concealed=label["concealed"], truth=truth, **collect_answered_fields(label, answer))
     if truth is None or not outcome.laws:
         return outcome
     motions = read_fresh_motions(fresh_path, label["axes"], truth.axes, truth.acts_on == ("response",))

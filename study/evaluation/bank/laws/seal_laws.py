@@ -21,7 +21,7 @@ from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, Proof
 from study.evaluation.bank.seal_cases import SALT_BYTES, SEARCH_CPU_S, BankPlan, seal_missing_cases
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ
 from study.evaluation.challenge.laws.draw_law import FreshTestMotion, LawCase, LawDraw, draw_law, generate_law_case
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.disk.text_file import write_text
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.recording_file import write_recording
@@ -109,8 +109,8 @@ def _make_label(folder: ProofFolder, law_draw: LawDraw, law_case: LawCase, case_
         "axes": [AXES[axis] for axis in law_draw.settings.axes],
         "truth": None if law_case.truth is None else asdict(law_case.truth),
         "adds": law_case.case.detectability,
-        "recording_sha256": sha256_of(case_folder / RECORDING),
-        "model_sha256": sha256_of(case_folder / MODEL),
-        "fresh_sha256": sha256_of(fresh_motions_path(folder, law_draw.number)),
+        "recording_sha256": compute_sha256(case_folder / RECORDING),
+        "model_sha256": compute_sha256(case_folder / MODEL),
+        "fresh_sha256": compute_sha256(fresh_motions_path(folder, law_draw.number)),
         "salt": secrets.token_hex(SALT_BYTES),
     }

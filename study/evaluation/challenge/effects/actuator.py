@@ -12,7 +12,7 @@ Each range goes from an effect that hardly shows in the recordings of the challe
 `actuator_kernel.drive` computes the force.
 """
 
-from study.evaluation.challenge.actuator_kernel import DEAD_BAND, DELAY_S, GAIN, LAG_S, LIMIT, RATE
+from study.evaluation.challenge.actuator_kernel import DEAD_BAND, DELAY_S, FORCE_LIMIT, GAIN, LAG_S, SLEW_RATE
 from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values, with_amplifier
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.drive_plan import LEVELS_N
@@ -24,7 +24,7 @@ def _draw_saturation(context: EffectContext) -> dict[str, float]:
 
 
 def _build_saturation(device: Device, axis: int, values: Values) -> Device:
-    return with_amplifier(device, axis, {LIMIT: values["limit"]})
+    return with_amplifier(device, axis, {FORCE_LIMIT: values["limit"]})
 
 
 def _draw_deadband(context: EffectContext) -> dict[str, float]:
@@ -42,7 +42,7 @@ def _draw_slew(context: EffectContext) -> dict[str, float]:
 
 
 def _build_slew(device: Device, axis: int, values: Values) -> Device:
-    return with_amplifier(device, None, {RATE: values["rate"]})
+    return with_amplifier(device, None, {SLEW_RATE: values["rate"]})
 
 
 def _draw_lag(context: EffectContext) -> dict[str, float]:

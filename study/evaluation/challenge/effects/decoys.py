@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from study.evaluation.challenge.actuator_kernel import FADE, FADE_S, HYSTERESIS
+from study.evaluation.challenge.actuator_kernel import HEATING_LOSS, HEATING_TIME_S, HYSTERESIS_HALF_WIDTH
 from study.evaluation.challenge.concealed_effect import (
     ConcealedEffect,
     EffectContext,
@@ -105,7 +105,7 @@ def _draw_heating(context: EffectContext) -> dict[str, float]:
 
 
 def _build_heating(device: Device, axis: int, values: Values) -> Device:
-    return with_amplifier(device, axis, {FADE: values["loss_per_n2"], FADE_S: values["seconds"]})
+    return with_amplifier(device, axis, {HEATING_LOSS: values["loss_per_n2"], HEATING_TIME_S: values["seconds"]})
 
 
 def _draw_hysteresis(context: EffectContext) -> dict[str, float]:
@@ -114,7 +114,7 @@ def _draw_hysteresis(context: EffectContext) -> dict[str, float]:
 
 
 def _build_hysteresis(device: Device, axis: int, values: Values) -> Device:
-    return with_amplifier(device, axis, {HYSTERESIS: values["half_width"]})
+    return with_amplifier(device, axis, {HYSTERESIS_HALF_WIDTH: values["half_width"]})
 
 
 DECOYS = (

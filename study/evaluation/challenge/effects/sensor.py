@@ -6,7 +6,8 @@ drift, linear from 0 to `total` at the end; mains hum; quantization to `step`; c
 that repeats the sample before); logger offset (s; positive: the acceleration is delayed, but not the position).
 
 Accelerations are in m/s^2. Drift and hum have a random share in each channel; the largest share is 1. The strength
-interpolates each range geometrically. `challenge.sensor` applies the effects.
+interpolates each range geometrically. `challenge.sensor` applies the effects; `EFFECTS` is part of the table from which
+`draw_case` chooses. A `_draw_...` function draws parameters, a `_build_...` function builds them into a device.
 """
 
 from dataclasses import replace
@@ -21,6 +22,7 @@ from study.evaluation.challenge.sensor import Sensor
 
 
 def _with_sensor(device: Device, sensor: Sensor) -> Device:
+    """The device with another sensor."""
     return replace(device, sensor=sensor)
 
 
@@ -32,10 +34,12 @@ def _set_channel(table: FloatArray, axis: int, value: float) -> FloatArray:
 
 
 def _draw_lag(context: EffectContext) -> dict[str, float]:
+    """Bandwidth, 420 Hz (weakest) to 30 Hz."""
     return {"bandwidth": context.interpolate_log(420.0, 30.0)}
 
 
 def _build_lag(device: Device, axis: int, values: Values) -> Device:
+    """Replace the bandwidth of all channels."""
     return _with_sensor(device, replace(device.sensor, bandwidth_hz=values["bandwidth"]))
 
 
@@ -45,6 +49,7 @@ def _draw_clipping(context: EffectContext) -> dict[str, float]:
 
 
 def _build_clipping(device: Device, axis: int, values: Values) -> Device:
+    """Clip one channel at +-limit."""
     return _with_sensor(device, replace(device.sensor, limit=_set_channel(device.sensor.limit, axis, values["limit"])))
 
 
@@ -56,6 +61,7 @@ def _draw_misalignment(context: EffectContext) -> dict[str, float]:
 
 
 def _build_misalignment(device: Device, axis: int, values: Values) -> Device:
+    """Replace the orientation of the sensor by the rotation."""
     rotation_deg = np.array([values["about_x"], values["about_y"], values["about_z"]])
     return _with_sensor(
         device, replace(device.sensor, orientation=Rotation.from_rotvec(rotation_deg, degrees=True).as_matrix())
@@ -63,10 +69,12 @@ def _build_misalignment(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_gain(context: EffectContext) -> dict[str, float]:
+    """Gain that differs from 1 by 0.5 % to 30 %, in either direction."""
     return {"gain": 1.0 + context.draw_sign() * context.interpolate_log(0.005, 0.3)}
 
 
 def _build_gain(device: Device, axis: int, values: Values) -> Device:
+    """Replace the gain of one channel."""
     return _with_sensor(device, replace(device.sensor, gain=_set_channel(device.sensor.gain, axis, values["gain"])))
 
 
@@ -76,38 +84,45 @@ def _draw_nonlinearity(context: EffectContext) -> dict[str, float]:
 
 
 def _build_nonlinearity(device: Device, axis: int, values: Values) -> Device:
+    """Set the cubic coefficient of one channel."""
     return _with_sensor(device, replace(device.sensor, cubic=_set_channel(device.sensor.cubic, axis, values["cubic"])))
 
 
 def _draw_shares(context: EffectContext) -> dict[str, float]:
-    """Shares of the three channels; the largest among those that are read is 1."""
+    """Random shares of the three channels, of either sign; the largest in magnitude among those that are read is 1."""
     shares = context.draw_direction()
     read_shares = shares[list(context.axes)]
     shares /= read_shares[np.argmax(np.abs(read_shares))]
     return dict(zip(("share_x", "share_y", "share_z"), map(float, shares), strict=True))
 
 
-def _channel_shares(values: Values) -> FloatArray:
+def _stack_shares(values: Values) -> FloatArray:
+    """(3,): shares of the channels."""
     return np.array([values["share_x"], values["share_y"], values["share_z"]])
 
 
 def _draw_drift(context: EffectContext) -> dict[str, float]:
+    """Drift over the whole recording, 0.01 to 2 m/s^2 of either sign, and shares of the channels."""
     return {"total": context.draw_sign() * context.interpolate_log(0.01, 2.0)} | _draw_shares(context)
 
 
 def _build_drift(device: Device, axis: int, values: Values) -> Device:
-    return _with_sensor(device, replace(device.sensor, drift=values["total"] * _channel_shares(values)))
+    """Set the drift of all channels."""
+    return _with_sensor(device, replace(device.sensor, drift=values["total"] * _stack_shares(values)))
 
 
-def _draw_steps(context: EffectContext) -> dict[str, float]:
+def _draw_quantization(context: EffectContext) -> dict[str, float]:
+    """Step, 0.02 to 1.5 m/s^2."""
     return {"step": context.interpolate_log(0.02, 1.5)}
 
 
-def _build_steps(device: Device, axis: int, values: Values) -> Device:
+def _build_quantization(device: Device, axis: int, values: Values) -> Device:
+    """Set the quantization step of all channels."""
     return _with_sensor(device, replace(device.sensor, step=values["step"]))
 
 
 def _draw_hum(context: EffectContext) -> dict[str, float]:
+    """Amplitude, 0.01 to 1 m/s^2; frequency, 50 or 60 Hz up to 0.05 Hz off; phase (rad); shares of the channels."""
     mains_hz = float(context.random.choice((50.0, 60.0))) + context.random.uniform(-0.05, 0.05)
     phase = context.random.uniform(0.0, 2 * np.pi)
     return {"amplitude": context.interpolate_log(0.01, 1.0), "frequency": mains_hz, "phase": phase} | _draw_shares(
@@ -116,41 +131,47 @@ def _draw_hum(context: EffectContext) -> dict[str, float]:
 
 
 def _build_hum(device: Device, axis: int, values: Values) -> Device:
-    size = values["amplitude"] * _channel_shares(values)
+    """Set the cosine and sine amplitudes of the hum, (2, 3), m/s^2, and its frequency."""
+    amplitudes = values["amplitude"] * _stack_shares(values)
     return _with_sensor(
         device,
         replace(
             device.sensor,
-            hum=np.array([np.cos(values["phase"]) * size, np.sin(values["phase"]) * size]),
+            hum=np.array([np.cos(values["phase"]) * amplitudes, np.sin(values["phase"]) * amplitudes]),
             hum_hz=values["frequency"],
         ),
     )
 
 
-def _draw_clock(context: EffectContext) -> dict[str, float]:
+def _draw_clock_error(context: EffectContext) -> dict[str, float]:
+    """Clock error, 0.5 to 100 ppm of either sign."""
     return {"ppm": context.draw_sign() * context.interpolate_log(0.5, 100.0)}
 
 
-def _build_clock(device: Device, axis: int, values: Values) -> Device:
+def _build_clock_error(device: Device, axis: int, values: Values) -> Device:
+    """Set the error of the sensor's clock."""
     return _with_sensor(device, replace(device.sensor, ppm=values["ppm"]))
 
 
-def _draw_lost(context: EffectContext) -> dict[str, float]:
+def _draw_lost_samples(context: EffectContext) -> dict[str, float]:
+    """Fraction of lost samples, 0.01 % to 4 %."""
     return {"fraction": context.interpolate_log(1e-4, 0.04)}
 
 
-def _build_lost(device: Device, axis: int, values: Values) -> Device:
+def _build_lost_samples(device: Device, axis: int, values: Values) -> Device:
+    """Set the fraction of lost samples."""
     return _with_sensor(device, replace(device.sensor, lost=values["fraction"]))
 
 
-def _draw_crossed(context: EffectContext) -> dict[str, float]:
+def _draw_cross_axis(context: EffectContext) -> dict[str, float]:
     """Shares of the two other channels, in cyclic order; together 0.3 % to 15 % (root of the sum of squares)."""
     angle = context.random.uniform(0.0, 2 * np.pi)
-    size = context.interpolate_log(0.003, 0.15)
-    return {"from_next": float(size * np.cos(angle)), "from_after_next": float(size * np.sin(angle))}
+    share = context.interpolate_log(0.003, 0.15)
+    return {"from_next": float(share * np.cos(angle)), "from_after_next": float(share * np.sin(angle))}
 
 
-def _build_crossed(device: Device, axis: int, values: Values) -> Device:
+def _build_cross_axis(device: Device, axis: int, values: Values) -> Device:
+    """Set the shares of the other channels in one channel."""
     # Replaces the mixing of a nuisance effect in this row, so that the label agrees with the device.
     mixing = device.sensor.orientation.copy()
     mixing[axis, (axis + 1) % 3] = values["from_next"]
@@ -159,20 +180,24 @@ def _build_crossed(device: Device, axis: int, values: Values) -> Device:
 
 
 def _draw_offset(context: EffectContext) -> dict[str, float]:
+    """Offset, 0.0005 to 0.5 m/s^2 of either sign."""
     return {"offset": context.draw_sign() * context.interpolate_log(5e-4, 0.5)}
 
 
 def _build_offset(device: Device, axis: int, values: Values) -> Device:
+    """Set the offset of one channel."""
     return _with_sensor(
         device, replace(device.sensor, offset=_set_channel(device.sensor.offset, axis, values["offset"]))
     )
 
 
-def _draw_logger(context: EffectContext) -> dict[str, float]:
+def _draw_logger_offset(context: EffectContext) -> dict[str, float]:
+    """Delay of the acceleration, 10 µs to 5 ms; negative: it is early."""
     return {"offset": context.draw_sign() * context.interpolate_log(1e-5, 5e-3)}
 
 
-def _build_logger(device: Device, axis: int, values: Values) -> Device:
+def _build_logger_offset(device: Device, axis: int, values: Values) -> Device:
+    """Set the delay of the acceleration."""
     return _with_sensor(device, replace(device.sensor, late_s=values["offset"]))
 
 
@@ -183,12 +208,12 @@ EFFECTS = (
     ConcealedEffect("sensor_gain", "sensor", True, _draw_gain, _build_gain),
     ConcealedEffect("sensor_nonlinearity", "sensor", True, _draw_nonlinearity, _build_nonlinearity),
     ConcealedEffect("sensor_drift", "sensor", False, _draw_drift, _build_drift),
-    ConcealedEffect("quantization", "sensor", False, _draw_steps, _build_steps),
+    ConcealedEffect("quantization", "sensor", False, _draw_quantization, _build_quantization),
     ConcealedEffect("mains_hum", "sensor", False, _draw_hum, _build_hum),
-    ConcealedEffect("clock_drift", "sensor", False, _draw_clock, _build_clock),
-    ConcealedEffect("lost_samples", "sensor", False, _draw_lost, _build_lost),
-    ConcealedEffect("cross_axis_sensitivity", "sensor", True, _draw_crossed, _build_crossed),
+    ConcealedEffect("clock_drift", "sensor", False, _draw_clock_error, _build_clock_error),
+    ConcealedEffect("lost_samples", "sensor", False, _draw_lost_samples, _build_lost_samples),
+    ConcealedEffect("cross_axis_sensitivity", "sensor", True, _draw_cross_axis, _build_cross_axis),
     ConcealedEffect("sensor_offset", "sensor", True, _draw_offset, _build_offset),
-    ConcealedEffect("logger_offset", "sensor", False, _draw_logger, _build_logger),
+    ConcealedEffect("logger_offset", "sensor", False, _draw_logger_offset, _build_logger_offset),
 )
 """Each: name, place, whether it acts on one axis (else on all), how its parameters are drawn, how it is built."""

@@ -6,7 +6,8 @@ are exact for any other dynamics of the device, because a controller that impose
 forces.
 
 Written for the challenge only: no code is shared with the effects that a diagnosis compares, so that an error there
-cannot cancel here. Ranges of the drawn parameters are set by hand.
+cannot cancel here. Ranges of the drawn parameters are set by hand. Called by `injections`; positions, velocities and
+forces have the units of the recording.
 """
 
 from collections.abc import Callable
@@ -23,8 +24,8 @@ from study.evaluation.challenge.injection.drive_injections import (
     rms,
 )
 
-SIGN_WIDTH = 0.05
-"""Width of the smoothed sign change of dry friction, tanh(v / width), as a fraction of the rms speed."""
+SIGN_WIDTH_RATIO = 0.05
+"""Width of the smoothed sign of the velocity, tanh(v / width), as a fraction of the rms speed."""
 
 
 def _scale_shape(name: str, shape: Callable[[AxisMotion], FloatArray]) -> ForceInjection:
@@ -32,14 +33,15 @@ def _scale_shape(name: str, shape: Callable[[AxisMotion], FloatArray]) -> ForceI
     `compute_force_level`."""
 
     def draw(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+        """The factor of the shape."""
         return {"size": compute_force_level(motion, strength) / max(rms(shape(motion)), 1e-300)}
 
     return ForceInjection(name, draw, lambda motion, values: motion.command + values["size"] * shape(motion))
 
 
-def _sign(motion: AxisMotion) -> FloatArray:
+def _smooth_sign(motion: AxisMotion) -> FloatArray:
     """(n,): smoothed sign of the velocity, -1 to 1."""
-    return np.asarray(np.tanh(motion.v / max(SIGN_WIDTH * float(np.sqrt(np.mean(motion.v**2))), 1e-300)))
+    return np.asarray(np.tanh(motion.v / max(SIGN_WIDTH_RATIO * float(np.sqrt(np.mean(motion.v**2))), 1e-300)))
 
 
 def _centre_position(motion: AxisMotion) -> FloatArray:
@@ -58,28 +60,28 @@ def _add_cogging(motion: AxisMotion, values: Values) -> FloatArray:
     return motion.command + values["amplitude"] * np.sin(2 * np.pi * (motion.q / values["pitch"] + values["turn"]))
 
 
-def _travel_beyond(motion: AxisMotion, position: float) -> FloatArray:
-    """(n,): penetration of stops at +-position from the centre; 0 between them."""
+def _compute_penetration(motion: AxisMotion, stop_position: float) -> FloatArray:
+    """(n,): signed penetration of stops at +-stop_position from the centre; 0 between them."""
     displacement = _centre_position(motion)
-    return np.asarray(np.sign(displacement) * np.maximum(np.abs(displacement) - position, 0.0))
+    return np.asarray(np.sign(displacement) * np.maximum(np.abs(displacement) - stop_position, 0.0))
 
 
 def _draw_stop(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
     """Position of the stops, 40 to 90 % of the largest excursion, and their stiffness."""
-    position = float(random.uniform(0.4, 0.9)) * float(np.abs(_centre_position(motion)).max())
-    stiffness = compute_force_level(motion, strength) / max(rms(_travel_beyond(motion, position)), 1e-300)
-    return {"position": position, "stiffness": stiffness}
+    stop_position = float(random.uniform(0.4, 0.9)) * float(np.abs(_centre_position(motion)).max())
+    stiffness = compute_force_level(motion, strength) / max(rms(_compute_penetration(motion, stop_position)), 1e-300)
+    return {"position": stop_position, "stiffness": stiffness}
 
 
-def _draw_asymmetric(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
+def _draw_asymmetric_friction(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
     """Friction levels of the two directions, which differ from their mean by 20 to 60 %."""
-    level, share = 1.2 * compute_force_level(motion, strength), float(random.uniform(0.2, 0.6))
-    return {"level_positive": level * (1 + share), "level_negative": level * (1 - share)}
+    level, asymmetry = 1.2 * compute_force_level(motion, strength), float(random.uniform(0.2, 0.6))
+    return {"level_positive": level * (1 + asymmetry), "level_negative": level * (1 - asymmetry)}
 
 
 def _add_asymmetric_friction(motion: AxisMotion, values: Values) -> FloatArray:
     """(n,): command with Coulomb friction of a different level in each direction."""
-    sign = _sign(motion)
+    sign = _smooth_sign(motion)
     return motion.command + np.where(sign > 0, values["level_positive"], values["level_negative"]) * sign
 
 
@@ -103,8 +105,8 @@ FORCE_INJECTIONS: tuple[ForceInjection, ...] = (
     _scale_shape("added_mass", lambda motion: motion.a),
     _scale_shape("viscous_damping", lambda motion: motion.v),
     _scale_shape("quadratic_damping", lambda motion: motion.v * np.abs(motion.v)),
-    _scale_shape("coulomb_friction", _sign),
-    ForceInjection("asymmetric_friction", _draw_asymmetric, _add_asymmetric_friction),
+    _scale_shape("coulomb_friction", _smooth_sign),
+    ForceInjection("asymmetric_friction", _draw_asymmetric_friction, _add_asymmetric_friction),
     ForceInjection("presliding_hysteresis", _draw_bristles, _add_bristles, memory=True),
     _scale_shape("added_stiffness", _centre_position),
     _scale_shape("hardening_stiffness", lambda motion: _centre_position(motion) ** 3),
@@ -112,7 +114,7 @@ FORCE_INJECTIONS: tuple[ForceInjection, ...] = (
     ForceInjection(
         "end_stop",
         _draw_stop,
-        lambda motion, values: motion.command + values["stiffness"] * _travel_beyond(motion, values["position"]),
+        lambda motion, values: motion.command + values["stiffness"] * _compute_penetration(motion, values["position"]),
     ),
     *DRIVE_INJECTIONS,
 )

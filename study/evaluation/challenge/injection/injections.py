@@ -3,7 +3,7 @@ mechanism and actuator are in `force_injections`.
 
 The size of a fault is drawn relative to the response (rms, peak, median frequency), because nothing else is known of
 the device; a strength of 0 to 1 interpolates geometrically. No code is shared with the effects that a diagnosis
-compares.
+compares. Called by `study.evaluation.real.inject_real`.
 """
 
 from collections.abc import Callable, Mapping
@@ -38,7 +38,7 @@ from study.evaluation.challenge.injection.reading_faults import (
 
 MAINS_HZ = (50.0, 60.0)
 """Nominal frequencies of the mains (Hz); hum has either of them."""
-FASTEST_PPM = 2e4
+MAX_CLOCK_ERROR_PPM = 2e4
 """Largest drawn clock error (ppm): that of oscillators without a crystal."""
 
 
@@ -59,9 +59,9 @@ class ResponseStatistics:
 
 
 Draw = Callable[[ResponseStatistics, float, np.random.Generator], dict[str, float]]
-"""draw(reading, strength, random): the parameters of a fault; strength 0 = weakest, 1 = strongest."""
+"""draw(statistics, strength, random): the parameters of a fault; strength 0 = weakest, 1 = strongest."""
 ApplyFault = Callable[[FloatArray, float, Mapping[str, float], np.random.Generator], FloatArray]
-"""spoil(samples, rate_hz, values, random): the response (n, p) with the fault (`reading_faults`)."""
+"""apply(samples, rate_hz, values, random): the response (n, p) with the fault (`reading_faults`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ class Injection:
     """A fault of sensor, clock or line that can be injected."""
 
     effect: str
-    """Name in the vocabulary."""
+    """Name in the vocabulary of effects."""
     draw: Draw
     apply: ApplyFault
     axes: int = 1
@@ -79,7 +79,7 @@ class Injection:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Injected:
+class FaultyRecording:
     """A recording with its injected fault."""
 
     recording: Recording
@@ -88,41 +88,50 @@ class Injected:
     values: dict[str, float]
     """Parameters of the fault, by name."""
     strength: float
+    """Strength with which the fault was drawn, 0 to 1."""
     change: FloatArray
     """(p,): rms change per response channel; for a fault of mechanism or actuator, per command channel."""
 
 
-def _log_between(low: float, high: float, strength: float) -> float:
+def _interpolate_log(low: float, high: float, strength: float) -> float:
     """Geometric interpolation between two values by the strength."""
     return float(low * (high / low) ** strength)
 
 
-def _draw_turn(statistics: ResponseStatistics, strength: float, random: np.random.Generator) -> dict[str, float]:
+def _draw_misalignment(
+    statistics: ResponseStatistics, strength: float, random: np.random.Generator
+) -> dict[str, float]:
     """Misalignment: angle of 1 to 20 degrees about a random axis, a unit vector."""
     x, y, z = (direction := random.normal(size=3)) / np.linalg.norm(direction)
-    return {"degrees": _log_between(1.0, 20.0, strength), "about_x": float(x), "about_y": float(y), "about_z": float(z)}
+    return {
+        "degrees": _interpolate_log(1.0, 20.0, strength),
+        "about_x": float(x),
+        "about_y": float(y),
+        "about_z": float(z),
+    }
 
 
-def _random_sign(random: np.random.Generator) -> float:
+def _draw_sign(random: np.random.Generator) -> float:
+    """+1 or -1 with equal probability."""
     return float(random.choice((-1.0, 1.0)))
 
 
 INJECTIONS: tuple[Injection, ...] = (
     Injection(
         "sensor_lag",
-        lambda statistics, s, r: {"bandwidth": statistics.median_hz * _log_between(20.0, 0.5, s)},
+        lambda statistics, s, r: {"bandwidth": statistics.median_hz * _interpolate_log(20.0, 0.5, s)},
         apply_lag,
         memory=True,
     ),
     Injection(
         "sensor_clipping",
-        lambda statistics, s, r: {"limit": statistics.peak * _log_between(0.95, 0.25, s)},
+        lambda statistics, s, r: {"limit": statistics.peak * _interpolate_log(0.95, 0.25, s)},
         clip_readings,
     ),
     Injection(
         "mains_hum",
         lambda statistics, s, r: {
-            "amplitude": statistics.rms * _log_between(0.01, 1.0, s),
+            "amplitude": statistics.rms * _interpolate_log(0.01, 1.0, s),
             "frequency": float(r.choice(MAINS_HZ)) + float(r.normal(0.0, 0.02)),
             "turn": float(r.random()),
         },
@@ -130,74 +139,76 @@ INJECTIONS: tuple[Injection, ...] = (
     ),
     Injection(
         "sensor_drift",
-        lambda statistics, s, r: {"total": _random_sign(r) * statistics.rms * _log_between(0.05, 3.0, s)},
+        lambda statistics, s, r: {"total": _draw_sign(r) * statistics.rms * _interpolate_log(0.05, 3.0, s)},
         add_drift,
     ),
     Injection(
         "sensor_offset",
-        lambda statistics, s, r: {"offset": _random_sign(r) * statistics.rms * _log_between(0.02, 1.5, s)},
+        lambda statistics, s, r: {"offset": _draw_sign(r) * statistics.rms * _interpolate_log(0.02, 1.5, s)},
         add_offset,
     ),
     Injection(
         "quantization",
-        lambda statistics, s, r: {"step": statistics.rms * _log_between(0.05, 1.5, s)},
+        lambda statistics, s, r: {"step": statistics.rms * _interpolate_log(0.05, 1.5, s)},
         quantize_readings,
     ),
-    Injection("lost_samples", lambda statistics, s, r: {"fraction": _log_between(0.003, 0.3, s)}, lose_samples),
+    Injection("lost_samples", lambda statistics, s, r: {"fraction": _interpolate_log(0.003, 0.3, s)}, lose_samples),
     Injection(
         "clock_drift",
         lambda statistics, s, r: {
-            "ppm": _random_sign(r)
-            * min(1e6 * _log_between(0.02, 1.0, s) / statistics.median_hz / statistics.seconds, FASTEST_PPM)
+            "ppm": _draw_sign(r)
+            * min(1e6 * _interpolate_log(0.02, 1.0, s) / statistics.median_hz / statistics.seconds, MAX_CLOCK_ERROR_PPM)
         },
         shift_clock,
     ),
     Injection(
         "sensor_gain",
-        lambda statistics, s, r: {"gain": 1 + float(r.choice((-0.5, 1.0))) * _log_between(0.02, 0.8, s)},
+        lambda statistics, s, r: {"gain": 1 + float(r.choice((-0.5, 1.0))) * _interpolate_log(0.02, 0.8, s)},
         scale_readings,
     ),
     Injection(
         "logger_offset",
-        lambda statistics, s, r: {"offset": _log_between(0.005, 0.1, s) / statistics.median_hz},
+        lambda statistics, s, r: {"offset": _interpolate_log(0.005, 0.1, s) / statistics.median_hz},
         delay_readings,
         memory=True,
     ),
     Injection(
         "sensor_nonlinearity",
-        lambda statistics, s, r: {"cubic": _random_sign(r) * _log_between(0.02, 0.3, s) / statistics.peak**2},
+        lambda statistics, s, r: {"cubic": _draw_sign(r) * _interpolate_log(0.02, 0.3, s) / statistics.peak**2},
         add_cubic_term,
     ),
     Injection(
         "sensor_asymmetry",
-        lambda statistics, s, r: {"square": _random_sign(r) * _log_between(0.02, 0.4, s) / statistics.peak},
+        lambda statistics, s, r: {"square": _draw_sign(r) * _interpolate_log(0.02, 0.4, s) / statistics.peak},
         add_square_term,
     ),
     Injection(
-        "sensor_noise", lambda statistics, s, r: {"rms": statistics.rms * _log_between(0.003, 0.5, s)}, add_noise
+        "sensor_noise", lambda statistics, s, r: {"rms": statistics.rms * _interpolate_log(0.003, 0.5, s)}, add_noise
     ),
     Injection(
         "sensor_play",
-        lambda statistics, s, r: {"gap": statistics.rms * _log_between(0.01, 0.6, s)},
+        lambda statistics, s, r: {"gap": statistics.rms * _interpolate_log(0.01, 0.6, s)},
         apply_play,
         memory=True,
     ),
     Injection(
         "cross_axis_sensitivity",
-        lambda statistics, s, r: {"from_next": _log_between(0.02, 0.8, s)},
+        lambda statistics, s, r: {"from_next": _interpolate_log(0.02, 0.8, s)},
         mix_channels,
         axes=2,
     ),
-    Injection("sensor_misalignment", _draw_turn, rotate_readings, axes=3),
+    Injection("sensor_misalignment", _draw_misalignment, rotate_readings, axes=3),
 )
-"""Faults of sensor, clock and line: name in the vocabulary, draw of the parameters, and change of the response."""
+"""Faults of sensor, clock and line: name in the vocabulary, draw of the parameters, and change of the response. In the
+draws, s is the strength and r the random generator."""
 
 
-def inject(recording: Recording, effect: str, strength: float, random: np.random.Generator) -> Injected:
-    """Inject a fault. effect: a name from INJECTIONS or FORCE_INJECTIONS; empty = none. Raises ValueError for an
-    unknown name, a strength outside 0..1, or a fault for which the recording lacks channels or a motion."""
+def inject(recording: Recording, effect: str, strength: float, random: np.random.Generator) -> FaultyRecording:
+    """Inject a fault of a strength from 0 to 1. effect: a name from INJECTIONS or FORCE_INJECTIONS; empty = none.
+    Raises ValueError for an unknown name, a strength outside 0..1, or a fault for which the recording lacks channels or
+    a motion."""
     if not effect:
-        return Injected(recording, "", {}, 0.0, np.zeros(recording.response.samples.shape[1]))
+        return FaultyRecording(recording, "", {}, 0.0, np.zeros(recording.response.samples.shape[1]))
     if not 0.0 <= strength <= 1.0:
         raise ValueError(f"strength is {strength}; it must lie between 0 and 1")
     force_injection = next((candidate for candidate in FORCE_INJECTIONS if candidate.effect == effect), None)
@@ -218,12 +229,12 @@ def inject(recording: Recording, effect: str, strength: float, random: np.random
     faulty = np.vstack([injection.apply(samples[start:stop], rate_hz, values, random) for start, stop in takes])
     change = np.sqrt(np.nanmean((faulty - samples) ** 2, axis=0))
     response = replace(recording.response, samples=faulty)
-    return Injected(replace(recording, response=response), effect, values, strength, np.asarray(change))
+    return FaultyRecording(replace(recording, response=response), effect, values, strength, np.asarray(change))
 
 
 def _inject_force(
     recording: Recording, injection: ForceInjection, strength: float, random: np.random.Generator
-) -> Injected:
+) -> FaultyRecording:
     """Inject a fault of mechanism or drive at a random axis: the recorded command is changed instead of the response.
     Raises ValueError where the recording has no motion along the command."""
     samples = recording.command.samples.copy()
@@ -236,21 +247,22 @@ def _inject_force(
     samples[:, axis] = np.concatenate([injection.command(motion.select_samples(*bounds), values) for bounds in takes])
     change = np.sqrt(np.mean((samples - recording.command.samples) ** 2, axis=0))
     command = replace(recording.command, samples=samples)
-    return Injected(replace(recording, command=command), injection.effect, values, strength, np.asarray(change))
+    return FaultyRecording(replace(recording, command=command), injection.effect, values, strength, np.asarray(change))
 
 
-def applicable_injections(recording: Recording) -> tuple[str, ...]:
-    """Names of the faults that can be injected into this recording. Mains hum needs a sample rate above four times its
-    frequency; a misalignment needs the three channels x, y, z of a sensor; a fault of the mechanism needs a measured
-    motion along each command; a fault of the drive needs in addition that the motion is not imposed."""
+def list_applicable_injections(recording: Recording) -> tuple[str, ...]:
+    """Names of the faults that can be injected into this recording. A cross-axis sensitivity needs two channels; mains
+    hum needs a sample rate above four times its frequency; a misalignment needs the three channels x, y, z of a sensor;
+    a fault of the mechanism needs a measured motion along each command; a fault of the drive needs in addition that the
+    motion is not imposed."""
     rate_hz = recording.sample_rate_hz
-    width = 3 if {name[-1:] for name in recording.response.channels} == {"x", "y", "z"} else 1
+    sensor_axes = 3 if {name[-1:] for name in recording.response.channels} == {"x", "y", "z"} else 1
     can_hum = rate_hz > 4 * max(MAINS_HZ)
     has_channels = len(recording.response.channels) > 1
     sensor_effects = [
         injection.effect
         for injection in INJECTIONS
-        if (injection.axes in (1, width) or (injection.axes == 2 and has_channels))
+        if (injection.axes in (1, sensor_axes) or (injection.axes == 2 and has_channels))
         and (can_hum or injection.effect != "mains_hum")
     ]
     axes = range(recording.command.samples.shape[1])
@@ -261,15 +273,15 @@ def applicable_injections(recording: Recording) -> tuple[str, ...]:
     return (*sensor_effects, *(injection.effect for injection in force_injections if is_measured))
 
 
-def place_of(effect: str) -> Place:
-    """Place where the fault acts: mechanism, actuator or sensor."""
+def find_place(effect: str) -> Place:
+    """Place where the fault acts: mechanism, actuator or sensor; sensor for an unknown name."""
     injection = next((candidate for candidate in FORCE_INJECTIONS if candidate.effect == effect), None)
     return "sensor" if injection is None else "actuator" if injection.actuator else "mechanism"
 
 
 def measure_response(recording: Recording) -> ResponseStatistics:
-    """Rate, rms, peak, median frequency and duration of the response; rows with NaN are left out, except in
-    duration."""
+    """Measure rate, rms, peak, median frequency and duration of the response; samples with NaN in any channel are left
+    out, except in the duration."""
     samples = recording.response.samples
     finite_rows = samples[np.isfinite(samples).all(axis=1)]
     centred = finite_rows - finite_rows.mean(axis=0)

@@ -2,7 +2,7 @@
 
 For a law that is a force, the ratio of the rms of the force, along the motion without the law, to the rms of the
 command is given by the strength; for a law of commands or readings, the ratio of the rms of the change to that of the
-changed signal.
+changed signal, except for a saturating law. Called by `draw_law`.
 """
 
 from dataclasses import dataclass, replace
@@ -16,9 +16,9 @@ from study.evaluation.challenge.law_kernel import advance_law_memory, compute_la
 from study.evaluation.challenge.laws.concealed_laws import LawKind, PeakValues, Random
 from study.evaluation.challenge.mechanism_kernel import Motion
 
-WEAKEST, STRONGEST = 0.015, 0.25
+WEAKEST_RMS_RATIO, STRONGEST_RMS_RATIO = 0.015, 0.25
 """Rms of a law relative to that of the commands, or of the readings, at strength 0 and 1."""
-SOFT_LAW_SIZE = 1.0
+SATURATING_LAW_SIZE = 1.0
 """Size k of a saturating law of commands or readings: its parameter a alone sets its strength."""
 
 
@@ -29,6 +29,7 @@ class LawTruth:
     law: str
     """Name of the law."""
     formula: str
+    """Formula for display, see `LawKind.formula`."""
     axes: tuple[str, ...]
     """Letters of the axes on which the law acts."""
     acts_on: tuple[str, ...]
@@ -42,37 +43,42 @@ class LawTruth:
 
 
 def build_law(
-    device: Device, kind: LawKind, baseline: tuple[Motion, FloatArray], places: tuple[int, int], strength: float,
+    device: Device, kind: LawKind, baseline: tuple[Motion, FloatArray], axis_pair: tuple[int, int], strength: float,
     random: Random,
 ) -> tuple[Device, LawTruth]:  # fmt: skip
-    """The device with the law, and its label. baseline: motion and commands (samples, 3) without the law. places: the
-    axis of the law, and another axis. strength: 0 to 1."""
+    """Draw the parameters of a law and build it in; returns the device and its label. baseline: motion and commands
+    (samples, 3), N, without the law. axis_pair: the axis of the law, and another axis. strength: 0 to 1."""
     motion, command = baseline
-    axis, other_axis = places
+    axis, other_axis = axis_pair
     peaks = PeakValues(
-        *(float(np.abs(part[:, axis]).max()) for part in (motion.position, motion.velocity, motion.acceleration))
+        *(
+            float(np.abs(quantity[:, axis]).max())
+            for quantity in (motion.position, motion.velocity, motion.acceleration)
+        )
     )
-    first, second = kind.draw(random, peaks)
-    side = float(random.choice((-1.0, 1.0)))
-    share = WEAKEST * (STRONGEST / WEAKEST) ** strength
+    parameter_a, parameter_b = kind.draw(random, peaks)
+    sign = float(random.choice((-1.0, 1.0)))
+    rms_ratio = WEAKEST_RMS_RATIO * (STRONGEST_RMS_RATIO / WEAKEST_RMS_RATIO) ** strength
     if kind.change is not None:
-        device, size = _build_change(device, kind, (motion, command), places, (first, second, side, share))
+        device, size = _build_change(
+            device, kind, (motion, command), axis_pair, (parameter_a, parameter_b, sign, rms_ratio)
+        )
     else:
-        unit_row = np.array([kind.code, axis, other_axis, 1.0, first, second, side])
-        size = share * _rms(command[:, axis]) / _rms(_evaluate_force(unit_row, motion, command))
-        rows = [[kind.code, axis, other_axis, size, first, second, side]]
+        unit_row = np.array([kind.code, axis, other_axis, 1.0, parameter_a, parameter_b, sign])
+        size = rms_ratio * _compute_rms(command[:, axis]) / _compute_rms(_evaluate_force(unit_row, motion, command))
+        rows = [[kind.code, axis, other_axis, size, parameter_a, parameter_b, sign]]
         if kind.mutual:
-            rows.append([kind.code, other_axis, axis, size, first, second, -side])
+            rows.append([kind.code, other_axis, axis, size, parameter_a, parameter_b, -sign])
         device = replace(device, laws=np.array(rows))
-    numbers = {"k": abs(float(size)), "a": first, "b": second, "s": side}
-    return device, _make_truth(kind, places, numbers)
+    numbers = {"k": abs(float(size)), "a": parameter_a, "b": parameter_b, "s": sign}
+    return device, _make_truth(kind, axis_pair, numbers)
 
 
-def _make_truth(kind: LawKind, places: tuple[int, int], numbers: dict[str, float]) -> LawTruth:
-    """The label of a law at these axes."""
-    axis_pairs = (places, places[::-1]) if kind.mutual else (places,)
-    readings = tuple(
-        tuple(_with_axis_names(reading, axis, other_axis) for reading in kind.variables)
+def _make_truth(kind: LawKind, axis_pair: tuple[int, int], numbers: dict[str, float]) -> LawTruth:
+    """The label of a law. axis_pair: as in `build_law`; numbers: see `LawTruth.numbers`."""
+    axis_pairs = (axis_pair, axis_pair[::-1]) if kind.mutual else (axis_pair,)
+    variables = tuple(
+        tuple(_substitute_axes(variable_set, axis, other_axis) for variable_set in kind.variables)
         for axis, other_axis in axis_pairs
     )
     return LawTruth(
@@ -80,16 +86,16 @@ def _make_truth(kind: LawKind, places: tuple[int, int], numbers: dict[str, float
         kind.formula,
         tuple(AXES[axis] for axis, _ in axis_pairs),
         kind.acts_on,
-        readings,
+        variables,
         kind.memory,
         numbers,
     )
 
 
-def _with_axis_names(reading: str, axis: int, other_axis: int) -> str:
+def _substitute_axes(variable_set: str, axis: int, other_axis: int) -> str:
     """Variables such as "vx vy", with x and y replaced by the letters of the axes `axis` and `other_axis`."""
     letters = {"x": AXES[axis], "y": AXES[other_axis]}
-    names = [name if name == "t" else name[:-1] + letters[name[-1]] for name in reading.split()]
+    names = [name if name == "t" else name[:-1] + letters[name[-1]] for name in variable_set.split()]
     return " ".join(sorted(names))
 
 
@@ -97,22 +103,25 @@ def _build_change(
     device: Device,
     kind: LawKind,
     baseline: tuple[Motion, FloatArray],
-    places: tuple[int, int],
+    axis_pair: tuple[int, int],
     numbers: tuple[float, float, float, float],
 ) -> tuple[Device, float]:
     """Build in a law that changes commands or readings; returns the device and the size of the law. numbers: parameters
-    a and b, sign, and share (rms of the change relative to the signal). A law with a > 0 has the size
-    `SOFT_LAW_SIZE`."""
-    change, (axis, other_axis), (motion, command) = kind.change, places, baseline
-    first, second, side, share = numbers
+    a and b, sign s, and rms of the change relative to the signal. A law with a > 0 has the size `SATURATING_LAW_SIZE`,
+    so that neither sign nor rms ratio is used."""
+    change, (axis, other_axis), (motion, command) = kind.change, axis_pair, baseline
+    parameter_a, parameter_b, sign, rms_ratio = numbers
     assert change is not None
-    argument = motion.acceleration if kind.acts_on == ("response",) else command
-    unit_change_rms = _rms(change(argument[:, axis], argument[:, other_axis], first, second))
-    size = SOFT_LAW_SIZE if first > 0 else side * share * _rms(argument[:, axis]) / unit_change_rms
+    signal = motion.acceleration if kind.acts_on == ("response",) else command
+    unit_change_rms = _compute_rms(change(signal[:, axis], signal[:, other_axis], parameter_a, parameter_b))
+    size = (
+        SATURATING_LAW_SIZE if parameter_a > 0 else sign * rms_ratio * _compute_rms(signal[:, axis]) / unit_change_rms
+    )
 
     def apply_law(samples: FloatArray) -> FloatArray:
+        """Copy of the commands or readings (n, 3) with the change on the axis of the law."""
         new_samples = samples.copy()
-        new_samples[:, axis] += size * change(samples[:, axis], samples[:, other_axis], first, second)
+        new_samples[:, axis] += size * change(samples[:, axis], samples[:, other_axis], parameter_a, parameter_b)
         return new_samples
 
     if kind.acts_on == ("response",):
@@ -120,16 +129,16 @@ def _build_change(
     return replace(device, drive_law=apply_law), size
 
 
-def _evaluate_force(row: FloatArray, motion: Motion, command: FloatArray) -> FloatArray:
+def _evaluate_force(law_row: FloatArray, motion: Motion, command: FloatArray) -> FloatArray:
     """(samples,), N: force of the law (a row of `law_kernel`) along the given motion and command."""
     memory, force = 0.0, np.zeros(len(command))
     for k in range(len(command)):
-        q, v, drive = motion.position[k], motion.velocity[k], command[k]
-        force[k] = compute_law_force(row, q, v, drive, memory, k / RATE_HZ)
-        memory = advance_law_memory(row, q, drive, memory, 1 / RATE_HZ)
+        q, v, drive_force = motion.position[k], motion.velocity[k], command[k]
+        force[k] = compute_law_force(law_row, q, v, drive_force, memory, k / RATE_HZ)
+        memory = advance_law_memory(law_row, q, drive_force, memory, 1 / RATE_HZ)
     return force
 
 
-def _rms(samples: FloatArray) -> float:
+def _compute_rms(samples: FloatArray) -> float:
     """Root mean square, with a tiny lower limit so that it can be divided by."""
     return max(float(np.sqrt(np.mean(samples**2))), 1e-300)

@@ -21,8 +21,9 @@ STEPS_PER_SAMPLE = 10
 """Integration steps per sample."""
 STEP_S = 1.0 / (RATE_HZ * STEPS_PER_SAMPLE)
 """Step of integration (s)."""
-HANDLE_SHARE = 0.4
-"""Mass of the handle's body over that of the lightest axis. The rest of an axis's mass moves with that axis alone."""
+HANDLE_MASS_RATIO = 0.4
+"""Mass of the handle's body over that of the lightest axis. The rest of an axis's mass is armature, the inertia of that
+joint alone."""
 CONTACT_IMPEDANCE = 0.01
 """MuJoCo's constraint impedance (0 to 1) of a contact: small, so that the contact force is that of a spring and a
 damper with their nominal values."""
@@ -36,6 +37,7 @@ class MujocoBench:
     """Parameters of the bench and of its concealed effects; each array (3,), of the driven axes."""
 
     mass_kg: FloatArray
+    """Mass that moves along each axis (kg), without the oscillators."""
     damping: FloatArray
     """N s/m, to the ground."""
     stiffness: FloatArray
@@ -43,17 +45,17 @@ class MujocoBench:
     oscillators: Oscillators
     """Oscillators attached to the handle."""
     friction_n: FloatArray
-    """Dry friction."""
+    """Dry friction (N)."""
     force_n: FloatArray
-    """Constant force on the handle."""
+    """Constant force on the handle (N)."""
     gain: FloatArray
     """Force per command."""
     limit_n: FloatArray
-    """Saturation of the force; 0 = none."""
+    """Saturation of the force (N); 0 = none."""
     lag_s: float = 0.0
-    """Time constant of the actuators' first-order lag; 0 = none."""
+    """Time constant of the actuators' first-order lag (s); 0 = none."""
     delay_s: float = 0.0
-    """Delay of the commands, rounded to integration steps."""
+    """Delay of the commands (s), rounded to integration steps by the simulation."""
     stop: tuple[int, float, float, float] | None = None
     """End stop: axis, lower and upper end (m), stiffness (N/m)."""
     play: tuple[int, Values] | None = None
@@ -68,9 +70,9 @@ def make_baseline_bench(bench: Bench) -> MujocoBench:
     return MujocoBench(mass, damping, stiffness, bench.oscillators, zeros, zeros, np.ones(3), zeros)
 
 
-def linearise_bench(bench: MujocoBench) -> Bench:
-    """The linear part as a bench. Perpendicular to its slide, an oscillator moves with the handle, so that its mass
-    adds to the handle's in these directions."""
+def linearise(bench: MujocoBench) -> Bench:
+    """The linear part as a bench, without gain, lag and delay. Perpendicular to its slide, an oscillator moves with the
+    handle, so that its mass adds to the handle's in these directions."""
     mass = np.diag(bench.mass_kg)
     for oscillator_kg, direction in zip(bench.oscillators.mass_kg, bench.oscillators.direction, strict=True):
         mass += oscillator_kg * (np.eye(3) - np.outer(direction, direction))
@@ -80,8 +82,8 @@ def linearise_bench(bench: MujocoBench) -> Bench:
 def simulate_motion(bench: MujocoBench, command: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Acceleration (m/s²) and position (m) of the handle, (samples, 3) each, just before each command is written.
 
-    The delay is whole samples and a rest of integration steps. command: (samples, 3), N. Raises ValueError where the
-    motion is not finite or reaches 1 m.
+    The delay consists of whole samples and remaining integration steps. command: (samples, 3), N. Raises ValueError
+    where the motion is not finite or reaches 1 m.
     """
     model = mujoco.MjModel.from_xml_string(_format_mjcf(bench))
     data = mujoco.MjData(model)
@@ -104,7 +106,7 @@ def simulate_motion(bench: MujocoBench, command: FloatArray) -> tuple[FloatArray
 
 
 def with_delay(bench: MujocoBench, delay_s: float) -> MujocoBench:
-    """The bench with a delay rounded to whole steps, so that the label is exact."""
+    """The bench with a delay (s) rounded to whole steps, at least one, so that the label is exact."""
     return replace(bench, delay_s=max(round(delay_s / STEP_S), 1) * STEP_S)
 
 
@@ -121,20 +123,21 @@ def _format_mjcf(bench: MujocoBench) -> str:
     _add_element(root, "option", {"timestep": f"{STEP_S:.12g}", "gravity": "0 0 0"} | solver_options)
     world = _add_element(root, "worldbody")
     handle = _add_element(world, "body", {"name": "handle"})
-    handle_kg = HANDLE_SHARE * float(bench.mass_kg.min())
+    handle_kg = HANDLE_MASS_RATIO * float(bench.mass_kg.min())
     motor_kg = np.zeros(3)
     if bench.play is not None:
-        axis, values = bench.play
-        motor_kg[axis] = values["motor_mass"]
+        axis, play_values = bench.play
+        motor_kg[axis] = play_values["motor_mass"]
         motor = _add_element(world, "body", {"name": "motor"})
         _add_slide(motor, "motor", np.eye(3)[axis], {})
-        _add_mass(motor, float(values["motor_mass"]))
-    for index, name in enumerate(AXES):
+        _add_mass(motor, float(play_values["motor_mass"]))
+    for axis_index, axis_name in enumerate(AXES):
         joint_values = {
-            "armature": bench.mass_kg[index] - handle_kg - motor_kg[index], "damping": bench.damping[index],
-            "stiffness": bench.stiffness[index], "frictionloss": bench.friction_n[index],
+            "armature": bench.mass_kg[axis_index] - handle_kg - motor_kg[axis_index],
+            "damping": bench.damping[axis_index],
+            "stiffness": bench.stiffness[axis_index], "frictionloss": bench.friction_n[axis_index],
         }  # fmt: skip
-        _add_slide(handle, name, np.eye(3)[index], joint_values)
+        _add_slide(handle, axis_name, np.eye(3)[axis_index], joint_values)
     _add_mass(handle, handle_kg)
     _add_oscillators(handle, bench.oscillators)
     tendons = _add_element(root, "tendon")
@@ -172,14 +175,17 @@ def _add_oscillators(handle: Xml.Element, oscillators: Oscillators) -> None:
 def _add_play(tendons: Xml.Element, bench: MujocoBench, axis: int, values: Values) -> None:
     """Backlash: a tendon between motor and handle limits their distance, a one-sided contact at each end of the gap."""
     motor_kg = values["motor_mass"]
-    mass, _, _ = linearise_bench(bench).assemble_matrices()
+    mass, _, _ = linearise(bench).assemble_matrices()
     mass[axis, axis] -= motor_kg
     # MuJoCo takes stiffness and damping of a contact per unit of effective mass, here of motor and handle in series.
     reduced_mass_kg = 1.0 / (1.0 / motor_kg + np.linalg.inv(mass)[axis, axis])
-    spring, damper = values["contact_stiffness"] / reduced_mass_kg, values["contact_damping"] / reduced_mass_kg
+    stiffness_per_kg, damping_per_kg = (
+        values["contact_stiffness"] / reduced_mass_kg,
+        values["contact_damping"] / reduced_mass_kg,
+    )
     half_gap_m = 0.5 * values["gap"]
     contact = {
-        "solreflimit": f"{-spring:.12g} {-damper:.12g}",
+        "solreflimit": f"{-stiffness_per_kg:.12g} {-damping_per_kg:.12g}",
         "solimplimit": f"{CONTACT_IMPEDANCE} {CONTACT_IMPEDANCE} 1",
     }
     play_tendon = _add_element(
@@ -191,23 +197,23 @@ def _add_play(tendons: Xml.Element, bench: MujocoBench, axis: int, values: Value
 
 def _add_actuators(parent: Xml.Element, bench: MujocoBench) -> None:
     """Add the force of each axis, with gain, saturation and lag; with backlash it acts on the motor."""
-    for index, name in enumerate(AXES):
-        joint = "motor" if bench.play is not None and bench.play[0] == index else name
-        actuator = _add_element(parent, "general", {"joint": joint, "gainprm": float(bench.gain[index])})
-        if bench.limit_n[index] > 0.0:
-            actuator.set("forcerange", f"{-bench.limit_n[index]:.12g} {bench.limit_n[index]:.12g}")
+    for axis_index, axis_name in enumerate(AXES):
+        joint = "motor" if bench.play is not None and bench.play[0] == axis_index else axis_name
+        actuator = _add_element(parent, "general", {"joint": joint, "gainprm": float(bench.gain[axis_index])})
+        if bench.limit_n[axis_index] > 0.0:
+            actuator.set("forcerange", f"{-bench.limit_n[axis_index]:.12g} {bench.limit_n[axis_index]:.12g}")
         if bench.lag_s > 0.0:
             actuator.set("dyntype", "filter")
             actuator.set("dynprm", f"{bench.lag_s:.12g}")
 
 
-def _add_slide(body: Xml.Element, name: str, direction: FloatArray, values: Mapping[str, float]) -> None:
-    """Add a sliding joint along a direction; values that are zero are left out. Dry friction is a nearly rigid
-    constraint with a time constant of two steps and a damping ratio of 1."""
+def _add_slide(body: Xml.Element, name: str, direction: FloatArray, attributes: Mapping[str, float]) -> None:
+    """Add a sliding joint along a direction (3,); attributes (MJCF names) that are zero are left out. Dry friction is a
+    nearly rigid constraint with a time constant of two steps and a damping ratio of 1."""
     joint = _add_element(
         body, "joint", {"name": name, "type": "slide", "axis": " ".join(f"{component:.15g}" for component in direction)}
     )
-    for key, value in values.items():
+    for key, value in attributes.items():
         if value:
             joint.set(key, f"{value:.15g}")
     if "frictionloss" in joint.attrib:
@@ -220,7 +226,9 @@ def _add_mass(body: Xml.Element, mass_kg: float) -> None:
     _add_element(body, "inertial", {"pos": "0 0 0", "mass": mass_kg, "diaginertia": "1e-4 1e-4 1e-4"})
 
 
-def _add_element(parent: Xml.Element, kind: str, attributes: Mapping[str, str | float] | None = None) -> Xml.Element:
-    """Append an element; numbers are written with 15 digits."""
-    texts = {key: value if isinstance(value, str) else f"{value:.15g}" for key, value in (attributes or {}).items()}
-    return Xml.SubElement(parent, kind, texts)
+def _add_element(parent: Xml.Element, tag: str, attributes: Mapping[str, str | float] | None = None) -> Xml.Element:
+    """Append an element with this tag and return it; numbers are written with 15 digits."""
+    attribute_texts = {
+        key: value if isinstance(value, str) else f"{value:.15g}" for key, value in (attributes or {}).items()
+    }
+    return Xml.SubElement(parent, tag, attribute_texts)

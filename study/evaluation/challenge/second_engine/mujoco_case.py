@@ -26,7 +26,7 @@ from study.evaluation.challenge.drive_plan import RATE_HZ, draw_plan
 from study.evaluation.challenge.nominal import as_model, draw_calibration, retune
 from study.evaluation.challenge.second_engine.mujoco_bench import (
     MujocoBench,
-    linearise_bench,
+    linearise,
     make_baseline_bench,
     simulate_motion,
     with_delay,
@@ -47,7 +47,7 @@ def draw_mujoco_case(
     random = np.random.default_rng([seed, len(effects), 2])
     drawn_bench, plan = draw_bench(random), draw_plan(random, settings)
     baseline = make_baseline_bench(drawn_bench)
-    bench = linearise_bench(baseline)
+    bench = linearise(baseline)
     base_motion = simulate_motion(baseline, plan.command)
     device, measured, truth = baseline, Device(bench), []
     peak = np.minimum(np.abs(base_motion[0]).max(axis=0), RANGE_MPS2)

@@ -107,7 +107,7 @@ def _format_tables(controller: RealtimeController) -> str:
     ]
     for edge_name, edge_hz in (("low", split.edges.low_hz), ("high", split.edges.high_hz)):
         if edge_hz is not None:
-            numerator, denominator = split.one_pole(edge_hz)
+            numerator, denominator = split.design_one_pole(edge_hz)
             definitions.append(format_c_table(f"hapteq_{edge_name}_filter", [*numerator, denominator[1]]))
     return "\n".join(definitions)
 

@@ -21,7 +21,7 @@ from equalizer.tracking.realtime.realtime_controller import (
 )
 from study.devices.opening import HAND_STIMULUS_CAP_N, STRONGEST_N
 from study.errors import StudyError
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.disk.text_file import write_text
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.trajectory_file import read_trajectory
@@ -182,7 +182,7 @@ def _describe_origin(plan: ControllerPlan, model: IdentifiedModel) -> tuple[str,
         "" if model.place_m is None else f", at {', '.join(f'{coordinate_m:g}' for coordinate_m in model.place_m)} m"
     )
     return (
-        f"Of {plan.model.name} (SHA-256 {sha256_of(plan.model)[:16]}), {low_hz:g} to {high_hz:g} Hz{place_text}.",
+        f"Of {plan.model.name} (SHA-256 {compute_sha256(plan.model)[:16]}), {low_hz:g} to {high_hz:g} Hz{place_text}.",
         f"Forces {', '.join(model.input_channels)} in N; accelerations {', '.join(model.output_channels)} in m/s^2.",
         f"The transient: {transient_text}. Weight {plan.settings.weight:g}.",
     )

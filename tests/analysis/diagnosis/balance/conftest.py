@@ -20,9 +20,9 @@ def axis_module(module_at) -> ModuleType:
 def find_balance():
     """Of a recording, one per axis."""
     from analysis.diagnosis.balance.balances import find_balances
-    from analysis.diagnosis.search.time_budget import unlimited_time
+    from analysis.diagnosis.search.time_budget import grant_time
 
-    return lambda recording, without=(): find_balances([recording], frozenset(without), unlimited_time)
+    return lambda recording, without=(): find_balances([recording], frozenset(without), grant_time)
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.balance import actuator_equivalents
-from analysis.diagnosis.balance.command_laws import AS_COMMANDED, vary_parameters
+from analysis.diagnosis.balance.command_laws import IDEAL_ACTUATOR, vary_parameters
 
 
 @pytest.fixture(scope="module")
@@ -224,7 +224,7 @@ def test_what_pulls_alike_everywhere_is_no_coil(find_balance, law):
 
 
 def test_a_law_of_the_command_is_tried_in_order_and_never_twice():
-    law = replace(AS_COMMANDED, values={"power": 2.0, "width": 0.0, "limit": 3.0})
+    law = replace(IDEAL_ACTUATOR, values={"power": 2.0, "width": 0.0, "limit": 3.0})
     tried = [tuple(each.values.values()) for each in vary_parameters(law)]
     assert tried == [(2.0, 0.0, 3.0 * f) for f in (0.95, 0.98, 1.02, 1.05)] + [
         (2.0 * f, 0.0, 3.0) for f in (0.95, 0.98, 1.02, 1.05)
@@ -236,6 +236,6 @@ def test_a_law_of_the_command_is_tried_in_order_and_never_twice():
 def test_laws_behind_a_dead_band_in_doubt_are_not_named(rubbing_dead_band, monkeypatch, inertia):
     balance = rubbing_dead_band
     monkeypatch.setattr(actuator_equivalents, "_has_inertia", lambda regression, laws: inertia)
-    doubted = actuator_equivalents.doubt_laws_of_actuator(balance)
+    doubted = actuator_equivalents.withdraw_ambiguous_names(balance)
     assert set(laws_by_name(doubted)) == ({"force_deadband", "coulomb_friction"} if inertia else set())
     assert len(doubted.laws) == len(balance.laws)

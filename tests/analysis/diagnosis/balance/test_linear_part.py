@@ -111,14 +111,14 @@ def test_a_body_that_is_not_measured_does_not_hide_friction(two_bodies, record_s
 
 def test_what_is_left_of_a_command_drives_one_body(balances_of_both):
     from analysis.diagnosis.first_model.model_from_balance import build_first_model
-    from analysis.diagnosis.first_model.reduced_recordings import is_reduced, reduce_recordings
+    from analysis.diagnosis.first_model.reduced_recordings import is_reduction_needed, reduce_recordings
 
     recording, balances = balances_of_both
 
     (reduced,) = reduce_recordings((recording,), balances)
     model = build_first_model(balances, reduced, "one body")
 
-    assert is_reduced(balances)
+    assert is_reduction_needed(balances)
     assert reduced.response.channels == ("x",)
     assert reduced.command.samples.shape == recording.command.samples.shape
     assert model is not None

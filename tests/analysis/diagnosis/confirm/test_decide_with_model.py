@@ -11,7 +11,7 @@ from analysis.diagnosis.confirm.balance_with_model import find_balances_with_mod
 from analysis.diagnosis.confirm.decide_with_model import find_objection
 from analysis.diagnosis.confirm.held_out_gain import estimate_held_out_gain, explains_half, predicts_motion
 from analysis.diagnosis.errors.tuning import make_tuning
-from analysis.diagnosis.search.time_budget import unlimited_time
+from analysis.diagnosis.search.time_budget import grant_time
 from equalizer.plant.mechanical_model import MechanicalModel, Tolerance
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -42,7 +42,7 @@ def record_friction(level, mass=MASS):
 
 @pytest.fixture(scope="module")
 def friction_balance():
-    return find_balances_with_model((record_friction(LEVEL),), GIVEN, frozenset(), unlimited_time)[0]
+    return find_balances_with_model((record_friction(LEVEL),), GIVEN, frozenset(), grant_time)[0]
 
 
 def test_what_a_given_model_lacks_is_named_by_the_balance(friction_balance):
@@ -54,7 +54,7 @@ def test_what_a_given_model_lacks_is_named_by_the_balance(friction_balance):
 
 @pytest.mark.parametrize("mass", [MASS, MASS + 0.05], ids=["as calibrated", "a standard deviation off"])
 def test_a_device_within_its_calibration_lacks_nothing(mass):
-    (balance,) = find_balances_with_model((record_friction(0.0, mass),), GIVEN, frozenset(), unlimited_time)
+    (balance,) = find_balances_with_model((record_friction(0.0, mass),), GIVEN, frozenset(), grant_time)
     assert balance.named == ()
     assert balance.linear < 0.05
 

@@ -12,7 +12,7 @@ from analysis.diagnosis.data.recorded_conditions import apply_conditions
 from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.prepare_recordings import prepare_recordings
 from analysis.diagnosis.result.wording import format_effect_title
-from equalizer.effects.discovered_law import Channels, condition_names
+from equalizer.effects.discovered_law import Channels, name_conditions
 from equalizer.effects.placing import PlacingError, place_effects, place_recorded_effects
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.laws.evaluate import evaluate
@@ -122,9 +122,9 @@ def test_a_model_with_such_a_law_is_played_with_the_recording_s_condition_and_no
 
 
 def test_a_condition_is_called_by_its_channel_where_no_signal_is_called_so():
-    names = condition_names(Channels(conditions=("T", "t", "vx", "oil pressure", "sin", "p1", "supply_bar")))
+    names = name_conditions(Channels(conditions=("T", "t", "vx", "oil pressure", "sin", "p1", "supply_bar")))
     assert names == ("T", "c2", "c3", "c4", "c5", "c6", "supply_bar")
-    assert condition_names(Channels(("force",), ("x",), conditions=("force", "T", "T"))) == ("c1", "c2", "c3")
+    assert name_conditions(Channels(("force",), ("x",), conditions=("force", "T", "T"))) == ("c1", "c2", "c3")
 
 
 @pytest.mark.parametrize(("mean", "spread"), [(312.68, 7.64003), (1_013_250.4, 0.3), (-2.5e-4, 1e-5), (3.0, 4e4)])

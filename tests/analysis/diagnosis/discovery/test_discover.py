@@ -17,7 +17,7 @@ from analysis.diagnosis.discovery.matched_filter import build_views
 from analysis.diagnosis.discovery.screen_terms import build_normal_equations
 from analysis.diagnosis.discovery.snap_exponents import simplify_powers
 from analysis.diagnosis.discovery.validation import NO_OTHER_EXCITATION
-from analysis.diagnosis.discovery.view_terms import view_terms
+from analysis.diagnosis.discovery.view_terms import list_view_terms
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.result.wording import write_summary_lines
@@ -125,7 +125,7 @@ def test_a_shuffled_force_holds_no_law(seed=9):
     view = build_views(
         context.measure, context.tuning, evaluate_fit(context.measure, context.tuning, fitted.deviations, NO_EFFECTS)
     )[0]
-    found = search_best_sums(build_normal_equations(view), view_terms(view), always)
+    found = search_best_sums(build_normal_equations(view), list_view_terms(view), always)
     best = found.sums[0]
     assert best.cross_validated / best.base_error < LAW_PLACEBO * (1 - found.placebo)
     assert any("vx" not in each.variables for each in found.sums)  # the grammar without it was asked

@@ -14,7 +14,7 @@ from analysis.diagnosis.errors.hypothesis import Claim, combine_hypotheses, make
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.verdict import SearchResult, judge
-from equalizer.effects.discovered_law import law_channels, law_effect, law_values
+from equalizer.effects.discovered_law import collect_channels, get_law_values, make_law_effect
 from tests.lawful import arena_of, law, recorded
 
 QUIET = (("multisine", 0.2, "fit"), ("multisine", 0.3, "fit"), ("multisine", 0.4, "fit"), ("sweep", 2.0, "test"))
@@ -80,8 +80,8 @@ def test_of_laws_that_fit_alike_the_one_that_the_louder_test_bears_out_is_chosen
 def test_a_law_too_weak_to_be_known_takes_no_other_laws_name_away(search_result):
     context, known, found = search_result
     weak = replace(law("p0*x*vx*abs(vx)", 1e-3), units=())
-    effect = law_effect(weak, law_channels(context.measure.records[0].recording))
-    alone = make_claim_hypothesis(Claim(effect, "one", (0,)), [law_values(weak)])
+    effect = make_law_effect(weak, collect_channels(context.measure.records[0].recording))
+    alone = make_claim_hypothesis(Claim(effect, "one", (0,)), [get_law_values(weak)])
     after = found.explanation.after.fitted
     first, both = (
         context.score_fit(refine(context, evaluate_fit(context.measure, context.tuning, after.deviations, hypothesis)))
@@ -107,8 +107,8 @@ def test_a_law_whose_round_is_not_known_is_named_by_no_check(search_result):
     """A weak law was found after it, and its exponent was rounded since: its checks are those of no round by name."""
     context, known, found = search_result
     weak = replace(law("p0*x*vx*abs(vx)", 1e-3), units=())
-    effect = law_effect(weak, law_channels(context.measure.records[0].recording))
-    alone = make_claim_hypothesis(Claim(effect, "one", (0,)), [law_values(weak)])
+    effect = make_law_effect(weak, collect_channels(context.measure.records[0].recording))
+    alone = make_claim_hypothesis(Claim(effect, "one", (0,)), [get_law_values(weak)])
     first, rounded = found.rounds[0].fitted_candidates[0], found.explanation.after.fitted
     expressions = [list_fitted_laws(each.hypothesis)[0].expression for each in (first.fitted, rounded)]
     assert expressions[0] != expressions[1]

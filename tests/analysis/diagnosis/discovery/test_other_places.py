@@ -17,12 +17,12 @@ from analysis.diagnosis.discovery.discover import discover
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import Term
 from analysis.diagnosis.discovery.matched_filter import build_views
-from analysis.diagnosis.discovery.view_terms import terms_of_readings
+from analysis.diagnosis.discovery.view_terms import list_reading_terms
 from analysis.diagnosis.document import Candidate, diagnosis_from_json, make_found_law
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.result.candidates import add_balances_with_given_model
-from equalizer.effects.discovered_law import Channels, law_effect, law_parameters, law_values
+from equalizer.effects.discovered_law import Channels, get_law_values, make_law_effect, make_law_parameters
 from equalizer.effects.effect import PlacedEffect
 from equalizer.laws.law import Law
 from equalizer.plant.mechanical_model import Tolerance
@@ -37,8 +37,8 @@ def ignore_progress(said, share):
 
 def test_a_force_that_grows_with_time_is_no_coupling_of_axes():
     drift = Law("p0*t", (0.1,), (), "force", "x")
-    claim = Claim(law_effect(drift), "one", (0,))
-    fitted = SimpleNamespace(hypothesis=make_claim_hypothesis(claim, [law_values(drift)]))
+    claim = Claim(make_law_effect(drift), "one", (0,))
+    fitted = SimpleNamespace(hypothesis=make_claim_hypothesis(claim, [get_law_values(drift)]))
     assert not can_coupling_imitate(None, fitted, ("fx", "fy"))
 
 
@@ -75,7 +75,9 @@ def whirl_forces(size, sign=-1.0):
     """Forces of each axis on the other: antisymmetric, or by `sign` 1 symmetric."""
     channels = Channels(("fx", "fy"), ("ax", "ay"))
     laws = (Law("p0*vy", (size,), (), "force", "x"), Law("p0*vx", (sign * size,), (), "force", "y"))
-    return [PlacedEffect(law_effect(each, channels), (axis,), law_values(each)) for axis, each in enumerate(laws)]
+    return [
+        PlacedEffect(make_law_effect(each, channels), (axis,), get_law_values(each)) for axis, each in enumerate(laws)
+    ]
 
 
 @pytest.mark.slow
@@ -160,14 +162,16 @@ def test_a_force_of_commands_alone_is_a_law_of_the_command():
 
 
 def test_what_is_added_to_a_signal_can_be_none():
-    none = {each.name: each.none for each in law_parameters(law("fx + p0*tanh(fx/p1)", 1.0, 2.0, acts_on="command"))}
+    none = {
+        each.name: each.none for each in make_law_parameters(law("fx + p0*tanh(fx/p1)", 1.0, 2.0, acts_on="command"))
+    }
     assert none == {"p0": 0.0, "p1": None}
-    assert law_parameters(law("p0*tanh(fx/p0)", 2.0, acts_on="command"))[0].none is None
+    assert make_law_parameters(law("p0*tanh(fx/p0)", 2.0, acts_on="command"))[0].none is None
 
 
 def test_readings_hold_products_with_other_readings_and_nothing_linear():
     columns = {name: np.linspace(-1.0, 1.0, 50) for name in ("ax", "ay", "t")}
-    shapes = [term.shape for term in terms_of_readings(columns, 1, 2)]
+    shapes = [term.shape for term in list_reading_terms(columns, 1, 2)]
     assert "ay*ax" in shapes
     assert not {"ax", "ay"} & set(shapes)
 

@@ -170,10 +170,10 @@ def test_a_model_is_possible_until_a_matrix_becomes_indefinite(name, lowest):
     tuning = make_tuning(make_hanging_model(1), ("fx",))
     deviations = np.zeros(len(tuning.names))
     deviations[tuning.names.index(name)] = -0.9 * lowest
-    assert tuning.is_possible(deviations)
+    assert tuning.is_physical(deviations)
     deviations[tuning.names.index(name)] = -1.1 * lowest
     if name == "mass fx":  # no such model can be made
         with pytest.raises(MechanicalModelError):
-            tuning.is_possible(deviations)
+            tuning.is_physical(deviations)
     else:
-        assert not tuning.is_possible(deviations)
+        assert not tuning.is_physical(deviations)

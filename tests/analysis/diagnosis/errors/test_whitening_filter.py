@@ -46,7 +46,7 @@ def test_a_sample_depends_on_no_later_sample():
 def test_only_samples_after_enough_known_ones_count():
     whitening, residual = fit_whitening_filter([ringing_noise(1)], LEAST), ringing_noise(2)
     residual[:300] = np.nan
-    full = whitening.has_full_history(residual)
+    full = whitening.mask_full_history(residual)
     assert not full[: 300 + whitening.lags].any()
     assert full[300 + whitening.lags :].all()
     assert np.isnan(whitening.apply(residual)[:300]).all()

@@ -10,8 +10,8 @@ from analysis.diagnosis.errors.choose_measure import make_force_measure
 from analysis.diagnosis.forces.inverse_dynamics import compute_band_motion, compute_required_force
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.simulation.dry_friction_kernel import bristle_bend
-from equalizer.effects.simulation.forces_along_motion import effect_forces_along_motion
+from equalizer.effects.simulation.dry_friction_kernel import compute_bristle_deflection
+from equalizer.effects.simulation.forces_along_motion import compute_effect_forces_along_motion
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.plant.linear_simulation import DiscreteModel, discretise_model
 from equalizer.plant.mechanical_model import MechanicalModel
@@ -75,7 +75,7 @@ def test_friction_along_a_motion_is_that_of_the_simulation() -> None:
     played = simulate_mechanism(make_body(), force, RATE_HZ, rubbing)
     velocity = played.axis_velocity
     motion = played.axis_position, velocity, np.gradient(velocity, 1 / RATE_HZ, axis=0)
-    along = effect_forces_along_motion(make_body(), rubbing, motion, (force, played.axis_force), RATE_HZ)
+    along = compute_effect_forces_along_motion(make_body(), rubbing, motion, (force, played.axis_force), RATE_HZ)
     sliding = np.abs(velocity[:, 0]) > 0.02
     assert np.allclose(along[sliding], played.axis_force[sliding], atol=1e-3)
 
@@ -84,7 +84,7 @@ def test_what_sticks_answers_to_what_pushes_against_it() -> None:
     rubbing = (PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": 1.5}),)
     still = np.zeros((400, 1))
     pushing = np.linspace(0.0, 3.0, 400)[:, None]
-    along = effect_forces_along_motion(make_body(), rubbing, (still, still, still), (pushing, pushing), RATE_HZ)
+    along = compute_effect_forces_along_motion(make_body(), rubbing, (still, still, still), (pushing, pushing), RATE_HZ)
     settled = slice(50, None)
     assert np.allclose(along[settled], -np.minimum(pushing, 1.5)[settled], atol=0.05)
 
@@ -101,11 +101,11 @@ def test_without_a_mass_friction_follows_the_motion_and_not_what_is_missing(name
     light = make_body(mass=1e-6, damping=0.0)
     commands = 300.0 * x + missing
 
-    along = effect_forces_along_motion(
+    along = compute_effect_forces_along_motion(
         light, (PlacedEffect(EFFECTS[name], (0,), values),), (x, v, -(omega**2) * x), (commands, missing), RATE_HZ
     )
 
-    bent = np.sign(v[:, 0]) if name == "coulomb_friction" else bristle_bend(x[:, 0], 0.01)
+    bent = np.sign(v[:, 0]) if name == "coulomb_friction" else compute_bristle_deflection(x[:, 0], 0.01)
     inside = np.abs(v[:, 0]) > 0.05 * v.max()
     assert np.std((along[:, 0] + 20.0 * bent)[inside]) < 0.5
 

@@ -104,10 +104,10 @@ def test_a_floor_knows_a_channel_by_its_other_inputs(device):
     cells = find_cells(*record_with_prediction(device()))
     floor = learn_floor([cells])
     one = cells[0]
-    assert floor.share(one.output, one.quantity, "fw", one.band_hz) >= floor.share(
+    assert floor.get_share(one.output, one.quantity, "fw", one.band_hz) >= floor.get_share(
         one.output, one.quantity, one.input, one.band_hz
     )
-    assert floor.share("aw", one.quantity, one.input, one.band_hz) == 0
+    assert floor.get_share("aw", one.quantity, one.input, one.band_hz) == 0
 
 
 def test_noise_that_is_not_known_gives_no_cells(device):

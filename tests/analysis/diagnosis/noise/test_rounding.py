@@ -3,29 +3,29 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.diagnosis.noise.rounding import rounding_step, undo_rounding
+from analysis.diagnosis.noise.rounding import find_rounding_step, undo_rounding
 
 
 @pytest.mark.parametrize("step", [1e-5, 0.25])
 def test_a_rounded_channel_gives_its_step(step):
     moved = np.cumsum(np.random.default_rng(1).standard_normal(5000)) * step
     rounded = (step * np.round(moved / step)).astype(np.float32).astype(np.float64)
-    assert rounding_step(rounded) == pytest.approx(step, rel=1e-3)
+    assert find_rounding_step(rounded) == pytest.approx(step, rel=1e-3)
 
 
 def test_a_channel_that_is_not_rounded_has_no_step():
     random = np.random.default_rng(2)
-    assert rounding_step(random.standard_normal(5000)) == 0
-    assert rounding_step(random.standard_normal(5000).astype(np.float32).astype(np.float64)) == 0
-    assert rounding_step(np.zeros(100)) == 0
+    assert find_rounding_step(random.standard_normal(5000)) == 0
+    assert find_rounding_step(random.standard_normal(5000).astype(np.float32).astype(np.float64)) == 0
+    assert find_rounding_step(np.zeros(100)) == 0
 
 
 def test_missing_samples_do_not_make_a_channel_a_rounded_one():
     fine = np.round(np.cumsum(np.random.default_rng(1).standard_normal(2000)), 3)
-    assert rounding_step(fine) == 0
+    assert find_rounding_step(fine) == 0
     with_gaps = np.full(3 * len(fine), np.nan)
     with_gaps[::3] = fine
-    assert rounding_step(with_gaps) == 0
+    assert find_rounding_step(with_gaps) == 0
 
 
 @settings(max_examples=20, deadline=None)

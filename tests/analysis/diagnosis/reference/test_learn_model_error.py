@@ -8,7 +8,7 @@ import pytest
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, combine_hypotheses, make_claim_hypothesis
-from analysis.diagnosis.localisation.clean_floor import CleanFloor, NothingLearned, clean_floor_sentence
+from analysis.diagnosis.localisation.clean_floor import CleanFloor, NothingLearned, describe_clean_floor
 from analysis.diagnosis.reference.learn_model_error import (
     learn_model_error,
     require_same_measure,
@@ -108,7 +108,7 @@ def test_a_device_equal_to_its_model_teaches_hardly_any_error(diagnosed):
     sound, other = (diagnosed.recorded(1, (), seed=seed) for seed in (11, 12))
     floor = learn_model_error((sound,), diagnosed.device(1), (other,), map, ignore_progress).floor
     assert max(floor.channels) < 0.01
-    assert (floor.error, floor.recordings, floor.beyond) == ("free simulation", 1, 2.0)
+    assert (floor.error, floor.recordings, floor.margin_factor) == ("free simulation", 1, 2.0)
 
 
 def test_the_shares_of_a_channel_are_those_of_the_mismatch(diagnosed):
@@ -130,9 +130,9 @@ def test_recordings_that_can_only_be_compared_otherwise_teach_nothing():
 
 
 def test_what_was_learned_is_reported_and_where_it_is_much_that_too():
-    assert clean_floor_sentence(CleanFloor(), ("ax",)) == ""
-    little = clean_floor_sentence(CleanFloor(channels=(0.1, 0.004), recordings=2), ("ax", "x"))
+    assert describe_clean_floor(CleanFloor(), ("ax",)) == ""
+    little = describe_clean_floor(CleanFloor(channels=(0.1, 0.004), recordings=2), ("ax", "x"))
     assert "from 2 clean recordings: ax 10 % and x 0.4 % of the channel's signal" in little
     assert "times 1.5" in little
     assert "This is a large difference" not in little
-    assert "This is a large difference" in clean_floor_sentence(CleanFloor(channels=(0.4,), recordings=1), ("ax",))
+    assert "This is a large difference" in describe_clean_floor(CleanFloor(channels=(0.4,), recordings=1), ("ax",))

@@ -16,7 +16,7 @@ from analysis.diagnosis.search.identifiability import (
     keep_identifiable,
 )
 from analysis.diagnosis.search.search import search_effects
-from analysis.diagnosis.search.time_budget import unlimited_time
+from analysis.diagnosis.search.time_budget import grant_time
 from analysis.diagnosis.settings import INTERVAL_FACTOR, MOST_BETWEEN_SEGMENTS
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
@@ -61,17 +61,17 @@ FRICTION, OPEN = make_hypothesis("coulomb_friction", level=FRICTION_N), make_hyp
 
 def test_a_number_that_is_fixed_is_named(friction_context):
     found = make_explanation(friction_context, FRICTION, OPEN)
-    assert effect_names(keep_identifiable(friction_context, found, unlimited_time)) == effect_names(found)
+    assert effect_names(keep_identifiable(friction_context, found, grant_time)) == effect_names(found)
 
 
 def test_in_place_of_one_that_is_open_stands_what_is_as_good_and_fixed(friction_context):
     assert effect_names(
-        keep_identifiable(friction_context, make_explanation(friction_context, OPEN, FRICTION), unlimited_time)
+        keep_identifiable(friction_context, make_explanation(friction_context, OPEN, FRICTION), grant_time)
     ) == ["coulomb_friction"]
 
 
 def test_with_nothing_as_good_nothing_is_named_and_what_was_left_out_is_known(friction_context):
-    left = keep_identifiable(friction_context, make_explanation(friction_context, OPEN), unlimited_time)
+    left = keep_identifiable(friction_context, make_explanation(friction_context, OPEN), grant_time)
     assert left.after is left.retuned
     assert (left.steps, left.undetermined) == ((), ("viscous_damping",))
 
@@ -81,7 +81,7 @@ def test_of_two_the_one_that_is_open_goes_whichever_came_first(friction_context,
     base = friction_context.score_fit(retune_alone(friction_context))
     first, both = make_candidate(friction_context, base, order[0]), make_candidate(friction_context, base, *order)
     ends = [friction_context.with_test_score(each) for each in (base, base, both)]
-    left = keep_identifiable(friction_context, Explanation(*ends, ((first,), (both,)), (first, both)), unlimited_time)
+    left = keep_identifiable(friction_context, Explanation(*ends, ((first,), (both,)), (first, both)), grant_time)
     assert (effect_names(left), left.undetermined) == (["coulomb_friction"], ("viscous_damping",))
     assert [step.fitted.hypothesis.key for step in left.steps] == [left.rounds[0][0].fitted.hypothesis.key]
 
@@ -91,12 +91,12 @@ def test_one_number_that_is_fixed_is_enough(friction_context):
     found = make_explanation(
         friction_context, make_hypothesis("asymmetric_friction", level_positive=FRICTION_N, level_negative=1e-9)
     )
-    assert effect_names(keep_identifiable(friction_context, found, unlimited_time)) == effect_names(found)
+    assert effect_names(keep_identifiable(friction_context, found, grant_time)) == effect_names(found)
 
 
 def test_what_has_no_number_that_could_be_none_is_not_judged(friction_context):
     found = make_explanation(friction_context, make_hypothesis("force_saturation", limit=1e3))
-    assert effect_names(keep_identifiable(friction_context, found, unlimited_time)) == effect_names(found)
+    assert effect_names(keep_identifiable(friction_context, found, grant_time)) == effect_names(found)
 
 
 def test_it_is_said_that_numbers_were_left_open(friction_context, monkeypatch):
@@ -150,7 +150,7 @@ def test_an_interval_that_contains_zero_is_corrected_by_the_profile_likelihood(f
     wide = plain.copy()
     wide[place] = np.log1p(2 / (1.96 * INTERVAL_FACTOR))
     monkeypatch.setattr("analysis.diagnosis.search.identifiability.compute_standard_errors", lambda *given: wide)
-    named = keep_identifiable(friction_context, found, unlimited_time)
+    named = keep_identifiable(friction_context, found, grant_time)
     assert effect_names(named) == ["coulomb_friction"]
     assert 1.96 * INTERVAL_FACTOR * level * np.expm1(named.errors[1][place]) < level
 
@@ -162,7 +162,7 @@ def test_numbers_whose_intervals_all_hold_none_are_not_named(friction_context, m
     wide = compute_final_errors(friction_context, found).copy()
     wide[len(friction_context.tuning.names) :] = np.log1p(2 / (1.96 * INTERVAL_FACTOR))
     monkeypatch.setattr("analysis.diagnosis.search.identifiability.compute_standard_errors", lambda *given: wide)
-    assert keep_identifiable(friction_context, found, unlimited_time).undetermined == ("asymmetric_friction",)
+    assert keep_identifiable(friction_context, found, grant_time).undetermined == ("asymmetric_friction",)
 
 
 def test_stated_intervals_hold_the_noise_and_a_bounded_part_of_what_varies_between_segments(friction_context):
@@ -195,7 +195,7 @@ def test_a_jump_that_no_sample_shows_does_not_leave_a_dead_band_open(make_contex
     )
     step = dead.score_fit(start)
     found = Explanation(*(dead.with_test_score(each) for each in (base, base, step)), ((step,),), (step,))
-    left = keep_identifiable(dead, found, unlimited_time)
+    left = keep_identifiable(dead, found, grant_time)
     assert effect_names(left) == ["force_deadband"]
     placed = left.after.fitted.hypothesis.list_placed_effects()[0]
     assert placed.values["jump"] == 0.0

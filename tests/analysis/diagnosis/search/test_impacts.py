@@ -10,7 +10,7 @@ from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.document import diagnosis_from_json, diagnosis_to_json
 from analysis.diagnosis.errors.band_power import BandPower
-from analysis.diagnosis.errors.band_power_fit import BandPowerProblem, _estimate_errors, _step, evaluate_hypothesis
+from analysis.diagnosis.errors.band_power_fit import BandPowerProblem, _estimate_errors, _get_step, evaluate_hypothesis
 from analysis.diagnosis.errors.choose_measure import make_measure
 from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, make_claim_hypothesis
@@ -69,7 +69,7 @@ def test_play_that_rattles_is_named_at_its_axis_with_its_gap(told):
 def test_errors_stay_small_where_parameters_are_correlated():
     """Two columns with a correlation of 0.95, of whose information a third is chance."""
     number = make_claim_hypothesis(Claim(PLAY, "one", (AXIS,)), [LOOSE[0].values]).parameters[0]
-    power = 2 * _step(number) ** 2
+    power = 2 * _get_step(number) ** 2
     problem = SimpleNamespace(spread=np.sqrt(power * 30.0), ensemble=1, weights=np.ones((1, 1, 1)))
     at = SimpleNamespace(
         hypothesis=SimpleNamespace(parameters=(number, number)), predicted=np.zeros((1, 1, 1)), cost=1.0

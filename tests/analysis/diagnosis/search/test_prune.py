@@ -10,7 +10,7 @@ from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.search.explain import Explanation, retune_alone
 from analysis.diagnosis.search.search import prune, search_effects
 from analysis.diagnosis.search.starting_hypotheses import list_candidates
-from analysis.diagnosis.search.time_budget import unlimited_time
+from analysis.diagnosis.search.time_budget import grant_time
 from analysis.diagnosis.settings import LAST_EFFECT_SHARE
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 from equalizer.effects.effect import PlacedEffect
@@ -57,7 +57,7 @@ def test_a_stopgap_goes_once_the_true_law_has_its_numbers(friction_context):
         make_hypothesis("coulomb_friction", level=FRICTION_N),
     )
     assert effect_names(found) == ["constant_force", "coulomb_friction"]
-    left = prune(friction_context, found, unlimited_time)
+    left = prune(friction_context, found, grant_time)
     assert effect_names(left) == ["coulomb_friction"]
     assert len(left.rounds) == len(left.steps) == 1
     # What it was compared with stays to be told.
@@ -74,7 +74,7 @@ def test_two_that_are_needed_stay(friction_and_force_context):
         make_hypothesis("constant_force", force=0.2),
         make_hypothesis("coulomb_friction", level=FRICTION_N),
     )
-    left = prune(friction_and_force_context, found, unlimited_time)
+    left = prune(friction_and_force_context, found, grant_time)
     assert [each.fitted.hypothesis.key for each in left.steps] == [each.fitted.hypothesis.key for each in found.steps]
     assert left.steps[-1].fitted.cost <= found.steps[-1].fitted.cost
 
@@ -94,7 +94,7 @@ def test_two_that_are_needed_are_compared_while_there_is_time(friction_and_force
         make_hypothesis("coulomb_friction", level=FRICTION_N),
     )
     with pytest.raises(AssertionError, match="fitted again"):
-        prune(friction_and_force_context, found, unlimited_time)
+        prune(friction_and_force_context, found, grant_time)
 
 
 def test_out_of_time_nothing_is_fitted_again(friction_and_force_context, forbid_fit):

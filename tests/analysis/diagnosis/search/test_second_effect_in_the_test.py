@@ -9,7 +9,7 @@ from analysis.diagnosis.errors.choose_measure import make_measure
 from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.search import search
 from analysis.diagnosis.search.search_context import SearchContext
-from analysis.diagnosis.search.time_budget import OUT_OF_TIME, OutOfTimeError, unlimited_time
+from analysis.diagnosis.search.time_budget import OUT_OF_TIME, OutOfTimeError, grant_time
 from analysis.diagnosis.search.verdict import Judgement
 from equalizer.effects.catalogue import EFFECTS
 from study.evaluation.challenge.draw_bank import draw_case_plan, generate_case
@@ -22,7 +22,7 @@ def case():
     return generate_case(draw_case_plan(SEED, SLOW_SENSOR_AND_HARDENING), "sledge")
 
 
-def diagnose_names(case, time_left=unlimited_time):
+def diagnose_names(case, time_left=grant_time):
     settings = DiagnosisSettings(discovery=False, time_left=time_left)
     found = diagnose([case.recording], case.model, settings, map, lambda what, share: None)
     return found.diagnosis.verdict, {effect.effect for effect in found.diagnosis.effects}, found.remarks

@@ -82,7 +82,7 @@ STUCK = {"level": 0.2, "stiffness": 400.0}
 def test_friction_that_remembers_what_was_cut_out_gets_a_longer_run_in(make_context, monkeypatch, patient):
     if not patient:
         monkeypatch.setattr(short_recordings, "RUN_IN_ERROR", np.inf)
-        monkeypatch.setattr(short_recordings, "_continue_from", lambda short, measure, held: short)
+        monkeypatch.setattr(short_recordings, "_restart_pieces", lambda short, measure, held: short)
     rubbing = make_context((PlacedEffect(EFFECTS["presliding_hysteresis"], (0,), STUCK),))
     true = evaluate_at_zero(rubbing, make_hypothesis("presliding_hysteresis", **STUCK))
     short = shorten_recordings(rubbing, true)
@@ -187,6 +187,6 @@ def test_under_friction_each_piece_begins_as_the_whole_simulation_is_there(frict
     assert len(shorten_recordings(friction_context, law).context.measure.restarts) == 1
     monkeypatch.setattr(short_recordings, "RUN_IN_CONSTANTS", 0.5)
     continued = shorten_recordings(friction_context, law)
-    monkeypatch.setattr(short_recordings, "_continue_from", lambda short, measure, held: short)
+    monkeypatch.setattr(short_recordings, "_restart_pieces", lambda short, measure, held: short)
     from_rest = shorten_recordings(friction_context, law)
     assert from_rest is None or len(from_rest.kept[0]) > 1.2 * len(continued.kept[0])

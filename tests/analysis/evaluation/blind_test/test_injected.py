@@ -3,7 +3,7 @@
 import pytest
 
 from analysis.evaluation.blind_test.injected import DETECTABLE, make_tallies, read_outcome, score_injections
-from analysis.reports.injected_section import figure_text, kind_of, make_injected_section
+from analysis.reports.injected_section import classify_injection, format_rate, make_injected_section
 
 PLACES = {"sensor_lag": "sensor", "sensor_gain": "sensor", "amplifier_lag": "actuator", "added_mass": "mechanism"}
 
@@ -47,7 +47,7 @@ def test_of_two_faults_one_may_be_left_open():
     both = ("added_mass", "sensor_gain")
     assert make_outcome(both, ("added_mass",)).answer_class == "named"
     assert make_outcome(both, ("amplifier_lag",)).answer_class == "wrong"
-    assert kind_of(make_outcome(both)) == "two at once"
+    assert classify_injection(make_outcome(both)) == "two at once"
 
 
 def test_nothing_injected_is_right_where_nothing_is_named():
@@ -75,8 +75,8 @@ def test_only_detectable_faults_are_asked_for():
     asked = figures["detectable faults named, or in the class"]
     assert (asked.hits, asked.of) == (2, 3)
     assert figures["nothing injected, nothing named"].hits == 1
-    assert figure_text(figures_by_name([])["nothing injected, nothing named"]) == "none was drawn"
-    (row,) = make_tallies(outcomes, kind_of)
+    assert format_rate(figures_by_name([])["nothing injected, nothing named"]) == "none was drawn"
+    (row,) = make_tallies(outcomes, classify_injection)
     assert (row.name, row.fault_count, row.counts) == ("sensor_lag", 5, (2, 0, 0, 0, 1))
 
 

@@ -7,7 +7,7 @@ from analysis.psychophysics.hierarchy.answers import count_cells
 from analysis.psychophysics.hierarchy.curve import Family
 from analysis.psychophysics.hierarchy.run_likelihood import Nuisance, compute_run_likelihoods, convert_to_newton
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
-from analysis.reports.primary_tables import run_words
+from analysis.reports.primary_tables import format_run
 from tests.analysis.conftest import PUBLISHED
 
 CAP_DB = 20 * np.log10(3.0)
@@ -58,7 +58,7 @@ def test_right_answers_alone_give_an_upper_bound_and_no_size(family, slope):
     assert run.below and run.db is None and run.lower_db is None
     more = likelihood_of_run(np.tile(levels, 2), np.ones(24, dtype=bool), family, slope)
     assert -25.0 < more.upper_db < run.upper_db < 0.0
-    size, interval = run_words(run)
+    size, interval = format_run(run)
     assert size == "below the levels played" and interval.startswith("below 0.")
 
 
@@ -74,7 +74,7 @@ def test_an_upper_bound_after_right_answers_alone_excludes_what_it_should():
 def test_one_right_answer_bounds_nothing_and_a_wrong_one_ends_the_case():
     nothing = likelihood_of_run([1.0], [True])
     assert nothing.below and nothing.upper_db is None
-    assert run_words(nothing) == ("below the levels played", "–")
+    assert format_run(nothing) == ("below the levels played", "–")
     some = likelihood_of_run(np.repeat([1.0, 0.5, 0.25], 4), [True] * 8 + [True, False, False, True])
     assert not some.below and some.db is not None
 
@@ -82,4 +82,4 @@ def test_one_right_answer_bounds_nothing_and_a_wrong_one_ends_the_case():
 def test_wrong_answers_far_below_the_cap_give_no_size_either():
     run = likelihood_of_run(np.full(12, 0.02), np.zeros(12, dtype=bool))
     assert not run.below and run.db is None and run.lower_db is not None
-    assert run_words(run)[0] == "above the cap"
+    assert format_run(run)[0] == "above the cap"

@@ -5,7 +5,13 @@ import pytest
 
 from equalizer.effects.effect import PlacedEffect
 from equalizer.effects.force_saturation import EFFECT as SATURATION
-from equalizer.effects.simulation.command_path import delay_at_end, delay_mean, lag_at_end, lag_mean, subdivide_commands
+from equalizer.effects.simulation.command_path import (
+    compute_delayed_end,
+    compute_delayed_mean,
+    compute_lagged_end,
+    compute_lagged_mean,
+    subdivide_commands,
+)
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.effects.slew_limit import EFFECT as SLEW
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel
@@ -30,19 +36,19 @@ def slewed(rate: float) -> tuple[np.ndarray, np.ndarray]:
 
 def test_a_lagged_jump_rises_exponentially():
     tau = 2.7e-3
-    np.testing.assert_allclose(lag_at_end(JUMP, STEP_S, tau), 1 - np.exp(-TIME_S / tau), atol=1e-12)
+    np.testing.assert_allclose(compute_lagged_end(JUMP, STEP_S, tau), 1 - np.exp(-TIME_S / tau), atol=1e-12)
     # The mean over a step is the difference of the integral t + tau exp(-t / tau).
     integral = np.concatenate([[tau], TIME_S + tau * np.exp(-TIME_S / tau)])
-    np.testing.assert_allclose(lag_mean(JUMP, STEP_S, tau), np.diff(integral) / STEP_S, atol=1e-12)
+    np.testing.assert_allclose(compute_lagged_mean(JUMP, STEP_S, tau), np.diff(integral) / STEP_S, atol=1e-12)
 
 
 def test_a_delay_by_whole_steps_shifts_and_by_a_part_shares_out():
     pulse = np.zeros(10)
     pulse[2] = 1.0
-    assert np.flatnonzero(delay_mean(pulse, 1.0, 3.0)).tolist() == [5]
-    np.testing.assert_allclose(delay_mean(pulse, 1.0, 3.25)[5:7], [0.75, 0.25])
-    assert np.flatnonzero(delay_at_end(pulse, 1.0, 3.25)).tolist() == [5]
-    assert not delay_mean(pulse, 1.0, 1e6).any()
+    assert np.flatnonzero(compute_delayed_mean(pulse, 1.0, 3.0)).tolist() == [5]
+    np.testing.assert_allclose(compute_delayed_mean(pulse, 1.0, 3.25)[5:7], [0.75, 0.25])
+    assert np.flatnonzero(compute_delayed_end(pulse, 1.0, 3.25)).tolist() == [5]
+    assert not compute_delayed_mean(pulse, 1.0, 1e6).any()
 
 
 def test_a_slew_limited_jump_is_a_ramp():

@@ -77,7 +77,9 @@ def _one_step(bodies, linear, state, u, memories, at):
     before = [memory.copy() for memory in memories]
     motion = linear.motion
     for sweep in range(CONVERGED if items > 1 else 1):
-        for item, (act, port, numbers) in enumerate(zip(bodies.actions, bodies.port, bodies.parameters, strict=True)):
+        for item, (act, port, numbers) in enumerate(
+            zip(bodies.actions, bodies.force_ports, bodies.parameters, strict=True)
+        ):
             if sweep:
                 force[port] -= own[item, 0]
                 end[port] -= own[item, 1]
@@ -110,7 +112,7 @@ def assert_same(model, effects, commands, steps, fine=1):
     scale = np.abs(wanted).max(axis=0) + 1e-12
     np.testing.assert_array_less(np.abs(found - wanted).max(axis=0) / scale, within)
     np.testing.assert_allclose(pushed, forced, atol=within * (np.abs(forced).max() + 1e-12), rtol=0)
-    short, none = simulate_bodies(bodies, driven, size, step_s, motion=False)
+    short, none = simulate_bodies(bodies, driven, size, step_s, with_motion=False)
     np.testing.assert_array_equal(none, np.zeros((size[0], 0)))
     np.testing.assert_allclose(
         short, found[:, 3 * bodies.ports.shape[1] :], atol=1e-12 * np.abs(found).max(), rtol=1e-12

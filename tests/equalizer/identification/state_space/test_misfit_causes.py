@@ -6,7 +6,7 @@ import pytest
 from equalizer.identification.state_space.held_out_validation import HeldOutValidation
 from equalizer.identification.state_space.identify_recordings import identify_recordings
 from equalizer.identification.state_space.misfit import Misfit
-from equalizer.identification.state_space.misfit_causes import held_out_remarks
+from equalizer.identification.state_space.misfit_causes import describe_test_error_causes
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.signals.recording import Segment
 
@@ -71,6 +71,11 @@ def test_a_test_that_errs_more_than_the_fit_names_no_more_than_is_known(plants, 
     segments = (Segment(0, 4000, "sweep", 1.0, 2000), Segment(4000, 8000, "multisine", level, 2000, "test"))
     recording = synthetic.recording_of(commands, commands, segments)
     tested = HeldOutValidation(error=0.2, noise=0.01, seconds=2.0)
-    (said,) = held_out_remarks(tested, 1.0, Misfit(0.01, 0.01, 1.0, None), (recording,))
+    (said,) = describe_test_error_causes(tested, 1.0, Misfit(0.01, 0.01, 1.0, None), (recording,))
     assert told in said
-    assert held_out_remarks(HeldOutValidation(0.015, 0.01, 2.0), 1.0, Misfit(0.01, 0.01, 1.0, None), (recording,)) == ()
+    assert (
+        describe_test_error_causes(
+            HeldOutValidation(0.015, 0.01, 2.0), 1.0, Misfit(0.01, 0.01, 1.0, None), (recording,)
+        )
+        == ()
+    )

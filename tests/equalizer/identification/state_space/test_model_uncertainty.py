@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.identification.state_space.bootstrap import response_deviation
+from equalizer.identification.state_space.bootstrap import estimate_response_deviation
 from equalizer.identification.state_space.identify import identify
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.plant.model_response import model_response
@@ -30,14 +30,16 @@ def test_the_interval_holds_the_truth_as_often_as_it_says(measuring, plant):
     inside = []
     for seed in range(12):
         model = found_at(measuring, plant, seed)
-        deviation = response_deviation(model, frequency)
+        deviation = estimate_response_deviation(model, frequency)
         inside.append(np.abs(model_response(model, frequency) - plant.response(frequency)) < 1.52 * deviation)
     assert 0.84 < np.mean(inside) < 0.95
 
 
 def test_twice_the_noise_is_twice_the_uncertainty(measuring, plant):
     frequency = np.arange(6, 35, 3.0)
-    one, two = (response_deviation(found_at(measuring, plant, 1, deviation), frequency) for deviation in (0.1, 0.2))
+    one, two = (
+        estimate_response_deviation(found_at(measuring, plant, 1, deviation), frequency) for deviation in (0.1, 0.2)
+    )
     assert np.median(two / one) == pytest.approx(2.0, rel=0.1)
 
 
@@ -53,4 +55,4 @@ def test_another_seed_draws_otherwise_and_no_draws_leave_no_samples(measuring, p
     assert np.abs(one.samples - other.samples).max() > 0
     without = found_at(measuring, plant, 3, draws=0)
     with pytest.raises(ValueError, match="identify it again with draws > 0"):
-        response_deviation(without, np.array([10.0]))
+        estimate_response_deviation(without, np.array([10.0]))

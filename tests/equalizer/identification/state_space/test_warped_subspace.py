@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from equalizer.identification.state_space.warped_subspace import (
-    default_horizon,
+    choose_horizon,
+    compute_warp_coefficient,
     estimate_subspace,
-    poles_and_shapes,
-    warp_coefficient,
+    extract_poles_and_shapes,
 )
 from equalizer.identification.state_space.weighted_lines import weight_lines
 
@@ -15,14 +15,14 @@ BAND = (5.0, 35.0)
 
 
 def test_the_map_puts_the_centre_of_the_band_at_a_quarter_turn():
-    c, z = warp_coefficient(13.0, 1000.0), np.exp(2j * np.pi * 13 / 1000)
+    c, z = compute_warp_coefficient(13.0, 1000.0), np.exp(2j * np.pi * 13 / 1000)
     assert (z - c) / (1 - c * z) == pytest.approx(1j)
 
 
 def test_poles_come_out_exactly_where_there_is_no_noise(plants, measuring):
     plant = measuring.small_plant(plants)
     lines = weight_lines([measuring.exact(plant, np.arange(5, 35, 0.1))], BAND)
-    form = poles_and_shapes(estimate_subspace(lines, default_horizon(6, 3), 13.2), 6, 0.9999)
+    form = extract_poles_and_shapes(estimate_subspace(lines, choose_horizon(6, 3), 13.2), 6, 0.9999)
     np.testing.assert_allclose(np.sort_complex(form.poles), np.sort_complex(np.linalg.eigvals(plant.A)), atol=1e-9)
 
 
@@ -53,5 +53,5 @@ def test_outputs_of_very_different_noise_are_brought_to_one_measure(plants, meas
     lines = weight_lines([measuring.response_of(frequency, values, deviation**2)], BAND)
     subspace = estimate_subspace(lines, 8, 13.2)
     assert subspace.singular_values[7:] == pytest.approx(1.0, abs=0.3)
-    found = np.sort_complex(poles_and_shapes(subspace, 6, 0.9999).poles)
+    found = np.sort_complex(extract_poles_and_shapes(subspace, 6, 0.9999).poles)
     np.testing.assert_allclose(found, np.sort_complex(np.linalg.eigvals(plant.A)), atol=4e-3)

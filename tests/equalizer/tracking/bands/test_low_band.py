@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from equalizer.tracking.bands.low_band import low_band_forces, plan_motion, plan_motion_causally
+from equalizer.tracking.bands.low_band import compute_low_band_forces, plan_motion, plan_motion_causally
 from equalizer.tracking.bands.rigid_model import RigidModel, fit_rigid_model
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 
@@ -42,7 +42,7 @@ def test_the_synthetic_device_plays_the_planned_acceleration(plants, slow):
     device, lines = plants.omega_like(), np.arange(0.5, 4.05, 0.1)
     rigid = fit_rigid_model(lines, device.response(lines), RATE_HZ)
     motion = plan_motion(slow, RATE_HZ, 0.1)
-    played = device.play(low_band_forces(motion, rigid, RATE_HZ))
+    played = device.play(compute_low_band_forces(motion, rigid, RATE_HZ))
     assert np.linalg.norm(played - motion.acceleration) < 0.01 * np.linalg.norm(slow)
     assert np.linalg.norm(played - slow) < 0.01 * np.linalg.norm(slow)
 
@@ -52,7 +52,7 @@ def test_superposed_on_a_rendered_spring_a_free_mass_makes_the_planned_motion(sl
     rigid = RigidModel(mass_kg * np.eye(3), np.zeros((3, 3)), np.zeros((3, 3)))
     motion = plan_motion(slow, RATE_HZ)
     rendered = -(spring.stiffness_n_per_m * motion.position_m + spring.damping_n_s_per_m * motion.velocity_m_s)
-    added = low_band_forces(motion, rigid, RATE_HZ) - rendered
+    added = compute_low_band_forces(motion, rigid, RATE_HZ) - rendered
     position, velocity, made = np.zeros(3), np.zeros(3), np.empty_like(slow)
     for k, force in enumerate(added):
         made[k] = position

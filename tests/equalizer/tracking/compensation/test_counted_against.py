@@ -12,7 +12,7 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from equalizer.tracking.compensation.effect_compensation import compensate
 from equalizer.tracking.compensation.subtract_effects import subtract_effects
-from equalizer.tracking.feedforward.band_part import band_part
+from equalizer.tracking.feedforward.band_pass import filter_to_band
 
 RATE_HZ, BAND_HZ = 1000.0, (5.0, 35.0)
 FORCES, ACCELERATIONS = ("fx", "fy", "fz"), ("ax", "ay", "az")
@@ -32,7 +32,7 @@ def physics(turned: bool) -> MechanicalModel:
 
 
 def shaken(seed: int) -> np.ndarray:
-    noise = band_part(np.random.default_rng(seed).standard_normal((3000, 3)), RATE_HZ, BAND_HZ)
+    noise = filter_to_band(np.random.default_rng(seed).standard_normal((3000, 3)), RATE_HZ, BAND_HZ)
     return noise * np.hanning(3000)[:, None] / noise.std()
 
 

@@ -14,13 +14,13 @@ from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, Mo
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 from equalizer.tracking.compensation.effect_compensation import compensate
-from equalizer.tracking.compensation.effect_roles import IN_MODEL, SENSOR_REASON
+from equalizer.tracking.compensation.effect_roles import IN_MODEL_REASON, SENSOR_REASON
 from equalizer.tracking.compensation.known_forces import LAWS, compute_deadband_share, compute_equivalent_impedance
 from equalizer.tracking.compensation.subtract_effects import subtract_effects
-from equalizer.tracking.feedforward.band_part import band_part
+from equalizer.tracking.feedforward.band_pass import filter_to_band
 from equalizer.tracking.feedforward.planned_motion import integrate_motion
 from equalizer.tracking.learning.iteration import rms
-from equalizer.tracking.lqr.lqr import stored_gains, track
+from equalizer.tracking.lqr.lqr import compute_stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 
 RATE_HZ, BAND_HZ, AROUND, PERIOD = 1000.0, (5.0, 35.0), 300, 10_000
@@ -49,19 +49,21 @@ def frictionless(plants) -> IdentifiedModel:
 
 @pytest.fixture(scope="module")
 def wanted() -> np.ndarray:
-    noise = band_part(np.random.default_rng(7).standard_normal((6000, 3)), RATE_HZ, BAND_HZ)[2000:4000]
+    noise = filter_to_band(np.random.default_rng(7).standard_normal((6000, 3)), RATE_HZ, BAND_HZ)[2000:4000]
     fade = np.clip(np.minimum(np.arange(2000), np.arange(2000)[::-1]) / 100, 0, 1)[:, None]
     rows = np.zeros((2000 + 2 * AROUND, 3))
     rows[AROUND:-AROUND] = 1.8 * noise / noise.std(axis=0) * (0.5 - 0.5 * np.cos(np.pi * fade))
-    return band_part(rows, RATE_HZ, BAND_HZ)
+    return filter_to_band(rows, RATE_HZ, BAND_HZ)
 
 
 def inverse(model, wanted) -> np.ndarray:
-    return track(stored_gains(make_tracking_problem(model, TrackingWeights(weight=1e-3)), len(wanted)), wanted).forces
+    return track(
+        compute_stored_gains(make_tracking_problem(model, TrackingWeights(weight=1e-3)), len(wanted)), wanted
+    ).forces
 
 
 def error(device, forces, wanted) -> float:
-    return rms(band_part(device.play(forces) - wanted, RATE_HZ, BAND_HZ)) / rms(wanted)
+    return rms(filter_to_band(device.play(forces) - wanted, RATE_HZ, BAND_HZ)) / rms(wanted)
 
 
 def recorded(device, commands, seed) -> Recording:
@@ -146,7 +148,7 @@ def test_what_is_linear_is_in_the_model_and_what_is_the_sensors_is_let_be(fricti
     known = physics(effect("viscous_damping", damping=5.0), effect("sensor_gain", gain=1.2))
     done = compensate(forces, wanted, frictionless, known, None)
     np.testing.assert_array_equal(done.forces, forces)
-    assert [reason for _, reason in done.not_used] == [IN_MODEL, SENSOR_REASON]
+    assert [reason for _, reason in done.not_used] == [IN_MODEL_REASON, SENSOR_REASON]
 
 
 def test_an_effect_on_one_axis_changes_that_force_alone(frictionless, wanted):
@@ -195,7 +197,7 @@ def test_a_dead_band_is_crossed(plants, frictionless, wanted, jump):
 
     def off(commands):
         behind = np.where(np.abs(commands) > width, commands - (1 - jump) * width * np.sign(commands), 0.0)
-        return rms(band_part(plant.play(behind) - wanted, RATE_HZ, BAND_HZ)) / rms(wanted)
+        return rms(filter_to_band(plant.play(behind) - wanted, RATE_HZ, BAND_HZ)) / rms(wanted)
 
     assert off(done.forces) < 0.2 * off(forces)
 

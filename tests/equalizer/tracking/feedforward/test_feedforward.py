@@ -7,9 +7,9 @@ import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import Signal
-from equalizer.tracking.feedforward.feedforward import FeedforwardSettings, feedforward
+from equalizer.tracking.feedforward.feedforward import FeedforwardSettings, compute_feedforward_forces
 from equalizer.tracking.lqr.limits import ForceLimitError
-from equalizer.tracking.lqr.padding import band_error
+from equalizer.tracking.lqr.padding import compute_band_error
 from equalizer.tracking.lqr.tracking_problem import TrackingError
 
 RATE_HZ, BAND_HZ = 1000.0, (5.0, 35.0)
@@ -38,10 +38,10 @@ def acceleration(samples) -> Signal:
 
 
 def test_what_is_wanted_in_the_band_is_what_the_device_does(model, plant, noise):
-    found = feedforward(model, noise)
+    found = compute_feedforward_forces(model, noise)
     assert found.forces.samples.shape == (2000, 3)
     played = plant.play(found.forces.samples)
-    assert band_error(noise.samples, played, RATE_HZ, BAND_HZ) < 0.01
+    assert compute_band_error(noise.samples, played, RATE_HZ, BAND_HZ) < 0.01
     assert found.error < 0.01
     assert found.out_of_band_share < 0.03
 
@@ -50,28 +50,28 @@ def test_what_lies_outside_the_band_is_left_out_and_said(model, plant, noise):
     """A whistle at 84 Hz, where the device is loudest, changes nothing within the band and is not played."""
     t = np.arange(2000) / RATE_HZ
     whistle = replace(noise, samples=noise.samples + 0.5 * np.sin(2 * np.pi * 84.0 * t)[:, None])
-    found, without = feedforward(model, whistle), feedforward(model, noise)
+    found, without = compute_feedforward_forces(model, whistle), compute_feedforward_forces(model, noise)
     assert found.out_of_band_share > 0.3
     assert np.abs(found.forces.samples - without.forces.samples).max() < 0.02
-    assert band_error(noise.samples, plant.play(found.forces.samples), RATE_HZ, BAND_HZ) < 0.02
+    assert compute_band_error(noise.samples, plant.play(found.forces.samples), RATE_HZ, BAND_HZ) < 0.02
 
 
 def test_forces_above_the_cap_are_refused_with_the_factor_that_fits(model, noise):
     loud = replace(noise, samples=8.0 * noise.samples)
     with pytest.raises(ForceLimitError, match="above the cap of 3 N") as refusal:
-        feedforward(model, loud)
+        compute_feedforward_forces(model, loud)
     factor = refusal.value.peaks.largest_scale
-    assert feedforward(model, replace(loud, samples=0.999 * factor * loud.samples)).peaks.is_under_cap
+    assert compute_feedforward_forces(model, replace(loud, samples=0.999 * factor * loud.samples)).peaks.is_under_cap
 
 
 def test_forces_above_the_cap_are_solved_under_it_with_the_loss_stated(model, noise):
     loud = replace(noise, samples=2.0 * noise.samples[600:1400])
-    peak_n = feedforward(model, loud, FeedforwardSettings(cap_n=50.0)).peaks.peak_n
-    capped = feedforward(model, loud, FeedforwardSettings(cap_n=0.8 * peak_n, constrain=True))
+    peak_n = compute_feedforward_forces(model, loud, FeedforwardSettings(cap_n=50.0)).peaks.peak_n
+    capped = compute_feedforward_forces(model, loud, FeedforwardSettings(cap_n=0.8 * peak_n, constrain=True))
     assert np.linalg.norm(capped.forces.samples, axis=1).max() <= 0.8 * peak_n
     assert 0 < capped.loss.lost < capped.loss.error_clipped
 
 
 def test_a_table_with_nothing_in_the_band_is_refused(model):
     with pytest.raises(TrackingError, match="nothing is wanted between 5 and 35 Hz"):
-        feedforward(model, acceleration(np.zeros((500, 3))))
+        compute_feedforward_forces(model, acceleration(np.zeros((500, 3))))

@@ -9,7 +9,11 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response, simulate
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
-from equalizer.tracking.feedforward.periodic_inverse import OutsideBandError, inverse_response, periodic_command
+from equalizer.tracking.feedforward.periodic_inverse import (
+    OutsideBandError,
+    compute_periodic_command,
+    compute_regularised_inverse,
+)
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 
 RATE_HZ = 1000.0
@@ -36,14 +40,14 @@ def wanted(frequency_hz, direction=AXIS, amplitude=1.0, seconds=0.2) -> Signal:
 
 @pytest.mark.parametrize("frequency_hz", [5.0, 15.0, 25.0, 35.0, 45.0])
 def test_a_loop_is_delivered_as_it_was_wanted(model, plant, frequency_hz):
-    loop = ModelEqualizer(model).periodic(wanted(frequency_hz)).samples
+    loop = ModelEqualizer(model).compute_loop_commands(wanted(frequency_hz)).samples
     played = plant.play(np.tile(loop, (30, 1)))[-200:]
     assert np.abs(played - wanted(frequency_hz).samples).max() < 1e-3
 
 
 def test_any_periodic_signal_in_the_band_may_be_wanted(model, plant):
     chord = replace(wanted(5.0), samples=wanted(5.0).samples + wanted(25.0, np.eye(3)[0]).samples)
-    loop = ModelEqualizer(model).periodic(chord).samples
+    loop = ModelEqualizer(model).compute_loop_commands(chord).samples
     assert np.abs(plant.play(np.tile(loop, (30, 1)))[-200:] - chord.samples).max() < 1e-3
 
 
@@ -53,8 +57,8 @@ def test_an_onset_leads_into_the_loop_where_a_faded_loop_leaks(model, plant, fre
     equalizer, ticks = ModelEqualizer(model), 500
     envelope = 0.5 - 0.5 * np.cos(np.pi * np.arange(ticks) / ticks)
     signal = wanted(frequency_hz)
-    loop = np.tile(equalizer.periodic(signal).samples, (10, 1))
-    onset = np.concatenate([equalizer.onset(signal, envelope).samples, loop[ticks % 200 :][:1000]])
+    loop = np.tile(equalizer.compute_loop_commands(signal).samples, (10, 1))
+    onset = np.concatenate([equalizer.compute_onset_commands(signal, envelope).samples, loop[ticks % 200 :][:1000]])
     faded = np.concatenate([envelope[:, None] * loop[:ticks], loop[ticks % 200 :][:1000]])
 
     def leaked(commands):
@@ -69,7 +73,7 @@ def test_an_onset_leads_into_the_loop_where_a_faded_loop_leaks(model, plant, fre
 
 def test_against_a_spring_the_command_leaves_to_it_what_it_does(model, plant):
     """Closed by hand: the spring's force along the motion that was wanted, added to the command, drives the device."""
-    loop = ModelEqualizer(model, SPRING).periodic(wanted(5.0)).samples
+    loop = ModelEqualizer(model, SPRING).compute_loop_commands(wanted(5.0)).samples
     omega = 2 * np.pi * 5.0
     t = np.arange(200) / RATE_HZ
     position = -np.sin(omega * t)[:, None] * AXIS / omega**2
@@ -88,7 +92,7 @@ def test_against_a_spring_an_onset_rises_as_wanted_too(model, plants, frequency_
         at_handle[:, 2 * number] = shape
     equalizer, ticks = ModelEqualizer(model, VirtualSpring(stiffness)), 500
     envelope = 0.5 - 0.5 * np.cos(np.pi * np.arange(ticks) / ticks)
-    commands = equalizer.onset(wanted(frequency_hz), envelope).samples
+    commands = equalizer.compute_onset_commands(wanted(frequency_hz), envelope).samples
     x, played = np.zeros(model.order), np.empty((ticks, 3))
     for k, force in enumerate(commands):
         played[k] = model.C @ x
@@ -99,13 +103,15 @@ def test_against_a_spring_an_onset_rises_as_wanted_too(model, plants, frequency_
 
 def test_a_spring_makes_no_difference_far_above_it(model):
     f = np.array([5.0, 45.0])
-    share = np.abs(inverse_response(model, f, spring=SPRING) - inverse_response(model, f)).max(axis=(1, 2))
+    share = np.abs(compute_regularised_inverse(model, f, spring=SPRING) - compute_regularised_inverse(model, f)).max(
+        axis=(1, 2)
+    )
     assert share[1] < 0.06 * share[0]
 
 
 def test_what_lies_outside_the_band_is_refused_with_what_would_do(model):
     with pytest.raises(OutsideBandError, match=r"made for 4 to 50 Hz, but 55 Hz is wanted; .*--band"):
-        periodic_command(model, wanted(55.0))
+        compute_periodic_command(model, wanted(55.0))
 
 
 @pytest.mark.parametrize(
@@ -117,11 +123,11 @@ def test_what_lies_outside_the_band_is_refused_with_what_would_do(model):
 )
 def test_a_signal_of_another_kind_is_refused(model, changes, said):
     with pytest.raises(ValueError, match=said):
-        periodic_command(model, replace(wanted(5.0), **changes))
+        compute_periodic_command(model, replace(wanted(5.0), **changes))
 
 
 def test_silence_is_played_by_silence(model):
-    assert not periodic_command(model, wanted(5.0, amplitude=0.0)).samples.any()
+    assert not compute_periodic_command(model, wanted(5.0, amplitude=0.0)).samples.any()
 
 
 def test_an_unstable_model_plays_nothing(model):

@@ -5,19 +5,19 @@ import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
-from equalizer.tracking.feedforward.band_part import band_part
-from equalizer.tracking.learning.convergence import convergence
+from equalizer.tracking.feedforward.band_pass import filter_to_band
+from equalizer.tracking.learning.convergence import predict_convergence
 from equalizer.tracking.learning.iteration import (
     Repetition,
     Verdict,
-    largest_share,
-    next_forces,
-    noise_of_repeats,
-    noise_of_rest,
+    estimate_repeat_noise,
+    estimate_rest_noise,
+    find_largest_share,
     rms,
     start_iteration,
+    update_forces,
 )
-from equalizer.tracking.lqr.lqr import stored_gains, track
+from equalizer.tracking.lqr.lqr import compute_stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 
 RATE_HZ, BAND_HZ, AROUND = 1000.0, (5.0, 35.0), 300
@@ -34,16 +34,16 @@ def model(plants) -> IdentifiedModel:
 @pytest.fixture(scope="module")
 def wanted() -> np.ndarray:
     """Two seconds of noise in the band, 1.8 m/s² per axis, faded, with time around."""
-    noise = band_part(np.random.default_rng(7).standard_normal((6000, 3)), RATE_HZ, BAND_HZ)[2000:4000]
+    noise = filter_to_band(np.random.default_rng(7).standard_normal((6000, 3)), RATE_HZ, BAND_HZ)[2000:4000]
     fade = np.clip(np.minimum(np.arange(2000), np.arange(2000)[::-1]) / 100, 0, 1)[:, None]
     rows = np.zeros((2000 + 2 * AROUND, 3))
     rows[AROUND:-AROUND] = 1.8 * noise / noise.std(axis=0) * (0.5 - 0.5 * np.cos(np.pi * fade))
-    return band_part(rows, RATE_HZ, BAND_HZ)
+    return filter_to_band(rows, RATE_HZ, BAND_HZ)
 
 
 @pytest.fixture(scope="module")
 def invert(model, wanted):
-    gains = stored_gains(make_tracking_problem(model, TrackingWeights(weight=1e-3)), len(wanted))
+    gains = compute_stored_gains(make_tracking_problem(model, TrackingWeights(weight=1e-3)), len(wanted))
     return lambda rows: track(gains, rows).forces
 
 
@@ -53,7 +53,7 @@ def repetition(wanted, invert) -> Repetition:
 
 
 def error(device, forces, wanted) -> float:
-    return rms(band_part(device.play(forces) - wanted, RATE_HZ, BAND_HZ)) / rms(wanted)
+    return rms(filter_to_band(device.play(forces) - wanted, RATE_HZ, BAND_HZ)) / rms(wanted)
 
 
 def repeated(device, repetition, repeats, seed):
@@ -62,19 +62,19 @@ def repeated(device, repetition, repeats, seed):
     for play in range(repeats + 1):
         if state.verdict is not Verdict.CONTINUE:
             break
-        state = next_forces(state, device.measured(state.forces, seed=1000 * seed + play))
+        state = update_forces(state, device.measured(state.forces, seed=1000 * seed + play))
     return state
 
 
 @pytest.mark.parametrize(("friction_n", "first_at_least"), [(0.1, 0.1), pytest.param(0.3, 0.3, marks=pytest.mark.slow)])
 def test_friction_is_learnt_within_ten_repeats(rubbing, plants, repetition, wanted, friction_n, first_at_least):
     device = rubbing.rubbing(plants.modes_of(), friction_n)
-    rest = [noise_of_rest(device.measured(np.zeros((1000, 3)), seed=seed + 77), repetition) for seed in SEEDS]
+    rest = [estimate_rest_noise(device.measured(np.zeros((1000, 3)), seed=seed + 77), repetition) for seed in SEEDS]
     states = [
         repeated(device, Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=floor), 10, seed)
         for seed, floor in zip(SEEDS, rest, strict=True)
     ]
-    errors = [error(device, state.best, wanted) for state in states]
+    errors = [error(device, state.best_forces, wanted) for state in states]
     assert error(device, states[0].repetition.invert(wanted), wanted) > first_at_least
     assert np.median(errors) < 0.02
     assert max(errors) < 0.02
@@ -92,9 +92,11 @@ def test_friction_is_learnt_within_ten_repeats(rubbing, plants, repetition, want
 def test_a_good_first_shot_is_not_made_worse(rubbing, plants, repetition, wanted, friction_n, floor_from):
     device = rubbing.rubbing(plants.modes_of(0.003, 0.2), friction_n)
     first = error(device, repetition.invert(wanted), wanted)
-    known = noise_of_rest(device.measured(np.zeros((1000, 3)), seed=5), repetition) if floor_from == "rest" else None
+    known = (
+        estimate_rest_noise(device.measured(np.zeros((1000, 3)), seed=5), repetition) if floor_from == "rest" else None
+    )
     same = Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=known)
-    errors = [error(device, repeated(device, same, 10, seed).best, wanted) for seed in SEEDS]
+    errors = [error(device, repeated(device, same, 10, seed).best_forces, wanted) for seed in SEEDS]
     assert max(errors) <= 1.05 * first
 
 
@@ -102,7 +104,7 @@ def test_a_fixed_gain_would_make_a_good_first_shot_worse(rubbing, plants, repeti
     device = rubbing.rubbing(plants.modes_of(), 0.0)
     forces = repetition.invert(wanted)
     first = error(device, forces, wanted)
-    missing = repetition.part(wanted - device.measured(forces, seed=1))
+    missing = repetition.extract_band(wanted - device.measured(forces, seed=1))
     assert error(device, forces + repetition.invert(missing), wanted) > 1.05 * first
 
 
@@ -118,14 +120,14 @@ def test_the_floor_from_two_plays_is_the_sensors(rubbing, plants, repetition, wa
     device = rubbing.rubbing(plants.modes_of(), 0.1)
     forces = repetition.invert(wanted)
     plays = np.stack([device.measured(forces, seed) for seed in range(2)])
-    noise = band_part(np.random.default_rng(1).standard_normal((20000, 3)) * plants.SENSOR_RMS, RATE_HZ, BAND_HZ)
-    assert noise_of_repeats(plays, repetition) == pytest.approx(rms(noise), rel=0.15)
+    noise = filter_to_band(np.random.default_rng(1).standard_normal((20000, 3)) * plants.SENSOR_RMS, RATE_HZ, BAND_HZ)
+    assert estimate_repeat_noise(plays, repetition) == pytest.approx(rms(noise), rel=0.15)
 
 
 def test_at_a_place_shifted_by_a_fifth_divergence_is_predicted(plants, model):
     inverse = np.linalg.inv(model_response(model, LINES_HZ))
-    here = convergence(inverse, plants.omega_like().response(LINES_HZ), LINES_HZ, BAND_HZ)
-    there = convergence(inverse, plants.omega_like(0.2, 10.0).response(LINES_HZ), LINES_HZ, BAND_HZ)
+    here = predict_convergence(inverse, plants.omega_like().response(LINES_HZ), LINES_HZ, BAND_HZ)
+    there = predict_convergence(inverse, plants.omega_like(0.2, 10.0).response(LINES_HZ), LINES_HZ, BAND_HZ)
     assert here.converges
     assert here.safe_beta == pytest.approx(2, abs=1e-6)
     assert not there.converges
@@ -134,17 +136,17 @@ def test_at_a_place_shifted_by_a_fifth_divergence_is_predicted(plants, model):
 
 def test_the_safe_gain_is_where_errors_begin_to_grow(plants, model):
     inverse, device = np.linalg.inv(model_response(model, LINES_HZ)), plants.omega_like(0.1, 5.0).response(LINES_HZ)
-    safe = convergence(inverse, device, LINES_HZ, BAND_HZ).safe_beta
+    safe = predict_convergence(inverse, device, LINES_HZ, BAND_HZ).safe_beta
     assert 0 < safe < 2
-    assert convergence(inverse, device, LINES_HZ, BAND_HZ, 0.999 * safe).converges
-    assert not convergence(inverse, device, LINES_HZ, BAND_HZ, 1.001 * safe).converges
+    assert predict_convergence(inverse, device, LINES_HZ, BAND_HZ, 0.999 * safe).converges
+    assert not predict_convergence(inverse, device, LINES_HZ, BAND_HZ, 1.001 * safe).converges
 
 
 @pytest.mark.parametrize("singular", [0, 1], ids=["learned inverse", "device"])
 def test_no_gain_is_safe_where_one_direction_is_not_corrected_or_does_not_move(plants, model, singular):
     inverse, device = np.linalg.inv(model_response(model, LINES_HZ)), plants.omega_like().response(LINES_HZ)
     (inverse, device)[singular][:, 1] = (inverse, device)[singular][:, 0]
-    found = convergence(inverse, device, LINES_HZ, BAND_HZ)
+    found = predict_convergence(inverse, device, LINES_HZ, BAND_HZ)
     assert found.safe_beta == 0
     assert not found.converges
 
@@ -152,23 +154,23 @@ def test_no_gain_is_safe_where_one_direction_is_not_corrected_or_does_not_move(p
 def test_of_several_possible_devices_the_worst_counts(plants, model):
     inverse = np.linalg.inv(model_response(model, LINES_HZ))
     one, other = (plants.omega_like(shift).response(LINES_HZ) for shift in (0.0, 0.1))
-    both = convergence(inverse, np.stack([one, other]), LINES_HZ, BAND_HZ)
-    assert both.safe_beta == convergence(inverse, other, LINES_HZ, BAND_HZ).safe_beta
+    both = predict_convergence(inverse, np.stack([one, other]), LINES_HZ, BAND_HZ)
+    assert both.safe_beta == predict_convergence(inverse, other, LINES_HZ, BAND_HZ).safe_beta
 
 
 def test_responses_that_do_not_belong_together_are_refused(plants, model):
     inverse = np.linalg.inv(model_response(model, LINES_HZ))
     with pytest.raises(ValueError, match="as many forces as responses"):
-        convergence(inverse, inverse[:5], LINES_HZ, BAND_HZ)
+        predict_convergence(inverse, inverse[:5], LINES_HZ, BAND_HZ)
     with pytest.raises(ValueError, match="no line lies in the band"):
-        convergence(inverse, inverse, LINES_HZ, (80.0, 90.0))
+        predict_convergence(inverse, inverse, LINES_HZ, (80.0, 90.0))
 
 
 def test_at_a_shifted_place_a_smaller_gain_gets_there(rubbing, plants, repetition, wanted):
     device = rubbing.rubbing(plants.modes_of(0.2, 10.0), 0.0)
     careful = Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, first_gain=0.7)
     first = error(device, repetition.invert(wanted), wanted)
-    errors = [error(device, repeated(device, careful, 10, seed).best, wanted) for seed in range(3)]
+    errors = [error(device, repeated(device, careful, 10, seed).best_forces, wanted) for seed in range(3)]
     assert first > 0.2
     assert max(errors) < 0.05
 
@@ -180,7 +182,7 @@ def test_a_correction_that_is_always_wrong_ends_as_diverging(plants, repetition,
     for play in range(10):
         if state.verdict is not Verdict.CONTINUE:
             break
-        state = next_forces(state, plant.measured(state.forces, play))
+        state = update_forces(state, plant.measured(state.forces, play))
     assert state.verdict is Verdict.DIVERGING
     np.testing.assert_array_equal(state.forces, 0.5 * repetition.invert(wanted))
 
@@ -188,9 +190,9 @@ def test_a_correction_that_is_always_wrong_ends_as_diverging(plants, repetition,
 def test_corrections_stay_under_the_cap_and_say_so(rubbing, plants, repetition, wanted):
     device = rubbing.rubbing(plants.modes_of(), 0.3)
     peak = float(np.linalg.norm(repetition.invert(wanted), axis=1).max())
-    capped = Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, cap=1.02 * peak)
+    capped = Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, cap_n=1.02 * peak)
     state = repeated(device, capped, 5, seed=1)
-    assert np.linalg.norm(state.best, axis=1).max() <= 1.02 * peak * (1 + 1e-9)
+    assert np.linalg.norm(state.best_forces, axis=1).max() <= 1.02 * peak * (1 + 1e-9)
     assert "were scaled down" in state.remark
     assert f"within {1.02 * peak:g} N" in state.remark
 
@@ -198,20 +200,24 @@ def test_corrections_stay_under_the_cap_and_say_so(rubbing, plants, repetition, 
 def test_corrections_stay_below_the_slew_limit_and_say_so(rubbing, plants, repetition, wanted):
     device, first = rubbing.rubbing(plants.modes_of(), 0.3), repetition.invert(wanted)
     slew = 1.1 * steepest(first)
-    state = start_iteration(Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=0.02, slew=slew))
+    state = start_iteration(
+        Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=0.02, slew_n_per_s=slew)
+    )
     found = []
     while state.verdict is Verdict.CONTINUE and len(found) < 5:
-        state = next_forces(state, device.measured(state.forces, seed=len(found)))
+        state = update_forces(state, device.measured(state.forces, seed=len(found)))
         found.append(steepest(state.forces))
     assert max(found) <= slew * (1 + 1e-9)
-    assert min(state.fitted) < 1
+    assert min(state.scales) < 1
     assert state.remark.endswith(f"to keep its change within {slew:.4g} N/s")
 
 
 def test_a_correction_that_no_slew_limit_leaves_room_for_ends_with_the_best_forces(plants, repetition, wanted):
     first = repetition.invert(wanted)
-    tight = Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=1e-3, slew=0.5 * steepest(first))
-    state = next_forces(start_iteration(tight, first), 0.8 * wanted)
+    tight = Repetition(
+        wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=1e-3, slew_n_per_s=0.5 * steepest(first)
+    )
+    state = update_forces(start_iteration(tight, first), 0.8 * wanted)
     assert state.verdict is Verdict.BEST_KEPT
     np.testing.assert_array_equal(state.forces, first)
 
@@ -224,7 +230,7 @@ def test_at_the_ends_of_the_record_no_impulse_is_built_up(repetition, wanted):
     first = repetition.invert(wanted)
     state = start_iteration(known, first)
     for _ in range(4):
-        state = next_forces(state, 0.5 * wanted)
+        state = update_forces(state, 0.5 * wanted)
     assert state.gains
     np.testing.assert_array_equal(state.forces[[0, -1]], first[[0, -1]])
     assert steepest(state.forces) < 0.5 * RATE_HZ * np.linalg.norm(jumps[0])
@@ -238,20 +244,20 @@ def test_what_fits_under_a_cap_is_not_above_it_by_rounding():
     for seed in range(200):
         forces, correction = np.random.default_rng(seed).standard_normal((2, 20, 3))
         cap = 1.01 * float(np.linalg.norm(forces, axis=1).max())
-        fitted = forces + largest_share(forces, 10 * correction, cap) * 10 * correction
+        fitted = forces + find_largest_share(forces, 10 * correction, cap) * 10 * correction
         assert np.linalg.norm(fitted, axis=1).max() <= cap
 
 
 def test_the_share_that_fits_ends_at_the_cap():
     forces, correction = np.array([[1.0, 0.0], [0.0, 0.5]]), np.array([[2.0, 1.0], [0.0, 0.1]])
-    share = largest_share(forces, correction, 2.0)
+    share = find_largest_share(forces, correction, 2.0)
     assert np.linalg.norm(forces + share * correction, axis=1).max() == pytest.approx(2.0)
-    assert largest_share(forces, correction, 10.0) == 1.0
+    assert find_largest_share(forces, correction, 10.0) == 1.0
 
 
 def test_first_forces_above_the_cap_are_refused(repetition, wanted):
     with pytest.raises(ValueError, match=r"the first forces reach .* N, but the cap is 0.1 N"):
-        start_iteration(Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, cap=0.1))
+        start_iteration(Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, cap_n=0.1))
 
 
 def test_what_has_nothing_in_the_band_is_refused(repetition, wanted):
@@ -262,23 +268,23 @@ def test_what_has_nothing_in_the_band_is_refused(repetition, wanted):
 def test_a_measurement_that_does_not_fit_is_refused(repetition, wanted):
     state = start_iteration(repetition)
     with pytest.raises(ValueError, match="it must be"):
-        next_forces(state, wanted[:-1])
+        update_forces(state, wanted[:-1])
     with pytest.raises(ValueError, match="not finite"):
-        next_forces(state, wanted * np.nan)
+        update_forces(state, wanted * np.nan)
 
 
 def test_an_iteration_that_is_over_takes_nothing_more(plants, repetition, wanted):
     state = repeated(plants.omega_like(), repetition, 10, seed=1)
     with pytest.raises(ValueError, match="this iteration is over"):
-        next_forces(state, wanted)
+        update_forces(state, wanted)
 
 
 def test_a_sharp_tone_in_the_band_passes_whole_and_one_outside_not():
     time_s = np.arange(4000) / RATE_HZ
     window = np.hanning(4000)[:, None]
     inside, outside = (np.sin(2 * np.pi * hz * time_s)[:, None] * window for hz in (15.0, 60.0))
-    np.testing.assert_allclose(band_part(inside, RATE_HZ, BAND_HZ), inside, atol=1e-3)
-    assert rms(band_part(outside, RATE_HZ, BAND_HZ)) < 1e-4
+    np.testing.assert_allclose(filter_to_band(inside, RATE_HZ, BAND_HZ), inside, atol=1e-3)
+    assert rms(filter_to_band(outside, RATE_HZ, BAND_HZ)) < 1e-4
 
 
 def test_rows_that_are_not_judged_do_not_hold_up_a_verdict(plants, repetition, wanted):
@@ -290,5 +296,5 @@ def test_rows_that_are_not_judged_do_not_hold_up_a_verdict(plants, repetition, w
         state = start_iteration(
             Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, noise_floor=0.02, judged_rows=judged)
         )
-        states.append(next_forces(state, plant.measured(state.forces, 3) + spoilt))
+        states.append(update_forces(state, plant.measured(state.forces, 3) + spoilt))
     assert [state.verdict for state in states] == [Verdict.CONTINUE, Verdict.AT_FLOOR]

@@ -3,7 +3,7 @@ import pytest
 from scipy.optimize import minimize
 
 from equalizer.tracking.lqr.constrained import CapSettings, track_under_cap
-from equalizer.tracking.lqr.lqr import stored_gains, track
+from equalizer.tracking.lqr.lqr import compute_stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
 from tests.equalizer.tracking.lqr.dense_least_squares import block_toeplitz
 
@@ -13,7 +13,7 @@ def walk(samples, seed):
 
 
 def free_peak(problem, wanted):
-    return float(np.linalg.norm(track(stored_gains(problem, len(wanted)), wanted).forces, axis=1).max())
+    return float(np.linalg.norm(track(compute_stored_gains(problem, len(wanted)), wanted).forces, axis=1).max())
 
 
 def dense_optimum(problem, wanted, cap_n, already):
@@ -72,7 +72,7 @@ def test_the_cap_holds_exactly_and_the_loss_is_less_than_that_of_clipping(device
 def test_a_cap_that_does_not_bind_costs_nothing(problem_of):
     problem, wanted = problem_of(6, 3), walk(50, 3)
     capped = track_under_cap(problem, wanted, 1.01 * free_peak(problem, wanted))
-    assert np.array_equal(capped.forces, track(stored_gains(problem, 50), wanted).forces)
+    assert np.array_equal(capped.forces, track(compute_stored_gains(problem, 50), wanted).forces)
     assert (capped.loss.lost, capped.loss.gap, capped.loss.rounds) == (0.0, 0.0, 0)
 
 

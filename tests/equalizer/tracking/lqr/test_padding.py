@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from equalizer.tracking.lqr.lqr import stored_gains, track
-from equalizer.tracking.lqr.padding import CAUSAL, Padding, band_error, simulate_from_rest, track_padded
+from equalizer.tracking.lqr.lqr import compute_stored_gains, track
+from equalizer.tracking.lqr.padding import CAUSAL, Padding, compute_band_error, simulate_from_rest, track_padded
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
 
 
@@ -20,7 +20,7 @@ def noise(plants):
 def test_rows_of_forces_are_one_to_one_with_rows_of_the_trajectory(problem, noise):
     for padding in (Padding(), CAUSAL, Padding(0.0, 0.0), Padding(0.1, 0.2)):
         padded = track_padded(problem, noise, padding)
-        before, after = padding.samples(1000.0)
+        before, after = padding.count_rows(1000.0)
         assert padded.forces.shape == (500, 3)
         assert padded.padded.forces.shape == (500 + before + after, 3)
         assert padded.padded.predicted[padded.rows].shape == (500, 3)
@@ -28,7 +28,7 @@ def test_rows_of_forces_are_one_to_one_with_rows_of_the_trajectory(problem, nois
 
 def test_no_padding_at_all_is_plain_tracking(problem, noise):
     bare = track_padded(problem, noise, Padding(0.0, 0.0))
-    assert (bare.forces == track(stored_gains(problem, 500), noise).forces).all()
+    assert (bare.forces == track(compute_stored_gains(problem, 500), noise).forces).all()
 
 
 def test_room_before_the_start_helps_where_it_is_played(problem, noise):
@@ -47,8 +47,8 @@ def test_the_stated_errors_are_those_of_the_device(problem, noise, plants):
     padded = track_padded(problem, noise, Padding())
     whole = plants.omega_like().play(padded.padded.forces)[padded.rows]
     cut = plants.omega_like().play(padded.forces)
-    assert padded.padded_error == pytest.approx(band_error(noise, whole, 1000.0, (5.0, 35.0)), rel=1e-6)
-    assert padded.cut_error == pytest.approx(band_error(noise, cut, 1000.0, (5.0, 35.0)), rel=1e-6)
+    assert padded.padded_error == pytest.approx(compute_band_error(noise, whole, 1000.0, (5.0, 35.0)), rel=1e-6)
+    assert padded.cut_error == pytest.approx(compute_band_error(noise, cut, 1000.0, (5.0, 35.0)), rel=1e-6)
 
 
 def test_room_after_the_end_lets_the_device_come_to_rest(problem, noise):

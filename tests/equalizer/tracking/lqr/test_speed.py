@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from equalizer.tracking.lqr.changing_direction import make_rotatable_transient, play
-from equalizer.tracking.lqr.lqr import stored_gains, track
-from equalizer.tracking.lqr.riccati import backward_gains
-from equalizer.tracking.lqr.rotation import rotation_basis
+from equalizer.tracking.lqr.lqr import compute_stored_gains, track
+from equalizer.tracking.lqr.riccati import compute_backward_gains
+from equalizer.tracking.lqr.rotation import compute_rotation_basis
 
 SAMPLES, TRIES = 500, 5
 
@@ -28,11 +28,11 @@ def half_a_second(problem_of):
 
 def test_stored_gains_are_ten_times_faster_than_the_compiled_recursion(half_a_second):
     problem, wanted = half_a_second
-    gains = stored_gains(problem, SAMPLES)
+    gains = compute_stored_gains(problem, SAMPLES)
 
     def reached() -> bool:
-        anew = quickest(lambda: track(stored_gains(problem, SAMPLES), wanted))
-        plainly = quickest(lambda: backward_gains(problem, SAMPLES), repeat=2)
+        anew = quickest(lambda: track(compute_stored_gains(problem, SAMPLES), wanted))
+        plainly = quickest(lambda: compute_backward_gains(problem, SAMPLES), repeat=2)
         stored = quickest(lambda: track(gains, wanted), repeat=50)
         return anew >= 10 * stored and plainly >= 100 * stored
 
@@ -41,12 +41,12 @@ def test_stored_gains_are_ten_times_faster_than_the_compiled_recursion(half_a_se
 
 def test_a_rotation_is_five_hundred_times_faster(half_a_second, random_rotation):
     problem, wanted = half_a_second
-    basis, R = rotation_basis(stored_gains(problem, SAMPLES), wanted), random_rotation(0)
+    basis, R = compute_rotation_basis(compute_stored_gains(problem, SAMPLES), wanted), random_rotation(0)
 
     def reached() -> bool:
-        anew = quickest(lambda: track(stored_gains(problem, SAMPLES), wanted))
-        plainly = quickest(lambda: backward_gains(problem, SAMPLES), repeat=2)
-        rotated = quickest(lambda: basis.forces(R), number=200, repeat=50)
+        anew = quickest(lambda: track(compute_stored_gains(problem, SAMPLES), wanted))
+        plainly = quickest(lambda: compute_backward_gains(problem, SAMPLES), repeat=2)
+        rotated = quickest(lambda: basis.compute_forces(R), number=200, repeat=50)
         return anew >= 500 * rotated and plainly >= 5000 * rotated
 
     assert in_one_of_some_tries(reached)
@@ -54,6 +54,6 @@ def test_a_rotation_is_five_hundred_times_faster(half_a_second, random_rotation)
 
 def test_a_tick_that_turns_takes_less_than_a_microsecond(half_a_second, random_rotation):
     problem, wanted = half_a_second
-    transient = make_rotatable_transient(stored_gains(problem, SAMPLES), wanted)
+    transient = make_rotatable_transient(compute_stored_gains(problem, SAMPLES), wanted)
     turns = np.array([random_rotation(k) for k in range(SAMPLES)])
     assert in_one_of_some_tries(lambda: quickest(lambda: play(transient, turns)) <= SAMPLES * 1e-6)

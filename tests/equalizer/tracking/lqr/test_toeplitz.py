@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from equalizer.tracking.lqr.lqr import stored_gains, track
+from equalizer.tracking.lqr.lqr import compute_stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 from tests.equalizer.tracking.lqr.dense_least_squares import block_toeplitz, least_squares_forces
 
@@ -20,7 +20,7 @@ def test_riccati_equals_dense_least_squares(problem_of, difference, weight, feed
             problem = problem_of(order, seed, weight, float(seed % 2), feedthrough=feedthrough)
             draw = np.random.default_rng(seed).standard_normal
             wanted, x0 = draw((samples, 3)), draw(problem.order)
-            found = track(stored_gains(problem, samples), wanted, x0).forces
+            found = track(compute_stored_gains(problem, samples), wanted, x0).forces
             right = least_squares_forces(problem, wanted, x0)
             assert difference(found, right) <= AGREEMENT[weight], (order, seed, samples)
 
@@ -29,7 +29,7 @@ def test_riccati_equals_dense_least_squares(problem_of, difference, weight, feed
 def test_and_on_a_device_s_own_equations(device_model, difference, weight):
     problem = make_tracking_problem(device_model, TrackingWeights(weight))
     wanted = np.random.default_rng(0).standard_normal((250, 3))
-    found = track(stored_gains(problem, 250), wanted).forces
+    found = track(compute_stored_gains(problem, 250), wanted).forces
     assert difference(found, least_squares_forces(problem, wanted)) <= AGREEMENT[weight]
 
 
@@ -43,7 +43,7 @@ def test_with_any_output_weight_terminal_weight_and_target(model_of, difference,
     problem = make_tracking_problem(model_of(order, seed, size=size), TrackingWeights(weight, root @ root.T))
     end_root, wanted, x0, end = draw((order, order)), draw((samples, size)), draw(order), draw(order)
     terminal = end_root @ end_root.T
-    found = track(stored_gains(problem, samples, terminal), wanted, x0, end).forces
+    found = track(compute_stored_gains(problem, samples, terminal), wanted, x0, end).forces
     assert difference(found, least_squares_forces(problem, wanted, x0, terminal, end)) <= 1e-10
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from equalizer.tracking.lqr.lqr import stored_gains, track
+from equalizer.tracking.lqr.lqr import compute_stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingWeights, make_tracking_problem
 
 
@@ -28,7 +28,7 @@ def test_a_low_frequency_weight_keeps_slow_force_down(device_model):
     free, held = (
         make_tracking_problem(device_model, TrackingWeights(1e-5, low_frequency_weight=w)) for w in (0.0, 10.0)
     )
-    mean = [np.abs(track(stored_gains(problem, 1000), wanted).forces[:, 0].mean()) for problem in (free, held)]
+    mean = [np.abs(track(compute_stored_gains(problem, 1000), wanted).forces[:, 0].mean()) for problem in (free, held)]
     assert mean[1] < 0.2 * mean[0]
 
 
@@ -43,7 +43,7 @@ def test_the_model_s_own_state_is_filled_up_with_penalties_at_rest(problem_of):
 def test_a_state_that_is_no_number_is_refused(problem_of):
     problem = problem_of(4, 1)
     with pytest.raises(TrackingError, match="a state holds values that are not finite"):
-        track(stored_gains(problem, 5), np.zeros((5, 3)), x0=np.array([0.0, np.nan, 0.0, 0.0]))
+        track(compute_stored_gains(problem, 5), np.zeros((5, 3)), x0=np.array([0.0, np.nan, 0.0, 0.0]))
 
 
 def test_the_matrices_cannot_be_written(problem_of):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from equalizer.tracking.lqr.lqr import stored_gains, track
+from equalizer.tracking.lqr.lqr import compute_stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingError
 from equalizer.tracking.realtime.controller_cases import controller_cases
 from equalizer.tracking.realtime.realtime_controller import (
@@ -48,7 +48,7 @@ def test_the_transient_is_the_best_forces_for_the_table_with_room_behind_it(cont
     wanted = np.pad(make_default_transient(device_model), ((0, 300), (0, 0)))
     assert len(controller.transient) == len(wanted)
     cases = controller_cases(controller, seed=5)
-    best = track(stored_gains(controller.problem, len(wanted)), wanted)
+    best = track(compute_stored_gains(controller.problem, len(wanted)), wanted)
     np.testing.assert_allclose(np.einsum("kmc,c->km", controller.transient.g, np.eye(3).ravel())[0], best.forces[0])
     assert len(cases) > len(wanted)
 

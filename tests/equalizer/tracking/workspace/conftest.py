@@ -49,7 +49,7 @@ class Workspaces:
     def worst(self, at, bend=0.0) -> Quality:
         """at: from a place to ModelsAtPlace. Over all lines and 21 places."""
         found = [
-            measure_quality(self.plant(x, bend).response(LINES_HZ) @ at(self.place_m(x)).inverse(LINES_HZ))
+            measure_quality(self.plant(x, bend).response(LINES_HZ) @ at(self.place_m(x)).compute_inverse(LINES_HZ))
             for x in OFF_GRID
         ]
         return Quality(

@@ -8,10 +8,10 @@ import pytest
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import model_response
 from equalizer.tracking.feedforward.baselines import (
-    baseline_inverses,
+    compute_baseline_inverses,
+    fit_rigid_body_inverse,
+    invert_measured_response,
     make_identified_inverse,
-    raw_estimate,
-    rigid_body,
 )
 from equalizer.tracking.feedforward.quality import measure_quality
 
@@ -35,7 +35,7 @@ def rows(plants, three, measured, workspaces):
         "edge": workspaces.plant(1.0).response(LINES),
         "hand": hand.response(LINES),
     }
-    inverses = baseline_inverses(three.models[0], measured, LINES)
+    inverses = compute_baseline_inverses(three.models[0], measured, LINES)
     return {
         (where, inverse.name): measure_quality(response @ inverse.response)
         for where, response in responses.items()
@@ -73,7 +73,7 @@ def test_a_rigid_model_does_not_hold_resonances_but_is_exact_for_a_rigid_device(
         A, np.array([[0.0], [step / mass]]), np.array([[-40 / mass, -3 / mass]]), np.array([[1 / mass]]),
         rate, (5.0, 35.0), "N", "m/s^2", ("fx",), ("ax",),
     )  # fmt: skip
-    delivered = model_response(model, LINES) @ rigid_body(model, LINES).response
+    delivered = model_response(model, LINES) @ fit_rigid_body_inverse(model, LINES).response
     assert np.abs(delivered - 1).max() < 0.01
 
 
@@ -87,7 +87,7 @@ def test_in_a_hand_the_free_model_loses_and_one_identified_there_wins_it_back(ro
 
 
 def test_costs_are_counted(three, measured):
-    cost = {each.name: each.multiply_adds for each in baseline_inverses(three.models[0], measured, LINES)}
+    cost = {each.name: each.multiply_adds for each in compute_baseline_inverses(three.models[0], measured, LINES)}
     assert cost == {
         "nothing": 0,
         "static gain": 3,
@@ -100,10 +100,10 @@ def test_costs_are_counted(three, measured):
 
 def test_a_raw_estimate_says_nothing_beyond_its_lines(measured):
     with pytest.raises(ValueError, match="reliable lines from 4.5 to 37 Hz, but 30 to 40 Hz is wanted"):
-        raw_estimate(measured, np.array([30.0, 40.0]))
+        invert_measured_response(measured, np.array([30.0, 40.0]))
     nowhere = measured.select_lines(measured.frequency_hz > 100)
     with pytest.raises(ValueError, match="reliable lines"):
-        raw_estimate(nowhere, np.array([30.0]))
+        invert_measured_response(nowhere, np.array([30.0]))
 
 
 @pytest.mark.slow

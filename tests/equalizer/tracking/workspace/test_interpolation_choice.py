@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.tracking.workspace.interpolation_choice import HeldOutPlace, choose_interpolation, held_out_model
+from equalizer.tracking.workspace.interpolation_choice import HeldOutPlace, choose_interpolation, make_held_out_place
 from equalizer.tracking.workspace.workspace_models import WorkspaceError, WorkspaceModels
 
 LINES = np.linspace(5, 35, 301)
@@ -17,7 +17,7 @@ def test_a_model_left_out_shows_that_moving_resonances_are_better_interpolated(t
     assert check.modal_error < 0.1 < 0.2 < check.blended_error
     assert check.modal.coupling_db < check.blended.coupling_db - 10
     assert "resonances are interpolated (error at 1 place held out:" in choice.reason
-    assert len(choice.at((0.02, 0.01, 0.0)).models) == 1
+    assert len(choice.find_models_at((0.02, 0.01, 0.0)).models) == 1
 
 
 @pytest.mark.slow
@@ -33,7 +33,7 @@ def test_without_a_model_between_others_forces_are_blended(three):
     choice = choose_interpolation(ends)
     assert choice.interpolation == "blended forces"
     assert "no model lies between the others" in choice.reason
-    assert choice.at((0.03, 0.01, 0.0)).weights == pytest.approx((0.5, 0.5))
+    assert choice.find_models_at((0.03, 0.01, 0.0)).weights == pytest.approx((0.5, 0.5))
 
 
 def test_where_modes_do_not_match_forces_are_blended_and_the_reason_is_reported(three):
@@ -67,7 +67,7 @@ def test_a_check_where_blending_does_better_is_obeyed(workspaces, three):
     from equalizer.tracking.workspace.blended_inverse import blend_at
 
     place = workspaces.place_m(0.3)
-    truth = np.linalg.inv(blend_at(three, place).inverse(LINES))
+    truth = np.linalg.inv(blend_at(three, place).compute_inverse(LINES))
     choice = choose_interpolation(three, [HeldOutPlace(place, LINES, truth)])
     assert choice.interpolation == "blended forces"
     assert choice.reason.startswith("forces are blended (error at 1 place held out:")
@@ -80,9 +80,9 @@ def test_one_model_is_all_there_is(three):
 
 def test_a_held_out_place_that_is_a_model_s_own_is_refused(three):
     with pytest.raises(WorkspaceError, match="the place held out is that of model 2"):
-        choose_interpolation(three, [held_out_model(three.models[1], (5.0, 35.0))])
+        choose_interpolation(three, [make_held_out_place(three.models[1], (5.0, 35.0))])
 
 
 def test_a_held_out_model_needs_a_place(three):
     with pytest.raises(ValueError, match="does not say where it was identified"):
-        held_out_model(replace(three.models[0], place_m=None), (5.0, 35.0))
+        make_held_out_place(replace(three.models[0], place_m=None), (5.0, 35.0))

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from equalizer.tracking.workspace.band_modes import BandMode
-from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError, match_modes, mode_likeness
+from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError, compute_modal_assurance, match_modes
 
 BAND = (5.0, 35.0)
 SHAPES = np.random.default_rng(4).standard_normal((6, 3))
@@ -50,6 +50,6 @@ def test_a_mode_that_changed_its_shape_altogether_is_refused():
 
 def test_likeness_ignores_a_complex_factor():
     residue = SHAPES[:3] + 1j * SHAPES[3:]
-    assert mode_likeness(residue, (2 - 3j) * residue) == pytest.approx(1)
-    assert mode_likeness(np.diag([1, 0, 0]), np.diag([0, 1, 0])) == 0
-    assert mode_likeness(np.zeros((3, 3)), residue) == 0
+    assert compute_modal_assurance(residue, (2 - 3j) * residue) == pytest.approx(1)
+    assert compute_modal_assurance(np.diag([1, 0, 0]), np.diag([0, 1, 0])) == 0
+    assert compute_modal_assurance(np.zeros((3, 3)), residue) == 0

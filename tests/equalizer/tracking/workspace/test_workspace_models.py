@@ -56,14 +56,16 @@ def test_forces_are_blended_not_models(model):
     """Half of what each model asks for; the mean of the models would ask for something else."""
     strong = moved(model, 0.02, C=3 * np.eye(2))
     at = blend_at(WorkspaceModels((model, strong)), (0.01, 0.0, 0.0))
-    asked = at.inverse(np.array([10.0]), weight=0.0)[0]
-    parts = [blend_at(WorkspaceModels((each,)), (0, 0, 0)).inverse(np.array([10.0]), 0.0)[0] for each in at.models]
+    asked = at.compute_inverse(np.array([10.0]), weight=0.0)[0]
+    parts = [
+        blend_at(WorkspaceModels((each,)), (0, 0, 0)).compute_inverse(np.array([10.0]), 0.0)[0] for each in at.models
+    ]
     np.testing.assert_allclose(asked, (parts[0] + parts[1]) / 2)
-    np.testing.assert_allclose(at.forces(lambda each: each.C), 2 * np.eye(2))
+    np.testing.assert_allclose(at.compute_forces(lambda each: each.C), 2 * np.eye(2))
 
 
 def test_a_model_that_does_not_count_is_not_asked(model):
     at = blend_at(WorkspaceModels((model, moved(model, 0.02))), (0.0, 0.0, 0.0))
     asked = []
-    at.forces(lambda each: asked.append(each) or np.zeros(1))
+    at.compute_forces(lambda each: asked.append(each) or np.zeros(1))
     assert asked == [model]

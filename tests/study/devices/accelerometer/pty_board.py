@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from study.devices.accelerometer.calibration import Calibration
-from study.devices.accelerometer.parser import CHECKED, LAYOUT, SIZE, SYNC, compute_crc
+from study.devices.accelerometer.parser import CRC_BYTES, PACKET_DTYPE, PACKET_SIZE, SYNC, compute_crc
 
 SCALE = 600.0
 IDEAL = Calibration(np.full(3, 32_768.0), SCALE * np.eye(3), np.zeros(3), 0.0)
@@ -22,12 +22,12 @@ AT_REST = np.array([0.0, 0.0, 9.81])
 def encode_packets(sequence: npt.ArrayLike, time_us: npt.ArrayLike, raw: npt.ArrayLike) -> bytes:
     """Packets as the firmware sends them; sequence (n,), time_us (n,) and raw (n, 3), taken modulo their range."""
     numbers = np.atleast_1d(np.asarray(sequence, dtype=np.int64))
-    packets = np.zeros(len(numbers), dtype=LAYOUT)
+    packets = np.zeros(len(numbers), dtype=PACKET_DTYPE)
     packets["sync"] = int.from_bytes(SYNC, "little")
     packets["sequence"] = numbers & 0xFFFF
     packets["time_us"] = np.asarray(time_us, dtype=np.int64) & 0xFFFFFFFF
     packets["raw"] = raw
-    packets["crc"] = compute_crc(packets.view(np.uint8).reshape(-1, SIZE)[:, CHECKED])
+    packets["crc"] = compute_crc(packets.view(np.uint8).reshape(-1, PACKET_SIZE)[:, CRC_BYTES])
     return packets.tobytes()
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from study.devices.accelerometer.parser import CHECKED, SIZE, SYNC, PacketParser, compute_crc
+from study.devices.accelerometer.parser import CRC_BYTES, PACKET_SIZE, SYNC, PacketParser, compute_crc
 from tests.study.devices.accelerometer.pty_board import encode_packets
 
 FIRMWARE = Path(__file__).parents[4] / "docs" / "firmware"
@@ -37,7 +37,7 @@ def test_encoded_packets_are_decoded_unchanged():
 
 
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(cuts=st.lists(st.integers(0, 100 * SIZE), max_size=40))
+@given(cuts=st.lists(st.integers(0, 100 * PACKET_SIZE), max_size=40))
 def test_packets_are_decoded_from_bytes_split_anywhere(cuts):
     data, raw = stream(100)
     parser, found = PacketParser(), []
@@ -58,8 +58,8 @@ def test_counters_and_times_continue_after_an_overflow():
 def test_lost_packets_are_counted():
     data, _ = stream(100)
     parser = PacketParser()
-    parser.feed(data[: 10 * SIZE])
-    parser.feed(data[13 * SIZE : 50 * SIZE] + data[90 * SIZE :])
+    parser.feed(data[: 10 * PACKET_SIZE])
+    parser.feed(data[13 * PACKET_SIZE : 50 * PACKET_SIZE] + data[90 * PACKET_SIZE :])
     assert parser.counts.lost == 3 + 40
     assert (parser.counts.packets, parser.counts.restarts) == (57, 0)
 
@@ -99,11 +99,11 @@ def test_among_a_million_garbled_bytes_every_good_packet_is_found(seed):
     fate = random.choice(["good", "torn", "flipped"], size=count, p=[0.8, 0.1, 0.1])
     pieces, starts = [], []
     for k in range(count):
-        packet = bytearray(data[k * SIZE : (k + 1) * SIZE])
+        packet = bytearray(data[k * PACKET_SIZE : (k + 1) * PACKET_SIZE])
         if fate[k] == "torn":
-            del packet[random.integers(0, SIZE) :]
+            del packet[random.integers(0, PACKET_SIZE) :]
         elif fate[k] == "flipped":
-            packet[random.integers(0, SIZE)] ^= 1 << random.integers(0, 8)
+            packet[random.integers(0, PACKET_SIZE)] ^= 1 << random.integers(0, 8)
         noise = random.integers(0, 256, random.integers(0, 80), dtype=np.uint8).tobytes()
         starts.append(sum(map(len, pieces[-3:])) + (starts[-1] if starts else 0))
         pieces += [bytes(packet), SYNC * int(random.integers(0, 3)), noise]
@@ -116,42 +116,50 @@ def test_among_a_million_garbled_bytes_every_good_packet_is_found(seed):
         at += size
     numbers = np.concatenate([samples.sequence for samples in found])
     # A packet whose last byte was lost is whole all the same where the noise after it begins with that byte.
-    whole = [k for k in range(count) if garbled[starts[k] : starts[k] + SIZE] == data[k * SIZE : (k + 1) * SIZE]]
+    whole = [
+        k
+        for k in range(count)
+        if garbled[starts[k] : starts[k] + PACKET_SIZE] == data[k * PACKET_SIZE : (k + 1) * PACKET_SIZE]
+    ]
     assert set(np.flatnonzero(fate == "good")) <= set(whole)
     assert numbers.tolist() == whole
     assert (np.concatenate([samples.raw for samples in found]) == raw[whole]).all()
     counts = parser.counts
     assert counts.packets == len(numbers)
     assert counts.packets + counts.lost == numbers[-1] - numbers[0] + 1
-    assert 0 <= len(garbled) - SIZE * counts.packets - counts.spoiled_bytes < SIZE
+    assert 0 <= len(garbled) - PACKET_SIZE * counts.packets - counts.spoiled_bytes < PACKET_SIZE
 
 
 def test_a_million_bytes_of_noise_are_no_packets():
     parser = PacketParser()
     noise = np.random.default_rng(4).integers(0, 256, 10**6, dtype=np.uint8).tobytes()
     assert len(parser.feed(noise)) == 0
-    assert parser.counts.spoiled_bytes > 10**6 - SIZE
+    assert parser.counts.spoiled_bytes > 10**6 - PACKET_SIZE
 
 
 def forged(tail: bytes, sequence: int) -> bytes:
     """Bytes that make with `tail`, which a real packet begins with, a packet whose check sum is right."""
-    head = np.frombuffer(encode_packets(sequence, 123_456_789, [[0, 0, 0]])[: SIZE - len(tail)], dtype=np.uint8)
+    head = np.frombuffer(encode_packets(sequence, 123_456_789, [[0, 0, 0]])[: PACKET_SIZE - len(tail)], dtype=np.uint8)
     tries = np.tile(np.concatenate((head, np.frombuffer(tail, dtype=np.uint8))), (2**16, 1))
     tries[:, 4:6] = np.arange(2**16, dtype="<u2").view(np.uint8).reshape(-1, 2)  # of its time stamp: one of them fits
-    right = compute_crc(tries[:, CHECKED]) == tries[:, 14:16].copy().view("<u2")[:, 0]
-    return tries[np.flatnonzero(right)[0], : SIZE - len(tail)].tobytes()
+    right = compute_crc(tries[:, CRC_BYTES]) == tries[:, 14:16].copy().view("<u2")[:, 0]
+    return tries[np.flatnonzero(right)[0], : PACKET_SIZE - len(tail)].tobytes()
 
 
 @pytest.mark.parametrize("overlap", [2, 7, 10])
 def test_a_false_packet_that_ends_in_a_real_one_does_not_hide_it(overlap):
     """However the bytes come: a parser that has used up those of the false one has lost the real one."""
     data, _ = stream(4)
-    spoiled = data[: 2 * SIZE] + forged(data[2 * SIZE : 2 * SIZE + overlap], 777) + data[2 * SIZE :]
+    spoiled = (
+        data[: 2 * PACKET_SIZE]
+        + forged(data[2 * PACKET_SIZE : 2 * PACKET_SIZE + overlap], 777)
+        + data[2 * PACKET_SIZE :]
+    )
     for cut in range(len(spoiled)):
         parser = PacketParser()
         found = parser.feed(spoiled[:cut]).sequence.tolist() + parser.feed(spoiled[cut:]).sequence.tolist()
         assert found == [0, 1, 2, 3], cut
-        assert (parser.counts.restarts, parser.counts.spoiled_bytes) == (0, SIZE - overlap)
+        assert (parser.counts.restarts, parser.counts.spoiled_bytes) == (0, PACKET_SIZE - overlap)
 
 
 @pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
@@ -160,16 +168,16 @@ def test_false_packets_among_a_million_garbled_bytes_count_for_nothing(seed):
     random = np.random.default_rng(seed)
     data, raw = stream(25_000, seed=seed)
     false = [encode_packets(int(random.integers(2**16)), int(random.integers(2**32)), [[1, 2, 3]]) for _ in range(50)]
-    pieces = [data[: 2 * SIZE]]
+    pieces = [data[: 2 * PACKET_SIZE]]
     for k in range(2, len(raw)):
         fate = random.random()
         if fate < 0.01:
             pieces.append(false[int(random.integers(len(false)))])
         elif fate < 0.011:
-            pieces.append(forged(data[k * SIZE : k * SIZE + 6], int(random.integers(2**16))))
+            pieces.append(forged(data[k * PACKET_SIZE : k * PACKET_SIZE + 6], int(random.integers(2**16))))
         else:
             pieces.append(random.integers(0, 256, int(random.integers(0, 50)), dtype=np.uint8).tobytes())
-        pieces.append(data[k * SIZE : (k + 1) * SIZE])
+        pieces.append(data[k * PACKET_SIZE : (k + 1) * PACKET_SIZE])
     garbled, parser, found, at = b"".join(pieces), PacketParser(), [], 0
     assert len(garbled) > 10**6
     while at < len(garbled):
@@ -180,14 +188,14 @@ def test_false_packets_among_a_million_garbled_bytes_count_for_nothing(seed):
     assert (np.concatenate([samples.raw for samples in found]) == raw).all()
     counts = parser.counts
     assert (counts.packets, counts.lost, counts.restarts) == (len(raw), 0, 0)
-    assert counts.spoiled_bytes == len(garbled) - SIZE * len(raw)
+    assert counts.spoiled_bytes == len(garbled) - PACKET_SIZE * len(raw)
 
 
 def with_crc_ending_in(start: bytes, sequence: int) -> tuple[bytes, np.ndarray]:
     """A packet whose check sum ends in these bytes, and its raw values."""
     raw = np.random.default_rng(7).integers(0, 2**16, (2**18, 3), dtype=np.uint16)
     tries = encode_packets(np.full(len(raw), sequence), np.full(len(raw), 250 * sequence), raw)
-    rows = np.frombuffer(tries, dtype=np.uint8).reshape(-1, SIZE)
+    rows = np.frombuffer(tries, dtype=np.uint8).reshape(-1, PACKET_SIZE)
     found = np.flatnonzero((rows[:, -len(start) :] == np.frombuffer(start, dtype=np.uint8)).all(axis=1))[0]
     return rows[found].tobytes(), raw[found]
 
@@ -197,7 +205,7 @@ def test_a_packet_that_lost_its_last_bytes_does_not_hide_the_next_that_begins_wi
     """Then both are whole, however the bytes come."""
     data, raw = stream(4)
     torn, torn_raw = with_crc_ending_in(SYNC[:lost], 2)
-    spoiled = data[: 2 * SIZE] + torn[:-lost] + data[3 * SIZE :]
+    spoiled = data[: 2 * PACKET_SIZE] + torn[:-lost] + data[3 * PACKET_SIZE :]
     for cut in range(len(spoiled)):
         parser = PacketParser()
         samples = parser.feed(spoiled[:cut]), parser.feed(spoiled[cut:])
@@ -240,14 +248,14 @@ def test_packets_that_come_again_or_lie_are_told_apart_among_garbled_ones(seed):
     """Repeats, old ones sent again, ones from the near future and from anywhere, two in a row as well."""
     random = np.random.default_rng(seed)
     data, raw = stream(20_000, seed=seed)
-    pieces, good = [data[: 4 * SIZE]], [0, 1, 2, 3]
+    pieces, good = [data[: 4 * PACKET_SIZE]], [0, 1, 2, 3]
     for k in range(4, len(raw)):
-        packet, fate = data[k * SIZE : (k + 1) * SIZE], random.random()
+        packet, fate = data[k * PACKET_SIZE : (k + 1) * PACKET_SIZE], random.random()
         if fate < 0.8:
             good.append(k)
             pieces.append(packet * (1 + (fate < 0.05)))
         elif fate < 0.82:
-            pieces.append(packet[: int(random.integers(SIZE - 2))])
+            pieces.append(packet[: int(random.integers(PACKET_SIZE - 2))])
         elif fate < 0.825:
             late = good[-int(random.integers(1, 50)) :][0]
             pieces.append(encode_packets(late, 250 * late, raw[late][None]))
@@ -257,7 +265,7 @@ def test_packets_that_come_again_or_lie_are_told_apart_among_garbled_ones(seed):
             pieces.append(encode_packets(int(random.integers(2**16)), int(random.integers(2**32)), [[1, 2, 3]]))
         else:
             pieces.append(random.integers(0, 256, int(random.integers(0, 200)), dtype=np.uint8).tobytes())
-    pieces.append(data[-SIZE:])
+    pieces.append(data[-PACKET_SIZE:])
     good = sorted({*good, len(raw) - 1})
     garbled, parser, found, at = b"".join(pieces), PacketParser(), [], 0
     while at < len(garbled):
@@ -268,7 +276,7 @@ def test_packets_that_come_again_or_lie_are_told_apart_among_garbled_ones(seed):
     assert (np.concatenate([samples.raw for samples in found]) == raw[good]).all()
     counts = parser.counts
     assert (counts.packets, counts.lost, counts.restarts) == (len(good), len(raw) - len(good), 0)
-    assert 0 <= len(garbled) - SIZE * len(good) - counts.spoiled_bytes < SIZE
+    assert 0 <= len(garbled) - PACKET_SIZE * len(good) - counts.spoiled_bytes < PACKET_SIZE
 
 
 def test_the_firmware_makes_the_same_packets(vendor, tmp_path):
@@ -286,6 +294,6 @@ def test_the_firmware_makes_the_same_packets(vendor, tmp_path):
     for _ in range(200):
         number, time_us = int(random.integers(2**16)), int(random.integers(2**32))
         raw = random.integers(0, 2**16, 3, dtype=np.uint16)
-        out = ctypes.create_string_buffer(SIZE)
+        out = ctypes.create_string_buffer(PACKET_SIZE)
         make(out, number, time_us, raw.ctypes.data)
         assert out.raw == encode_packets(number, time_us, raw[None])

@@ -11,7 +11,7 @@ from pydantic import TypeAdapter
 
 from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, UP_DIRECTIONS
 from study.devices.accelerometer.newest_sample import MAX_AGE_S
-from study.devices.accelerometer.parser import SIZE
+from study.devices.accelerometer.parser import PACKET_SIZE
 from study.devices.accelerometer.sensor import Accelerometer
 from study.devices.accelerometer.serial_reader import open_serial
 from study.devices.accelerometer.six_positions import calibrate_on_table
@@ -37,20 +37,20 @@ def sensor(board):
 
 
 def test_at_rest_it_reads_nothing_and_moved_it_reads_the_motion(board, sensor):
-    assert within(5.0, lambda: np.allclose(sensor.latest()[0], 0.0, atol=0.01))
+    assert within(5.0, lambda: np.allclose(sensor.read_latest()[0], 0.0, atol=0.01))
     board.acceleration = AT_REST + [3.0, -2.0, 1.0]
-    assert within(5.0, lambda: np.allclose(sensor.latest()[0], [3.0, -2.0, 1.0], atol=0.01))
-    assert sensor.latest()[1] is False
+    assert within(5.0, lambda: np.allclose(sensor.read_latest()[0], [3.0, -2.0, 1.0], atol=0.01))
+    assert sensor.read_latest()[1] is False
 
 
 def test_a_channel_at_its_limit_is_reported(board, sensor):
     board.acceleration = np.array([100.0, 0.0, 0.0])
-    assert within(5.0, lambda: sensor.latest()[1])
+    assert within(5.0, lambda: sensor.read_latest()[1])
 
 
 def test_a_board_that_falls_silent_reads_nothing(board, sensor):
     board.on = False
-    assert within(MAX_AGE_S + 5.0, lambda: bool(np.isnan(sensor.latest()[0]).all()))
+    assert within(MAX_AGE_S + 5.0, lambda: bool(np.isnan(sensor.read_latest()[0]).all()))
 
 
 @pytest.mark.parametrize("rate_hz", [1000.0, pytest.param(4000.0, marks=pytest.mark.slow), 10_000.0])
@@ -69,7 +69,7 @@ def test_every_rate_is_followed_and_what_is_lost_is_counted(rate_hz):
             counts = sensor.counts
         assert 0 < counts.lost < 0.2 * counts.packets
         assert counts.restarts == 0
-        assert counts.spoiled_bytes >= (SIZE - 1) * (counts.lost - 1)
+        assert counts.spoiled_bytes >= (PACKET_SIZE - 1) * (counts.lost - 1)
 
 
 def test_a_silent_serial_line_is_an_error():
@@ -79,7 +79,7 @@ def test_a_silent_serial_line_is_an_error():
         os.write(master, b"no packet at all")
         with pytest.raises(DeviceError, match="The accelerometer is silent"):
             sensor.zero(0.1)
-        assert np.isnan(sensor.latest()[0]).all()
+        assert np.isnan(sensor.read_latest()[0]).all()
     os.close(master)
     os.close(slave)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study.devices.accelerometer.parser import SIZE, PacketParser
+from study.devices.accelerometer.parser import PACKET_SIZE, PacketParser
 
 FIRMWARE = Path(__file__).parents[4] / "docs" / "firmware"
 STAND_INS = Path(__file__).parent / "stand_ins"
@@ -64,7 +64,7 @@ def test_after_a_stall_of_the_board_no_old_samples_come_in_a_burst(sent):
     data = sent(20_000, stall_at=5_000)
     parser = PacketParser()
     samples = parser.feed(data)
-    assert len(data) == SIZE * len(samples)
+    assert len(data) == PACKET_SIZE * len(samples)
     apart_us = np.diff(samples.time_us)
     assert apart_us.max() >= 5000 and (apart_us >= PERIOD_US).all()
     assert (apart_us > 2 * PERIOD_US).sum() == 1

@@ -93,7 +93,7 @@ def test_samples_come_numbered_timed_and_in_units(request, kind):
         now_s = time.monotonic()
         tick_s = now_s - 0.2 + np.arange(150) / 1000
         sensed = sensor.sensed(now_s - 0.2, tick_s, 1000.0)
-        assert np.allclose(sensor.latest()[0], [1.0, -2.0, 0.5], atol=1e-6)
+        assert np.allclose(sensor.read_latest()[0], [1.0, -2.0, 0.5], atol=1e-6)
     np.testing.assert_allclose(sensed.acceleration_mps2, np.tile([1.0, -2.0, 0.5], (150, 1)), atol=1e-6)
     assert sensed.health.lost == 0 and abs(sensed.health.drift_ppm) < 500
     assert scanner.calls[-1] == "close"

@@ -42,7 +42,7 @@ def opened(board: Board):
 
 def newest_of(sensor: Accelerometer) -> np.ndarray:
     time.sleep(0.01)
-    return sensor.latest()[0]
+    return sensor.read_latest()[0]
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from study.devices.drive.realtime_drive import RealtimeDrive
 from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.governor import cells
 from study.devices.governor.governor import Governor
-from study.devices.native import CLOCK, SLEEP, SYSTEM_SIZE, SharedLock, call_int, find_address, system_calls
+from study.devices.native import CLOCK, SLEEP, SYSTEM_SIZE, SharedLock, call_int, collect_system_calls, find_address
 from study.devices.rig import READING_SIZE, CompiledIo
 from study.devices.safe import SafeDevice
 from study.errors import DeviceError
@@ -145,7 +145,7 @@ class ScriptedRig:
 
     def __init__(self, rigs, clock: ScriptedTime, fails_at: int) -> None:
         self.info = replace(rigs.INFO, simulated=False)
-        self._calls = np.append(system_calls(SharedLock()), find_address(clock.work))
+        self._calls = np.append(collect_system_calls(SharedLock()), find_address(clock.work))
         self._calls[CLOCK], self._calls[SLEEP] = find_address(clock.now), find_address(clock.wait)
         self._own, self._samples = np.array([float(fails_at), 0.0]), np.zeros((1, 1))
         self.halves = CompiledIo(tremble, work, self._calls, self._own, self._samples, lambda code: OSError(code))
@@ -186,10 +186,10 @@ def played(rigs, monkeypatch):
             calls += 1
             if not drive._attend_compiled():
                 drive._wait_for_tick()
-                drive.pump(clock.now_s())
+                drive.run_due_ticks(clock.now_s())
         assert (calls < 3) == compiled  # all of it in a call, or a tick each
         arrays = (governor.state, governor.buffer, governor.ring, governor.force, drive._loop_state[STARTED_S:DUE_S])
-        return *(each.tobytes() for each in arrays), governor.health(), repr(runner.failure), clock.time_s
+        return *(each.tobytes() for each in arrays), governor.collect_health(), repr(runner.failure), clock.time_s
 
     yield play
     ended.set()

@@ -58,8 +58,8 @@ class Bench:
 
     def pump(self, seconds: float) -> None:
         self.clock.seconds = seconds
-        self.governor.sign_of_life()
-        self.drive.pump(seconds)
+        self.governor.restart_watchdog()
+        self.drive.run_due_ticks(seconds)
 
 
 @pytest.fixture(params=["HeldForceRig", "compiled_rig"])
@@ -95,7 +95,7 @@ def test_a_suspended_process_is_not_reported_as_a_lost_device(bench, rigs):
     bench.clock.seconds += 0.5
     bench.clock.while_asleep = lambda: bench.pump(bench.clock.seconds)
     bench.drive.check()
-    bench.drive.pump(bench.clock.seconds)
+    bench.drive.run_due_ticks(bench.clock.seconds)
     assert bench.runner.failure is None
     assert bench.governor.fault is Fault.STALLED
 
@@ -161,7 +161,7 @@ def test_a_tick_whose_work_ends_after_the_next_was_due_is_late(bench, rigs, take
     bench.hold(rigs)
     slow_by(bench, takes_s)
     bench.pump(0.101)
-    health = bench.governor.health()
+    health = bench.governor.collect_health()
     assert (health.late_ticks, health.missed_ticks) == (late, 0)
     assert health.latest_s == pytest.approx(takes_s)
 
@@ -170,7 +170,7 @@ def test_a_tick_whose_work_ends_after_the_next_was_due_is_late(bench, rigs, take
 def test_missed_ticks_report_the_delay_of_the_first(bench, rigs):
     bench.hold(rigs)
     bench.pump(0.1052)
-    health = bench.governor.health()
+    health = bench.governor.collect_health()
     assert (health.late_ticks, health.missed_ticks) == (0, 4)
     assert health.latest_s == pytest.approx(0.0042)
 
@@ -180,6 +180,6 @@ def test_counters_restart_with_each_stimulus(bench, rigs):
     bench.hold(rigs)
     slow_by(bench, 0.002)
     bench.pump(0.101)
-    assert bench.governor.health().late_ticks == 1
+    assert bench.governor.collect_health().late_ticks == 1
     bench.governor.begin_hold(rigs.push())
-    assert (bench.governor.health().late_ticks, bench.governor.health().latest_s) == (0, 0.0)
+    assert (bench.governor.collect_health().late_ticks, bench.governor.collect_health().latest_s) == (0, 0.0)

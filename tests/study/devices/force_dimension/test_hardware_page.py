@@ -7,7 +7,7 @@ from pathlib import Path
 from pydantic import TypeAdapter
 
 from study.cli.main import main
-from study.devices.accelerometer.parser import LAYOUT, SIZE
+from study.devices.accelerometer.parser import PACKET_DTYPE, PACKET_SIZE
 from study.devices.force_dimension.lab import LabSettings, SensorSettings
 from study.devices.force_dimension.models import MODELS
 from study.devices.force_dimension.usb import RULE, RULE_FILE
@@ -58,5 +58,9 @@ def test_the_commands_of_the_hardware_page_have_the_options_that_it_gives_them(c
 def test_rule_devices_and_packet_are_those_of_the_code():
     assert RULE in PAGE and RULE_FILE in PAGE
     assert all(f"`{name}`" in PAGE or f"--device {name}`" in PAGE for name in MODELS)
-    assert LAYOUT.itemsize == SIZE == 16
-    assert (LAYOUT.fields["time_us"][1], LAYOUT.fields["raw"][1], LAYOUT.fields["crc"][1]) == (4, 8, 14)
+    assert PACKET_DTYPE.itemsize == PACKET_SIZE == 16
+    assert (PACKET_DTYPE.fields["time_us"][1], PACKET_DTYPE.fields["raw"][1], PACKET_DTYPE.fields["crc"][1]) == (
+        4,
+        8,
+        14,
+    )

@@ -3,12 +3,12 @@
 import pytest
 
 from study.devices.accelerometer.calibration import Calibration
-from study.devices.accelerometer.six_positions import calibration_toml
+from study.devices.accelerometer.six_positions import format_calibration_toml
 from study.devices.force_dimension.lab import read_lab, write_sensor_table
 from study.errors import DeviceError
 from tests.study.devices.accelerometer.pty_board import IDEAL
 
-TABLE = calibration_toml(IDEAL, "/dev/ttyACM3", 115_200)
+TABLE = format_calibration_toml(IDEAL, "/dev/ttyACM3", 115_200)
 
 OLD = """# the lab's own words
 effector_mass_kg = 0.153     # with the sensor
@@ -70,4 +70,4 @@ def test_nothing_changes_where_the_file_cannot_be_used_or_the_table_is_none(file
 
 def test_a_range_at_the_ends_of_16_bits_is_written_as_whole_numbers():
     wide = Calibration(IDEAL.bias, 10 * IDEAL.sensitivity, IDEAL.noise_mps2, 0.0)
-    assert "raw_range = [0, 65535]" in calibration_toml(wide, "COM3", 9600)
+    assert "raw_range = [0, 65535]" in format_calibration_toml(wide, "COM3", 9600)

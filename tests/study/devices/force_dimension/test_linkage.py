@@ -57,8 +57,13 @@ def test_the_jacobian_is_the_derivative_of_positions_by_joint_angles(stub):
     """Oracle: central differences of the library's own positions, by its encoder counts."""
     with open_linkage("omega3") as linkage:
         for place in np.array([[0.0, 0, 0], [0.03, -0.02, 0.04], [-0.04, 0.05, 0.0]]):
-            angles = np.array([linkage.angles_at(each) for each in list_difference_positions(place)])
-            assert compute_difference_error(linkage.at(place).jacobian, list_difference_positions(place), angles) < 0.01
+            angles = np.array([linkage.compute_angles_at(each) for each in list_difference_positions(place)])
+            assert (
+                compute_difference_error(
+                    linkage.compute_reading_at(place).jacobian, list_difference_positions(place), angles
+                )
+                < 0.01
+            )
 
 
 def test_lengths_and_masses_are_recovered(calibrated):
@@ -125,7 +130,7 @@ def test_a_library_without_these_functions_still_drives_the_device(stub, rigs, m
     with pytest.raises(DeviceError, match="has no dhdDeltaPositionToEncoder"):
         calibrated()
     handle = stub.opened()
-    assert np.isfinite(handle.position_m()).all()
+    assert np.isfinite(handle.read_position_m()).all()
     handle.disconnect()
 
 

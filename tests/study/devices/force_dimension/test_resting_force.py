@@ -11,8 +11,8 @@ import pytest
 from numba import njit
 
 from study.devices.drive.stepped_runner import CLOSE_TIMEOUT_S
-from study.devices.force_dimension.rig import JOIN_S
-from study.devices.native import acquire, now_s, release, sleep_until
+from study.devices.force_dimension.rig import JOIN_TIMEOUT_S
+from study.devices.native import acquire, read_clock_s, release, sleep_until
 
 pytestmark = pytest.mark.real_time
 
@@ -24,13 +24,13 @@ KEPT_S = 0.05
 @njit(nogil=True)
 def longest_wait_s(calls, every_s, for_s):
     """For the lock of the writes, asked for again and again without the interpreter, as the loop does."""
-    longest, until = 0.0, now_s(calls) + for_s
-    while now_s(calls) < until:
-        asked = now_s(calls)
+    longest, until = 0.0, read_clock_s(calls) + for_s
+    while read_clock_s(calls) < until:
+        asked = read_clock_s(calls)
         if acquire(calls, for_s):
-            longest = max(longest, now_s(calls) - asked)
+            longest = max(longest, read_clock_s(calls) - asked)
             release(calls)
-        sleep_until(calls, now_s(calls) + every_s)
+        sleep_until(calls, read_clock_s(calls) + every_s)
     return longest
 
 
@@ -125,7 +125,7 @@ def test_closing_waits_for_a_zero_that_hangs_no_longer_than_half_of_its_time(stu
         hang_a_zero(stub, rig, 3.0)
         began_s = time.monotonic()
         assert rig.close()
-        assert JOIN_S <= time.monotonic() - began_s < CLOSE_TIMEOUT_S
+        assert JOIN_TIMEOUT_S <= time.monotonic() - began_s < CLOSE_TIMEOUT_S
         assert rig._zero_thread.is_alive() and stub.safe
 
 

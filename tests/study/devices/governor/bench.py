@@ -22,7 +22,7 @@ class Bench:
         """With signs of life. All forces so far."""
         for _ in range(0, ticks, 10):
             if self.governor.moving:
-                self.governor.sign_of_life()
+                self.governor.restart_watchdog()
                 self.runner.run(10)
         return self.forces()
 
@@ -33,7 +33,7 @@ class Bench:
         return self.rigs.written(self.rig)
 
     def health(self) -> Health:
-        return self.governor.health()
+        return self.governor.collect_health()
 
     def gained(self):
-        return self.governor.rows()[:, 3:6]
+        return self.governor.copy_rows()[:, 3:6]

@@ -46,22 +46,22 @@ def test_ten_million_ticks_of_false_readings_never_exceed_the_force_limits(lying
 
 MUTATIONS = {
     "the fade turns the force round": (
-        govern, "force[i] = max(remaining, 0.0) * state[LET_GO_FROM + i]",
-        "force[i] = -max(remaining, 0.0) * state[LET_GO_FROM + i]", "fade: its sign",
+        govern, "force[i] = max(remaining_gain, 0.0) * state[LET_GO_FROM + i]",
+        "force[i] = -max(remaining_gain, 0.0) * state[LET_GO_FROM + i]", "fade: its sign",
     ),
     "the fade rises": (
-        govern, "remaining = 1.0 - (state[TICK] - state[LET_GO_AT] + 1.0)",
-        "remaining = 1.0 + (state[TICK] - state[LET_GO_AT] + 1.0)", "fade: no way down",
+        govern, "remaining_gain = 1.0 - (state[TICK] - state[LET_GO_AT] + 1.0)",
+        "remaining_gain = 1.0 + (state[TICK] - state[LET_GO_AT] + 1.0)", "fade: no way down",
     ),
     "the fade takes twice as long": (
         govern, "/ settings[LET_GO_TICKS]", "/ (2.0 * settings[LET_GO_TICKS])", "fade: longer",
     ),
     "the release turns the force round": (
-        govern, "remaining = 1.0 - _fade_share(", "remaining = _fade_share(", "",
+        govern, "remaining_gain = 1.0 - _compute_fade_gain(", "remaining_gain = _compute_fade_gain(", "",
     ),
     "the stimulus' fade turns round": (
-        govern, "    return remaining * state[STIMULUS_GAIN], remaining * state[SPRING_GAIN]",
-        "    return -remaining * state[STIMULUS_GAIN], remaining * state[SPRING_GAIN]", "fade: its sign",
+        govern, "    return remaining_gain * state[STIMULUS_GAIN], remaining_gain * state[SPRING_GAIN]",
+        "    return -remaining_gain * state[STIMULUS_GAIN], remaining_gain * state[SPRING_GAIN]", "fade: its sign",
     ),
     "the stimulus fades in twice too high": (
         govern, "return state[STIMULUS_GAIN], state[SPRING_GAIN]",
@@ -264,7 +264,7 @@ def pull_at(governor, x_m: float, stamp_s: float) -> float:
 
     reading = np.zeros(READING_SIZE)
     reading[0] = x_m
-    governor.sign_of_life()
+    governor.restart_watchdog()
     governor.state[cells.STAMP_S] = stamp_s
     govern.tick(governor.state, governor.settings, governor.loop, governor.buffer, reading, governor.force)
     return -float(governor.force[0])

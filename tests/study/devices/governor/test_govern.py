@@ -149,7 +149,7 @@ def test_missed_ticks_are_rows_without_readings_in_which_the_force_was_held(benc
     bench.hold(rigs.sine(2.0, fade_s=0.0), 20)
     bench.governor.record_missed_ticks(3)
     bench.go_on(10)
-    rows = bench.governor.rows()
+    rows = bench.governor.copy_rows()
     assert len(rows) == 33
     assert (rows[20:23, 0:3] == rows[19, 0:3]).all()
     assert np.isnan(rows[20:23, 6:]).all()
@@ -164,7 +164,7 @@ def test_ticks_missed_at_the_end_of_commands_do_not_shift_what_was_recorded(benc
     bench.governor.record_missed_ticks(30)  # 500 to settle, 301 to play
     bench.go_on(100)
     assert np.allclose(bench.gained()[:290], commands.samples[:290])
-    assert len(bench.governor.rows()) == 301
+    assert len(bench.governor.copy_rows()) == 301
     assert bench.health().missed_ticks == 30
 
 

@@ -34,7 +34,7 @@ def test_an_impossible_position_releases_the_handle_for_good(bench, rigs, fault,
         bench.hold(rigs.sine(2.0), 700)
     for tick in range(400):
         bench.lean(BEYOND[fault](tick), 0.0, 0.0)
-        bench.governor.sign_of_life()
+        bench.governor.restart_watchdog()
         bench.runner.run(1)
     assert bench.health().fault is Fault[fault]
     assert not bench.governor.moving

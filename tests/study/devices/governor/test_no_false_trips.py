@@ -30,7 +30,7 @@ def hold(rigs, rng, seconds: float, frequency_hz: float, level_n: float) -> tupl
     fades = {"fade_in_s": float(rng.choice([0.0, 0.1, 0.5])), "fade_out_s": 0.1}
     governor.begin_hold(replace(rigs.sine(), loop=rigs.force(wave), **fades))
     for _ in range(round(seconds)):
-        governor.sign_of_life()
+        governor.restart_watchdog()
         runner.run(1000)
     governor.request_release()
     runner.run(1000)
@@ -46,7 +46,7 @@ def sweep(rigs, rng, seconds: float, level_n: float) -> tuple[Fault, int]:
     wave = np.sin(2 * np.pi * np.expm1(rate * t) / rate)[:, None] * direction(rng) * level_n
     governor.begin_play(rigs.force(wave * np.minimum(1.0, t / 0.1)[:, None]))
     while governor.moving:
-        governor.sign_of_life()
+        governor.restart_watchdog()
         runner.run(100)
     return governor.fault, governor.ticks
 
@@ -89,7 +89,7 @@ def test_a_hand_resting_on_the_spring_raises_no_fault(rigs, lean_m, frequency_hz
     wave = np.sin(2 * np.pi * frequency_hz * np.arange(1000) / 1000)[:, None] * np.array([0.0, 0.7, 0.7]) * level_n
     governor.begin_hold(replace(rigs.sine(), loop=rigs.force(wave)))
     for _ in range(15):
-        governor.sign_of_life()
+        governor.restart_watchdog()
         runner.run(1000)
     assert governor.fault is Fault.NONE
     assert governor.moving

@@ -92,7 +92,7 @@ def fuzz(rigs, seed: int, break_it=lambda governor: None):
             governor.begin_hold(random_stimulus(rng, rigs))
         disturb(rng, rigs, rig, governor)
         if rng.random() < 0.8:
-            governor.sign_of_life()
+            governor.restart_watchdog()
         runner.run(min(left, int(rng.integers(1, 300))))
         if governor.moving and rng.random() < 0.05 and not ask_for_zero(rng, rigs, rig, runner, release):
             found.append("late: a force after the release")

@@ -28,6 +28,6 @@ def device(behind, served, rigs):
 
 @pytest.fixture
 def impatient(monkeypatch):
-    for name in ("ANSWER_S", "STOP_S", "CLOSE_S"):
+    for name in ("ANSWER_TIMEOUT_S", "STOP_TIMEOUT_S", "CLOSE_TIMEOUT_S"):
         monkeypatch.setattr(remote_device, name, 0.2)
     monkeypatch.setattr(line, "GRACE_S", 0.1)

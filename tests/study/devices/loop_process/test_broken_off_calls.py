@@ -93,7 +93,7 @@ def test_an_interrupted_close_hangs_up_and_can_be_made_good_for(behind, served, 
         device.hold(rigs.push())
     hang.set()
     device.close()
-    assert device._process.patience_s == [remote_device.CLOSE_S]
+    assert device._process.patience_s == [remote_device.CLOSE_TIMEOUT_S]
     assert rig.closed and not rig.last_n.any()
 
 
@@ -102,7 +102,7 @@ import os, pickle, signal, sys
 from study.devices.clock import RealClock
 from study.devices.loop_process import remote_device
 from study.devices.opening import open_device
-remote_device.CLOSE_S = 0.2
+remote_device.CLOSE_TIMEOUT_S = 0.2
 device = open_device("omega3", pickle.load(sys.stdin.buffer), RealClock(), 1)
 print(device._process.pid)
 os.kill(device._process.pid, signal.SIGSTOP)
@@ -135,8 +135,8 @@ def interrupted(*arguments) -> None:
 
 def test_an_interruption_while_the_process_starts_leaves_none(rigs, monkeypatch):
     started: list[subprocess.Popen] = []
-    really = start._start
-    monkeypatch.setattr(start, "_start", lambda *ends: started.append(really(*ends)) or started[0])
+    really = start._start_process
+    monkeypatch.setattr(start, "_start_process", lambda *ends: started.append(really(*ends)) or started[0])
     monkeypatch.setattr(start, "Line", interrupted)
     with pytest.raises(KeyboardInterrupt):
         remote_device.open_remotely("omega3", rigs.SETTINGS, 1)
@@ -149,7 +149,7 @@ def test_an_interruption_before_the_device_opens_ends_the_process(behind, served
     monkeypatch.setattr(process.work, "queue_call", interrupted)
     with pytest.raises(KeyboardInterrupt):
         remote_device.open_remotely("omega3", rigs.SETTINGS, 1)
-    assert process.patience_s == [remote_device.CLOSE_S]
+    assert process.patience_s == [remote_device.CLOSE_TIMEOUT_S]
     assert process.server.ended.is_set()
 
 
@@ -188,7 +188,7 @@ serve.open_device = hang if where == "open" else lambda *arguments, **named: dev
 serve.OVERDUE_S = 0.5
 if where == "exit":
     atexit.register(hang)
-pairs = [Pipe() for _ in serve.LINES]
+pairs = [Pipe() for _ in serve.LINE_NAMES]
 pairs[0][0].send(("open", ("omega3", settings, 1, "")))
 serve.run(0, *[end.fileno() for _, end in pairs])
 """

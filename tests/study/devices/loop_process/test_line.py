@@ -26,17 +26,17 @@ def test_an_answer_that_comes_together_with_an_interruption_is_kept(pipe, monkey
     line, theirs = pipe
     call = line.queue_call("ask")
     theirs.send((VALUE, 7))
-    take = call._next_progress
+    take = call._wait_for_progress
 
     def interrupted(*patience) -> None:
         take(*patience)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(call, "_next_progress", interrupted)
+    monkeypatch.setattr(call, "_wait_for_progress", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        call.answer(20.0)
-    monkeypatch.setattr(call, "_next_progress", take)
-    assert call.answer(0.0, grace_s=0.0) == 7
+        call.wait_for_answer(20.0)
+    monkeypatch.setattr(call, "_wait_for_progress", take)
+    assert call.wait_for_answer(0.0, grace_s=0.0) == 7
 
 
 def test_only_what_carries_much_is_waited_for_longer(pipe, monkeypatch):
@@ -50,14 +50,14 @@ def test_only_what_carries_much_is_waited_for_longer(pipe, monkeypatch):
             call.receive((VALUE, 7))
         return share
 
-    monkeypatch.setattr(call, "_next_progress", take)
-    assert call.answer(3.0, sending_s=2.0) == 7
+    monkeypatch.setattr(call, "_wait_for_progress", take)
+    assert call.wait_for_answer(3.0, sending_s=2.0) == 7
     assert waited_s == [5.0, 3.0, 3.0, 5.0]
 
 
 def test_a_process_that_cannot_be_killed_is_not_said_to_be_gone(monkeypatch):
     process = LoopProcess()
-    monkeypatch.setattr(start, "DEAD_S", 0.1)
+    monkeypatch.setattr(start, "KILL_TIMEOUT_S", 0.1)
     monkeypatch.setattr(process._process, "kill", lambda: None)
     try:
         assert process.end(0.0) == "was killed, but has not ended"
@@ -101,7 +101,7 @@ def test_why_an_answer_cannot_be_read_is_said(pipe):
     call = line.queue_call("ask")
     theirs.send_bytes(b"no pickle")
     with pytest.raises(LoopGoneError, match=r"its answer cannot be read \(UnpicklingError: .+\)"):
-        call.answer(20.0)
+        call.wait_for_answer(20.0)
 
 
 def test_a_call_after_the_end_of_its_line_is_refused_at_once(pipe, monkeypatch):
@@ -110,11 +110,11 @@ def test_a_call_after_the_end_of_its_line_is_refused_at_once(pipe, monkeypatch):
     line.end()
     queued = line.queue_call("ask")
     theirs.send((VALUE, 7))
-    assert waiting.answer(20.0) == 7
+    assert waiting.wait_for_answer(20.0) == 7
     assert line._ended.wait(20.0)
     for call in (queued, line.queue_call("ask")):
         with pytest.raises(LoopGoneError, match="it was given up"):
-            call.answer(20.0)
+            call.wait_for_answer(20.0)
 
 
 def test_a_call_that_races_with_a_close_says_that_the_device_is_closed(behind, served, rigs, hang, monkeypatch):

@@ -269,7 +269,7 @@ import gc, os, pickle, sys, threading
 from multiprocessing import Pipe
 from study.devices.loop_process import serve
 settings = pickle.load(sys.stdin.buffer)
-pairs = [Pipe() for _ in serve.LINES]
+pairs = [Pipe() for _ in serve.LINE_NAMES]
 ours = [end for end, _ in pairs]
 
 def ask() -> None:

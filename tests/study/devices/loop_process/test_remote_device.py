@@ -177,7 +177,7 @@ def test_only_what_a_stop_and_a_sign_of_life_wait_for_goes_before_other_programs
         first.append(threading.current_thread().name)
         yield
 
-    pairs = [Pipe() for _ in line.LINES]
+    pairs = [Pipe() for _ in line.LINE_NAMES]
     server = DeviceServer(behind, tuple(theirs for _, theirs in pairs), raise_thread_priority=noted)
     server.start()
     for ours, _ in pairs:

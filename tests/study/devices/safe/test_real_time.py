@@ -90,9 +90,9 @@ def test_a_process_that_stood_still_too_long_finds_its_force_off(rigs, hand_pump
         governor, drive = hand_pumped(rig)
         drive.start(lambda governor=governor: governor.begin_hold(rigs.sine(3.0)))
         for k in range(1, 201):
-            drive.pump(k * 0.001)
-        governor.sign_of_life()
-        drive.pump(0.2 + rigs.LIMITS.watchdog_s + 0.01)
+            drive.run_due_ticks(k * 0.001)
+        governor.restart_watchdog()
+        drive.run_due_ticks(0.2 + rigs.LIMITS.watchdog_s + 0.01)
         assert governor.fault is Fault.STALLED
         assert not rigs.written(rig if hasattr(rig, "state") else rig.mass)[200:].any()
 
@@ -101,8 +101,8 @@ def test_a_simulated_world_catches_up_and_misses_nothing(rigs, rig, hand_pumped)
     governor, drive = hand_pumped(rig)
     drive.start(lambda: governor.begin_hold(rigs.sine(2.0)))
     for now_s in (0.003, 0.0301, 0.2, 0.2504):
-        drive.pump(now_s)
-    assert governor.health().missed_ticks == 0
+        drive.run_due_ticks(now_s)
+    assert governor.collect_health().missed_ticks == 0
     assert len(rigs.written(rig)) == 250
 
 
@@ -111,10 +111,10 @@ def test_a_real_world_misses_late_ticks_and_the_waveform_is_not_stretched(rigs, 
     governor, drive = hand_pumped(rig)
     drive.start(lambda: governor.begin_hold(rigs.sine(2.0, fade_s=0.0)))
     for k in (*range(1, 50), *range(60, 101)):
-        drive.pump(k * 0.001)
-    assert governor.health().missed_ticks == 10
+        drive.run_due_ticks(k * 0.001)
+    assert governor.collect_health().missed_ticks == 10
     assert len(rigs.written(rig.mass)) == 90
-    excitation = governor.rows()[:, 3:6]
+    excitation = governor.copy_rows()[:, 3:6]
     assert len(excitation) == 100
     assert np.allclose(excitation[60:], rigs.sine(2.0).loop.samples[60:100])
 

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from study.evaluation.bank.ask_engine import TRIES, Engine
+from study.evaluation.bank.ask_engine import MAX_ATTEMPTS, Engine
 from study.evaluation.bank.proof_folder import ProofFolder
 
 DYING = "import os, sys, time; sys.stdin.readline(); os.close(1); time.sleep(60)"
@@ -45,12 +45,12 @@ def engine(tmp_path):
 @pytest.mark.timeout(60)
 def test_a_process_that_dies_costs_a_single_try(engine):
     asked = engine(DYING, ANSWERING)
-    assert [asked.ask("a"), asked.ask("a"), asked.ask("b")] == [False, True, True]
+    assert [asked.request_answer("a"), asked.request_answer("a"), asked.request_answer("b")] == [False, True, True]
     assert len(asked.started) == 2 and asked.started[0].poll() is not None
 
 
 @pytest.mark.timeout(60)
 def test_a_case_that_kills_every_process_is_given_up(engine):
     asked = engine(DYING)
-    assert not any(asked.ask("a") for _ in range(TRIES))
-    assert len(asked.started) == TRIES
+    assert not any(asked.request_answer("a") for _ in range(MAX_ATTEMPTS))
+    assert len(asked.started) == MAX_ATTEMPTS

@@ -25,7 +25,7 @@ from study.evaluation.bank.proof_folder import (
 from study.evaluation.bank.prove import outcome_of
 from study.evaluation.bank.seal_cases import BankPlan, format_settings, write_sealed_case
 from study.evaluation.challenge.draw_bank import draw_case_plan
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.formats.mechanical_model_file import read_mechanical_model
 
 SEED, NUMBER, LEVEL_N = 51_404, 0, 3.0
@@ -51,8 +51,8 @@ def answer(place, effect="sensor_gain", rival="force_gain", best=""):
         "diagnosis": diagnosis,
         "channel_errors": {"retuned": {"ay": 9.0}},
         "proposal": {"axis": 0, "level": LEVEL_N, "best": [best] if best else []},
-        "recording_sha256": sha256_of(place / RECORDING),
-        "model_sha256": sha256_of(place / MODEL),
+        "recording_sha256": compute_sha256(place / RECORDING),
+        "model_sha256": compute_sha256(place / MODEL),
     }
     (place / ANSWER).write_text(json.dumps(said))
 
@@ -115,7 +115,7 @@ def test_the_same_call_continues_without_doing_anything_twice(followed):
 def test_where_nothing_is_proposed_the_start_stays_open_and_the_random_one_is_played(tmp_path, monkeypatch):
     folder, outcome, _ = started(tmp_path / "bank", False)
     asked = []
-    monkeypatch.setattr("study.evaluation.bank.ask_engine.ask_engine", lambda again, names, *_: asked.extend(names))
+    monkeypatch.setattr("study.evaluation.bank.ask_engine.diagnose_cases", lambda again, names, *_: asked.extend(names))
     with pytest.raises(StudyError, match="answer.json"):  # without an answer
         follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)
     (name,) = asked
@@ -132,7 +132,7 @@ def test_a_case_whose_process_died_keeps_all_its_recordings(tmp_path, monkeypatc
             on_answered(name)
 
     folder, outcome, _ = started(tmp_path / "bank", False)
-    monkeypatch.setattr("study.evaluation.bank.ask_engine.ask_engine", die)
+    monkeypatch.setattr("study.evaluation.bank.ask_engine.diagnose_cases", die)
     follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)
     (place,) = (folder.path / FOLLOW_UP_FOLDER / "open").iterdir()
     assert {path.name for path in place.glob("*.h5")} == {RECORDING, FURTHER_RECORDING.format(2)}

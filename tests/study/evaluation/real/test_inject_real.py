@@ -16,8 +16,8 @@ from equalizer.signals.signal import Signal
 from study.errors import StudyError
 from study.evaluation.bank.proof_folder import open_proof_folder
 from study.evaluation.real.inject_real import PROCESSOR_S, Carrier, seal_injections
-from study.evaluation.real.injected_halves import blank_lead_responses, draw_halves, held_out_change
-from study.store.disk.provenance import sha256_of
+from study.evaluation.real.injected_halves import blank_lead_responses, compute_held_out_change, draw_halves
+from study.store.disk.provenance import compute_sha256
 from study.store.formats.recording_file import read_recording
 
 RATE_HZ, SAMPLES = 500.0, 6000
@@ -109,11 +109,11 @@ def test_parts_by_chance_are_whole_and_in_one_half_only():
 @pytest.mark.slow
 def test_what_a_fault_changes_is_what_a_base_of_the_clean_half_misses(split):
     sound, rest = (blank_lead_responses(half) for half in split)
-    assert held_out_change(sound, rest, rest) == 1.0
+    assert compute_held_out_change(sound, rest, rest) == 1.0
     doubled = replace(rest, command=replace(rest.command, samples=2 * rest.command.samples))
     slightly = replace(rest, command=replace(rest.command, samples=1.0001 * rest.command.samples))
-    assert held_out_change(sound, rest, doubled) > 1.25
-    assert held_out_change(sound, rest, slightly) == pytest.approx(1.0, abs=0.05)
+    assert compute_held_out_change(sound, rest, doubled) > 1.25
+    assert compute_held_out_change(sound, rest, slightly) == pytest.approx(1.0, abs=0.05)
 
 
 @pytest.mark.slow
@@ -140,8 +140,8 @@ def test_labels_bind_recording_model_and_clean_half_and_the_search_has_its_time(
     folder = open_proof_folder(tmp_path / "bank", 4, False)
     (name,) = seal_injections(folder, (carrier,), 1, 4)
     label, place = json.loads(folder.label_file(0).read_text()), folder.open / name
-    assert label["model_sha256"] == sha256_of(place / "model.toml")
-    assert label["others_sha256"] == {"clean/recording.h5": sha256_of(place / "clean" / "recording.h5")}
+    assert label["model_sha256"] == compute_sha256(place / "model.toml")
+    assert label["others_sha256"] == {"clean/recording.h5": compute_sha256(place / "clean" / "recording.h5")}
     assert json.loads((place / "settings.json").read_text()) == {"without": [], "processor_s": PROCESSOR_S}
 
 

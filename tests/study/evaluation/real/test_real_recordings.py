@@ -71,7 +71,7 @@ def test_recordings_that_are_links_are_sent_to_workers_too(folder: Path, tmp_pat
     write_files(there / "axis", read_files(linked))
     (sent,) = read_real_folder(there).recordings
     assert (sent.name, [path.name for path in sent.found_map.files]) == ("run", ["run.npz"])
-    assert sent.model() is not None
+    assert sent.read_model() is not None
 
 
 def test_a_recording_that_did_not_come_to_its_worker_is_named() -> None:
@@ -210,7 +210,7 @@ def test_every_folder_of_public_recordings_is_understood(shared: Path) -> None:
     assert [test.files[0].stem for test in on_a_body.tests] == ["condition2_clip"]
     assert [test.name for test in by_name["silverbox"].tests] == ["silverbox_growing_noise", "silverbox_schroeder"]
     assert all(recording.found_map.source.map.diagnosis.objections for recording in found.recordings)
-    assert by_name["haptic_paddle_torque"].model().rotational
+    assert by_name["haptic_paddle_torque"].read_model().rotational
 
 
 @pytest.mark.slow

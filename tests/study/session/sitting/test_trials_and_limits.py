@@ -20,8 +20,8 @@ from study.session.state.machine import (
     EndSitting,
     Finish,
     TakeRest,
+    find_next_action,
     find_reached_limit,
-    next_action,
 )
 from study.session.state.progress import estimate_progress
 from study.session.state.vibration_dose import compute_a8_mps2
@@ -32,26 +32,26 @@ LATER = "2026-01-01T02:00:00.000+00:00"
 
 def test_practice_stays_at_its_level_until_it_is_passed(begun, full, facts):
     state = apply_event(prepared(begun(full)), DemoFinished(UTC))
-    while next_action(state) and not state.runs[state.run].practice:
-        action = next_action(state)
+    while find_next_action(state) and not state.runs[state.run].practice:
+        action = find_next_action(state)
         state = (
             apply_event(state, RestTaken(UTC, state.run, state.trial, 2.0))
             if isinstance(action, TakeRest)
             else facts.one_trial(state, correct=True)
         )
-    if isinstance(next_action(state), TakeRest):
+    if isinstance(find_next_action(state), TakeRest):
         state = apply_event(state, RestTaken(UTC, state.run, state.trial, 2.0))
     practice = state.run
     levels = []
     for correct in (False, True, True):
-        action = next_action(state)
+        action = find_next_action(state)
         assert (action.phase, action.run) == (Phase.TRAINING, practice)
         levels.append(action.level_n)
         state = facts.one_trial(state, correct)
     assert levels == [2.0] * 3
     assert state.run == practice + 1
     assert state.rest_due_s == 0.0
-    assert next_action(state).level_n == 1.0
+    assert find_next_action(state).level_n == 1.0
 
 
 def through_to_test(state, facts):
@@ -67,7 +67,7 @@ def test_catch_trials_are_at_full_level_and_steer_nothing(begun, small_protocol,
     state = through_to_test(begun(protocol), facts)
     caught = 0
     for _ in range(8):
-        action, before = next_action(state), state
+        action, before = find_next_action(state), state
         state = facts.one_trial(state, correct=False)
         if action.phase is Phase.CATCH:
             caught += 1
@@ -91,7 +91,7 @@ def test_in_a_detection_run_the_interval_is_the_answer(begun, small_protocol, fa
     state = begun(protocol)
     seen = set()
     for _ in range(30):
-        action = next_action(state)
+        action = find_next_action(state)
         if isinstance(action, Finish):
             break
         assert action.phase is Phase.DETECTION
@@ -103,13 +103,13 @@ def test_in_a_detection_run_the_interval_is_the_answer(begun, small_protocol, fa
 
 def test_the_dose_counts_every_vibration_at_the_hand(begun, small_protocol, facts):
     state = begun(small_protocol)
-    action = next_action(state)
+    action = find_next_action(state)
     state = apply_event(apply_event(state, facts.presented(action)), facts.answered(action, correct=True))
     measured = replace(facts.measured(action), delivered_mps2=3.0, off_axis_mps2=4.0, vibrated_s=10.0)
     state = apply_event(state, measured)
     first = state.sitting.dose
     assert first.vibrated_s == 10.0
-    action = next_action(state)
+    action = find_next_action(state)
     state = apply_event(state, facts.presented(action))
     state = apply_event(state, TrialSpoiled(UTC, action.run, action.trial, action.attempt, "a pause", vibrated_s=10.0))
     assert state.sitting.dose.vibrated_s == 20.0
@@ -119,7 +119,7 @@ def test_the_dose_counts_every_vibration_at_the_hand(begun, small_protocol, fact
 
 def test_a_stimulus_without_a_measurement_is_marked_in_the_dose(begun, small_protocol, facts):
     state = begun(small_protocol)
-    action = next_action(state)
+    action = find_next_action(state)
     state = apply_event(state, facts.presented(action))
     state = apply_event(state, TrialSpoiled(UTC, action.run, action.trial, action.attempt, "a fault", vibrated_s=3.0))
     assert state.sitting.dose.unmeasured_s == 3.0
@@ -140,11 +140,11 @@ def test_a_sitting_that_is_too_long_ends_between_two_trials(begun, small_protoco
     protocol = replace(small_protocol, limits=SittingLimits(longest_min=119.0))
     state = facts.one_trial(begun(protocol), correct=True)
     assert find_reached_limit(state, UTC) == ""
-    due = next_action(state, LATER)
+    due = find_next_action(state, LATER)
     assert isinstance(due, EndSitting)
     assert "119 minutes" in due.reason and "another day" in due.reason
     resumed = apply_event(state, SessionResumed(LATER, state.opened.device, {}))
-    assert next_action(resumed, LATER).phase is Phase.TRAINING
+    assert find_next_action(resumed, LATER).phase is Phase.TRAINING
 
 
 def test_a_hand_that_had_its_dose_rests_for_the_day(begun, small_protocol):
@@ -152,10 +152,10 @@ def test_a_hand_that_had_its_dose_rests_for_the_day(begun, small_protocol):
     state = begun(protocol)
     shaken = replace(state.sitting, dose=replace(state.sitting.dose, squared_s=100.0), still_s=0.0, last=Moment(UTC))
     tired = replace(state, sitting=shaken)
-    assert "vibration dose for today" in next_action(tired, LATER).reason
-    assert not isinstance(next_action(tired, LATER.replace("01-01", "01-02")), EndSitting)
+    assert "vibration dose for today" in find_next_action(tired, LATER).reason
+    assert not isinstance(find_next_action(tired, LATER.replace("01-01", "01-02")), EndSitting)
     simulated = replace(tired, opened=replace(tired.opened, observer="ideal"))
-    assert not isinstance(next_action(simulated, LATER), EndSitting)
+    assert not isinstance(find_next_action(simulated, LATER), EndSitting)
 
 
 def test_a_pause_changes_nothing(begun, small_protocol):

@@ -19,7 +19,7 @@ from study.session.facts.events import (
 )
 from study.session.state.draw_check import LogContradiction
 from study.session.state.fold import apply_event
-from study.session.state.machine import Finish, TakeRest, next_action
+from study.session.state.machine import Finish, TakeRest, find_next_action
 from study.session.state.state import begin_session
 from tests.session_facts import UTC, answered, measured, one_trial, opened, presented
 
@@ -32,15 +32,15 @@ def fresh(small_protocol, small_text):
 def test_training_comes_first_and_ends_at_its_trial_limit(fresh):
     state = fresh
     for _ in range(4):
-        assert next_action(state).phase is Phase.TRAINING
+        assert find_next_action(state).phase is Phase.TRAINING
         state = one_trial(state, correct=True)
-    assert next_action(state) == TakeRest(2.0)
+    assert find_next_action(state) == TakeRest(2.0)
 
 
 def test_a_session_of_right_and_wrong_answers_comes_to_its_end(fresh):
     state = fresh
     answers = iter([True, True, True, False] * 100)
-    while not isinstance(next_action(state), Finish):
+    while not isinstance(find_next_action(state), Finish):
         state = one_trial(state, next(answers))
     assert {t.phase for t in state.trials} == {Phase.TRAINING, Phase.TEST}
     assert {t.frequency_hz for t in state.trials if t.phase is Phase.TEST} == {25.0, 35.0}
@@ -48,17 +48,17 @@ def test_a_session_of_right_and_wrong_answers_comes_to_its_end(fresh):
 
 
 def test_a_spoiled_trial_is_drawn_again_at_the_same_level_and_moves_nothing(fresh):
-    action = next_action(fresh)
+    action = find_next_action(fresh)
     state = apply_event(fresh, presented(action))
     state = apply_event(state, TrialSpoiled(UTC, action.run, action.trial, action.attempt, "a fault"))
-    again = next_action(state)
+    again = find_next_action(state)
     assert (again.trial, again.attempt, again.level_n) == (action.trial, action.attempt + 1, action.level_n)
     assert state.trials[0].status is TrialStatus.SPOILED
     assert state.staircase == fresh.staircase
 
 
 def test_an_answer_moves_the_staircase_only_when_the_trial_is_closed(fresh):
-    action = next_action(fresh)
+    action = find_next_action(fresh)
     state = apply_event(apply_event(fresh, presented(action)), answered(action, correct=False))
     assert state.staircase == fresh.staircase
     assert state.answers == 1
@@ -67,7 +67,7 @@ def test_an_answer_moves_the_staircase_only_when_the_trial_is_closed(fresh):
 
 
 def test_a_trial_answered_and_then_spoiled_by_the_device_counts_for_nothing(fresh):
-    action = next_action(fresh)
+    action = find_next_action(fresh)
     state = apply_event(apply_event(fresh, presented(action)), answered(action, correct=False))
     state = apply_event(state, TrialSpoiled(UTC, action.run, action.trial, action.attempt, "the device let go"))
     assert state.answers == 0
@@ -76,14 +76,14 @@ def test_a_trial_answered_and_then_spoiled_by_the_device_counts_for_nothing(fres
 
 
 def test_a_level_that_the_rules_do_not_give_is_a_contradiction(fresh):
-    wrong = replace(presented(next_action(fresh)), level_n=1.1)
+    wrong = replace(presented(find_next_action(fresh)), level_n=1.1)
     with pytest.raises(LogContradiction, match=r"level_n 1\.1 where 1\.0 is due: .*different rules"):
         apply_event(fresh, wrong)
 
 
 @pytest.mark.parametrize("field", ["direction", "angle_deg", "polarity", "level_db", "frequency_hz", "phase"])
 def test_no_part_of_a_draw_can_be_changed_in_the_log(fresh, field):
-    right = presented(next_action(fresh))
+    right = presented(find_next_action(fresh))
     other = {
         "direction": 3 - right.direction,
         "angle_deg": right.angle_deg + 90.0,
@@ -97,7 +97,7 @@ def test_no_part_of_a_draw_can_be_changed_in_the_log(fresh, field):
 
 
 def test_the_last_bit_of_a_level_may_differ_between_machines(fresh):
-    right = presented(next_action(fresh))
+    right = presented(find_next_action(fresh))
     assert apply_event(fresh, replace(right, level_n=right.level_n * (1 + 1e-15))).presented is not None
 
 
@@ -114,23 +114,23 @@ def test_a_rest_that_was_not_due_is_a_contradiction(fresh):
 @pytest.mark.parametrize("change", [{"run": 1}, {"trial": 1}, {"attempt": 1}])
 def test_a_trial_out_of_turn_is_a_contradiction(fresh, change):
     with pytest.raises(LogContradiction, match="was due"):
-        apply_event(fresh, replace(presented(next_action(fresh)), **change))
+        apply_event(fresh, replace(presented(find_next_action(fresh)), **change))
 
 
 def test_an_answer_without_a_trial_is_a_contradiction(fresh):
     with pytest.raises(LogContradiction, match="which is not open"):
-        apply_event(fresh, answered(next_action(fresh), correct=True))
+        apply_event(fresh, answered(find_next_action(fresh), correct=True))
 
 
 def test_a_second_answer_to_a_trial_is_a_contradiction(fresh):
-    action = next_action(fresh)
+    action = find_next_action(fresh)
     state = apply_event(apply_event(fresh, presented(action)), answered(action, correct=True))
     with pytest.raises(LogContradiction, match="answered twice"):
         apply_event(state, answered(action, correct=False))
 
 
 def test_a_measurement_before_the_answer_is_a_contradiction(fresh):
-    action = next_action(fresh)
+    action = find_next_action(fresh)
     with pytest.raises(LogContradiction, match="measured before it was answered"):
         apply_event(apply_event(fresh, presented(action)), measured(action))
 
@@ -138,7 +138,7 @@ def test_a_measurement_before_the_answer_is_a_contradiction(fresh):
 def finished_session(fresh):
     state = fresh
     answers = iter([True, True, True, False] * 100)
-    while not isinstance(next_action(state), Finish):
+    while not isinstance(find_next_action(state), Finish):
         state = one_trial(state, next(answers))
     return apply_event(state, SessionClosed(UTC, "completed"))
 
@@ -162,13 +162,13 @@ def test_a_session_is_opened_once(fresh):
 
 def test_an_open_trial_must_be_closed_before_the_next_action(fresh):
     with pytest.raises(ValueError, match="a trial is open"):
-        next_action(apply_event(fresh, presented(next_action(fresh))))
+        find_next_action(apply_event(fresh, presented(find_next_action(fresh))))
 
 
 def test_swapped_labels_change_the_number_and_not_the_device(small_protocol, small_text):
     swapping = replace(small_protocol, schedule=replace(small_protocol.schedule, labels="swapped_for_half"))
-    first = next_action(begin_session(opened(swapping, small_text, participant_number=0), swapping))
-    second = next_action(begin_session(opened(swapping, small_text, participant_number=1), swapping))
+    first = find_next_action(begin_session(opened(swapping, small_text, participant_number=0), swapping))
+    second = find_next_action(begin_session(opened(swapping, small_text, participant_number=1), swapping))
     assert first.direction == second.direction
     assert {first.label, second.label} == {1, 2}
 
@@ -182,11 +182,11 @@ def test_who_felt_what(small_protocol, small_text):
     }
     for expected, line in cases.items():
         state = begin_session(line, small_protocol)
-        assert apply_event(state, presented(next_action(state))).trials[0].felt is expected
+        assert apply_event(state, presented(find_next_action(state))).trials[0].felt is expected
 
 
 def test_every_event_survives_its_line(fresh):
-    action = next_action(fresh)
+    action = find_next_action(fresh)
     events = [
         fresh.opened,
         presented(action),
@@ -214,7 +214,7 @@ def test_folding_gives_the_levels_of_the_staircase_alone(answers):
     for correct in answers:
         if state.run != 1:
             break
-        before = next_action(state) if not isinstance(next_action(state), TakeRest) else None
+        before = find_next_action(state) if not isinstance(find_next_action(state), TakeRest) else None
         if before is not None:
             assert before.level_n == level_n(protocol.staircase, expected)
         state = one_trial(state, correct)

@@ -56,11 +56,11 @@ def test_a_stimulus_in_acceleration_goes_through_the_equalizer(small_protocol):
         name = "a mass of half a kilogram"
         takes = "acceleration"
 
-        def periodic(self, wanted: Signal) -> Signal:
+        def compute_loop_commands(self, wanted: Signal) -> Signal:
             assert wanted.unit == "m/s^2"
             return Signal(0.5 * wanted.samples, wanted.sample_rate_hz, "force", "N", ("fx", "fy", "fz"))
 
-        def onset(self, wanted: Signal, envelope) -> None:
+        def compute_onset_commands(self, wanted: Signal, envelope) -> None:
             return None
 
     vector = compute_direction_vector(small_protocol.directions, 1)
@@ -71,7 +71,7 @@ def test_a_stimulus_in_acceleration_goes_through_the_equalizer(small_protocol):
 def test_without_an_equalizer_only_a_force_can_be_played():
     wanted = Signal(np.zeros((4, 3)), RATE_HZ, "acceleration", "m/s^2", ("ax", "ay", "az"))
     with pytest.raises(ValueError, match="only a force can be played, not acceleration"):
-        Identity().periodic(wanted)
+        Identity().compute_loop_commands(wanted)
 
 
 def test_the_slew_limit_is_just_above_the_steepest_stimulus(small_protocol):

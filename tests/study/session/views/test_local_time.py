@@ -4,7 +4,7 @@ from datetime import UTC, datetime, timedelta, timezone
 
 import pytest
 
-from study.local_clock import local_now, machine_zone
+from study.local_clock import convert_to_machine_zone, format_local_now
 from study.session.views.local_time import format_time_in_zone, format_times_in_zone, split_time_in_zone, to_utc
 
 
@@ -28,7 +28,7 @@ def test_a_time_is_that_of_the_place_with_its_offset(utc, zone, expected):
 
 
 @pytest.mark.parametrize("text", ["", "T10;01", "yesterday", "9999-12-31T23:59:59+00:00", "0001-01-01T00:00:00+14:00"])
-@pytest.mark.parametrize("zone", [machine_zone, india])
+@pytest.mark.parametrize("zone", [convert_to_machine_zone, india])
 def test_what_cannot_be_converted_stays_as_it_is_or_is_converted(text, zone, summer_and_winter):
     assert format_time_in_zone(text, zone)[:4] in (text[:4], "1000")
 
@@ -48,11 +48,11 @@ def test_a_zone_that_breaks_down_leaves_the_time_as_it_is():
     ],
 )
 def test_the_machine_knows_summer_time(utc, expected, summer_and_winter):
-    assert split_time_in_zone(utc, machine_zone) == expected
+    assert split_time_in_zone(utc, convert_to_machine_zone) == expected
 
 
 def test_now_is_local(summer_and_winter):
-    said = datetime.strptime(local_now(), "%Y-%m-%d %H:%M %z")
+    said = datetime.strptime(format_local_now(), "%Y-%m-%d %H:%M %z")
     assert said.utcoffset() in (timedelta(hours=1), timedelta(hours=2))
     assert abs(said - datetime.now(UTC)) < timedelta(days=1)
 

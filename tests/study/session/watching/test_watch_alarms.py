@@ -12,7 +12,7 @@ from study.session.facts.events import (
 )
 from study.session.facts.void_reasons import HARDLY_ARRIVED, SCREEN_LATE
 from study.session.state.due_trial import PresentTrial
-from study.session.state.machine import next_action
+from study.session.state.machine import find_next_action
 from study.session.watching.make_watch_view import LiveInfo, make_watch_view
 from tests.watched_story import DEVICE, at, kinds
 
@@ -83,7 +83,7 @@ def test_two_lapses_of_the_last_five_catch_trials_are_an_alarm(with_parts):
     lapses = 0
     while lapses < 2:
         assert kinds(story.view()) == []
-        catch = next_action(story.watched.state)
+        catch = find_next_action(story.watched.state)
         is_catch = isinstance(catch, PresentTrial) and catch.phase is Phase.CATCH
         story.answer(not is_catch)
         lapses += is_catch

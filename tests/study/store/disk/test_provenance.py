@@ -6,7 +6,7 @@ import pytest
 
 from study.store.disk.file_errors import CannotReadError
 from study.store.disk.json_document import read_json, write_json
-from study.store.disk.provenance import PACKAGES, anonymise_arguments, gather_provenance, list_versions, sha256_of
+from study.store.disk.provenance import PACKAGES, anonymise_arguments, compute_sha256, gather_provenance, list_versions
 from study.store.sessions.written_elsewhere import note_written_folder, read_written_folders
 
 
@@ -42,7 +42,7 @@ def test_the_command_line_keeps_options_and_loses_folders():
 
 def test_a_parent_that_is_not_there_is_named(tmp_path):
     with pytest.raises(CannotReadError, match="There is no file"):
-        sha256_of(tmp_path / "none")
+        compute_sha256(tmp_path / "none")
 
 
 def test_file_names_that_are_not_utf8_do_not_stop_what_is_written(tmp_path):

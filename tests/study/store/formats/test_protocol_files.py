@@ -7,7 +7,7 @@ import pytest
 from protocols.document.hashing import protocol_hash
 from protocols.document.lock import lock_from_json
 from study.errors import ExitCode, StudyError, WrongUseError
-from study.local_clock import machine_zone
+from study.local_clock import convert_to_machine_zone
 from study.session.views.local_time import format_time_in_zone
 from study.store.disk.file_errors import CannotReadError, CannotWriteError, UnusableFileError
 from study.store.formats.protocol_files import (
@@ -142,7 +142,7 @@ def test_a_locked_protocol_that_changed_is_refused_before_data_come_in(mine):
     error = caught.value
     assert error.title == "This protocol is locked, and it is not the locked one"
     assert str(path) in error.happened
-    assert f"was locked on {format_time_in_zone(WHEN, machine_zone)} and has changed since" in error.happened
+    assert f"was locked on {format_time_in_zone(WHEN, convert_to_machine_zone)} and has changed since" in error.happened
     assert error.saved == "Nothing was changed, and no session was begun."
     assert error.do_now.startswith("Restore the locked version")
 

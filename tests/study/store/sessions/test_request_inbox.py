@@ -29,9 +29,9 @@ def folder(tmp_path, inbox):
 @pytest.mark.parametrize("request_", [STOP, PAUSE, NOTE])
 def test_what_is_sent_is_taken_once(inbox, request_):
     name = inbox.send(request_)
-    assert inbox.unread(name)
+    assert inbox.is_unread(name)
     assert inbox.take() == (request_,)
-    assert not inbox.unread(name)
+    assert not inbox.is_unread(name)
     assert inbox.take() == ()
 
 

@@ -125,7 +125,7 @@ def test_a_silent_screen_ends_every_force_at_the_hand(screen, wait):
 
 def test_a_silent_screen_of_a_busy_computer_is_distinguished(screen):
     screen.fall_silent()
-    busy = RemoteDisplay(screen.link, RealClock(), load=lambda: 4.0)
+    busy = RemoteDisplay(screen.link, RealClock(), get_load=lambda: 4.0)
     assert busy.ask(QUESTION, alive) == make_silent_screen_reply(0.0, 4.0)
 
 
@@ -208,7 +208,7 @@ def test_an_engine_that_understands_nothing_any_more_stops_its_device_and_ends(s
     time.sleep(0.15)
     screen.pipe.send_bytes(b"nothing that was pickled")
     assert stopped.wait(20.0)
-    assert screen.link.next_command() is None
+    assert screen.link.wait_for_command() is None
     with pytest.raises(KeyboardInterrupt):
         screen.display.await_return("a reason")
     assert "UnpicklingError" in capfd.readouterr().err

@@ -123,7 +123,7 @@ def test_f4_opens_it_from_the_start_and_escape_comes_back(on_screen, home):
 
 def test_while_the_device_is_prepared_it_says_what_and_for_how_long(on_screen, monkeypatch):
     now = [100.0]
-    monkeypatch.setattr("study.tui.screens.preparing.TICK_S", 0.02)
+    monkeypatch.setattr("study.tui.screens.preparing.UPDATE_INTERVAL_S", 0.02)
 
     async def story(sight):
         assert "Compiling the simulation." in sight.text
@@ -143,7 +143,7 @@ def test_before_the_language_is_known_nothing_is_said(on_screen):
 
     async def story(sight):
         assert re.findall(r"[A-Za-z]{2,}", sight.text) == []
-        sight.app.screen.speak(german)
+        sight.app.screen.set_language(german)
         await sight.pilot.pause()
         assert re.findall(r"[A-Za-z]{2,}", sight.text) == []
         sight.app.screen.say("Das Gerät wird vorbereitet.")

@@ -7,7 +7,7 @@ from textual.widgets import Input, Select
 
 from study.session.views.archive_views import HomeView, ProtocolLine
 from study.tui.screens.home import HomeScreen
-from study.tui.widgets.session_table import AT_ONCE, SessionTable
+from study.tui.widgets.session_table import BATCH_ROWS, SessionTable
 from tests.study.tui.home.conftest import messages_of
 
 
@@ -84,7 +84,7 @@ def test_five_hundred_sessions_open_at_once_and_scroll_to_the_last(on_screen, ho
     async def story(sight):
         sight.app.screen.show(replace(home, sessions=many))
         table = sight.app.screen.query_one(SessionTable)
-        assert table.row_count == AT_ONCE
+        assert table.row_count == BATCH_ROWS
         await sight.until(lambda: table.row_count == len(many))
         await sight.press("f3", "ctrl+end", "enter")
         assert "P499_001" in sight.text

@@ -7,19 +7,19 @@ from study.tui.keys.answer_keys import DIGITS, AnswerKeys, parse_keys
 def test_named_keys_answer_and_so_do_the_digits():
     keys = parse_keys("f, j")
     assert keys == AnswerKeys("f", "j")
-    assert [keys.answer(typed) for typed in ("f", "j", "1", "2", "F", "J")] == [1, 2, 1, 2, 1, 2]
-    assert keys.choice() == "f for 1, j for 2"
+    assert [keys.parse_answer(typed) for typed in ("f", "j", "1", "2", "F", "J")] == [1, 2, 1, 2, 1, 2]
+    assert keys.describe_keys() == "f for 1, j for 2"
 
 
 @pytest.mark.parametrize("typed", ["", "k", "11", "fj", "\x1b[A"])
 def test_anything_else_is_no_answer(typed):
-    assert parse_keys("f,j").answer(typed) is None
-    assert DIGITS.answer(typed) is None
+    assert parse_keys("f,j").parse_answer(typed) is None
+    assert DIGITS.parse_answer(typed) is None
 
 
 def test_the_digits_alone_may_be_named_too():
     assert parse_keys("1,2") == DIGITS
-    assert DIGITS.choice() == "1 or 2"
+    assert DIGITS.describe_keys() == "1 or 2"
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,9 @@ import pytest
 from protocols.definition.recording_segments import MultisineSegment
 from study.devices.clock import VirtualClock
 from study.devices.device import DeviceInfo
-from study.devices.opening import device_folder
+from study.devices.opening import get_device_folder
 from study.devices.safe import SafeDevice
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
 from study.workflows.checks.daily_check import MotionCallbacks, check_on_device
@@ -45,7 +45,7 @@ def device_like(stepped_stub):
         stepped_stub.set("noise", state["noise"])
         stepped_stub.seed = seed
         rig = stepped_stub.rig()
-        plan = RecordingPlan(short(), "omega3", (0.0, 0.0, 0.0), 1, device_folder() / f"{seed}.h5")
+        plan = RecordingPlan(short(), "omega3", (0.0, 0.0, 0.0), 1, get_device_folder() / f"{seed}.h5")
         stepped_stub.move(0.0, 0.0, 0.0)
         with contextlib.closing(SafeDevice(rig, make_recording_settings(plan), VirtualClock())) as device:
             yield device, plan
@@ -62,7 +62,7 @@ def kept(tmp_path_factory):
 @pytest.fixture
 def recorded(device_like, kept):
     def record(seed: int, **changed: float):
-        out = device_folder() / f"{seed}.h5"
+        out = get_device_folder() / f"{seed}.h5"
         once = kept / f"{'-'.join(map(str, (seed, *changed, *changed.values())))}.h5"
         if not once.exists():
             with device_like(seed, changed) as (device, plan):
@@ -81,8 +81,8 @@ INFO = DeviceInfo("omega.3", False, 1000.0, 12.0, 0.28, "serial 4242, firmware 2
 def two_days(recorded, device_like, vendor):
     """Accepted with a baseline, which is given back, and a function that checks that device once more."""
     recorded(1)
-    baseline = device_folder() / "1.h5"
-    vendor.accept("omega.3", baseline=(baseline.name, sha256_of(baseline)))
+    baseline = get_device_folder() / "1.h5"
+    vendor.accept("omega.3", baseline=(baseline.name, compute_sha256(baseline)))
 
     def again(seed: int, **changed: float):
         with device_like(seed, changed) as (device, plan):

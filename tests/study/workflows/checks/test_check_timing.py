@@ -200,7 +200,7 @@ def test_doctor_judges_late_ticks_by_the_load_that_it_shows(rigs, settings, monk
     monkeypatch.setattr(examine_setup, "check_timing", timing)
     clock = VirtualClock()
     with contextlib.closing(SafeDevice(rigs.ScriptedRig(), settings, clock)) as device, pytest.raises(DeviceError):
-        examine_setup._time(device, clock, 0.1, lambda done: None)
+        examine_setup._measure_timing(device, clock, 0.1, lambda done: None)
     assert asked == [1.3]
 
 

@@ -10,12 +10,12 @@ import pytest
 from analysis.device_change.compare_devices import Change
 from study.cli.main import main
 from study.devices.force_dimension.acceptance import Acceptance, acceptance_file, write_acceptance
-from study.devices.opening import device_folder
+from study.devices.opening import get_device_folder
 from study.errors import DeviceError, UserInterruptError
 from study.session.views.views import DeviceFinding, DeviceReport
 from study.workflows.checks import daily_check, examine_setup
 from study.workflows.checks.daily_check import MotionCallbacks, check_on_device, compare_recordings, judge_last_check
-from study.workflows.checks.device_changes import change_findings
+from study.workflows.checks.device_changes import make_change_findings
 from study.workflows.checks.examine_setup import Examination
 from tests.study.workflows.checks.conftest import INFO, QUIET, short
 
@@ -49,7 +49,7 @@ def change(kind: str, **other) -> Change:
 
 
 def test_changes_are_said_with_their_numbers_their_limits_and_what_to_do():
-    found = change_findings(
+    found = make_change_findings(
         [
             change("friction", accepted=0.2, today=0.4, unit="N", changed=True),
             change("gain", today=0.8, limit=0.122, changed=True),
@@ -67,19 +67,19 @@ def test_changes_are_said_with_their_numbers_their_limits_and_what_to_do():
 
 
 def test_what_was_measured_too_inaccurately_is_neither_changed_nor_fine():
-    (found,) = change_findings([change("response", today=0.16, band_hz=(50.0, 63.0), error=0.3, unclear=True)])
+    (found,) = make_change_findings([change("response", today=0.16, band_hz=(50.0, 63.0), error=0.3, unclear=True)])
     assert found.warning and not found.fine and "close other programs" in found.advice
 
 
 def test_a_handle_that_does_not_move_any_more_has_changed():
-    (found,) = change_findings([change("friction", today=np.nan, unit="N", changed=True)])
+    (found,) = make_change_findings([change("friction", today=np.nan, unit="N", changed=True)])
     assert "the handle did not move" in found.value and found.wrong
 
 
 def test_a_check_leaves_a_file_that_the_check_before_a_sitting_finds(two_days, stepped_stub, capsys):
     _, check = two_days
     assert judge_last_check(INFO).value == "none yet" and judge_last_check(INFO).warning
-    (device_folder() / "daily_checks").mkdir()
+    (get_device_folder() / "daily_checks").mkdir()
     for seed, noise, said in ((2, 0.05, "nothing changed"), (3, 0.2, "noise changed")):
         checked = check(seed, noise=noise)
         assert stepped_stub.get("peak_n") > 0
@@ -91,7 +91,7 @@ def test_a_check_leaves_a_file_that_the_check_before_a_sitting_finds(two_days, s
         )
         assert main(["validate", str(checked.file), str(checked.file.with_suffix(".h5"))]) == 0
         assert f"daily check of omega.3 at {document['utc']}" in capsys.readouterr().out
-        checked.file.rename(device_folder() / "daily_checks" / checked.file.name)
+        checked.file.rename(get_device_folder() / "daily_checks" / checked.file.name)
         found = judge_last_check(INFO)
         assert said in found.value and checked.file.name in found.value
         assert found.fine == (seed == 2) and found.warning == (seed != 2)
@@ -102,7 +102,7 @@ def test_a_check_leaves_a_file_that_the_check_before_a_sitting_finds(two_days, s
                 judge_last_check(INFO, required=True)
     other = replace(INFO, details="serial 7, firmware 2.41, SDK 3.17.5.0")
     assert judge_last_check(other).value == "none yet"
-    path = device_folder() / "daily_checks" / "3.json"
+    path = get_device_folder() / "daily_checks" / "3.json"
     path.write_text(path.read_text().replace(document["utc"], "2020-01-01T08:00:00+00:00"))
     yesterday = judge_last_check(INFO)
     assert yesterday.warning and "none today; the last one was 2020-01-01" in yesterday.value

@@ -12,15 +12,15 @@ from analysis.device_change import compare_devices
 from analysis.device_change.measure_device import measure_device
 from equalizer.signals.recording import Recording
 from study.cli.main import main
-from study.devices.opening import device_folder
+from study.devices.opening import get_device_folder
 from study.errors import DeviceError
 from study.session.views.views import DeviceFinding, DeviceReport
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.formats.daily_check_file import DailyCheck, write_daily_check
 from study.store.formats.recording_file import read_recording
 from study.workflows.checks import daily_check, examine_setup
 from study.workflows.checks.daily_check import MotionCallbacks, check_on_device, compare_recordings, judge_last_check
-from study.workflows.checks.device_changes import change_findings
+from study.workflows.checks.device_changes import make_change_findings
 from study.workflows.checks.examine_setup import Examination, accept
 from tests.study.workflows.checks.conftest import INFO, QUIET
 
@@ -77,7 +77,7 @@ def test_a_band_that_is_not_reliable_any_more_is_no_pass(recorded, monkeypatch):
     measured = iter([found, replace(found, response=cut)])
     monkeypatch.setattr(compare_devices, "measure_device", lambda _: next(measured))
     (response,) = (
-        each for each in change_findings(compare_recordings(recording, recording)) if each.name == "Response"
+        each for each in make_change_findings(compare_recordings(recording, recording)) if each.name == "Response"
     )
     assert response.warning and not response.fine
     assert "fx, fy, fz not measured at" in response.value and "Not told (fx, fy, fz)" in response.advice
@@ -147,8 +147,8 @@ def test_a_pass_ends_with_another_acceptance_and_with_a_check_that_broke_off(
     two_days, device_like, vendor, monkeypatch
 ):
     baseline, _ = two_days
-    accepted = (baseline.name, sha256_of(baseline))
-    checks = device_folder() / "daily_checks"
+    accepted = (baseline.name, compute_sha256(baseline))
+    checks = get_device_folder() / "daily_checks"
     checks.mkdir()
     now = datetime.now(UTC).isoformat(timespec="seconds")
     changes = ({"kind": "noise", "changed": False},)

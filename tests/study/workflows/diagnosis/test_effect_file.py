@@ -8,9 +8,9 @@ import pytest
 
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
-from equalizer.effects.discovered_law import Channels, law_effect, law_values
+from equalizer.effects.discovered_law import Channels, get_law_values, make_law_effect
 from equalizer.effects.effect import PlacedEffect
-from equalizer.effects.law_entry import effects_per_axis
+from equalizer.effects.law_entry import make_effects_per_axis
 from equalizer.effects.simulation.simulator import simulate_mechanism
 from equalizer.laws.law import parse_law
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect, Tolerance
@@ -18,7 +18,7 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
 from study.errors import StudyError
 from study.store.formats.mechanical_model_file import write_mechanical_model
-from study.workflows.diagnosis.effect_file import read_entry, write_entry
+from study.workflows.diagnosis.effect_file import read_entries, read_entry, write_entry
 
 RATE_HZ, N = 1000.0, 20_000
 LAW = parse_law("-60.0*abs(vx)**1.5*sign(vx)", "force", "x")
@@ -47,7 +47,7 @@ def test_a_law_is_written_as_an_effect_and_read_back(model_file, tmp_path):
 @pytest.mark.parametrize("axis", ['x"""\nraise SystemExit\n"""', 'x"', "x\\"])
 def test_a_text_of_a_diagnosis_never_runs_as_code(tmp_path, monkeypatch, axis):
     law = replace(LAW, axis=axis)
-    monkeypatch.setattr("study.workflows.diagnosis.effect_file._laws", lambda found: [law])
+    monkeypatch.setattr("study.workflows.diagnosis.effect_file._read_laws", lambda found: [law])
     write_entry(tmp_path / "diagnosis.json", tmp_path / "drag.py")
     assert read_entry(tmp_path / "drag.py").law.axis == axis
     assert axis in ast.get_docstring(ast.parse((tmp_path / "drag.py").read_text()), clean=False)
@@ -78,11 +78,11 @@ def test_a_file_that_is_no_effect_is_refused(tmp_path, text, said):
 def test_at_other_axes_all_letters_turn_along(model_file, tmp_path):
     entry = write_entry(model_file, tmp_path / "drag.py")
     turned = replace(entry, law=parse_law("-2.0*vx*y + 0.1*fz + 0*t", "force", "x"))
-    assert [each.law.text for each in effects_per_axis(turned, Channels())] == [
+    assert [each.law.text for each in make_effects_per_axis(turned, Channels())] == [
         "-2.0*vx*y + 0.1*fz + 0*t", "-2.0*vy*z + 0.1*fx + 0*t", "-2.0*vz*x + 0.1*fy + 0*t"
     ]  # fmt: skip
     only = replace(entry, law=parse_law("-2.0*vy**3", "force", "y"))
-    assert [each.law.text for each in effects_per_axis(only, Channels(("u",), ("a",)))] == ["-2.0*vx**3"]
+    assert [each.law.text for each in make_effects_per_axis(only, Channels(("u",), ("a",)))] == ["-2.0*vx**3"]
 
 
 def recording(*laws) -> Recording:
@@ -93,7 +93,9 @@ def recording(*laws) -> Recording:
     wave = np.cos(2 * np.pi * lines * 0.25 * time_s[:, None] + phases).sum(axis=1)
     levels = np.repeat([0.5, 1.0, 2.0, 3.0, 1.5], N // 5)
     commands = (levels * np.tile(wave / np.abs(wave).max(), N // 4000))[:, None]
-    effects = [PlacedEffect(law_effect(law, Channels(("fx",), ("ax",))), (0,), law_values(law)) for law in laws]
+    effects = [
+        PlacedEffect(make_law_effect(law, Channels(("fx",), ("ax",))), (0,), get_law_values(law)) for law in laws
+    ]
     answer = simulate_mechanism(body(), commands, RATE_HZ, effects).response
     noisy = answer + 0.01 * random.standard_normal(answer.shape)
     segments = tuple(Segment(k * 4000, (k + 1) * 4000, "multisine", float(levels[k * 4000]), 4000) for k in range(5))
@@ -126,3 +128,13 @@ def test_where_it_is_not_it_is_not_named(model_file, tmp_path):
     kept = (read_entry(tmp_path / "drag_of_oil.py"),)
     found = diagnose([recording()], body(), DiagnosisSettings(kept=kept), map, lambda said, share: None)
     assert not found.diagnosis.effects
+
+
+def test_an_effect_of_a_signal_that_was_not_recorded_is_refused_before_the_search(model_file, tmp_path):
+    path = tmp_path / "warm_drag.py"
+    expression = write_entry(model_file, path).law.expression
+    path.write_text(path.read_text().replace(repr(expression), repr(f"{expression}*warmth")))
+    with pytest.raises(StudyError, match="does not fit the recordings: the law needs the signal 'warmth'") as said:
+        read_entries((path,), (recording(),))
+    assert "leave --effect-file out" in said.value.do_now
+    assert read_entries((), (recording(),)) == ()

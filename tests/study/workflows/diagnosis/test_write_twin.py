@@ -76,9 +76,9 @@ def test_what_friction_put_into_the_damping_is_taken_off_and_said(twin):
     written = twin[1]
     # The device's own, with its friction apart: 10.2 N s/m.
     left = np.diag(written.fit.model.damping - written.model.damping)[:3]
-    np.testing.assert_allclose(left, written.rigid_body.of_friction)
-    assert (written.rigid_body.of_friction > 4.0).all()
-    np.testing.assert_allclose(written.rigid_body.damping - written.rigid_body.of_friction, 10.2, rtol=0.4)
+    np.testing.assert_allclose(left, written.rigid_body.friction_damping)
+    assert (written.rigid_body.friction_damping > 4.0).all()
+    np.testing.assert_allclose(written.rigid_body.damping - written.rigid_body.friction_damping, 10.2, rtol=0.4)
     assert any("were attributed to friction and subtracted" in note for note in written.notes)
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from study.cli.main import main
 from study.store.disk.file_errors import UnusableFileError
-from study.workflows.equalizer.direction_limit import band_of_study
+from study.workflows.equalizer.direction_limit import read_study_band
 
 LIMIT = {"frequency_hz": 34.7, "lower_hz": 31.6, "upper_hz": None, "words": ""}
 
@@ -23,11 +23,11 @@ def written(tmp_path):
 
 
 def test_the_band_ends_at_the_limit_and_says_how_sure_that_is(written):
-    found = band_of_study(written(), 5.0)
+    found = read_study_band(written(), 5.0)
     assert found.band_hz == (5.0, 34.7)
     assert "34.7 Hz (interval: 31.6 Hz to above what was played)" in found.origin
     assert "simulated" not in found.origin
-    assert "simulated" in band_of_study(written(population="simulated"), 5.0).origin
+    assert "simulated" in read_study_band(written(population="simulated"), 5.0).origin
 
 
 @pytest.mark.parametrize(
@@ -41,7 +41,7 @@ def test_the_band_ends_at_the_limit_and_says_how_sure_that_is(written):
 )
 def test_a_study_without_a_usable_limit_is_refused(written, changes, lowest_hz, said):
     with pytest.raises(UnusableFileError, match=said):
-        band_of_study(written(**changes), lowest_hz)
+        read_study_band(written(**changes), lowest_hz)
 
 
 def test_identify_takes_its_band_from_there(written, tmp_path, monkeypatch, capsys):

@@ -11,7 +11,7 @@ from equalizer.signals.signal import Signal
 from study.errors import StudyError, WrongUseError
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.recording_file import write_recording
-from study.workflows.equalizer.identified_summary import summary, summary_lines
+from study.workflows.equalizer.identified_summary import format_summary, summarise_model
 from study.workflows.equalizer.identify_model import IdentifyPlan, identify_model
 from study.workflows.equalizer.report_identification import report_identification
 
@@ -77,9 +77,9 @@ def test_results_hold_the_hashes_of_their_input_files(device):
 
 
 def test_what_is_said_is_what_was_measured(device):
-    found = summary(device)
+    found = summarise_model(device)
     assert found["held_out_error"] == pytest.approx(found["held_out_noise"], rel=0.2)
-    first, *rest = summary_lines(device)
+    first, *rest = format_summary(device)
     assert f"the error of the model is {100 * found['held_out_error']:.2f} %, noise of the record" in first
     assert "friction" not in first + " ".join((*rest, *device.remarks))
     assert "Order 20, 5 to 35 Hz, stable" in " ".join(rest)
@@ -90,7 +90,7 @@ def test_the_file_keeps_how_good_the_model_is(device):
     assert quality == device.model.quality
     assert (quality.held_out_error, quality.held_out_noise) == (device.held_out_test.error, device.held_out_test.noise)
     assert quality.expected_error >= quality.held_out_error
-    assert summary(device)["quality"]["expected_error"] == quality.expected_error
+    assert summarise_model(device)["quality"]["expected_error"] == quality.expected_error
 
 
 @pytest.mark.slow

@@ -57,7 +57,7 @@ def refusal(folder, tmp_path, **more) -> StudyError:
 def test_the_model_gives_the_transient_that_one_gain_misses(done):
     found, told = done
     assert found.equalized.error < 0.5 * found.single_gain.error
-    assert found.start.error(found.normal) <= found.start.worst_error
+    assert found.start.compute_error(found.normal) <= found.start.worst_error
     across = found.equalized.measured - np.outer(found.equalized.measured @ found.normal, found.normal)
     plain = found.single_gain.measured - np.outer(found.single_gain.measured @ found.normal, found.normal)
     assert np.linalg.norm(across) < np.linalg.norm(plain)

@@ -8,7 +8,7 @@ import pytest
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, ModelEffect, SensorLimits
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
-from equalizer.tracking.feedforward.band_part import band_part
+from equalizer.tracking.feedforward.band_pass import filter_to_band
 from equalizer.tracking.feedforward.trajectory import Trajectory
 from equalizer.tracking.learning.iteration import rms
 from study.cli.main import main
@@ -54,11 +54,11 @@ def folder(device, plants, tmp_path_factory):
         write_recording(folder / f"{number}.h5", recorded(device, turned, number))
     friction = ModelEffect("coulomb_friction", None, {"level": LEVEL_N})
     write_mechanical_model(folder / "improved.toml", mechanical(friction))
-    noise = band_part(np.random.default_rng(7).standard_normal((6000, 3)), RATE_HZ, BAND_HZ)[2000:4000]
+    noise = filter_to_band(np.random.default_rng(7).standard_normal((6000, 3)), RATE_HZ, BAND_HZ)[2000:4000]
     fade = np.clip(np.minimum(np.arange(2000), np.arange(2000)[::-1]) / 100, 0, 1)[:, None]
     rows = np.zeros((2600, 3))
     rows[300:-300] = 1.8 * noise / noise.std(axis=0) * (0.5 - 0.5 * np.cos(np.pi * fade))
-    signal = Signal(band_part(rows, RATE_HZ, BAND_HZ), RATE_HZ, "acceleration", "m/s^2", ("ax", "ay", "az"))
+    signal = Signal(filter_to_band(rows, RATE_HZ, BAND_HZ), RATE_HZ, "acceleration", "m/s^2", ("ax", "ay", "az"))
     write_trajectory(folder / "wanted.csv", Trajectory(signal))
     return folder
 
@@ -72,7 +72,7 @@ def error(device, folder, name, *options) -> float:
     assert main(["equalize", str(folder / f"{name}.h5"), wanted_file, "--out", str(forces), *options]) == 0
     wanted = read_trajectory(folder / "wanted.csv").signal.samples
     played = device.play(read_trajectory(forces).signal.samples)
-    return rms(band_part(played - wanted, RATE_HZ, BAND_HZ)) / rms(wanted)
+    return rms(filter_to_band(played - wanted, RATE_HZ, BAND_HZ)) / rms(wanted)
 
 
 @pytest.mark.slow

@@ -10,11 +10,11 @@ from equalizer.identification.frequency_response.transfer_estimate import estima
 from equalizer.identification.state_space.identify import identify
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.signals.signal import Signal
-from equalizer.tracking.feedforward.band_part import band_part
+from equalizer.tracking.feedforward.band_pass import filter_to_band
 from equalizer.tracking.feedforward.trajectory import Trajectory
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from equalizer.tracking.learning.iteration import Verdict, rms
-from equalizer.tracking.learning.model_inverse import inverse_operator
+from equalizer.tracking.learning.model_inverse import make_inverse_operator
 from protocols.definition.apparatus import SafetySettings
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.recording_segments import SweepSegment
@@ -43,7 +43,9 @@ SPRING = VirtualSpring(0.282 * (2 * np.pi * 3.5) ** 2)
 
 
 def trajectory(level=1.8, rows=2000) -> Trajectory:
-    noise = band_part(np.random.default_rng(7).standard_normal((rows + 4000, 3)), 1000.0, BAND_HZ)[2000 : 2000 + rows]
+    noise = filter_to_band(np.random.default_rng(7).standard_normal((rows + 4000, 3)), 1000.0, BAND_HZ)[
+        2000 : 2000 + rows
+    ]
     fade = np.clip(np.minimum(np.arange(rows), np.arange(rows)[::-1]) / 150, 0, 1)[:, None]
     shaped = level * noise / noise.std(axis=0) * (0.5 - 0.5 * np.cos(np.pi * fade))
     return Trajectory(Signal(shaped, 1000.0, "acceleration", "m/s^2", ("ax", "ay", "az")))
@@ -60,7 +62,7 @@ def inverse(tmp_path_factory):
     out = tmp_path_factory.mktemp("model") / "band.h5"
     record_device(RecordingPlan(protocol, "simulated", (0.0, 0.0, 0.0), seed=3, out=out), lambda _: None)
     settings = IdentificationSettings(draws=0, longer_horizons=(0,), record_horizons=())
-    return inverse_operator(identify(estimate_transfer([read_recording(out)]), settings).model)
+    return make_inverse_operator(identify(estimate_transfer([read_recording(out)]), settings).model)
 
 
 @pytest.fixture
@@ -69,8 +71,8 @@ def plan(inverse) -> RepeatPlan:
 
 
 def true_error(played, wanted, rows=2000) -> float:
-    part = band_part(np.pad(wanted.signal.samples, ((0, 300), (0, 0))), 1000.0, BAND_HZ)
-    off = band_part(played.truth.samples - part, 1000.0, BAND_HZ)
+    part = filter_to_band(np.pad(wanted.signal.samples, ((0, 300), (0, 0))), 1000.0, BAND_HZ)
+    off = filter_to_band(played.truth.samples - part, 1000.0, BAND_HZ)
     return rms(off[:rows]) / rms(part[:rows])
 
 

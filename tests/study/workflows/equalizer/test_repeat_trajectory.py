@@ -8,7 +8,7 @@ import pytest
 
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.signal import Signal
-from equalizer.tracking.feedforward.band_part import band_part
+from equalizer.tracking.feedforward.band_pass import filter_to_band
 from equalizer.tracking.feedforward.trajectory import Trajectory
 from study.errors import DeviceError, StudyError, UserInterruptError
 from study.store.formats.identified_model_file import read_identified_model, write_identified_model
@@ -32,7 +32,9 @@ def unheard(play: int, share: float) -> None:
 
 
 def table(level=1.8, rows=2000) -> Trajectory:
-    noise = band_part(np.random.default_rng(7).standard_normal((rows + 4000, 3)), 1000.0, BAND_HZ)[2000 : 2000 + rows]
+    noise = filter_to_band(np.random.default_rng(7).standard_normal((rows + 4000, 3)), 1000.0, BAND_HZ)[
+        2000 : 2000 + rows
+    ]
     fade = np.clip(np.minimum(np.arange(rows), np.arange(rows)[::-1]) / 150, 0, 1)[:, None]
     shaped = level * noise / noise.std(axis=0) * (0.5 - 0.5 * np.cos(np.pi * fade))
     return Trajectory(Signal(shaped, 1000.0, "acceleration", "m/s^2", ("ax", "ay", "az")))

@@ -51,7 +51,7 @@ def hang_at_the_start() -> None:
 def test_a_worker_that_does_not_start_is_no_fault_of_a_file(tmp_path, monkeypatch, start):
     path = tmp_path / "sound.toml"
     path.write_text("x = 1\n")
-    monkeypatch.setattr(validate_apart, "_ready", start)
+    monkeypatch.setattr(validate_apart, "_confirm_start", start)
     monkeypatch.setattr(validate_apart, "START_TIMEOUT_S", 2.0)
     with pytest.raises(StudyError) as refused:
         list(validate_files([path]))

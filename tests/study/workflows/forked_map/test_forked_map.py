@@ -12,7 +12,7 @@ import pytest
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.search.time_budget import CountedBudget, OutOfTimeError, limit_map
 from equalizer.effects.catalogue import CATALOGUE
-from equalizer.effects.discovered_law import law_effect
+from equalizer.effects.discovered_law import make_law_effect
 from equalizer.effects.effect import effects_by_address
 from equalizer.laws.law import parse_law
 from study.workflows import forked_map as module
@@ -39,7 +39,7 @@ def test_arrays_and_effects_come_back_as_they_are():
 
 
 def test_a_law_that_was_there_before_comes_back_as_it_is_and_from_where_it_was_found():
-    law = law_effect(parse_law("2*vx", "force", "x"))
+    law = make_law_effect(parse_law("2*vx", "force", "x"))
 
     def found(_: int) -> tuple[object, int]:
         time.sleep(0.02)
@@ -51,7 +51,7 @@ def test_a_law_that_was_there_before_comes_back_as_it_is_and_from_where_it_was_f
 
 
 def test_an_effect_without_references_is_not_kept_alive():
-    law = law_effect(parse_law("2*vx", "force", "x"))
+    law = make_law_effect(parse_law("2*vx", "force", "x"))
     address = id(law)
     assert effects_by_address()[address] is law
     del law

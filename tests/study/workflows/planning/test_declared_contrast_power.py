@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from analysis.psychophysics.anova import compute_one_way_anova
-from analysis.psychophysics.comparisons import compare_all
+from analysis.psychophysics.comparisons import compare_group_means
 from analysis.psychophysics.power.power_curve import compute_true_difference_db, judge_study
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
@@ -36,7 +36,7 @@ def test_every_analysis_judges_the_declared_pair():
     assert by_pair[35.0, 45.0].means_error_db == pytest.approx(means[1] - means[2])
     assert by_pair[35.0, 45.0].primary_error_db == pytest.approx(-by_pair[45.0, 35.0].primary_error_db)
     groups = {f"{f:g} Hz": list(n) for f, n in zip(CROWD.frequencies_hz, study.threshold_n.T, strict=True)}
-    tukey = {(pair.first, pair.second): pair.p for pair in compare_all(compute_one_way_anova(groups)).pairs}
+    tukey = {(pair.first, pair.second): pair.p for pair in compare_group_means(compute_one_way_anova(groups)).pairs}
     assert by_pair[45.0, 35.0].published_found == (tukey["35 Hz", "45 Hz"] < 0.05)
     assert by_pair[()].published_found == (tukey["5 Hz", "45 Hz"] < 0.05)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from analysis.psychophysics.anova import compute_one_way_anova
-from analysis.psychophysics.comparisons import compare_all
+from analysis.psychophysics.comparisons import compare_group_means
 from analysis.psychophysics.group_contrasts import compute_contrasts
 from analysis.psychophysics.power.power_curve import judge_study
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
@@ -59,7 +59,7 @@ def test_the_published_verdict_is_that_of_the_pair_in_the_report():
         groups = {f"{f:g} Hz": list(column) for f, column in zip((5, 25, 45), study.threshold_n.T, strict=True)}
         (pair,) = [
             pair
-            for pair in compare_all(compute_one_way_anova(groups)).pairs
+            for pair in compare_group_means(compute_one_way_anova(groups)).pairs
             if (pair.first, pair.second) == ("5 Hz", "45 Hz")
         ]
         found.append(judge_study(crowd, RULE, 8, (5, number)).published_found)

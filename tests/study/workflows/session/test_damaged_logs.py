@@ -14,7 +14,7 @@ import pytest
 from study.errors import StudyError
 from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.json_document import write_json
-from study.store.disk.provenance import sha256_of
+from study.store.disk.provenance import compute_sha256
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import LOG_NAME, read_log, remove_incomplete_line
 from study.store.sessions.log_seal import SEAL_NAME
@@ -158,7 +158,7 @@ def test_a_finished_session_is_finished_by_resume_and_then_said_to_be(session):
 @pytest.mark.slow
 def test_a_report_from_before_the_end_is_written_again_by_resume(session):
     folder = SessionFolder(session)
-    statistics, sha256 = session / "analysis" / "anova.json", sha256_of(folder.log)
+    statistics, sha256 = session / "analysis" / "anova.json", compute_sha256(folder.log)
     statistics.parent.mkdir(exist_ok=True)
     (statistics.parent / "report.html").write_text("of the log as it was in the middle")
     write_json(statistics, "hapteq-anova", 1, {"provenance": {"parents": [{"file": LOG_NAME, "sha256": "0" * 64}]}})

@@ -12,7 +12,7 @@ from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
 from protocols.document.loading import load_protocol
 from study.devices.clock import VirtualClock
 from study.errors import StudyError
-from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, highest_level_n, make_study_limits
+from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, compute_highest_level_n, make_study_limits
 from study.session.stimulus.stimulus import make_held_stimulus
 from study.store.formats.identified_model_file import write_identified_model
 from study.store.formats.trials_file import TRIALS_NAME, read_trials
@@ -103,7 +103,7 @@ def test_a_steep_stimulus_roved_to_its_highest_keeps_the_slew_limit(small_text, 
 
     monkeypatch.setattr(equalize_stimuli, "make_held_stimulus", jagged)
     (scale, *_) = compute_level_scales(protocol, ModelEqualizer(rigid()), 1000.0)
-    steepest = max(played[:2]) * highest_level_n(protocol) / scale.n_per_mps2 + SPRING_SLEW_N_PER_S
+    steepest = max(played[:2]) * compute_highest_level_n(protocol) / scale.n_per_mps2 + SPRING_SLEW_N_PER_S
     assert steepest == pytest.approx(make_study_limits(protocol).slew_n_per_s)
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from study.store.sessions.archive import find_session
-from study.workflows.session.participant_number import participant_number
+from study.workflows.session.participant_number import find_participant_number
 from study.workflows.session.withdraw_participant import plan_withdrawal, withdraw
 
 
@@ -54,7 +54,7 @@ def test_a_damaged_older_session_keeps_no_participant_out(number, sitter):
     log = sitter.data / "P01_001" / "events.jsonl"
     log.write_text("not a log\n")
     assert number("P01") == 0
-    assert participant_number(sitter.data, "P02", "small", simulated=True) == 1
+    assert find_participant_number(sitter.data, "P02", "small", simulated=True) == 1
 
 
 def test_a_place_is_not_given_again_where_the_first_line_was_damaged(number, sitter):
@@ -63,6 +63,6 @@ def test_a_place_is_not_given_again_where_the_first_line_was_damaged(number, sit
     whole = log.read_bytes()
     for old, new in ((b'"seed":', b'"sead":'), (b"{", b"["), (b'"subject":"P', b'"subject":"\xff'), (b'"seed":', b"")):
         log.write_bytes(whole.replace(old, new, 1))
-        assert participant_number(sitter.data, "P03", "small", simulated=True) == 2, new
-        assert participant_number(sitter.data, "P03", "small", simulated=False) == 0
-        assert participant_number(sitter.data, "P03", "practice", simulated=True) == 0
+        assert find_participant_number(sitter.data, "P03", "small", simulated=True) == 2, new
+        assert find_participant_number(sitter.data, "P03", "small", simulated=False) == 0
+        assert find_participant_number(sitter.data, "P03", "practice", simulated=True) == 0

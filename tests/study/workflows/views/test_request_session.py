@@ -50,7 +50,7 @@ def test_a_fresh_live_state_saves_the_look_at_the_lock(sitter):
 
 def test_what_is_asked_lands_in_the_sessions_inbox(whole):
     name = ask(whole.path, PAUSE)
-    assert RequestInbox(whole.path).unread(name)
+    assert RequestInbox(whole.path).is_unread(name)
     assert RequestInbox(whole.path).take() == (PAUSE,)
 
 

@@ -121,7 +121,7 @@ def test_force_and_acceleration_arrive_at_another_end_while_the_trial_runs(tmp_p
     log = tmp_path / "events.jsonl"
     log.write_text(f"{time.time_ns()}\n")
     outlet = MarkerOutlet(log)
-    streams = SignalStreams(tmp_path, outlet.signal_outlet)
+    streams = SignalStreams(tmp_path, outlet.make_signal_outlet)
     with contextlib.closing(open_device("simulated", rigs.SETTINGS, RealClock(), 1)) as device:
         write_live(tmp_path, replace(LIVE, telemetry=device.telemetry))
         streams.push(OFFSET_S)

@@ -11,7 +11,7 @@ from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.result.curves.law_curves import compute_law_signature
 from analysis.diagnosis.result.curves.signature_bins import compute_correlation_ratio
 from analysis.figures.diagnosis.signature import draw_signature
-from equalizer.effects.discovered_law import Channels, law_effect, law_values
+from equalizer.effects.discovered_law import Channels, get_law_values, make_law_effect
 from equalizer.effects.effect import PlacedEffect
 from equalizer.laws.law import parse_law
 from equalizer.signals.unit_system import LINEAR
@@ -21,7 +21,7 @@ from equalizer.signals.unit_system import LINEAR
 def make_curve(diagnosed):
     def of(text, acts_on="force", axis="x", there=True, axes=("x",)):
         law = parse_law(text, acts_on, axis)
-        placed = PlacedEffect(law_effect(law, Channels(("fx",), ("ax",))), (0,), law_values(law))
+        placed = PlacedEffect(make_law_effect(law, Channels(("fx",), ("ax",))), (0,), get_law_values(law))
         recording, model = diagnosed.recorded(1, (placed,) if there else ()), diagnosed.device(1)
         noise = np.array(diagnosed.NOISE)
         measure = FreeSimulation((observe(recording, 1),), noise, noise)

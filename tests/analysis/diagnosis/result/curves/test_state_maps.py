@@ -10,7 +10,7 @@ from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect
 from analysis.diagnosis.result.candidates import add_balances_with_fitted_model, collect_balance_errors
 from analysis.diagnosis.result.curves.state_maps import WITH_CANDIDATES, compute_state_maps
-from analysis.diagnosis.search.time_budget import unlimited_time
+from analysis.diagnosis.search.time_budget import grant_time
 from analysis.figures.diagnosis.state_maps import make_state_map_pictures
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
@@ -40,7 +40,7 @@ def record_friction(level):
 def find_state_maps(level, without=frozenset()):
     recording = record_friction(level)
     motions = compute_motions(observe_parts((recording,), 1))
-    balance = judge_laws(search_structures(motions, 0, False, without, unlimited_time))
+    balance = judge_laws(search_structures(motions, 0, False, without, grant_time))
     return balance, compute_state_maps(NOTHING, (balance,), (), recording), recording
 
 

@@ -9,7 +9,12 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from study.evaluation.challenge.injection.axis_motion import compute_axis_motion
 from study.evaluation.challenge.injection.force_injections import FORCE_INJECTIONS
-from study.evaluation.challenge.injection.injections import INJECTIONS, applicable_injections, inject, measure_response
+from study.evaluation.challenge.injection.injections import (
+    INJECTIONS,
+    inject,
+    list_applicable_injections,
+    measure_response,
+)
 
 RATE_HZ = 1000.0
 
@@ -122,13 +127,15 @@ def test_a_lag_delays_a_slow_tone_by_its_time_constant():
 
 
 def test_only_faults_that_a_recording_can_carry_are_drawn():
-    assert "sensor_misalignment" in applicable_injections(recording(3))
-    assert "sensor_misalignment" not in applicable_injections(recording(1))
+    assert "sensor_misalignment" in list_applicable_injections(recording(3))
+    assert "sensor_misalignment" not in list_applicable_injections(recording(1))
     places = replace(recording(3).response, channels=("shaker", "wing tip", "payload"))
-    assert "sensor_misalignment" not in applicable_injections(replace(recording(3), response=places))
+    assert "sensor_misalignment" not in list_applicable_injections(replace(recording(3), response=places))
     imposed = replace(swinging(), meta={"imposed": "position"})
-    assert {"added_mass", "force_gain"} <= set(applicable_injections(swinging()))
-    assert "added_mass" in applicable_injections(imposed) and "force_gain" not in applicable_injections(imposed)
+    assert {"added_mass", "force_gain"} <= set(list_applicable_injections(swinging()))
+    assert "added_mass" in list_applicable_injections(imposed) and "force_gain" not in list_applicable_injections(
+        imposed
+    )
     assert measure_response(recording(1)).median_hz == pytest.approx(7, abs=0.5)
 
 

@@ -44,14 +44,12 @@ def apart(one, other):
 
 @pytest.mark.parametrize("name", ALONG_X)
 def test_both_engines_know_the_same_physics(name, bench, command):
-    from study.evaluation.challenge.second_engine.mujoco_bench import linearise_bench, simulate_motion
+    from study.evaluation.challenge.second_engine.mujoco_bench import linearise, simulate_motion
     from study.evaluation.challenge.second_engine.mujoco_case import BUILDERS
 
-    free, first = simulate_motion(bench, command), Device(linearise_bench(bench))
+    free, first = simulate_motion(bench, command), Device(linearise(bench))
     travel, peak = np.abs(free[1]).max(axis=0), np.abs(free[0]).max(axis=0)
-    values = EFFECTS[name].draw(
-        EffectContext(np.random.default_rng(5), 0.8, linearise_bench(bench), 0, travel, peak, (0,))
-    )
+    values = EFFECTS[name].draw(EffectContext(np.random.default_rng(5), 0.8, linearise(bench), 0, travel, peak, (0,)))
     with_it = BUILDERS[name](bench, 0, values)
     if name == "transport_delay":
         values = {"delay": with_it.delay_s}

@@ -8,7 +8,7 @@ import pytest
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.trajectory import Trajectory
-from equalizer.tracking.lqr.padding import band_error
+from equalizer.tracking.lqr.padding import compute_band_error
 from study.errors import StudyError
 from study.store.formats.trajectory_file import read_trajectory
 from study.workflows.equalizer.equalize_trajectory import EqualizePlan, equalize_trajectory
@@ -40,7 +40,7 @@ def with_models(plan: EqualizePlan, *names: str, **more) -> EqualizePlan:
 
 def played_error(plants, plan, shift) -> float:
     wanted, forces = read_trajectory(plan.trajectory).signal.samples, read_trajectory(plan.out).signal.samples
-    return band_error(wanted, plants.omega_like(shift).play(forces), RATE_HZ, BAND_HZ)
+    return compute_band_error(wanted, plants.omega_like(shift).play(forces), RATE_HZ, BAND_HZ)
 
 
 def refusal(plan, error=StudyError) -> StudyError:

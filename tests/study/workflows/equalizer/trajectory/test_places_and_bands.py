@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from equalizer.plant.model_quality import NOT_STORED
-from equalizer.tracking.lqr.padding import band_error
+from equalizer.tracking.lqr.padding import compute_band_error
 from study.errors import WrongUseError
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.equalize_trajectory import equalize_trajectory
@@ -110,4 +110,4 @@ def test_a_wide_model_alone_plays_its_whole_band(plants, plan, tmp_path):
     assert done.feedforward.out_of_band_share < 0.03
     forces = read_trajectory(done.plan.out).signal.samples
     wanted = read_trajectory(tmp_path / "wide.csv").signal.samples
-    assert band_error(wanted, plants.omega_like(0.1).play(forces), RATE_HZ, (5.0, 200.0)) < 0.02
+    assert compute_band_error(wanted, plants.omega_like(0.1).play(forces), RATE_HZ, (5.0, 200.0)) < 0.02

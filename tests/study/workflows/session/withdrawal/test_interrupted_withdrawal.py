@@ -16,7 +16,7 @@ from study.store.sessions.archive import SessionFolder
 from study.workflows.files.validate import validate_file
 from study.workflows.results.collect_sessions import collect_sessions
 from study.workflows.results.fold_session import fold_session
-from study.workflows.session.participant_number import participant_number
+from study.workflows.session.participant_number import find_participant_number
 from study.workflows.views.view_home import list_session_lines
 from study.workflows.views.view_session import make_session_view
 from tests.study.workflows.session.withdrawal.data_folder import UTC, erase, files
@@ -93,7 +93,7 @@ def check_half_erased(data: Path) -> None:
             assert not (data / name / "session.json").exists()
         for left in (path for path in (data / name).iterdir() if not path.name.startswith(("with", "session.lock"))):
             assert left.name in " ".join(validation.problems)
-    assert participant_number(data, "P09", "corpus", simulated=True) == 1
+    assert find_participant_number(data, "P09", "corpus", simulated=True) == 1
 
 
 def test_killed_before_any_operation_it_continues_and_finishes(data, elsewhere, killer, tmp_path, monkeypatch):
