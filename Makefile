@@ -83,11 +83,11 @@ bench: $(VENV)/.installed-test ## Ours against the same work done plainly and ag
 
 prove: prove-study prove-equalizer prove-diagnosis ## All tests marked slow, which `make test` leaves out
 
-prove-study: $(VENV)/.installed-test ## The slow proofs of the study: 100 sessions killed at random, calibration of the analysis
-	$(BIN)/python -m pytest -m slow tests/study tests/stories tests/project tests/references tests/benchmarks \
+prove-study: $(VENV)/.installed-test ## The slow tests of study and statistics: 100 sessions killed at random, calibration of the analysis
+	$(BIN)/python -m pytest -m slow tests/study tests/stories tests/protocols tests/contracts tests/project tests/references tests/benchmarks \
 		tests/analysis/psychophysics $(DIAGNOSIS:%=--ignore=%)
 
-prove-equalizer: $(VENV)/.installed-test ## The slow proofs of the equalizer: many noise seeds, worst case
+prove-equalizer: $(VENV)/.installed-test ## The slow tests of the equalizer: many noise seeds, worst case
 	$(BIN)/python -m pytest -m slow -s tests/equalizer tests/stories/test_the_device_is_equalized.py
 
 prove-diagnosis: $(VENV)/.installed-test ## The slow tests of the diagnosis, effect by effect

@@ -165,8 +165,7 @@ def _find_stamp_problem(stamps_s: Value, time_expression: str, unit_s: float) ->
     empty if they are finite and increase without a jump of an hour. time_expression: expression of the stamps; unit_s:
     their unit (s)."""
     if not np.isfinite(stamps_s).all():
-        row = int(np.argmax(~np.isfinite(stamps_s)))
-        return f"is no number at sample {row}; time is never missing"
+        return f"is no number at sample {int(np.argmax(~np.isfinite(stamps_s)))}; time is never missing"
     steps_s = np.diff(stamps_s)
     if (steps_s < 0).any():
         row = int(np.argmax(steps_s < 0)) + 1

@@ -66,6 +66,7 @@ def test_long_runs_of_small_steps_converge_where_levitt_says(published, down, ta
     assert np.mean(shares) == pytest.approx(target, abs=0.012)
 
 
+@pytest.mark.slow
 def test_the_step_at_the_third_reversal_moves_the_threshold(published):
     """Why it is a field of the protocol: half a decibel and more between two readings of one sentence."""
     share_right = weibull(10**-0.5, 2.0)

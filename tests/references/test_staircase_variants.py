@@ -3,6 +3,8 @@
 import sys
 from pathlib import Path
 
+import pytest
+
 sys.path.insert(0, str(Path(__file__).parent))
 
 from staircase_variants import TRUE_DB, VARIANTS, thresholds_db
@@ -19,10 +21,12 @@ def test_the_published_reading_is_nearly_unbiased():
     assert 1.4 < spread < 2.0
 
 
+@pytest.mark.slow
 def test_the_early_step_lowers_thresholds_by_about_a_decibel():
     assert 0.5 < measured("after_reversal")[0] - measured("at_reversal")[0] < 1.4
 
 
+@pytest.mark.slow
 def test_the_shortcut_at_the_start_costs_precision():
     ratio = measured("after_reversal, initial 1-up-1-down")[1] / measured("after_reversal")[1]
     assert 1.15 < ratio < 1.7

@@ -33,6 +33,7 @@ def short_file(tmp_path, small_text):
     return path
 
 
+@pytest.mark.slow
 def test_a_simulated_participant_takes_a_study_on_the_driver(stub, short_file, tmp_path, capsys):
     stub.set("stiffness", 150)  # a hand that holds the handle
     stub.set("stretch_in_use", 20)  # the computer of the tests is busier than that of a lab

@@ -34,6 +34,7 @@ def test_device_person_and_methods_stand_below_each_other(response):
     assert [label.get_text() for label in figure.axes[1].get_yticklabels()] == ["Device", "Person", "Driven by"]
 
 
+@pytest.mark.slow
 def test_the_mark_lies_where_the_curve_passes_the_threshold(response):
     onset = find_coupling_onset(response)
     axes = draw_frequency_bands(response, onset, frequency_bands(onset.frequency_hz), 35.0).axes[0]

@@ -66,6 +66,7 @@ def test_every_threshold_keeps_its_participants_marker_and_is_hollow_where_the_c
     assert len(arrows) == len(hollow)
 
 
+@pytest.mark.slow
 def test_each_participant_has_a_line_and_each_mean_stands_over_its_tick(study_drawings):
     axes = study_drawings["thresholds"].figure.axes[0]
     lines = [line for line in axes.lines if line.get_linestyle() == "-" and len(line.get_xdata()) == 5]
@@ -113,6 +114,7 @@ def test_means_carry_the_comparison_intervals(study_drawings, study_trials, prot
     assert drawn == [pytest.approx((interval.lower, interval.upper)) for interval in intervals]
 
 
+@pytest.mark.slow
 def test_one_participant_has_means_without_an_interval(one_person_drawings):
     figure = one_person_drawings["thresholds"].figure
     assert "comparison interval" not in figure_text(figure)

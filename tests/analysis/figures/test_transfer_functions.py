@@ -59,6 +59,7 @@ def test_lines_that_are_not_reliable_are_grey(response):
     assert "not reliable" in [text.get_text() for text in figure.legends[0].get_texts()]
 
 
+@pytest.mark.slow
 def test_a_model_and_a_band_are_laid_over(response):
     model = ResponseCurve("model of order 26", LINES[150:900], 1.1 * response.response[150:900])
     figure = draw_transfer_functions(response, model, (5.0, 35.0))

@@ -41,6 +41,7 @@ def test_a_recording_with_known_time_keeps_its_seconds():
     assert any(TIMED.search(text) for text in report_texts({}))
 
 
+@pytest.mark.slow
 def test_its_page_counts_samples():
     found = make_overview("rig", make_untimed_recording({"time": "unknown"}))
     page = render_look_report([found], [make_look_pictures(found, 1)], {}, "now")

@@ -53,6 +53,7 @@ def test_five_equal_groups_give_the_published_honest_difference():
     assert significant == {"AD", "AE"}
 
 
+@pytest.mark.slow
 def test_disjoint_intervals_are_the_significant_pairs_of_equal_groups():
     generator = np.random.default_rng(2)
     result = compare_group_means(
@@ -79,6 +80,7 @@ def test_the_published_standard_errors_of_six_very_unequal_groups_follow_from_th
         assert half_width(result.intervals[index]) == pytest.approx(result.critical_range / math.sqrt(2) * w, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_pairs_agree_with_scipy_and_intervals_with_statsmodels():
     generator = np.random.default_rng(8)
     groups = {name: generator.normal(shift, 1, n) for name, shift, n in (("a", 0, 10), ("b", 1, 7), ("c", 3, 4))}

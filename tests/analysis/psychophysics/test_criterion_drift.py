@@ -7,6 +7,7 @@ from scipy.stats import linregress
 from analysis.psychophysics.bias import estimate_response_bias
 from analysis.psychophysics.criterion_drift import estimate_criterion_drifts
 from tests.analysis.psychophysics.test_bias import simulate_answers
+from tests.slow_instances import slow_after
 
 
 def simulate_session(per_100_trials: float, seed: int, start: float = 0.0, runs: int = 5, n: int = 70, sd: float = 0.0):
@@ -28,6 +29,7 @@ def test_a_drift_is_recovered_with_its_sign(per_100_trials):
     assert np.mean(found) == pytest.approx(per_100_trials, abs=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("criterion", [0.0, 0.5])
 def test_no_drift_is_found_as_often_as_the_level_says(criterion):
     p = np.array(
@@ -37,7 +39,7 @@ def test_no_drift_is_found_as_often_as_the_level_says(criterion):
     assert np.mean(p < 0.01) < 0.02
 
 
-@pytest.mark.parametrize("sd", [0.2, 0.3])
+@pytest.mark.parametrize("sd", slow_after(1, [0.2, 0.3]))
 @pytest.mark.parametrize("size", [1, 10])
 def test_criteria_that_vary_without_an_order_are_no_drift(sd, size):
     """Of 600 sessions with p below 0.05, by binomial variance alone a fifth and a third."""

@@ -77,6 +77,7 @@ def test_the_declared_contrast_is_computed_by_both_analyses_the_declared_first(h
     assert not any(row.declared for row in analyse_declared("undeclared", (35.0, 45.0)).declared_result.results)
 
 
+@pytest.mark.slow
 def test_the_report_begins_with_it(hierarchical_declared):
     words = page_text(hierarchical_declared)
     assert words.index("The declared result") < words.index("Before you read the numbers")

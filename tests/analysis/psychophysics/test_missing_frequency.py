@@ -33,6 +33,7 @@ def drop_frequencies(trials, *frequencies_hz):
     return [trial for trial in trials if trial.frequency_hz not in frequencies_hz]
 
 
+@pytest.mark.slow
 def test_the_model_is_that_of_a_protocol_with_the_played_frequencies_alone(trials):
     played = drop_frequencies(trials, 15.0, 35.0)
     found = compute_primary_analysis(count_answers(played, (5.0, 15.0, 25.0, 35.0, 45.0)), 3.0)
@@ -45,6 +46,7 @@ def test_the_model_is_that_of_a_protocol_with_the_played_frequencies_alone(trial
     np.testing.assert_array_equal(found.persons[0].thresholds_n, alone.persons[0].thresholds_n)
 
 
+@pytest.mark.slow
 def test_the_report_names_the_missing_and_both_analyses_compare_with_the_lowest_played(trials, protocol):
     analysis = analyse_study(drop_frequencies(trials, 5.0), protocol)
     assert analysis.compared.startswith("The model leaves 5 Hz out, where there is no answer yet.")
@@ -55,6 +57,7 @@ def test_the_report_names_the_missing_and_both_analyses_compare_with_the_lowest_
     assert json.loads(json.dumps(make_anova_document(analysis), allow_nan=False))["primary"]["missing_hz"] == [5.0]
 
 
+@pytest.mark.slow
 def test_a_frequency_with_broken_runs_alone_has_no_reversal_means_to_compare(trials, protocol):
     broken = [t for t in trials if t.frequency_hz != 5.0 or t.trial <= 8]
     analysis = analyse_study(broken, protocol)
@@ -68,6 +71,7 @@ def test_void_trials_are_no_answers(trials):
     assert compute_primary_analysis(count_answers(void, (5.0, 15.0)), 3.0) is None
 
 
+@pytest.mark.slow
 def test_a_declared_contrast_with_a_missing_frequency_is_not_known(trials, protocol):
     declared = replace(protocol, analysis=AnalysisSettings("hierarchical", (45.0, 35.0)))
     by_model, _ = analyse_study(drop_frequencies(trials, 35.0), declared).declared_result.results
@@ -78,7 +82,7 @@ def test_a_declared_contrast_with_a_missing_frequency_is_not_known(trials, proto
 STUDY = simulate_crowd(Crowd((5.0, 25.0, 45.0), (0.4, 0.7, 1.0)), PUBLISHED, 10, (19, 1)).answers
 
 
-@pytest.mark.parametrize("count", [0, 8])
+@pytest.mark.parametrize("count", [0, pytest.param(8, marks=pytest.mark.slow)])
 def test_what_a_single_person_played_has_no_interval(count):
     """The estimate follows the one who played, whose spread is not known: it held the truth in half of the studies."""
     found = compute_primary_analysis(with_few(STUDY, 1, count), 3.0, declared_hz=(45.0, 5.0))

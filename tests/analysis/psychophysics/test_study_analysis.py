@@ -22,6 +22,7 @@ def statistics_json():
     return document
 
 
+@pytest.mark.slow
 def test_a_whole_study_is_analysed(simulate_study, protocol, statistics_json):
     analysis = analyse_study(simulate_study(), protocol)
     assert analysis.population is Population.SIMULATED

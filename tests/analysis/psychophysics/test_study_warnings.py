@@ -58,7 +58,11 @@ def test_thresholds_that_the_cap_cut_are_named(simulate_study, protocol):
     ("subjects", "sentence"),
     [
         (1, "There is one participant: individual thresholds can be shown, nothing can be tested."),
-        (3, "There are only 3 participants: means and tests say little about people in general."),
+        pytest.param(
+            3,
+            "There are only 3 participants: means and tests say little about people in general.",
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_few_participants_are_reported(simulate_study, protocol, subjects, sentence):
@@ -77,6 +81,7 @@ def test_a_run_that_the_trial_limit_stopped_is_never_dropped_in_silence(simulate
     assert "4 are missing because of the trial limit" in analysis.table.coverage
 
 
+@pytest.mark.slow
 def test_a_response_bias_is_named(able_trials, protocol):
     # The same answers, right whenever direction 1 was shown: a participant who nearly always says 1.
     leaning = [
@@ -101,6 +106,7 @@ def test_three_answers_of_an_unfinished_run_show_no_bias(able_trials, protocol):
     assert not any("A bias towards" in sentence for sentence in warnings_of(short, protocol))
 
 
+@pytest.mark.slow
 def test_spoiled_flagged_and_unmeasured_trials_are_counted(able_trials, protocol):
     spoiled = replace(able_trials[3], attempt=2, answer=None, correct=None, status=TrialStatus.SPOILED)
     able_trials[4] = replace(able_trials[4], status=TrialStatus.FLAGGED)
@@ -113,6 +119,7 @@ def test_spoiled_flagged_and_unmeasured_trials_are_counted(able_trials, protocol
     )
 
 
+@pytest.mark.slow
 def test_a_second_run_at_a_frequency_is_named(able_trials, protocol):
     again = [replace(trial, session="2") for trial in able_trials if trial.subject == "s01" and trial.run == 1]
     (second,) = warnings_of([*able_trials, *again], protocol)
@@ -134,6 +141,7 @@ def make_catch_trials(able_trials, frequency, wrong):
     ]
 
 
+@pytest.mark.slow
 def test_lapses_at_low_frequencies_are_named_with_their_interval(able_trials, protocol):
     (sentence,) = warnings_of([*able_trials, *make_catch_trials(able_trials, 5.0, wrong=True)], protocol)
     assert sentence.startswith("More than 10 % wrong in catch trials at full level, up to 15 Hz,")
@@ -158,6 +166,7 @@ def add_detection(full_protocol, simulate):
     return rows
 
 
+@pytest.mark.slow
 def test_a_direction_below_the_detection_threshold_is_named(able_trials, full_protocol, add_detection):
     (sentence,) = warnings_of(add_detection(able_trials, 2.0), full_protocol)
     assert sentence.startswith(
@@ -166,16 +175,19 @@ def test_a_direction_below_the_detection_threshold_is_named(able_trials, full_pr
     assert "differ by 2.4 dB" in sentence
 
 
+@pytest.mark.slow
 def test_a_vibration_that_is_felt_before_its_direction_is_as_it_should_be(able_trials, full_protocol, add_detection):
     assert warnings_of(add_detection(able_trials, 0.05), full_protocol) == ()
 
 
+@pytest.mark.slow
 def test_a_participant_who_feels_nothing_is_named(able_trials, full_protocol, add_detection):
     bound, chance, _ = warnings_of(add_detection(able_trials, float("inf")), full_protocol)
     assert bound == "1 detection threshold is cut by the cap: s01 at 35 Hz."
     assert chance.startswith("Detection not shown to be better than chance: s01 at 35 Hz (")
 
 
+@pytest.mark.slow
 def test_a_detection_run_that_was_broken_off_is_named(able_trials, full_protocol, add_detection):
     (sentence,) = warnings_of(add_detection(able_trials, 0.05)[:-5], full_protocol)
     assert sentence == "1 detection run is not complete and without a threshold: s01 at 35 Hz."

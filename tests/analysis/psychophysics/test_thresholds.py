@@ -92,6 +92,7 @@ def test_a_guesser_never_ends_at_the_cap_itself(simulate, rule):
     assert 100 < np.mean([row.trials for row in rows]) < 120
 
 
+@pytest.mark.slow
 def test_the_threshold_recovers_the_level_of_79_percent(simulate, rule):
     generator = np.random.default_rng(13)
     trials = [t for run in range(250) for t in simulate(0.8, generator, run=run, lapse=0.0)]

@@ -32,6 +32,7 @@ def test_what_the_cap_hides_is_reported(analysis):
         assert describe_coverage(MEASURED, name) in analysis.compared
 
 
+@pytest.mark.slow
 def test_numbers_simulated_with_the_published_rule_are_said_of_no_other(analysis):
     parts = analysis.primary, analysis.mean_contrasts, analysis.comparisons, analysis.table
     assert describe_comparison(*parts, SIMULATED_RULE) == analysis.compared
@@ -54,6 +55,7 @@ def test_a_missing_lower_bound_is_reported_on_the_page_and_in_the_terminal(analy
         assert "no lower bound" not in shown(analysis)
 
 
+@pytest.mark.slow
 def test_two_people_have_medians_without_an_interval_and_not_above_the_cap(protocol, simulate_study):
     analysis = analyse_study(simulate_study(subjects=2, true_n=(0.2, 0.2, 0.3, 0.5, 0.8)), protocol)
     page, lines = (

@@ -121,6 +121,7 @@ def test_the_page_follows_the_reader_into_the_dark_and_onto_paper(render_report)
     assert "@media print" in html
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("felt", "banner"),
     [(None, "Simulated participants: no person took part."), (False, "Nothing was felt: people answered while")],
@@ -211,6 +212,7 @@ def test_what_the_cap_cut_is_marked_in_rows_means_intervals_and_effect_sizes(ren
     assert "≥" not in html
 
 
+@pytest.mark.slow
 def test_without_a_cut_nothing_is_without_coverage(render_without_figures, simulate_study):
     assert (
         "without coverage"

@@ -120,6 +120,7 @@ def test_a_tone_is_found_outside_the_mains_as_well(bench, command):
     assert any(start["frequency"] == pytest.approx(133.31, abs=1e-3) for start in found)
 
 
+@pytest.mark.slow
 def test_a_tone_that_is_commanded_throughout_is_no_hum(bench, command):
     model = bench.three_axes()
     steady = 0.4 * np.sin(2 * np.pi * 50.0 * np.arange(len(command)) / 1000.0)

@@ -77,6 +77,7 @@ def law_with(tree: Node, numbers: list[float]) -> Law:
     return Law(format_formula(tree), tuple(numbers), (), "force", "x")
 
 
+@pytest.mark.slow
 @given(TREES, NUMBERS)
 @settings(max_examples=150, deadline=None)
 def test_random_formulas_give_what_numpy_gives(tree: Node, numbers: list[float]):

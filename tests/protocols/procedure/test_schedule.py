@@ -125,6 +125,7 @@ def test_swapped_labels_change_places_and_back():
     assert [label_direction(direction, False) for direction in (1, 2)] == [1, 2]
 
 
+@pytest.mark.slow
 def test_independent_draws_are_fair_and_know_nothing_of_their_neighbours():
     drawn = [draw_trial(RANDOM, "random", 7, trial // 100, trial % 100, 0) for trial in range(10_000)]
     sides = np.array([draw.direction for draw in drawn])
@@ -136,7 +137,7 @@ def test_independent_draws_are_fair_and_know_nothing_of_their_neighbours():
     assert abs(np.corrcoef(sides, signs)[0, 1]) < 0.04
 
 
-@pytest.mark.parametrize("vary", ["seed", "run", "attempt"])
+@pytest.mark.parametrize("vary", [pytest.param("seed", marks=pytest.mark.slow), "run", "attempt"])
 def test_draws_of_neighbouring_keys_are_unrelated(vary):
     def drawn(value: int) -> np.ndarray:
         key = {"seed": 1, "run": 0, "attempt": 0} | {vary: value}

@@ -9,6 +9,7 @@ import pytest
 pytestmark = pytest.mark.usefixtures("validated_here")
 
 
+@pytest.mark.slow
 def test_analyze_writes_everything_that_the_contract_names(run, data, tmp_path):
     code, out, _ = run("analyze", data, "--out", tmp_path / "out")
     assert code == 0
@@ -22,6 +23,7 @@ def test_analyze_writes_everything_that_the_contract_names(run, data, tmp_path):
     assert document["provenance"]["parents"][0]["file"] == "events.jsonl"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("sketched")
 def test_a_program_can_read_the_results(run, data):
     code, out, _ = run("analyze", data, "--json")
@@ -32,6 +34,7 @@ def test_a_program_can_read_the_results(run, data):
     assert Path(document["report"]).exists()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("sketched")
 def test_analyze_again_replaces_its_own_results(run, data):
     assert run("analyze", data)[0] == 0
@@ -73,6 +76,7 @@ def test_figures_of_a_participant_who_withdrew_do_not_stay(run, data, small_file
     assert not list((out / "figures").glob("*P02*"))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("sketched")
 def test_a_copied_session_is_left_out_and_the_rest_is_analysed(run, data):
     shutil.copytree(data / "P01_001", data / "P02_001")

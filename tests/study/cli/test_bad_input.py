@@ -71,6 +71,7 @@ def test_a_broken_file_is_named(tmp_path, refused, name):
     assert expected in err
 
 
+@pytest.mark.slow
 def test_a_broken_file_and_a_wrong_place_end_a_program_of_their_own_alike(tmp_path):
     path = broken(tmp_path, "a_file", "name = = 3")
     for asked in (("protocol", "show", path), ("protocol", "lock", "sweep", "--data", path)):
@@ -83,7 +84,7 @@ def test_a_broken_file_and_a_wrong_place_end_a_program_of_their_own_alike(tmp_pa
     "arguments",
     [
         ("study", "--observer", "ideal", "--data", "a_file"),
-        ("rehearse", "--subjects", "1", "--out", "a_file"),
+        pytest.param(("rehearse", "--subjects", "1", "--out", "a_file"), marks=pytest.mark.slow),
         ("analyze", "a_file"),
         ("analyze", "/dev/null"),
         ("protocol", "lock", "sweep", "--data", "a_file"),
@@ -124,6 +125,7 @@ def test_a_full_standard_output_is_no_traceback(tmp_path):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_a_terminal_that_knows_only_ascii_gets_question_marks(tmp_path, small_file):
     env = {"PYTHONIOENCODING": "ascii", "LC_ALL": "C", "PYTHONUTF8": "0"}
     person = ("study", "--plain", "--subject", "P01")
@@ -133,6 +135,7 @@ def test_a_terminal_that_knows_only_ascii_gets_question_marks(tmp_path, small_fi
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_a_person_without_a_terminal_must_say_the_code(tmp_path, small_file):
     done = hapteq("study", "--plain", "--protocol", small_file, cwd=tmp_path)
     assert done.returncode == 2
@@ -140,6 +143,7 @@ def test_a_person_without_a_terminal_must_say_the_code(tmp_path, small_file):
     assert not (tmp_path / "data").exists()
 
 
+@pytest.mark.slow
 def test_no_input_at_all_leaves_at_once(tmp_path, small_file):
     done = hapteq(
         "study", "--plain", "--subject", "P01", "--protocol", small_file, "--data", tmp_path / "d", cwd=tmp_path
@@ -155,8 +159,9 @@ def compiled(tmp_path_factory) -> None:
     assert hapteq("record", "ellipsoid", "--out", folder / "warm.h5", cwd=folder).returncode == 0
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("compiled")
-@pytest.mark.parametrize("size_kib", [pytest.param(8, marks=pytest.mark.slow), 30])
+@pytest.mark.parametrize("size_kib", [8, 30])
 def test_a_disk_that_fills_up_says_how_many_answers_are_safe_and_the_session_continues(tmp_path, small_file, size_kib):
     """A limit on the size of one file stands for a full disk: with 8 KiB recordings fail first, with 30 KiB the log."""
     script = (

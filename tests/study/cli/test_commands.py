@@ -71,6 +71,7 @@ def test_protocols_are_listed_and_explained(run):
     assert out.startswith("#")
 
 
+@pytest.mark.slow
 def test_a_recording_is_made_once_and_never_overwritten(run, tmp_path):
     out = tmp_path / "ellipsoid.h5"
     code, said, _ = run("record", "ellipsoid", "--out", out)

@@ -205,7 +205,7 @@ def test_what_is_missing_is_reported_with_its_cure(run, stub, tmp_path, switch, 
 
 @pytest.mark.parametrize(
     ("weight_n", "way", "cure"),
-    [(2.5, "sinks", "larger"), pytest.param(0.5, "rises", "smaller", marks=pytest.mark.slow)],
+    [(2.5, "sinks", "larger"), (0.5, "rises", "smaller")],
 )
 def test_a_handle_of_another_weight_is_a_warning(run, stub, tmp_path, weight_n, way, cure):
     """The compensation carries 0.148 kg, so 1.45 N."""

@@ -60,7 +60,7 @@ def test_a_psych_ds_dataset_names_all_its_columns(data, tmp_path):
 
 
 @pytest.mark.usefixtures("sketched")
-@pytest.mark.parametrize("form", ["psych-ds", "csv"])
+@pytest.mark.parametrize("form", [pytest.param("psych-ds", marks=pytest.mark.slow), "csv"])
 def test_what_was_exported_is_analysed_with_the_same_results(data, tmp_path, capsys, form):
     assert main(["export", str(data), "--out", str(tmp_path / "ds"), "--format", form]) == 0
     said = []
@@ -76,8 +76,9 @@ def test_what_was_exported_is_analysed_with_the_same_results(data, tmp_path, cap
     assert (tmp_path / "a" / "thresholds.csv").read_bytes() == (tmp_path / "b" / "thresholds.csv").read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("sketched")
-@pytest.mark.parametrize("form", [pytest.param("psych-ds", marks=pytest.mark.slow), "csv"])
+@pytest.mark.parametrize("form", ["psych-ds", "csv"])
 def test_what_was_left_out_before_an_export_is_counted_after_it_without_a_name(data, tmp_path, capsys, form):
     mine = tmp_path / "data"
     shutil.copytree(data, mine)

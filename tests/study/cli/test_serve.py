@@ -110,7 +110,7 @@ def server(tmp_path_factory):
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     script = (
-        "import sys; from study.tui import web_server; web_server.RELOAD_S = 2.0; "
+        "import sys; from study.tui import web_server; web_server.RELOAD_TIMEOUT_S = 2.0; "
         f"web_server.ScreenServer([sys.executable, {str(program)!r}], 'localhost', {port}, "
         "print_line=lambda text: print(text, flush=True)).serve()"
     )

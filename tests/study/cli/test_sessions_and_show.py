@@ -39,6 +39,7 @@ def test_sessions_are_a_table_with_a_word_for_how_each_stands(run, taken):
     assert out.splitlines()[1].endswith("small (ideal)")
 
 
+@pytest.mark.slow
 def test_remarks_say_why_a_session_cannot_be_used(run, taken, tmp_path):
     data = Path(shutil.copytree(taken, tmp_path / "data"))
     (data / "P02_001").mkdir()

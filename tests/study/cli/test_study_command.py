@@ -10,6 +10,7 @@ from study.tui.line_mode.line_input import LineInput
 pytestmark = pytest.mark.usefixtures("validated_here", "sketched")
 
 
+@pytest.mark.slow
 def test_a_simulated_participant_takes_the_study_and_results_go_to_stdout(run, small_file, tmp_path):
     code, out, err = run("study", "--protocol", small_file, "--observer", "ideal", "--data", tmp_path / "d")
     assert code == 0

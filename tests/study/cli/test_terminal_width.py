@@ -6,6 +6,7 @@ from collections import Counter
 import pytest
 
 from study.cli.main import main
+from tests.slow_instances import slow_after
 
 WIDTHS = (80, 100, 120, 200)
 COMMANDS = {
@@ -39,7 +40,7 @@ def said(data, capsys, monkeypatch):
     return call
 
 
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("width", slow_after(1, WIDTHS))
 @pytest.mark.parametrize("command", COMMANDS)
 def test_everything_is_there_at_each_width(said, command, width):
     whole, shown = said(command, None), said(command, width)

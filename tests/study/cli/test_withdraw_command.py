@@ -7,6 +7,7 @@ import pytest
 pytestmark = pytest.mark.usefixtures("validated_here", "sketched")
 
 
+@pytest.mark.slow
 def test_withdrawal_erases_all_sessions_of_the_participant_and_no_others(run, data, small_file):
     for subject in ("P01", "P02"):
         who = ("--observer", "ideal", "--subject", subject)

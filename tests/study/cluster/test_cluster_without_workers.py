@@ -126,6 +126,7 @@ def test_the_wait_for_a_worker_ends_at_once_by_ctrl_c(address, tmp_path):
     assert time.monotonic() - began[0] < 15.0
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_stands_still_ends_the_work_in_words(scheduler, monkeypatch):
     process, address = scheduler
     monkeypatch.setattr(cluster, "WORKER_TIMEOUT_S", 2.0)
@@ -163,6 +164,7 @@ def test_a_scheduler_that_stands_still_after_it_was_reached_ends_before_anything
     assert address in str(ended.value) and ended.value.saved == "Nothing was begun."
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_the_wait_for_a_scheduler_that_stands_still(scheduler):
     process, address = scheduler
     main = threading.main_thread().ident

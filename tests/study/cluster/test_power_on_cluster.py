@@ -32,6 +32,7 @@ def here(plan, tmp_path_factory):
         return simulate_power(plan, tmp_path_factory.mktemp("here") / "power", pool, lambda _: None)
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_a_cluster_gives_the_same_numbers_to_the_bit(plan, local, here, tmp_path):
     finished = []

@@ -126,6 +126,7 @@ def test_where_the_parent_s_number_stays_after_its_end_the_closed_pipe_ends_the_
     device.close()
 
 
+@pytest.mark.slow
 def test_nothing_that_the_driver_imports_is_of_posix_alone():
     """In a program of its own, in which those modules are missing."""
     program = (

@@ -16,6 +16,7 @@ from study.participants.intensity_cue import IntensityCue
 from study.participants.observer import Observer, PerceivedStimulus
 from study.participants.observers import OBSERVERS, find_observer
 from study.participants.population import TYPICAL_THRESHOLDS_N
+from tests.slow_instances import slow
 
 FELT = PerceivedStimulus(
     run=0, trial=0, attempt=0, phase=Phase.TEST, frequency_hz=15.0, level_n=0.6, direction_shown=1, trials_before=0
@@ -58,7 +59,7 @@ def test_the_ideal_observer_is_right_79_percent_of_the_time_at_threshold(frequen
     assert share_right(ideal, trials(frequency_hz, threshold_n)) == pytest.approx(0.5 ** (1 / 3), abs=FOUR_ERRORS)
 
 
-@pytest.mark.parametrize("level_n", [0.1, 0.3, 0.6, 1.2, 3.0])
+@pytest.mark.parametrize("level_n", [0.1, pytest.param(0.3, marks=pytest.mark.slow), 0.6, 1.2, 3.0])
 def test_the_ideal_observers_answers_follow_the_weibull_curve(level_n):
     """Textbook form: 0.5 + 0.5 (1 - exp(-(x/a)^b)), a put so that 0.6 N gives the cube root of one half."""
     a = 0.6 / (-np.log(2 - 2 * 0.5 ** (1 / 3))) ** (1 / 2)
@@ -66,6 +67,7 @@ def test_the_ideal_observers_answers_follow_the_weibull_curve(level_n):
     assert share_right(find_observer("ideal", 0), trials(level_n=level_n)) == pytest.approx(expected, abs=FOUR_ERRORS)
 
 
+@pytest.mark.slow
 def test_the_lapsing_observer_stays_below_certainty_where_the_ideal_one_is_certain():
     assert share_right(find_observer("lapsing", 0), trials(level_n=3.0)) == pytest.approx(0.95, abs=FOUR_ERRORS)
     assert share_right(find_observer("ideal", 0), trials(level_n=3.0)) == 1.0
@@ -79,6 +81,7 @@ def test_a_bias_to_one_answer_lowers_the_share_of_right_ones_as_detection_theory
     assert share_right(biased, trials()) == pytest.approx(expected, abs=FOUR_ERRORS)
 
 
+@pytest.mark.slow
 def test_the_biased_observer_says_1_more_often_and_the_ideal_one_does_not():
     felt = trials(level_n=0.05)
     assert share_of_1(find_observer("biased", 0), felt) == pytest.approx(0.69, abs=FOUR_ERRORS + 0.005)
@@ -149,7 +152,7 @@ def test_the_interval_is_found_79_percent_of_the_time_at_the_detection_threshold
     assert share_right(find_observer("ideal", 0), felt) == pytest.approx(0.5 ** (1 / 3), abs=FOUR_ERRORS)
 
 
-@pytest.mark.parametrize("level_n", [0.02, 0.05, 0.1, 0.2])
+@pytest.mark.parametrize("level_n", [pytest.param(0.02, marks=pytest.mark.slow), 0.05, 0.1, 0.2])
 def test_finding_the_interval_follows_a_weibull_curve_of_its_own(level_n):
     """Textbook form, with slope 2.5 and a so that 0.08 N gives the cube root of one half."""
     a = 0.08 / (-np.log(2 - 2 * 0.5 ** (1 / 3))) ** (1 / 2.5)
@@ -158,7 +161,7 @@ def test_finding_the_interval_follows_a_weibull_curve_of_its_own(level_n):
     assert found == pytest.approx(expected, abs=FOUR_ERRORS)
 
 
-@pytest.mark.parametrize("name", ["ideal", "vibration_only", "intensity_cue"])
+@pytest.mark.parametrize("name", ["vibration_only", *slow("ideal", "intensity_cue")])
 def test_who_finds_no_direction_feels_the_vibration_all_the_same(name):
     observer = find_observer(name, 0)
     assert share_right(observer, detection(35.0, 0.5)) > 0.99
@@ -175,6 +178,7 @@ def test_who_feels_nothing_finds_no_interval(name):
     assert share_right(find_observer(name, 1), detection(15.0, 3.0)) == pytest.approx(0.5, abs=FOUR_ERRORS)
 
 
+@pytest.mark.slow
 def test_lapses_and_a_bias_to_1_show_in_detection_trials_too():
     assert share_right(find_observer("lapsing", 0), detection(15.0, 3.0)) == pytest.approx(0.95, abs=FOUR_ERRORS)
     liked = share_of_1(find_observer("biased", 0), detection(15.0, 0.005))
@@ -231,6 +235,7 @@ def test_another_key_is_other_luck(change):
     assert here != [guesser.reply(trial, 2).answer for trial in trials()[:200]]
 
 
+@pytest.mark.slow
 def test_response_times_are_those_of_people_and_say_nothing_about_the_answer():
     replies = [find_observer("guesser", 0).reply(trial, 1) for trial in trials()]
     times_s = np.array([reply.response_time_s for reply in replies])

@@ -58,6 +58,7 @@ def test_measured_means_rise_with_frequency_up_to_35_hz(measured_n):
     assert means[4] == pytest.approx(means[3], rel=0.15)
 
 
+@pytest.mark.slow
 def test_some_thresholds_are_at_the_cap_at_35_hz_and_none_at_5_hz(measured_n):
     pinned = (measured_n > 2.4).mean(axis=0)
     assert 0.1 < pinned[3] < 0.5
@@ -71,6 +72,7 @@ def test_a_study_of_ten_finds_the_rise_at_35_hz_significant(measured_n, study):
     assert p_values[0, 3] < 0.05
 
 
+@pytest.mark.slow
 def test_people_who_are_all_the_same_show_no_rise(protocol):
     """Negative control: guessers have one threshold at every frequency."""
     guesser = find_observer("guesser", 0)

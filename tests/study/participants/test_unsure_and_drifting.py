@@ -37,7 +37,7 @@ def test_the_unsure_ask_again_as_often_as_their_evidence_is_near_the_criterion(s
     assert not any(observer.reply(felt, seed).ask_again for felt in trials(attempt=4)[:200])
 
 
-@pytest.mark.parametrize("looks", [1, 2, 4])
+@pytest.mark.parametrize("looks", [1, 2, pytest.param(4, marks=pytest.mark.slow)])
 def test_looks_together_tell_as_much_as_their_number_says(looks):
     observer = UnsureRepeater("unsure", DirectionFeeler("d", ((15.0, 0.6),)))
     right = np.mean([observer.reply(felt, 5).answer == felt.direction_shown for felt in trials(attempt=looks - 1)])
@@ -45,6 +45,7 @@ def test_looks_together_tell_as_much_as_their_number_says(looks):
     assert right == pytest.approx(expected, abs=four_errors(expected))
 
 
+@pytest.mark.slow
 def test_a_second_look_at_what_was_unsure_helps_and_the_sure_ask_for_none():
     observer = find_observer("repeating", 0)
     first = [(felt, observer.reply(felt, 5)) for felt in trials()]

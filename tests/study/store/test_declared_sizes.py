@@ -234,6 +234,7 @@ def test_an_hour_of_nine_channels_at_ten_kilohertz_is_within_the_limit():
     assert PLAIN_BYTES < size < MOST_BYTES
 
 
+@pytest.mark.slow
 def test_memory_is_taken_for_nothing_that_is_only_declared(tmp_path, recording):
     """In a process that may have 2 GB of addresses in all."""
     replaced(recording, "command", (2**29, 1), "f8", chunks=(1000, 1))

@@ -72,6 +72,7 @@ def test_esc_stops_it_and_nothing_is_written(files):
     assert sorted(path.name for path in files.iterdir()) == ["one.toml", "rec.h5", "three.toml"]
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(120)
 def test_what_cannot_be_diagnosed_is_reported_on_a_panel(files):
     async def story(sitter):

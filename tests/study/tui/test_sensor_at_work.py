@@ -77,6 +77,7 @@ def test_by_keys_from_the_start_screen_to_the_lab_s_file(tmp_path, lab_file):
     np.testing.assert_allclose(sensor.bias, 32_768, atol=2)
 
 
+@pytest.mark.slow
 def test_esc_stops_it_and_the_port_is_free_again(tmp_path, lab_file):
     with contextlib.closing(Board(2000.0)) as board:
 

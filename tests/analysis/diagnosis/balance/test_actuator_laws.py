@@ -64,6 +64,7 @@ def test_a_dead_band_leaves_the_dry_friction_beside_it(rubbing_dead_band):
     assert laws_by_name(balance)["coulomb_friction"].values["level"] == pytest.approx(0.5, rel=0.2)
 
 
+@pytest.mark.slow
 def test_the_error_before_is_that_of_the_force_as_commanded(dead_band):
     assert dead_band.error < 0.5 * dead_band.linear
 
@@ -78,7 +79,8 @@ def test_a_linear_actuator_has_no_deadband_saturation_or_nonlinearity(find_laws,
     assert not {"force_deadband", "force_saturation", "force_nonlinearity"} & set(laws_by_name(balance))
 
 
-@pytest.mark.parametrize("square", [-0.5, pytest.param(0.4, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("square", [-0.5, 0.4])
 def test_a_gain_that_changes_with_the_command_is_recovered_with_its_size(find_laws, square):
     balance = find_laws(lambda u: u * (1 - square + square * np.abs(u) / np.abs(u).max()))
     assert set(laws_by_name(balance)) == {"force_nonlinearity"}

@@ -27,6 +27,7 @@ def test_friction_that_grows_ninefold_is_named_in_a_class_with_its_drift(find_dr
     assert law.values["change"] == pytest.approx(0.8 * LEVEL, rel=0.1)
 
 
+@pytest.mark.slow
 def test_constant_friction_is_not_said_to_drift(find_drifting_balance):
     law = find_drifting_balance(0.0).named[0]
     assert law.law.effect == "coulomb_friction"

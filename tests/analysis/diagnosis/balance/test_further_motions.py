@@ -61,7 +61,8 @@ def test_the_band_of_the_motion_is_that_of_the_driven_one(record_hub):
     assert hub_hz < 0.8 * both_hz
 
 
-@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [3, 4])
 def test_friction_of_the_hub_is_named_beside_the_beam(record_hub, find_balance, seed):
     (balance,) = find_balance(record_hub(FRICTION, seed))
     assert [law.law.effect for law in balance.named] in (["coulomb_friction"], ["presliding_hysteresis"])

@@ -137,7 +137,8 @@ def effects_of_healthy_axis(axis_module, find_balance, seed, **beside):
     return [law.law.effect for law in balance.named]
 
 
-@pytest.mark.parametrize("seed", [pytest.param(21, marks=pytest.mark.slow), 22])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [21, 22])
 def test_where_nothing_is_missing_nothing_is_named(axis_module, find_balance, seed):
     assert effects_of_healthy_axis(axis_module, find_balance, seed) == []
 

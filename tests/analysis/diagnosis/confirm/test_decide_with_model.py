@@ -45,6 +45,7 @@ def friction_balance():
     return find_balances_with_model((record_friction(LEVEL),), GIVEN, frozenset(), grant_time)[0]
 
 
+@pytest.mark.slow
 def test_what_a_given_model_lacks_is_named_by_the_balance(friction_balance):
     law = friction_balance.named[0]
     assert law.law.effect == "coulomb_friction"

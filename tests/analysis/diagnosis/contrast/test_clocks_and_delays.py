@@ -261,6 +261,7 @@ def test_sensor_faults_of_a_response_with_hardly_any_noise_can_be_undone():
         assert compared.compute_grams(compared.faulty, undone).is_well_conditioned(variant)
 
 
+@pytest.mark.slow
 def test_a_slow_response_is_compared_by_as_many_rows_as_it_takes():
     """Decimated as its band allows, it had too few."""
     slow = np.sin(2 * np.pi * 0.9 * np.arange(6000) / 1000.0)

@@ -17,6 +17,7 @@ def compared_base(rig) -> ComparedBase:
     return compare_base(next(bases_of(clean, other))[0][0], clean, other)
 
 
+@pytest.mark.slow
 def test_the_ends_of_a_part_and_what_lies_beside_a_gap_do_not_count(rig):
     clean = split_into_parts([rig.record_rig(1)])
     gap = np.arange(rig.COUNT) == 2500
@@ -28,6 +29,7 @@ def test_the_ends_of_a_part_and_what_lies_beside_a_gap_do_not_count(rig):
     assert mask[2500 - 2 * REACH] and mask[2500 + 2 * REACH]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", ["every 30th", "a tenth"])
 def test_sparse_losses_leave_most_rows_to_compare_by(lost, rig):
     """Before, each took 33 rows, and a comparison without rows ended the diagnosis."""
@@ -39,6 +41,7 @@ def test_sparse_losses_leave_most_rows_to_compare_by(lost, rig):
     assert compared.faulty.count > 0.8 * compared.clean.count
 
 
+@pytest.mark.slow
 def test_a_side_with_too_few_rows_is_not_compared(rig):
     clean, other = split_into_parts([rig.record_rig(1)]), split_into_parts([rig.record_rig(2)])
     bare = replace(other[0], known=np.arange(rig.COUNT) < 60)
@@ -55,9 +58,8 @@ def test_what_undoing_a_fault_loses_stays_as_it_was(compared_base):
     assert np.abs(blocks[-8:]).max() < 1e-3 * np.abs(plain[-8:]).max()
 
 
-@pytest.mark.parametrize(
-    ("times", "belongs"), [pytest.param((0.99, 0.99), True, marks=pytest.mark.slow), ((0.85, 1.15), False)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("times", "belongs"), [((0.99, 0.99), True), ((0.85, 1.15), False)])
 def test_a_law_that_holds_the_named_one_is_of_its_class_where_it_leaves_less_everywhere(rig, times, belongs):
     found = rig.make_contrast("coulomb_friction", 0.6).comparison
     assert found is not None

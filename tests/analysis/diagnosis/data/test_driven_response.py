@@ -8,6 +8,7 @@ from analysis.diagnosis.data.driven_response import compute_response_significanc
 from analysis.diagnosis.settings import ANSWER_DEVIATIONS
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
+from tests.slow_instances import slow_after
 
 RATE_HZ = 500.0
 
@@ -21,7 +22,7 @@ def make_recording(command, response) -> Recording:
     )
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", slow_after(2, range(6)))
 @pytest.mark.parametrize("colour", ["white", "walk", "narrow"])
 def test_noise_of_any_colour_answers_nothing(colour, seed):
     rng = np.random.default_rng(seed)

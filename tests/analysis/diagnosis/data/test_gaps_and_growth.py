@@ -49,6 +49,7 @@ def test_every_estimator_sees_whole_courses_of_a_recording_with_a_gap(device_mod
         effect.starts(evidence, 0)
 
 
+@pytest.mark.slow
 def test_friction_is_named_in_spite_of_a_gap(device_module, gapped_recording):
     others = tuple(effect.name for effect in CATALOGUE if effect.name not in TRIED)
     found = diagnose(

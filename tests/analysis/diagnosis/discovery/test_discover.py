@@ -99,6 +99,7 @@ def search_any_law(recording):
     return LawSearch(ignore_progress, always).add_any(SearchResult(context, known, judge(known)))
 
 
+@pytest.mark.slow
 def test_a_proved_law_explains(seed=7):
     seen = search_any_law(recorded((DRAG,), seed))
     assert seen.judgement.verdict == "explained"
@@ -108,6 +109,7 @@ def test_a_proved_law_explains(seed=7):
     assert "Beyond vx = ±" in seen.remarks[0]
 
 
+@pytest.mark.slow
 def test_without_a_test_of_another_kind_a_law_is_a_candidate(seed=8):
     plan = (*PLAN[:3], ("multisine", 1.5, "test"))
     seen = search_any_law(recorded((DRAG,), seed, plan=plan))

@@ -69,6 +69,7 @@ def test_a_ripple_that_is_not_seen_twice_may_be_another_curve(hardening_context,
     assert not may_approximate_law(hardening_context[0], short)
 
 
+@pytest.mark.slow
 def test_several_forces_on_one_axis_may_be_one_law_and_a_force_and_a_sensor_may_not(hardening_context):
     cube, drag = make_hypothesis("hardening_stiffness", k3=CUBIC), make_hypothesis("quadratic_damping", coefficient=0.1)
     assert may_approximate_law(hardening_context[0], make_named_search(hardening_context, cube, drag))

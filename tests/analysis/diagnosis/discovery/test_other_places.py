@@ -90,6 +90,7 @@ def test_a_gyroscopic_pair_is_one_law_of_two_axes(seed=4):
     assert len(found.explanation.rounds) == len(found.explanation.steps) == 2
 
 
+@pytest.mark.slow
 def test_a_pair_has_equal_halves_and_is_told_from_one_force_only_by_the_calibration(seed=4):
     recording = recorded_on_axes(2, whirl_forces(0.6), seed)
     context, known = arena_of(recording, device(2))
@@ -116,6 +117,7 @@ def test_a_pair_has_equal_halves_and_is_told_from_one_force_only_by_the_calibrat
     assert can_coupling_imitate(loose, even, inputs)
 
 
+@pytest.mark.slow
 def test_one_force_is_a_pair_of_half_its_size_beside_the_models_coupling(seed=4):
     recording = recorded_on_axes(2, whirl_forces(0.6), seed)
     context, known = arena_of(recording, replace(device(2), tolerance=Tolerance(0.0003, 0.3, 0.8, 0.01)))

@@ -63,7 +63,8 @@ def test_two_effects_keep_their_names(seed=12):
     assert "looking for a law outside the catalogue" in said
 
 
-@pytest.mark.parametrize("seed", [pytest.param(13, marks=pytest.mark.slow), 20])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [13, 20])
 def test_an_effect_that_fits_keeps_its_name(seed):
     """Of seed 13 the held-out samples leave enough to look for a law: it is the same formula, and no better."""
     result, said = search_laws(recorded((CUBE,), seed))
@@ -122,7 +123,9 @@ def test_a_short_law_is_found_once_for_both_questions(seed=11):
     assert said.count("looking for a law outside the catalogue") == 1
 
 
-@pytest.mark.parametrize(("leaves", "begun"), [(1e-4, False), (LAW_ALONE_LEAVES, True)])
+@pytest.mark.parametrize(
+    ("leaves", "begun"), [pytest.param(1e-4, False, marks=pytest.mark.slow), (LAW_ALONE_LEAVES, True)]
+)
 def test_a_screen_that_leaves_too_much_costs_no_fit(monkeypatch, leaves, begun, seed=12):
     """Of two effects, a single term leaves a part of the missing force."""
     fits: list[object] = []

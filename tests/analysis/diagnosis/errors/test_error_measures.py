@@ -29,6 +29,7 @@ def test_a_controlled_plant_that_does_not_hold_itself_is_compared_by_forces(cont
     assert "compared up to" in chosen.remarks[1]
 
 
+@pytest.mark.slow
 def test_friction_under_a_controller_is_recovered_from_forces(controlled_recording: Recording) -> None:
     findings = diagnose_plant(
         controlled_recording, "coulomb_friction", "viscous_damping", "hardening_stiffness", "transport_delay"

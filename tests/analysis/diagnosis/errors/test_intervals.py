@@ -23,6 +23,7 @@ from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import Signal
+from tests.slow_instances import slow_rows
 
 RATE_HZ, SAMPLES, DRAWS = 200.0, 4000, 120
 FORCE_N, STIFFER = 0.3, 0.8
@@ -86,7 +87,7 @@ def fitted_and_errors(seed, colour, strength):
     return found, compute_standard_errors(measure, found, all_sensitivities(measure, found)), own
 
 
-@pytest.mark.parametrize(("colour", "strength"), [(0.0, 1.0), (0.9, 1.0), (0.9, 6.0)])
+@pytest.mark.parametrize(("colour", "strength"), [(0.9, 6.0), *slow_rows((0.0, 1.0), (0.9, 1.0))])
 def test_ninety_five_of_a_hundred_intervals_hold_the_truth(colour, strength):
     held = 0
     for seed in range(DRAWS):
@@ -138,9 +139,8 @@ def measure_of_segments(seed, varies, count=SEGMENTS):
     ]
 
 
-@pytest.mark.parametrize(
-    ("varies", "noise_holds"), [pytest.param(VARIES, (0.0, 0.75), marks=pytest.mark.slow), (0.0, (0.88, 1.0))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("varies", "noise_holds"), [(VARIES, (0.0, 0.75)), (0.0, (0.88, 1.0))])
 def test_segments_show_what_varies_between_them(varies, noise_holds):
     held = np.mean([measure_of_segments(seed, varies) for seed in range(DRAWS)], axis=0)
     assert noise_holds[0] <= held[0] <= noise_holds[1]
@@ -206,11 +206,13 @@ def measure_of_periods(seed, period=PERIOD, lacking=1.0):
     return of.to_value(at - 1.96 * error) <= FORCE_N <= of.to_value(at + 1.96 * error)
 
 
+@pytest.mark.slow
 def test_what_repeats_with_the_drive_is_not_counted_as_often_as_it_repeats():
     """Each period alone would give half the errors' width again; few clusters hold a little less than they say."""
     assert 0.8 <= np.mean([measure_of_periods(seed) for seed in range(DRAWS)]) <= 0.99
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("period", [100, 200, 500])
 def test_periods_of_few_stretches_do_not_make_the_intervals_narrow(period):
     """Scores sum to zero at the minimum: one or two clusters would tell next to nothing of the noise."""

@@ -63,6 +63,7 @@ def test_friction_is_found_from_far_away(friction_context, start):
     assert friction_context.score_fit(found).score.worst_channel < 1.03
 
 
+@pytest.mark.slow
 def test_two_effects_are_found_at_once(make_context):
     truth = (
         PlacedEffect(EFFECTS["coulomb_friction"], (0,), {"level": FRICTION_N}),
@@ -94,6 +95,7 @@ def test_a_fit_is_never_worse_than_its_start(friction_context):
         assert fit(friction_context.measure, friction_context.tuning, start, known, 3).cost <= start.cost
 
 
+@pytest.mark.slow
 def test_the_same_start_gives_the_same_fit(friction_context):
     one, other = (
         fit_hypothesis(friction_context, make_hypothesis("coulomb_friction", {"level": 0.1})) for _ in range(2)

@@ -62,7 +62,8 @@ def linear_acceleration(q: float, v: float) -> float:
     return -SPRING * q - DAMPING * v
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
 def test_the_weight_of_a_pendulum_is_named_from_its_decays(seed):
     found = diagnose_values(
         make_recording(
@@ -79,7 +80,7 @@ def test_the_weight_of_a_pendulum_is_named_from_its_decays(seed):
     assert found.improved.mass == pytest.approx(np.eye(1))
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_dry_friction_is_named_from_a_decay(seed):
     found = diagnose_values(make_recording(simulate_decay(friction_acceleration, 1.0, 8, seed)))
     (friction,) = found.diagnosis.effects
@@ -87,6 +88,7 @@ def test_dry_friction_is_named_from_a_decay(seed):
     assert friction.parameters["level"].value == pytest.approx(0.8, rel=0.25)
 
 
+@pytest.mark.slow
 def test_a_decay_in_an_unknown_unit_is_read_as_a_position_and_named():
     """As of a photodiode that a swinging mirror shines on: its parameters are in no unit."""
     counted = make_recording(simulate_decay(friction_acceleration, 1.0, 8, 3))
@@ -103,7 +105,8 @@ def test_what_is_no_motion_is_not_read_as_a_position(quantity, unit):
         diagnose_values(replace(cooled, response=replace(cooled.response, quantity=quantity, unit=unit)))
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow), pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_linear_decay_names_nothing(seed):
     found = diagnose_values(
         make_recording(

@@ -16,12 +16,14 @@ def find_cells(recording, prediction, **options):
     return compute_mismatch_cells(recording, prediction, estimate_noise_floor(recording), **options)
 
 
+@pytest.mark.slow
 def test_the_true_model_has_no_mismatch(device):
     found = [find_cells(*record_with_prediction(device(), seed)) for seed in range(12)]
     assert len(found[0]) > 100
     assert sum(any(cell.significant for cell in cells) for cells in found) <= 1
 
 
+@pytest.mark.slow
 def test_without_a_margin_false_alarms_come_at_the_stated_rate(device):
     cells = [
         cell

@@ -92,6 +92,7 @@ def test_dry_friction_and_presliding_are_distinguished_by_the_proposed_recording
     assert cost[1] - cost[0] > 2 * TELLING_GAIN
 
 
+@pytest.mark.slow
 def test_of_recordings_that_tell_alone_the_one_with_the_largest_gain_for_its_cost_is_chosen(friction_choice):
     _, _, gains = friction_choice
     (chosen,) = choose_experiments([gains]).experiments
@@ -99,6 +100,7 @@ def test_of_recordings_that_tell_alone_the_one_with_the_largest_gain_for_its_cos
     assert worth[chosen.words] == max(worth.values()) > 3 * min(each.gain / each.experiment.minutes for each in gains)
 
 
+@pytest.mark.slow
 def test_a_law_and_itself_are_never_told_apart(friction_choice):
     bench, (named, _), _ = friction_choice
     same = predict_menu_gains(bench, named, named)

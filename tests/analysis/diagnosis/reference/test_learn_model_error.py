@@ -87,6 +87,7 @@ def test_a_hum_below_the_learned_model_error_is_named(diagnosed, clean_recording
     assert found.diagnosis.effects[0].parameters["amplitude"].value == pytest.approx(tone, rel=0.3)
 
 
+@pytest.mark.slow
 def test_what_mends_the_model_itself_counts_against_an_explanation(diagnosed, clean_recordings):
     learned = learn_model_error(
         clean_recordings, diagnosed.device(1), (diagnosed.recorded(1, (LAG,), seed=4),), map, ignore_progress

@@ -48,6 +48,7 @@ def test_a_rival_started_from_shared_sensitivities_converges_to_its_own_fit(fric
     assert shared.deviations == pytest.approx(alone.deviations, abs=0.1)
 
 
+@pytest.mark.slow
 def test_sensitivities_that_say_nothing_do_not_leave_the_model_as_it_was_given(friction_fit):
     """Nothing moves it where they are nought; then they are taken anew."""
     context, plain, known = friction_fit

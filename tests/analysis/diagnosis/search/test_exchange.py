@@ -73,6 +73,7 @@ def compromise(saturated_lag):
 CATALOGUE = [EFFECTS[name] for name in ("amplifier_lag", "sensor_lag", "force_saturation", "viscous_damping")]
 
 
+@pytest.mark.slow
 def test_the_first_effect_is_looked_for_again_beside_the_second(saturated_lag, compromise):
     assert compromise.after.score.worst_channel > EXPLAINED_ERROR
     found = exchange_effects(saturated_lag, compromise, CATALOGUE, ignore_progress, grant_time)
@@ -92,6 +93,7 @@ def test_an_exchange_whose_time_ends_changes_nothing(saturated_lag, compromise, 
     assert found is compromise
 
 
+@pytest.mark.slow
 def test_a_discarded_effect_is_no_rival_of_the_one_that_stays(saturated_lag, compromise):
     lag = explain_by(saturated_lag, claim("amplifier_lag", time_constant=3e-3)).steps
     rivals = replace(compromise, rounds=((*compromise.rounds[0], *lag), *compromise.rounds[1:]))
@@ -99,6 +101,7 @@ def test_a_discarded_effect_is_no_rival_of_the_one_that_stays(saturated_lag, com
     assert [each.newest for each in found.rounds[0]] == [found.steps[0].newest]
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_not_to_be_named_takes_no_place(saturated_lag, compromise):
     barred = replace(saturated_lag, excluded=frozenset({"force_saturation"}))
     assert exchange_effects(barred, compromise, CATALOGUE, ignore_progress, grant_time) is compromise
@@ -160,6 +163,7 @@ def test_a_law_without_refinements_stays(friction_lag):
     assert exchange_for_relatives(friction_lag, plain, none, ignore_progress, grant_time) is plain
 
 
+@pytest.mark.slow
 def test_of_three_the_one_that_stood_in_is_dropped(saturated_lag):
     three = explain_by(
         saturated_lag,
@@ -183,6 +187,7 @@ def test_rivals_are_kept_only_where_they_were_compared(saturated_lag):
     assert len(left.rounds[0]) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", [0, 1, 2])
 def test_of_three_goes_the_one_without_which_two_fit_as_well_as_laws_of_real_devices_do(saturated_lag, place):
     claims = [claim("force_saturation", limit=LIMIT_N), claim("sensor_lag", bandwidth=LAG_HZ)]
@@ -262,6 +267,7 @@ def test_no_fourth_effect_is_looked_for_beside_three_that_are_taken_over(saturat
     assert [step.newest for step in again.steps] == [step.newest for step in found.steps]
 
 
+@pytest.mark.slow
 def test_the_last_goes_where_it_only_led_the_others_out_of_a_local_minimum(saturated_lag):
     right = explain_by(saturated_lag, claim("force_saturation", limit=LIMIT_N), claim("sensor_lag", bandwidth=LAG_HZ))
     worse = right.steps[1].fitted

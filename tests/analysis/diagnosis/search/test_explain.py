@@ -45,6 +45,7 @@ def friction_findings(friction_recording, diagnosed):
     return diagnose_recording(friction_recording, diagnosed.device(1))
 
 
+@pytest.mark.slow
 def test_friction_is_found_to_its_interval_and_the_noise(friction_findings, diagnosed):
     assert friction_findings.diagnosis.verdict == "explained"
     assert named_effects(friction_findings) == [("coulomb_friction", "x")]
@@ -66,6 +67,7 @@ def test_the_same_recording_gives_the_same_answer(friction_findings, friction_re
     assert again.diagnosis == friction_findings.diagnosis
 
 
+@pytest.mark.slow
 def test_another_seed_gives_the_same_name(diagnosed):
     other = diagnose_recording(diagnosed.recorded(1, seed=9), diagnosed.device(1))
     assert named_effects(other) == [("coulomb_friction", "x")]
@@ -90,6 +92,7 @@ def test_an_effect_that_is_not_asked_for_changes_nothing(friction_findings, fric
     assert friction_level(more) == pytest.approx(friction_level(friction_findings), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_without_the_true_name_no_other_explains(friction_recording, diagnosed):
     other = diagnose_recording(friction_recording, diagnosed.device(1), AMONG[1:])
     assert other.diagnosis.verdict in ("unexplained", "partly_explained")
@@ -108,6 +111,7 @@ def test_a_mirrored_axis_rubs_alike(friction_recording, diagnosed, friction_find
     assert friction_level(other) == pytest.approx(friction_level(friction_findings), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_constant_force_is_mirrored_with_its_axis(diagnosed):
     pull = (PlacedEffect(EFFECTS["constant_force"], (0,), {"force": 0.3}),)
     pulled = diagnosed.recorded(1, pull)
@@ -144,6 +148,7 @@ def swap_axes(signal: Signal) -> Signal:
     return replace(signal, samples=np.ascontiguousarray(signal.samples[:, ::-1]))
 
 
+@pytest.mark.slow
 def test_commands_in_another_order_explain_nothing(friction_recording, diagnosed):
     shuffled = np.random.default_rng(1).permutation(friction_recording.command.samples)
     lost = replace(friction_recording, command=replace(friction_recording.command, samples=shuffled))

@@ -64,6 +64,7 @@ def test_a_number_that_is_fixed_is_named(friction_context):
     assert effect_names(keep_identifiable(friction_context, found, grant_time)) == effect_names(found)
 
 
+@pytest.mark.slow
 def test_in_place_of_one_that_is_open_stands_what_is_as_good_and_fixed(friction_context):
     assert effect_names(
         keep_identifiable(friction_context, make_explanation(friction_context, OPEN, FRICTION), grant_time)
@@ -76,6 +77,7 @@ def test_with_nothing_as_good_nothing_is_named_and_what_was_left_out_is_known(fr
     assert (left.steps, left.undetermined) == ((), ("viscous_damping",))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [(FRICTION, OPEN), (OPEN, FRICTION)])
 def test_of_two_the_one_that_is_open_goes_whichever_came_first(friction_context, order):
     base = friction_context.score_fit(retune_alone(friction_context))
@@ -86,6 +88,7 @@ def test_of_two_the_one_that_is_open_goes_whichever_came_first(friction_context,
     assert [step.fitted.hypothesis.key for step in left.steps] == [left.rounds[0][0].fitted.hypothesis.key]
 
 
+@pytest.mark.slow
 def test_one_number_that_is_fixed_is_enough(friction_context):
     """Rubbing in one direction alone: the other's number is open, and the effect is there."""
     found = make_explanation(
@@ -99,6 +102,7 @@ def test_what_has_no_number_that_could_be_none_is_not_judged(friction_context):
     assert effect_names(keep_identifiable(friction_context, found, grant_time)) == effect_names(found)
 
 
+@pytest.mark.slow
 def test_it_is_said_that_numbers_were_left_open(friction_context, monkeypatch):
     monkeypatch.setattr("analysis.diagnosis.search.identifiability.INTERVAL_FACTOR", 1e6)
     seen = search_effects(friction_context, [EFFECTS["coulomb_friction"]], lambda what, share: None)
@@ -129,6 +133,7 @@ def test_the_profile_distinguishes_a_present_number_from_zero_and_an_absent_one_
     assert compute_null_distance(friction_context, both, 1) < 1
 
 
+@pytest.mark.slow
 def test_a_step_that_was_scored_on_all_samples_has_the_same_profile(friction_context):
     """A law that held-out samples chose is such a step; its residuals have other shapes than those of the search."""
     both = fit_claims(friction_context, FRICTION, OPEN)
@@ -140,6 +145,7 @@ def test_a_step_that_was_scored_on_all_samples_has_the_same_profile(friction_con
     )
 
 
+@pytest.mark.slow
 def test_an_interval_that_contains_zero_is_corrected_by_the_profile_likelihood(friction_context, monkeypatch):
     found = fit_claims(friction_context, FRICTION)
     place, level = (
@@ -155,6 +161,7 @@ def test_an_interval_that_contains_zero_is_corrected_by_the_profile_likelihood(f
     assert 1.96 * INTERVAL_FACTOR * level * np.expm1(named.errors[1][place]) < level
 
 
+@pytest.mark.slow
 def test_numbers_whose_intervals_all_hold_none_are_not_named(friction_context, monkeypatch):
     found = fit_claims(
         friction_context, make_hypothesis("asymmetric_friction", level_positive=FRICTION_N, level_negative=FRICTION_N)
@@ -165,6 +172,7 @@ def test_numbers_whose_intervals_all_hold_none_are_not_named(friction_context, m
     assert keep_identifiable(friction_context, found, grant_time).undetermined == ("asymmetric_friction",)
 
 
+@pytest.mark.slow
 def test_stated_intervals_hold_the_noise_and_a_bounded_part_of_what_varies_between_segments(friction_context):
     found = fit_claims(friction_context, FRICTION)
     noise = compute_final_errors(friction_context, found)
@@ -174,6 +182,7 @@ def test_stated_intervals_hold_the_noise_and_a_bounded_part_of_what_varies_betwe
     assert stated[-1] > noise[-1] > 0
 
 
+@pytest.mark.slow
 def test_one_segment_tells_nothing_between_segments(friction_context):
     def joined(measure):
         records = (replace(each, recording=replace(each.recording, segments=())) for each in measure.records)

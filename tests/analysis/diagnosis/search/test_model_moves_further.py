@@ -74,6 +74,7 @@ def test_of_parameters_alone_nothing_is_named():
     assert MODEL_MOVED in found.remarks
 
 
+@pytest.mark.slow
 def test_without_time_or_effects_to_try_the_model_does_not_move_further(make_context):
     context = make_context(RUBBING, model_off_by(9.0))
     first = search_effects(context, [], ignore_progress)
@@ -90,6 +91,7 @@ def test_without_time_or_effects_to_try_the_model_does_not_move_further(make_con
     assert begun.remarks == (*first.remarks, OUT_OF_TIME)
 
 
+@pytest.mark.slow
 def test_an_effect_that_a_model_could_take_up_is_named_first():
     tolerance = device(1).tolerance
     assert tolerance is not None

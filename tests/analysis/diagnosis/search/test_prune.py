@@ -50,6 +50,7 @@ def friction_and_force_context(make_context):
     return make_context((place_effect("coulomb_friction", level=FRICTION_N), place_effect("constant_force", force=0.2)))
 
 
+@pytest.mark.slow
 def test_a_stopgap_goes_once_the_true_law_has_its_numbers(friction_context):
     found = make_explanation(
         friction_context,
@@ -97,6 +98,7 @@ def test_two_that_are_needed_are_compared_while_there_is_time(friction_and_force
         prune(friction_and_force_context, found, grant_time)
 
 
+@pytest.mark.slow
 def test_out_of_time_nothing_is_fitted_again(friction_and_force_context, forbid_fit):
     found = make_explanation(
         friction_and_force_context,
@@ -109,6 +111,7 @@ def test_out_of_time_nothing_is_fitted_again(friction_and_force_context, forbid_
     ]
 
 
+@pytest.mark.slow
 def test_out_of_time_no_profile_is_fitted_and_what_may_be_none_is_not_named(friction_context, forbid_fit):
     """A constant force of 0.1 N that is not there, and whose interval holds zero by less than twice."""
     found = make_explanation(
@@ -150,6 +153,7 @@ def test_a_little_more_is_not_named_where_more_than_noise_is_left_with_it(
     assert len(prune(friction_and_weak_force_context, found, lambda: False).steps) == kept
 
 
+@pytest.mark.slow
 def test_a_delay_of_more_than_a_tick_is_found_where_re_tuning_hid_it(make_context, diagnosed):
     """From below a whole number of ticks no small step leads above it."""
     late = 1.16 / diagnosed.RATE_HZ

@@ -152,9 +152,10 @@ def recorded(diagnosed):
     return context, Explanation(given, given, given, (), ()), chosen.floors
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spread", "refined"),
-    [pytest.param(0.05, True, marks=pytest.mark.slow), (50.0, False)],
+    [(0.05, True), (50.0, False)],
     ids=["more than chance", "chance alone"],
 )
 def test_where_chance_alone_explains_the_band_powers_play_is_not_refined(recorded, monkeypatch, spread, refined):

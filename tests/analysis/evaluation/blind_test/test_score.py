@@ -19,6 +19,7 @@ from analysis.evaluation.blind_test.wording import describe_answer, describe_con
 from analysis.figures.blind_test_pictures import make_blind_test_pictures
 from analysis.reports.blind_test_report import BlindTestFacts, render_blind_test_report
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
+from tests.slow_instances import slow_rows
 
 CELL = Mismatch("ax", "fx", (1.0, 5.0), None, None, 0.5, 0.001)
 ERRORS = Errors(0.5, 0.3, 0.1, 0.1)
@@ -85,19 +86,21 @@ def find_figure(outcomes, name):
 @pytest.mark.parametrize(
     ("name", "hits", "of"),
     [
-        ("named right", 1, 4),
-        ("in the returned set", 2, 4),
-        ("right where one name is returned", 1, 2),
         ("nothing missing, yet named", 1, 2),
-        ("outside the catalogue, not explained", 1, 2),
         ("without the true effect, yet explained", 0, 2),
         ("pairs, both and no other", 0, 1),
-        ("pairs, at least one", 1, 1),
         ("true value in the 95 % interval", 1, 1),
         ("without the true effect, any name", 1, 2),
-        ("single effects that count as detectable", 4, 6),
-        ("named right, of those that an oracle sees", 1, 5),
-        ("not detectable, yet a wrong name", 1, 2),
+        *slow_rows(
+            ("named right", 1, 4),
+            ("in the returned set", 2, 4),
+            ("right where one name is returned", 1, 2),
+            ("outside the catalogue, not explained", 1, 2),
+            ("pairs, at least one", 1, 1),
+            ("single effects that count as detectable", 4, 6),
+            ("named right, of those that an oracle sees", 1, 5),
+            ("not detectable, yet a wrong name", 1, 2),
+        ),
     ],
 )
 def test_shares_count_what_their_names_say(name, hits, of):
@@ -148,6 +151,7 @@ def test_an_interval_holds_its_share():
     assert format_figure(found).startswith("50.0 % [40, 60]")
 
 
+@pytest.mark.slow
 def test_probabilities_that_mean_what_they_say_have_no_error():
     honest = [
         make_outcome(answer=make_diagnosis("explained", make_named_effect("coulomb_friction", probability=0.75)))

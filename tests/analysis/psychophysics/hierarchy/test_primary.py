@@ -16,6 +16,7 @@ from analysis.psychophysics.hierarchy.inference import (
 from analysis.psychophysics.hierarchy.primary import FAR_ABOVE_NOTE, compute_primary_analysis
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from tests.analysis.conftest import PUBLISHED, simulate_run
+from tests.slow_instances import slow_after
 
 HZ = (5.0, 15.0, 25.0, 35.0, 45.0)
 NEAR_CAP = Crowd(HZ, (0.35, 0.6, 0.85, 3.0, 4.0))
@@ -38,13 +39,14 @@ def test_a_contrast_towards_the_cap_is_not_lost():
     assert np.mean(fitted) - true == pytest.approx(0.0, abs=1.6)  # standard error 0.5 dB
 
 
-@pytest.mark.parametrize("family", list(Family))
+@pytest.mark.parametrize("family", slow_after(1, list(Family)))
 def test_medians_are_recovered_for_each_shape_of_the_curves(family):
     crowd = Crowd((5.0, 35.0), (0.5, 1.6), family=family, lapse=0.03)
     errors = [fit_hierarchy(s.answers).means_db - s.true_db.mean(axis=0) for s in simulate_studies(crowd, 5)]
     assert np.abs(np.mean(errors, axis=0)).max() < 0.8
 
 
+@pytest.mark.slow
 def test_spreads_slope_and_criterion_are_recovered():
     crowd = Crowd((5.0, 15.0, 25.0), (0.5, 0.7, 0.9), person_sd_db=3.0, frequency_sd_db=1.5, criterion_sd=0.4)
     (study,) = simulate_studies(crowd, 1, people=40)
@@ -64,6 +66,7 @@ def test_pseudo_thresholds_average_to_the_estimate():
     np.testing.assert_allclose(compute_pseudo_thresholds(fit).mean(axis=0), fit.means_db, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_above_the_cap_there_is_a_bound_and_no_size():
     (study,) = simulate_studies(Crowd((5.0, 45.0), (0.5, 8.0)), 1)
     low, high = compute_primary_analysis(study.answers, 3.0).medians
@@ -142,6 +145,7 @@ def test_flat_thresholds_are_equal_and_equivalent():
     assert all(c.p_equivalence < 0.05 for c in found.contrasts)
 
 
+@pytest.mark.slow
 def test_answers_at_the_cap_count_and_unfinished_runs_too():
     rng = np.random.default_rng(1)
     trials = [

@@ -17,6 +17,7 @@ from analysis.psychophysics.hierarchy.objective import Objective, Prior, maximis
 from analysis.psychophysics.hierarchy.quadrature import Quadrature, integrate
 from analysis.psychophysics.power.simulated_study import Crowd, simulate_study
 from tests.analysis.conftest import PUBLISHED
+from tests.slow_instances import slow_after
 
 MANY = NodeCounts(9, 11, 7, 13)
 NEAR_CAP = Crowd((5.0, 45.0), (0.7, 2.7), slope_log_sd=0.4, lapse=0.03)
@@ -80,7 +81,7 @@ def test_with_single_nodes_it_is_the_method_of_laplace(prepared_quadrature):
     np.testing.assert_allclose(found.value, objective.marginal.evaluate(numbers)[0], atol=1e-8)
 
 
-@pytest.mark.parametrize("family", list(Family))
+@pytest.mark.parametrize("family", slow_after(1, list(Family)))
 def test_gradient_and_hessian_are_those_of_the_integral(prepared_quadrature, family):
     answers, _, _, numbers = prepared_quadrature
     objective, quadrature = Objective(answers, family, Prior()), Quadrature(answers, family)

@@ -19,7 +19,7 @@ def simulate_runs(true_n, people=300):
     return compute_run_likelihoods(study.answers, [Nuisance(2.0, 0.0, (0.02,))] * people, CAP_DB)
 
 
-@pytest.mark.parametrize("true_n", [0.3, 1.0])
+@pytest.mark.parametrize("true_n", [pytest.param(0.3, marks=pytest.mark.slow), 1.0])
 def test_intervals_hold_the_truth_as_often_as_they_say(true_n):
     true_db, found = 20 * np.log10(true_n), simulate_runs(true_n)
     held = [(r.lower_db or -99) <= true_db <= (r.upper_db or 99) for r in found]
@@ -27,6 +27,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say(true_n):
     assert np.mean([r.db for r in found]) == pytest.approx(true_db, abs=0.4)
 
 
+@pytest.mark.slow
 def test_above_the_cap_there_is_a_bound():
     true_db, found = 20 * np.log10(5.0), simulate_runs(5.0)
     above = [r for r in found if r.db is None]

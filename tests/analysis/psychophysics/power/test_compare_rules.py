@@ -61,6 +61,7 @@ def test_a_spread_may_be_a_whole_number():
 RULES = ("staircase, new step after the reversal", "Psi, 60 trials")
 
 
+@pytest.mark.slow
 def test_the_same_seed_compares_the_same_people():
     rules = {"a": PUBLISHED, "b": PUBLISHED, "c": RULE}
     one, other, psi = compare_rules(Crowd((5.0,), (0.7,)), rules, 10, 3)

@@ -94,6 +94,7 @@ def test_the_interval_covers_the_truth_and_is_no_wider_than_it_must_be():
     assert 0.7 < width / (2 * 1.96 * spread) < 1.5
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_interval():
     response = response_of(0.25 * LINES / 12.0, LINES, 0.05)
     first, again, other = (find_coupling_onset(response, OnsetRule(seed=seed)) for seed in (1, 1, 2))
@@ -101,6 +102,7 @@ def test_the_same_seed_gives_the_same_interval():
     assert first.interval_hz != other.interval_hz
 
 
+@pytest.mark.slow
 def test_the_synthetic_device_couples_from_nine_hertz_on(plants, synthetic):
     fine = np.arange(8.0, 11.0, 0.002)
     exact = compute_worst_coupling(plants.omega_like().response(fine))

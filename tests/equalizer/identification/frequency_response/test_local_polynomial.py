@@ -32,6 +32,7 @@ def test_the_peak_at_eleven_hertz_is_not_cut_beyond_the_noise(pairs, plants):
     assert np.mean(np.abs(left) ** 2 / noise) < 1.3
 
 
+@pytest.mark.slow
 def test_the_variance_of_the_smooth_response_is_that_of_its_errors(pairs, plants):
     ratios = []
     for _, smooth in pairs:

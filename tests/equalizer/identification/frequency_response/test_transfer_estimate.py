@@ -41,12 +41,14 @@ def test_without_noise_the_truth_comes_out(plants, synthetic):
     assert (estimate.input_unit, estimate.output_unit) == ("N", "m/s^2")
 
 
+@pytest.mark.slow
 def test_the_sweeps_of_the_notes_reach_about_one_percent(plants, synthetic):
     estimate = estimate_transfer((synthetic.sweeps(plants, 4.5, 37.0, 30.0),))
     assert 0.008 < synthetic.rms_error(estimate, plants.omega_like()) < 0.012
     assert synthetic.errors(estimate, plants.omega_like()).max() < 0.032
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("periods", "lowest", "highest"), [(2, 0.6, 1.3), (5, 0.8, 1.25)])
 def test_the_stated_variance_is_the_variance_of_the_errors(plants, synthetic, periods, lowest, highest):
     """From one counted period by the scatter between lines, from four by what differs between them."""
@@ -76,6 +78,7 @@ def test_a_smooth_estimate_of_one_period_is_at_least_as_noisy_as_the_rest_before
     assert np.median(with_rest.noise_variance) > 20 * np.median(without.noise_variance)
 
 
+@pytest.mark.slow
 def test_a_spring_drops_out_of_the_estimate(plants, synthetic):
     recording = synthetic.under_a_spring(plants, synthetic.axes(plants.sweep(4.5, 37.0, 5.0)), 300.0, noise=0.0)
     estimate = estimate_transfer((recording,))

@@ -37,7 +37,7 @@ def test_all_the_mass_moves_as_one_below_the_joint_and_damping_stays_at_the_driv
     np.testing.assert_array_equal(joined.output, [[0.0, 1.0]])
 
 
-@pytest.mark.parametrize(("motor", "handle"), [(0.14, 0.14), (0.11, 0.17)])
+@pytest.mark.parametrize(("motor", "handle"), [(0.14, 0.14), pytest.param(0.11, 0.17, marks=pytest.mark.slow)])
 def test_mass_damping_and_resonance_are_recovered_across_a_joint(motor, handle):
     """However the mass is shared: half and half is taken."""
     k = 2e4

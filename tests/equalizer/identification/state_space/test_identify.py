@@ -30,6 +30,7 @@ def found(response):
     return identify(response)
 
 
+@pytest.mark.slow
 def test_the_device_is_found_from_noisy_sweeps_within_a_fifth_of_a_percent(plants, measuring, centre, found):
     rms, worst = measuring.errors_of(found.model, centre, GRID)
     assert rms < 0.002

@@ -36,11 +36,13 @@ def test_friction_is_distinguished_from_an_order_that_is_too_low(plants, rubbing
     assert ORDER not in said and BOUND not in said and "relaxed" not in said
 
 
+@pytest.mark.slow
 def test_without_two_counted_periods_friction_and_order_are_not_told_apart(plants, synthetic):
     said = said_of(recorded(plants, synthetic, plants.omega_like(), periods=1))
     assert "or the device is not linear, as with friction" in said and "do not show which" in said
 
 
+@pytest.mark.slow
 def test_an_order_that_is_too_low_is_not_taken_for_friction(plants, synthetic):
     said = said_of(recorded(plants, synthetic, plants.omega_like()))
     assert ORDER in said

@@ -43,6 +43,7 @@ def test_twice_the_noise_is_twice_the_uncertainty(measuring, plant):
     assert np.median(two / one) == pytest.approx(2.0, rel=0.1)
 
 
+@pytest.mark.slow
 def test_every_draw_is_stable(measuring, plant):
     model = found_at(measuring, plant, 3, order=12)
     for row in model.samples:

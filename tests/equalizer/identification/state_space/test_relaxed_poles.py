@@ -25,14 +25,15 @@ def device_of(plants, dampings, seed):
     return plants._sampled(modes), [mode[:2] for mode in modes[3:]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("dampings", "seed"),
     [
         ((0.01, 0.06, 0.05), 1),
-        pytest.param((0.02, 0.003, 0.05), 2, marks=pytest.mark.slow),
-        pytest.param((0.06, 0.05, 0.001), 3, marks=pytest.mark.slow),
-        pytest.param((0.001, 0.002, 0.003), 4, marks=pytest.mark.slow),
-        pytest.param((0.005, 0.01, 0.002), 5, marks=pytest.mark.slow),
+        ((0.02, 0.003, 0.05), 2),
+        ((0.06, 0.05, 0.001), 3),
+        ((0.001, 0.002, 0.003), 4),
+        ((0.005, 0.01, 0.002), 5),
     ],
 )
 def test_a_lightly_damped_resonance_is_found_to_the_noise(plants, measuring, dampings, seed):
@@ -49,6 +50,7 @@ def test_a_lightly_damped_resonance_is_found_to_the_noise(plants, measuring, dam
     assert found.model.spectral_radius < 1
 
 
+@pytest.mark.slow
 def test_a_well_damped_device_is_fitted_as_under_the_bound_to_the_last_digit(plants, measuring):
     plant, _ = device_of(plants, (0.06, 0.05, 0.05), 6)
     for order in (12, 16):  # with states to spare, some poles sit on the bound, and cost nothing there

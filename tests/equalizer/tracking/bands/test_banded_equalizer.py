@@ -98,6 +98,7 @@ def above_band(played, wanted):
     return np.linalg.norm(part(played, 36, 450)) / np.linalg.norm(part(wanted, 36, 450))
 
 
+@pytest.mark.slow
 def test_an_impact_with_content_above_the_band_is_played_as_strongly_as_wanted(band_model, low, high, impact, in_time):
     split = LinearPhaseSplit(BandEdges(), RATE_HZ, 4.0)
     banded = in_time(BandedEqualizer(band_model, split, low, high).compute_forces(impact), impact)
@@ -184,6 +185,7 @@ def test_a_stylus_from_a_contact_on_is_refused(band_model, low, high):
         BandedEqualizer(band_model, CausalSplit(BandEdges(), RATE_HZ), low, HighBand(high.source, stylus=stylus))
 
 
+@pytest.mark.slow
 def test_the_rendered_spring_is_left_its_part(band_model, low, high):
     t, spring = np.arange(2000) / RATE_HZ, VirtualSpring(200.0, 3.0)
     wanted = (np.sin(2 * np.pi * 10 * t) * np.hanning(2000))[:, None] * np.array([1.0, 0, 0])

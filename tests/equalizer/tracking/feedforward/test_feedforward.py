@@ -64,6 +64,7 @@ def test_forces_above_the_cap_are_refused_with_the_factor_that_fits(model, noise
     assert compute_feedforward_forces(model, replace(loud, samples=0.999 * factor * loud.samples)).peaks.is_under_cap
 
 
+@pytest.mark.slow
 def test_forces_above_the_cap_are_solved_under_it_with_the_loss_stated(model, noise):
     loud = replace(noise, samples=2.0 * noise.samples[600:1400])
     peak_n = compute_feedforward_forces(model, loud, FeedforwardSettings(cap_n=50.0)).peaks.peak_n

@@ -19,6 +19,7 @@ from equalizer.tracking.learning.iteration import (
 )
 from equalizer.tracking.lqr.lqr import compute_stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
+from tests.slow_instances import slow_rows
 
 RATE_HZ, BAND_HZ, AROUND = 1000.0, (5.0, 35.0), 300
 SEEDS = range(5)
@@ -66,7 +67,8 @@ def repeated(device, repetition, repeats, seed):
     return state
 
 
-@pytest.mark.parametrize(("friction_n", "first_at_least"), [(0.1, 0.1), pytest.param(0.3, 0.3, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("friction_n", "first_at_least"), [(0.1, 0.1), (0.3, 0.3)])
 def test_friction_is_learnt_within_ten_repeats(rubbing, plants, repetition, wanted, friction_n, first_at_least):
     device = rubbing.rubbing(plants.modes_of(), friction_n)
     rest = [estimate_rest_noise(device.measured(np.zeros((1000, 3)), seed=seed + 77), repetition) for seed in SEEDS]
@@ -82,12 +84,7 @@ def test_friction_is_learnt_within_ten_repeats(rubbing, plants, repetition, want
 
 @pytest.mark.parametrize(
     ("friction_n", "floor_from"),
-    [
-        pytest.param(0.0, "repeats", marks=pytest.mark.slow),
-        pytest.param(0.002, "repeats", marks=pytest.mark.slow),
-        (0.005, "rest"),
-        (0.01, "repeats"),
-    ],
+    [(0.005, "rest"), *slow_rows((0.0, "repeats"), (0.002, "repeats"), (0.01, "repeats"))],
 )
 def test_a_good_first_shot_is_not_made_worse(rubbing, plants, repetition, wanted, friction_n, floor_from):
     device = rubbing.rubbing(plants.modes_of(0.003, 0.2), friction_n)
@@ -166,6 +163,7 @@ def test_responses_that_do_not_belong_together_are_refused(plants, model):
         predict_convergence(inverse, inverse, LINES_HZ, (80.0, 90.0))
 
 
+@pytest.mark.slow
 def test_at_a_shifted_place_a_smaller_gain_gets_there(rubbing, plants, repetition, wanted):
     device = rubbing.rubbing(plants.modes_of(0.2, 10.0), 0.0)
     careful = Repetition(wanted, repetition.invert, RATE_HZ, BAND_HZ, first_gain=0.7)

@@ -53,7 +53,7 @@ def test_the_capped_forces_are_those_of_a_dense_solver(problem_of, share, seed, 
     assert np.abs(capped.forces - forces).max() < 1e-3 * cap_n
 
 
-@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
+@pytest.mark.parametrize("share", [0.3, 0.6, pytest.param(0.9, marks=pytest.mark.slow)])
 def test_the_cap_holds_exactly_and_the_loss_is_less_than_that_of_clipping(device_model, share):
     problem, t = make_tracking_problem(device_model, TrackingWeights(1e-3)), np.arange(300) / 1000
     wanted = 20 * (np.exp(-t / 0.05) * np.sin(2 * np.pi * 20 * t))[:, None] * np.array([1, 0.3, -0.4])

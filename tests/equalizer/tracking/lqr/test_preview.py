@@ -31,6 +31,7 @@ def test_the_stated_loss_is_that_of_a_long_stream(problems, plants):
             assert compute_preview_loss(problem, preview).error == pytest.approx(missed, rel=0.1)
 
 
+@pytest.mark.slow
 def test_more_preview_loses_less(problems):
     losses = [compute_preview_loss(problems[0], preview).error for preview in (50, 100, 200, 400, 1000)]
     assert losses == sorted(losses, reverse=True)

@@ -8,12 +8,13 @@ from hypothesis import strategies as st
 from equalizer.tracking.lqr.lqr import compute_stored_gains, track
 from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracking_problem
 from tests.equalizer.tracking.lqr.dense_least_squares import block_toeplitz, least_squares_forces
+from tests.slow_instances import slow_after
 
 AGREEMENT = {1.0: 1e-10, 1e-2: 1e-10, 1e-4: 1e-10, 1e-6: 1e-9}
 
 
 @pytest.mark.parametrize("feedthrough", [True, False], ids=["feedthrough", "delay"])
-@pytest.mark.parametrize("weight", AGREEMENT)
+@pytest.mark.parametrize("weight", slow_after(2, AGREEMENT))
 def test_riccati_equals_dense_least_squares(problem_of, difference, weight, feedthrough):
     for order in (2, 8, 14, 26):
         for seed, samples in enumerate((3, 7, 60, 150, 100)):

@@ -16,12 +16,14 @@ def test_between_three_models_the_worst_place_is_flat_and_uncoupled(workspaces, 
     assert worst.coupling_db <= -36
 
 
+@pytest.mark.slow
 def test_also_where_modes_do_not_change_linearly_along_the_way(workspaces, three_bent):
     worst = workspaces.worst(build_modal_interpolation(three_bent).at, bend=1.0)
     assert worst.flatness_db <= 0.3
     assert worst.coupling_db <= -32
 
 
+@pytest.mark.slow
 def test_blended_forces_are_a_safe_second_and_the_model_of_the_centre_is_bad(workspaces, three):
     blended = workspaces.worst(lambda place_m: blend_at(three, place_m))
     centre = workspaces.worst(lambda place_m: ModelsAtPlace(place_m, three.models[:1], (1.0,)))

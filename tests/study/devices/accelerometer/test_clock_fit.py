@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from study.devices.accelerometer.clock_fit import fit_clock
+from tests.slow_instances import slow_after
 
 RATE_HZ = 2000.0
 
@@ -20,7 +21,7 @@ def arrivals(drift_ppm: float, seed: int, seconds: float = 60.0) -> tuple[np.nda
     return device_s, np.maximum.accumulate(arrived_s), true_s
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", slow_after(1, [1, 2, 3]))
 @pytest.mark.parametrize("drift_ppm", [-200.0, 0.0, 30.0, 200.0])
 def test_offset_and_drift_are_found(drift_ppm, seed):
     device_s, arrived_s, true_s = arrivals(drift_ppm, seed)

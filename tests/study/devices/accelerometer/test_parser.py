@@ -214,7 +214,7 @@ def test_a_packet_that_lost_its_last_bytes_does_not_hide_the_next_that_begins_wi
         assert (parser.counts.packets, parser.counts.spoiled_bytes, parser.counts.lost) == (4, 0, 0)
 
 
-@pytest.mark.parametrize("late_us", [75, 250, 750])
+@pytest.mark.parametrize("late_us", [pytest.param(75, marks=pytest.mark.slow), 250, 750])
 def test_packets_that_were_stamped_late_count(late_us):
     """Of two in a hundred by 0.3 to 3 periods, and the following ones as far as the board has to catch up."""
     rng = np.random.default_rng(late_us)
@@ -243,7 +243,8 @@ def test_packets_that_were_stamped_just_before_the_next_count(period_us, late_us
     assert (parser.counts.lost, parser.counts.spoiled_bytes, parser.counts.restarts) == (0, 0, 0)
 
 
-@pytest.mark.parametrize("seed", [pytest.param(1, marks=pytest.mark.slow), pytest.param(2, marks=pytest.mark.slow), 3])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
 def test_packets_that_come_again_or_lie_are_told_apart_among_garbled_ones(seed):
     """Repeats, old ones sent again, ones from the near future and from anywhere, two in a row as well."""
     random = np.random.default_rng(seed)

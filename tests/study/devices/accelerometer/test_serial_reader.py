@@ -106,6 +106,7 @@ def test_the_driver_opens_it_as_the_lab_s_file_says(board, stub, rigs, tmp_path,
     assert stub.safe
 
 
+@pytest.mark.slow
 def test_six_positions_at_the_table_give_the_table_of_the_lab_s_file(board):
     laid: list[str] = []
 

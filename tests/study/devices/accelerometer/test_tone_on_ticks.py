@@ -93,6 +93,7 @@ def test_lost_torn_and_garbled_packets_are_counted_and_leave_the_phase_as_it_is(
     assert -1e-4 < late_s(sensed.acceleration_mps2, tick_s) < WORST_S
 
 
+@pytest.mark.slow
 def test_a_board_that_is_reset_goes_on_by_its_new_clock():
     with contextlib.closing(Board(2000.0, 100.0)) as board, opened(board) as sensor:
         board.signal = tone

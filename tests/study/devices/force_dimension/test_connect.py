@@ -49,7 +49,10 @@ def test_an_opened_device_states_its_identity_and_closes_with_brakes_on(stub, op
     assert (stub.get("opened"), stub.get("peak_n")) == (0, 0)
 
 
-@pytest.mark.parametrize(("name", "system_type"), [("omega6", 36), ("omega7", 35), ("delta3", 63), ("sigma7", 104)])
+@pytest.mark.parametrize(
+    ("name", "system_type"),
+    [("omega6", 36), ("omega7", 35), ("delta3", 63), pytest.param("sigma7", 104, marks=pytest.mark.slow)],
+)
 def test_the_vendor_s_other_devices_open_by_their_names(stub, vendor, opened, name, system_type):
     vendor.accept(MODELS[name].name)
     stub.set("type", system_type)

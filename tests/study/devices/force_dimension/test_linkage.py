@@ -37,6 +37,7 @@ def test_nothing_moves_and_no_force_is_taken(stub, calibrated):
     assert stub.safe and not stub.get("opened")
 
 
+@pytest.mark.slow
 def test_the_readings_are_of_the_linkage_behind_the_library(calibrated, tmp_path):
     written = calibrated()
     calibration = read_calibration(tmp_path / "cal.h5")
@@ -66,6 +67,7 @@ def test_the_jacobian_is_the_derivative_of_positions_by_joint_angles(stub):
             )
 
 
+@pytest.mark.slow
 def test_lengths_and_masses_are_recovered(calibrated):
     fitted = fit_linkage(calibrated().calibration)
     found, masses = fitted.parameters.linkage, fitted.parameters.masses
@@ -77,12 +79,14 @@ def test_lengths_and_masses_are_recovered(calibrated):
     assert fitted.jacobian_misfit < 1e-3 and fitted.inertia_misfit < 1e-3
 
 
+@pytest.mark.slow
 def test_a_device_that_stands_turned_has_its_lines_turned(calibrated):
     calibration = calibrated(linkage_turned_deg=15.0).calibration
     np.testing.assert_allclose(calibration.line_deg, [105.0, -135.0, -15.0], atol=0.2)
     assert calibration.asymmetry.max() < 1e-3
 
 
+@pytest.mark.slow
 def test_an_arm_unlike_the_others_is_named_and_no_simulation_pretends_to_have_it(calibrated):
     written = calibrated(odd_arm=0.3)
     assert len(written.warnings) == 3 and "The line at -150 degrees is a line of symmetry" in written.warnings[-1]
@@ -90,6 +94,7 @@ def test_an_arm_unlike_the_others_is_named_and_no_simulation_pretends_to_have_it
     assert fit_linkage(written.calibration).inertia_misfit > 0.02
 
 
+@pytest.mark.slow
 def test_what_is_out_of_reach_is_filled_in_by_mirror_lines(calibrated, tmp_path):
     whole = calibrated().calibration
     (tmp_path / "cal.h5").unlink()
@@ -151,6 +156,7 @@ def test_devices_that_tell_no_linkage_say_so(tmp_path, name):
         calibrate_linkage(CalibrationPlan(tmp_path / "cal.h5", name), lambda share: None)
 
 
+@pytest.mark.slow
 def test_the_calibrated_device_is_simulated_by_its_name(calibrated, rigs, tmp_path):
     calibration = calibrated().calibration
     settings = replace(rigs.SETTINGS, hand_on_handle=False)

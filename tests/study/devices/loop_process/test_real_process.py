@@ -218,6 +218,7 @@ def test_a_loop_that_was_stopped_for_a_moment_lets_go_and_serves_again(stub, rig
     assert opened.release().health.fault in (Fault.STALLED, Fault.LOST)
 
 
+@pytest.mark.slow
 def test_recordings_come_back_and_no_loop_runs_in_this_program(stub, rigs, opened):
     before = locked_kb()
     opened.hold(rigs.sine(2.0, 25))

@@ -15,6 +15,7 @@ from study.devices.device import Fault
 from study.devices.loop_process import line
 from study.devices.loop_process.serve import DeviceServer
 from study.errors import DeviceError, WrongUseError
+from tests.slow_instances import slow_rows
 
 
 class OddError(Exception):
@@ -29,9 +30,8 @@ class OddError(Exception):
     [
         (DeviceError("a", "b.", "c."), DeviceError, "a. b. c."),
         (WrongUseError("a", "b.", "c."), WrongUseError, "a. b. c."),
-        (ValueError("no"), ValueError, "no"),
-        (OddError("odd", "x"), RuntimeError, "OddError: odd"),
         (SystemExit(3), RuntimeError, "SystemExit: 3"),
+        *slow_rows((ValueError("no"), ValueError, "no"), (OddError("odd", "x"), RuntimeError, "OddError: odd")),
     ],
 )
 def test_an_error_on_the_other_side_is_raised_on_this_one(behind, served, monkeypatch, rigs, raised, kind, said):
@@ -93,6 +93,7 @@ def test_a_caller_that_hangs_while_it_plays_gives_no_sign_of_life(device, rigs, 
     assert forces == [0.0]
 
 
+@pytest.mark.slow
 def test_what_the_progress_raises_ends_the_playing_with_a_fade(device, rigs, rig):
     def leave(share: float) -> None:
         if share > 0.3:
@@ -108,6 +109,7 @@ def test_what_the_progress_raises_ends_the_playing_with_a_fade(device, rigs, rig
     assert device.release().health.fault is Fault.NONE
 
 
+@pytest.mark.slow
 def test_an_interrupted_release_can_be_asked_for_again(device, rigs):
     device.hold(rigs.sine(1.0, fade_s=1.0))
     device.keep_alive()
@@ -163,6 +165,7 @@ def test_after_the_end_of_its_process_a_device_is_lost_to_every_call(device, rig
     device.close()
 
 
+@pytest.mark.slow
 def test_a_play_whose_process_ends_raises(device, rigs):
     commands = rigs.force(np.tile(rigs.sine(1.0).loop.samples, (20, 1)))
     with pytest.raises(DeviceError, match="The device was lost"):

@@ -122,6 +122,7 @@ def hammer(state, settings, ring, reading, ticks: int) -> float:
     return idle
 
 
+@pytest.mark.slow
 def test_beside_a_writer_at_full_speed_each_row_is_whole_or_counted(ring):
     """Thousands of times as fast as a loop, into room for 64: many are lost, and none is a mixture of two."""
     writer, reader = Writer(ring), TelemetryReader(Path(ring.path))

@@ -141,6 +141,7 @@ def test_from_the_start_screen_to_the_report_and_back(order, tmp_path):
     assert Path(app.outcome.results.report).is_file()
 
 
+@pytest.mark.slow
 def test_beginning_twice_at_once_begins_one_sitting(order):
     async def story(person: Person) -> None:
         await person.until("HomeScreen")
@@ -153,6 +154,7 @@ def test_beginning_twice_at_once_begins_one_sitting(order):
     run(AppStart(order.data, "simulated"), story)
 
 
+@pytest.mark.slow
 def test_ctrl_c_lets_go_says_what_is_safe_and_the_session_continues(sitting, log):
     async def story(person: Person) -> None:
         await person.until("TrialScreen")

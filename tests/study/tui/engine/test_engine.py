@@ -102,6 +102,7 @@ def test_letting_go_ends_the_sitting_and_it_can_be_resumed(begun, order, session
     assert begun.wait_for(asks(DisplayCall.WELCOME)).content.resumed_after == 2
 
 
+@pytest.mark.slow
 def test_letting_go_before_the_engine_has_begun_begins_nothing(screen, order, session):
     screen.send(BeginSession(order))
     screen.send(LetGo())
@@ -113,6 +114,7 @@ def test_letting_go_before_the_engine_has_begun_begins_nothing(screen, order, se
     screen.wait_for(asks(DisplayCall.WELCOME))
 
 
+@pytest.mark.slow
 def test_a_reply_of_an_earlier_sitting_answers_nothing_in_the_next(screen, order):
     screen.send(Reply(1, True))
     screen.send(BeginSession(order))
@@ -121,6 +123,7 @@ def test_a_reply_of_an_earlier_sitting_answers_nothing_in_the_next(screen, order
         screen.next(1.0)
 
 
+@pytest.mark.slow
 def test_a_reply_to_what_is_over_is_ignored(begun, session):
     trial = third_trial(begun)
     begun.send(Reply(trial.number - 1, Answered(2, time.monotonic())))
@@ -146,6 +149,7 @@ def test_without_a_heartbeat_the_trial_is_void_and_waits_for_a_screen(begun, ses
     assert begun.next().content.repeated
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("request_", "call"), [(PauseAsked("participant"), DisplayCall.PAUSE), (StopAsked("participant"), None)]
 )
@@ -161,6 +165,7 @@ def test_requests_from_the_screen_reach_the_session(begun, session, request_, ca
     assert "coughed" in log_of(session)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_begun_is_reported_and_the_engine_continues(screen, order):
     screen.send(BeginSession(SessionOrder("no_such_protocol", "simulated", "P01", order.data)))
     failure = screen.next()

@@ -16,9 +16,9 @@ from study.tui.screens.session import SessionScreen
 @pytest.mark.parametrize(
     ("changes", "asks_first"),
     [
-        ({"standing": "running"}, True),
+        pytest.param({"standing": "running"}, True, marks=pytest.mark.slow),
         ({"standing": "running", "observer": "ideal"}, False),
-        ({"standing": "unfinished"}, False),
+        pytest.param({"standing": "unfinished"}, False, marks=pytest.mark.slow),
     ],
     ids=["a person", "a simulated participant", "not running"],
 )

@@ -71,6 +71,7 @@ def test_what_is_wrong_is_reported_before_anything_begins(on_screen, folder, sou
     assert said in words
 
 
+@pytest.mark.slow
 def test_escape_leaves_the_form_and_f1_explains_it(on_screen, home):
     async def story(sight):
         await sight.press("f8")
@@ -111,6 +112,7 @@ def test_while_it_is_computed_it_looks_like_this(on_screen, looks_like, size):
     on_screen(DiagnosingScreen("Getting ready.", lambda: 0.0), story, size)
 
 
+@pytest.mark.slow
 def test_escape_stops_it(on_screen, home):
     stopped = []
 

@@ -8,9 +8,11 @@ from textual.widgets import Input, Select
 from study.session.views.archive_views import ProtocolLine
 from study.tui.screens.home import HomeScreen
 from study.tui.widgets.session_table import SessionTable
+from tests.slow_instances import slow_after
 from tests.study.tui.home.conftest import messages_of
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(80, 24), (132, 40)], ids=["80x24", "132x40"])
 def test_it_looks_like_this(on_screen, home, looks_like, size):
     async def story(sight):
@@ -19,6 +21,7 @@ def test_it_looks_like_this(on_screen, home, looks_like, size):
     on_screen(HomeScreen(home), story, size)
 
 
+@pytest.mark.slow
 def test_the_first_frame_is_there_before_the_sessions(on_screen, home):
     async def story(sight):
         assert "Looking for sessions…" in sight.text
@@ -33,6 +36,7 @@ def test_the_first_frame_is_there_before_the_sessions(on_screen, home):
     on_screen(HomeScreen(None), story)
 
 
+@pytest.mark.slow
 def test_the_list_can_be_asked_for_before_it_is_there(on_screen, home):
     async def story(sight):
         await sight.press("f3")
@@ -44,6 +48,7 @@ def test_the_list_can_be_asked_for_before_it_is_there(on_screen, home):
     on_screen(HomeScreen(None), story)
 
 
+@pytest.mark.slow
 def test_only_a_protocol_and_a_device_can_be_chosen(on_screen, home):
     async def story(sight):
         for select in sight.app.screen.query("#protocol, #device").results(Select):
@@ -62,6 +67,7 @@ def test_a_new_lab_is_told_what_to_do_first(on_screen, home, looks_like):
     on_screen(HomeScreen(replace(home, sessions=())), story)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ["enter", "f5"])
 def test_a_code_and_a_key_begin_a_session(on_screen, home, key):
     async def story(sight):
@@ -71,6 +77,7 @@ def test_a_code_and_a_key_begin_a_session(on_screen, home, key):
     assert messages_of(app) == [("BeginWanted", "P06", "direction_threshold", "simulated", "")]
 
 
+@pytest.mark.slow
 def test_another_protocol_can_be_chosen_with_the_keyboard(on_screen, home):
     async def story(sight):
         await sight.press("P", "6", "tab", "enter", "down", "enter")
@@ -110,6 +117,7 @@ def test_the_name_of_a_models_file_is_no_markup_and_prints_no_control_character(
     assert messages_of(app) == [("BeginWanted", "P06", "equalized_threshold", "simulated", f"/lab/{name}")]
 
 
+@pytest.mark.slow
 def test_without_a_model_it_says_where_one_comes_from_and_begins_nothing(on_screen, home):
     async def story(sight):
         await sight.press("P", "0", "6", "f5")
@@ -118,6 +126,7 @@ def test_without_a_model_it_says_where_one_comes_from_and_begins_nothing(on_scre
     assert on_screen(HomeScreen(with_equalized_first(home)), story).asked == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("typed", "said"),
     [
@@ -134,6 +143,7 @@ def test_a_wrong_code_begins_nothing_and_says_why(on_screen, home, typed, said):
     assert on_screen(HomeScreen(home), story).asked == []
 
 
+@pytest.mark.slow
 def test_a_code_with_an_unfinished_session_is_noticed_before_a_second_one_begins(on_screen, home):
     async def story(sight):
         await sight.press("P", "0", "3")
@@ -142,6 +152,7 @@ def test_a_code_with_an_unfinished_session_is_noticed_before_a_second_one_begins
     on_screen(HomeScreen(home), story)
 
 
+@pytest.mark.slow
 def test_a_code_that_was_here_before_is_noticed(on_screen, home):
     async def story(sight):
         await sight.press("P", "0", "1")
@@ -150,6 +161,7 @@ def test_a_code_that_was_here_before_is_noticed(on_screen, home):
     on_screen(HomeScreen(home), story)
 
 
+@pytest.mark.slow
 def test_the_next_free_code_is_proposed(on_screen, home):
     async def story(sight):
         assert "such as P06" in sight.text
@@ -157,6 +169,7 @@ def test_the_next_free_code_is_proposed(on_screen, home):
     on_screen(HomeScreen(home), story)
 
 
+@pytest.mark.slow
 def test_a_paste_with_line_breaks_and_blanks_is_one_code(on_screen, home):
     from textual.events import Paste
 
@@ -170,6 +183,7 @@ def test_a_paste_with_line_breaks_and_blanks_is_one_code(on_screen, home):
     ]
 
 
+@pytest.mark.slow
 def test_without_protocols_nothing_can_be_begun(on_screen, home):
     async def story(sight):
         await sight.press("P", "1", "f5", "enter")
@@ -177,7 +191,7 @@ def test_without_protocols_nothing_can_be_begun(on_screen, home):
     assert on_screen(HomeScreen(replace(home, protocols=())), story).asked == []
 
 
-@pytest.mark.parametrize("theme", ["hapteq-dark", "hapteq-light", "hapteq-contrast"])
+@pytest.mark.parametrize("theme", slow_after(1, ["hapteq-dark", "hapteq-light", "hapteq-contrast"]))
 @pytest.mark.parametrize("size", [(40, 12), (200, 60)], ids=["tiny", "wide"])
 def test_it_stands_any_size_and_theme(on_screen, home, size, theme):
     async def story(sight):
@@ -186,6 +200,7 @@ def test_it_stands_any_size_and_theme(on_screen, home, size, theme):
     on_screen(HomeScreen(home), story, size, theme)
 
 
+@pytest.mark.slow
 def test_help_is_one_key_away_also_while_typing(on_screen, home):
     async def story(sight):
         await sight.press("P", "f1")

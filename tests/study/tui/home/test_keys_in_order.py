@@ -21,6 +21,7 @@ def burst(sight, *keys: str, read_s: float | None = None) -> None:
         sight.app._driver.send_message(event)
 
 
+@pytest.mark.slow
 def test_tab_in_a_burst_takes_the_keys_behind_it_to_the_next_field(on_screen):
     async def story(sight):
         burst(sight, *"rec", "tab", *"mod", "tab", *"ok", "tab", *"out", "shift+tab", "end", "2")
@@ -31,6 +32,7 @@ def test_tab_in_a_burst_takes_the_keys_behind_it_to_the_next_field(on_screen):
     on_screen(DiagnoseForm(), story)
 
 
+@pytest.mark.slow
 def test_a_code_and_begin_in_a_burst_begin_that_session(on_screen, home):
     async def story(sight):
         burst(sight, *"P77", "tab", "f5", "f5")
@@ -39,6 +41,7 @@ def test_a_code_and_begin_in_a_burst_begin_that_session(on_screen, home):
     assert [wanted.subject for wanted in on_screen(HomeScreen(home), story).asked][:1] == ["P77"]
 
 
+@pytest.mark.slow
 def test_what_follows_the_key_of_a_prompt_is_written_into_the_prompt(on_screen, session):
     """Of the prompt that erases: none of its letters is a key of the screen below, such as r, a or d."""
 
@@ -51,6 +54,7 @@ def test_what_follows_the_key_of_a_prompt_is_written_into_the_prompt(on_screen, 
     assert on_screen(SessionScreen(session), story).asked == []
 
 
+@pytest.mark.slow
 def test_a_note_in_a_burst_keeps_its_words_and_its_writer(on_screen):
     notes = []
 

@@ -14,6 +14,7 @@ from study.tui.screens.preparing import PreparingScreen, describe_elapsed
 from tests.study.tui.home.conftest import messages_of
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(80, 24), (132, 40)], ids=["80x24", "132x40"])
 def test_a_diagnosis_looks_like_this(on_screen, diagnosis, looks_like, size):
     async def story(sight):
@@ -22,6 +23,7 @@ def test_a_diagnosis_looks_like_this(on_screen, diagnosis, looks_like, size):
     on_screen(DiagnosisScreen(diagnosis), story, size)
 
 
+@pytest.mark.slow
 def test_a_diagnosis_can_be_scrolled_to_what_remains(on_screen, diagnosis):
     async def story(sight):
         await sight.press("end")
@@ -30,6 +32,7 @@ def test_a_diagnosis_can_be_scrolled_to_what_remains(on_screen, diagnosis):
     on_screen(DiagnosisScreen(diagnosis), story)
 
 
+@pytest.mark.slow
 def test_its_report_opens_in_the_browser_and_escape_goes_home(on_screen, diagnosis):
     async def story(sight):
         await sight.press("o", "escape")
@@ -92,6 +95,7 @@ def test_only_folders_and_our_files_are_offered(on_screen, folder):
     assert ".hidden" not in text
 
 
+@pytest.mark.slow
 def test_a_diagnosis_is_picked_with_the_keyboard(on_screen, folder):
     asked, _ = browse(on_screen, folder, "end", "enter")
     assert asked == [("ShowDiagnosis", str(folder / "diagnosis.json"))]
@@ -109,6 +113,7 @@ def test_a_path_that_is_not_there_is_reported(on_screen, folder):
     assert "There is nothing at" in text
 
 
+@pytest.mark.slow
 def test_f4_opens_it_from_the_start_and_escape_comes_back(on_screen, home):
     async def story(sight):
         await sight.press("f4")

@@ -8,9 +8,11 @@ from textual.widgets import Input, Select
 from study.session.views.archive_views import HomeView, ProtocolLine
 from study.tui.screens.home import HomeScreen
 from study.tui.widgets.session_table import BATCH_ROWS, SessionTable
+from tests.slow_instances import slow, slow_rows
 from tests.study.tui.home.conftest import messages_of
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("row", "key", "expected"),
     [
@@ -28,6 +30,7 @@ def test_keys_do_what_the_session_under_the_cursor_allows(on_screen, home, row, 
     assert messages_of(on_screen(HomeScreen(home), story)) == [expected]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("row", "key"), [(0, "r"), (4, "r"), (3, "r"), (2, "w"), (1, "w")])
 def test_what_it_does_not_allow_asks_for_nothing(on_screen, home, row, key):
     async def story(sight):
@@ -36,7 +39,9 @@ def test_what_it_does_not_allow_asks_for_nothing(on_screen, home, row, key):
     assert on_screen(HomeScreen(home), story).asked == []
 
 
-@pytest.mark.parametrize(("row", "offered"), [(0, {"Watch"}), (1, set()), (2, {"Resume"}), (3, set()), (4, set())])
+@pytest.mark.parametrize(
+    ("row", "offered"), [(0, {"Watch"}), *slow_rows((1, set()), (2, {"Resume"}), (3, set()), (4, set()))]
+)
 def test_keys_that_do_nothing_for_the_session_under_the_cursor_are_not_named(on_screen, home, row, offered):
     async def story(sight):
         await sight.press("f3", *["down"] * row)
@@ -45,6 +50,7 @@ def test_keys_that_do_nothing_for_the_session_under_the_cursor_are_not_named(on_
     on_screen(HomeScreen(home), story)
 
 
+@pytest.mark.slow
 def test_the_session_under_the_cursor_is_reported_in_a_sentence(on_screen, home):
     async def story(sight):
         await sight.press("f3", "down")
@@ -55,6 +61,7 @@ def test_the_session_under_the_cursor_is_reported_in_a_sentence(on_screen, home)
     on_screen(HomeScreen(home), story)
 
 
+@pytest.mark.slow
 def test_standings_are_told_by_symbol_and_word(on_screen, home):
     async def story(sight):
         for standing in ("▶ running", "! unreadable", "◐ unfinished", "✕ withdrawn", "✓ finished"):
@@ -63,6 +70,7 @@ def test_standings_are_told_by_symbol_and_word(on_screen, home):
     on_screen(HomeScreen(home), story)
 
 
+@pytest.mark.slow
 def test_f6_looks_again_and_keeps_what_is_typed_chosen_and_under_the_cursor(on_screen, home, line):
     async def story(sight):
         await sight.press("P", "9", "tab", "enter", "down", "enter", "f3", "down", "down", "f6")
@@ -78,6 +86,7 @@ def test_f6_looks_again_and_keeps_what_is_typed_chosen_and_under_the_cursor(on_s
     assert messages_of(on_screen(HomeScreen(home), story)) == [("HomeWanted",)]
 
 
+@pytest.mark.slow
 def test_five_hundred_sessions_open_at_once_and_scroll_to_the_last(on_screen, home, line):
     many = tuple(replace(line, name=f"P{n:03}_001", path=f"/data/P{n:03}_001", subject=f"P{n:03}") for n in range(500))
 
@@ -92,6 +101,7 @@ def test_five_hundred_sessions_open_at_once_and_scroll_to_the_last(on_screen, ho
     assert messages_of(on_screen(HomeScreen(None), story))[-1] == ("ShowSession", "/data/P499_001")
 
 
+@pytest.mark.slow
 def test_a_newer_list_replaces_a_long_one_that_still_comes_in(on_screen, home, line):
     many = tuple(replace(line, name=f"P{n:03}_001") for n in range(300))
 
@@ -106,6 +116,7 @@ def test_a_newer_list_replaces_a_long_one_that_still_comes_in(on_screen, home, l
     on_screen(HomeScreen(None), story)
 
 
+@pytest.mark.slow
 def test_weird_data_is_shown_as_text(on_screen, line):
     weird = replace(
         line, name="[red]X1_001", subject="X1", protocol="[/]" + "長" * 60, begun_utc="yesterday", observer="[b]x",
@@ -124,7 +135,7 @@ def test_weird_data_is_shown_as_text(on_screen, line):
     on_screen(HomeScreen(home), story)
 
 
-@pytest.mark.parametrize("width", [80, 100, 120, 200])
+@pytest.mark.parametrize("width", [100, *slow(80, 120, 200)])
 def test_no_column_of_the_list_is_cut(on_screen, home, width):
     lines = tuple(replace(line, name=f"PARTICIPANT0{line.name}") for line in home.sessions)
     long = replace(lines[0], protocol="equalized_threshold_of_our_laboratory", begun_utc="2026-02-05T10:02:00+00:00")

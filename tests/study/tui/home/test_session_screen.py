@@ -25,6 +25,7 @@ def standing(view, standing, **changes):
     return replace(view, line=replace(view.line, standing=standing, **changes))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(80, 24), (132, 40)], ids=["80x24", "132x40"])
 def test_each_page_looks_like_this(on_screen, session, looks_like, size):
     async def story(sight):
@@ -35,15 +36,18 @@ def test_each_page_looks_like_this(on_screen, session, looks_like, size):
     on_screen(SessionScreen(session), story, size)
 
 
+@pytest.mark.slow
 def test_keys_ask_for_what_a_finished_session_allows(asked_by, session):
     assert asked_by(session, "r", "w", "a") == [("Analyze", "/data/P01_001")]
     assert asked_by(session, "escape") == [("HomeWanted",)]
 
 
+@pytest.mark.slow
 def test_an_unfinished_session_can_be_resumed(asked_by, session):
     assert asked_by(standing(session, "unfinished"), "r") == [("ResumeWanted", "/data/P01_001")]
 
 
+@pytest.mark.slow
 def test_a_running_session_can_be_watched_and_not_erased(asked_by, session):
     assert asked_by(standing(session, "running"), "x", "P", "0", "1", "enter", "r", "a", "w") == [
         ("WatchWanted", "/data/P01_001")
@@ -55,15 +59,18 @@ def test_nothing_is_analyzed_where_nothing_can_be_read(asked_by, session, gone):
     assert asked_by(standing(session, gone), "r", "a", "w") == []
 
 
+@pytest.mark.slow
 def test_withdrawal_takes_the_typed_code(asked_by, session):
     assert asked_by(session, "x", "P", "0", "1", "enter") == [("Withdraw", "/data/P01_001")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("keys", [("P", "0", "2", "enter"), ("enter",), ("P", "0", "1", "escape")])
 def test_anything_else_erases_nothing(asked_by, session, keys):
     assert asked_by(session, "x", *keys) == []
 
 
+@pytest.mark.slow
 def test_a_wrong_code_says_that_nothing_was_erased(on_screen, session):
     async def story(sight):
         await sight.press("x", "n", "o", "enter")
@@ -74,6 +81,7 @@ def test_a_wrong_code_says_that_nothing_was_erased(on_screen, session):
     on_screen(SessionScreen(session), story)
 
 
+@pytest.mark.slow
 def test_the_report_opens_in_the_browser_where_there_is_one(on_screen, session):
     async def story(sight):
         await sight.press("o")
@@ -99,6 +107,7 @@ def test_a_path_with_blanks_is_a_url_that_a_browser_understands():
     assert make_file_url("/data/my study/report.html") == "file:///data/my%20study/report.html"
 
 
+@pytest.mark.slow
 def test_a_newer_view_stays_on_its_page(on_screen, session):
     async def story(sight):
         await sight.press("5")
@@ -112,6 +121,7 @@ def test_a_newer_view_stays_on_its_page(on_screen, session):
     on_screen(SessionScreen(replace(session, report="", figures=())), story)
 
 
+@pytest.mark.slow
 def test_right_and_wrong_and_turns_are_told_by_shape(on_screen, session):
     async def story(sight):
         await sight.press("3")
@@ -123,6 +133,7 @@ def test_right_and_wrong_and_turns_are_told_by_shape(on_screen, session):
     on_screen(SessionScreen(session), story)
 
 
+@pytest.mark.slow
 def test_a_long_log_scrolls_to_its_end(on_screen, session):
     events = tuple(f"09:30:{n % 60:02}  Line {n} of the log, which is as long as a line may be, and then longer still."
                    for n in range(2000))  # fmt: skip
@@ -137,6 +148,7 @@ def test_a_long_log_scrolls_to_its_end(on_screen, session):
     on_screen(SessionScreen(replace(session, events=events)), story)
 
 
+@pytest.mark.slow
 def test_what_is_broken_off_a_line_stands_below_its_text(on_screen, session):
     async def story(sight):
         await sight.press("4")
@@ -147,6 +159,7 @@ def test_what_is_broken_off_a_line_stands_below_its_text(on_screen, session):
     on_screen(SessionScreen(view), story)
 
 
+@pytest.mark.slow
 def test_an_empty_session_says_so_on_each_page(on_screen, session):
     view = replace(session, facts=(), thresholds=(), warnings=(), staircases=(), events=(), report="", figures=())
 
@@ -160,6 +173,7 @@ def test_an_empty_session_says_so_on_each_page(on_screen, session):
     on_screen(SessionScreen(view), story)
 
 
+@pytest.mark.slow
 def test_markup_in_notes_and_warnings_is_text(on_screen, session):
     view = replace(session, warnings=("[/red] oops [b]",), events=("[/] note", "\x1b[2J"), facts=(("[x]", "[/y]"),))
 
@@ -172,9 +186,8 @@ def test_markup_in_notes_and_warnings_is_text(on_screen, session):
     on_screen(SessionScreen(view), story)
 
 
-@pytest.mark.parametrize(
-    "theme", ["hapteq-dark", "hapteq-light", pytest.param("hapteq-contrast", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("theme", ["hapteq-dark", "hapteq-light", "hapteq-contrast"])
 def test_it_stands_a_small_window_in_every_theme(on_screen, session, theme):
     async def story(sight):
         for page in "12345":

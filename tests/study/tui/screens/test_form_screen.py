@@ -7,6 +7,7 @@ from textual import events
 from study.session.views.form_entry import make_blank_entry, make_reply, press
 from study.session.views.form_views import Form, FormField, FormKind, FormReply
 from study.tui.screens.form import FormScreen
+from tests.slow_instances import slow_after
 
 YES_NO = ("yes", "no")
 HEARING = ("ear plugs", "ear muffs", "masking noise", "plugs and noise", "nothing that covers it")
@@ -46,16 +47,19 @@ def filled(on_stage):
     return fill
 
 
+@pytest.mark.slow
 def test_numbers_letters_and_the_space_bar_choose_and_enter_continues(filled):
     reply, _ = filled(THREE, "1", "enter", "y", "enter", "right", "right", "space", "enter", "enter")
     assert reply == FormReply({"s1": "yes", "s2": "yes", "s3": "no"})
 
 
+@pytest.mark.slow
 def test_arrows_and_tab_go_from_question_to_question(filled):
     reply, _ = filled(THREE, "down", "2", "up", "1", "tab", "tab", "1", "down", "enter")
     assert reply == FormReply({"s1": "yes", "s2": "no", "s3": "yes"})
 
 
+@pytest.mark.slow
 def test_what_is_missing_is_named_and_gets_the_focus(filled):
     reply, words = filled(THREE, "1", "down", "down", "down", "enter")
     assert reply is None
@@ -64,10 +68,12 @@ def test_what_is_missing_is_named_and_gets_the_focus(filled):
     assert reply == FormReply({"s1": "yes", "s2": "no", "s3": "no"})
 
 
+@pytest.mark.slow
 def test_two_and_more_gaps_are_counted(filled):
     assert "2 more are open." in filled(THREE, "down", "down", "down", "enter")[1]
 
 
+@pytest.mark.slow
 def test_nothing_is_agreed_to_by_enter_alone_or_by_moving(filled):
     reply, words = filled(THREE, *["enter"] * 6)
     assert reply is None
@@ -75,6 +81,7 @@ def test_nothing_is_agreed_to_by_enter_alone_or_by_moving(filled):
     assert "3 of 3 still open" in filled(THREE, "right", "down", "left")[1]
 
 
+@pytest.mark.slow
 def test_a_form_says_how_much_is_open_and_when_it_is_done(filled):
     assert "Consent: 2 of 3 still open" in filled(THREE, "1")[1]
     _, words = filled(THREE, "1", "enter", "1", "enter", "1")
@@ -85,6 +92,7 @@ def test_version_and_ethics_id_are_shown(filled):
     assert "Version 2. Ethics approval EC 7." in filled(THREE)[1]
 
 
+@pytest.mark.slow
 def test_many_choices_lie_below_each_other_and_are_walked_through(filled):
     keys = ["down", "down", "space", "down", "down", "down", "down"]
     _, words = filled(MIXED, *keys)
@@ -93,11 +101,13 @@ def test_many_choices_lie_below_each_other_and_are_walked_through(filled):
     assert reply.answers == {"hearing": "masking noise", "rating": "3", "strategy": "by feel", "grip": "pen"}
 
 
+@pytest.mark.slow
 def test_a_digit_that_is_a_choice_means_that_choice_and_no_other(filled):
     assert "● 5" in filled(MIXED, "1", "enter", "5")[1]
     assert "●" not in filled(MIXED, "tab", "2")[1]
 
 
+@pytest.mark.slow
 def test_free_text_that_is_not_needed_may_stay_empty(filled):
     reply, _ = filled(MIXED, "1", "enter", "1", "enter", "enter", *"x", "enter", "enter")
     assert reply.answers["strategy"] == ""
@@ -151,7 +161,7 @@ def test_a_key_without_a_meaning_where_it_was_typed_means_nothing_later(on_stage
 
 
 @pytest.mark.parametrize("form", [EXCLUSION, MIXED], ids=["choices", "mixed"])
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", slow_after(1, range(2)))
 def test_any_burst_fills_in_what_the_same_keys_fill_in_one_by_one(on_stage, form, seed):
     follow_bursts(on_stage, form, seed, BURSTS)
 
@@ -219,6 +229,7 @@ def test_a_click_in_a_burst_of_keys_keeps_its_place(on_stage):
     on_stage(screen, story)
 
 
+@pytest.mark.slow
 def test_pasted_text_chooses_nothing_and_sends_nothing(on_stage):
     screen = FormScreen(MIXED)
 
@@ -234,6 +245,7 @@ def test_pasted_text_chooses_nothing_and_sends_nothing(on_stage):
     assert on_stage(screen, story) == []
 
 
+@pytest.mark.slow
 def test_a_changed_answer_to_an_exclusion_is_shown_before_it_is_sent(on_stage):
     async def story(stage):
         await stage.press("1", "2", "enter", "2", "enter", "2", "enter", "enter")
@@ -244,6 +256,7 @@ def test_a_changed_answer_to_an_exclusion_is_shown_before_it_is_sent(on_stage):
     assert on_stage(FormScreen(EXCLUSION), story) == [FormReply({"s1": "no", "s2": "no", "s3": "no"})]
 
 
+@pytest.mark.slow
 def test_a_question_mark_is_written_in_free_text_and_is_help_elsewhere(on_stage):
     screen = FormScreen(MIXED)
 

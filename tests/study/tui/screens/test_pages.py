@@ -58,7 +58,7 @@ def read(on_stage):
     "screen",
     [
         lambda: InstructionsScreen(Welcome("T", PICTURE, 5, 1, "d", device_moves=True, resumed_after=0)),
-        lambda: PracticeOverScreen(PracticeResult(True, 8, 10)),
+        pytest.param(lambda: PracticeOverScreen(PracticeResult(True, 8, 10)), marks=pytest.mark.slow),
         lambda: AwaitReturnScreen("reason"),
         lambda: GoodbyeScreen(Goodbye(True, 5)),
     ],
@@ -121,6 +121,7 @@ def test_a_device_that_is_fine_continues_by_enter(read):
     assert "ok Loop 4000 ticks" in words and "not to be shown" not in words and "nothing moves" in words
 
 
+@pytest.mark.slow
 def test_a_device_that_needs_a_look_is_not_passed_by_enter(read):
     heard, words = read(DeviceCheckScreen(DeviceReport("d", False, (FINE, BAD))), "enter")
     assert heard == []
@@ -243,6 +244,7 @@ def test_a_rest_cannot_be_shortened_and_tells_what_is_left(on_stage):
     assert 0.6 <= rested_s < 10.0
 
 
+@pytest.mark.slow
 def test_screens_load_nothing_heavy():
     code = (
         "import sys, importlib\n"

@@ -26,6 +26,7 @@ def test_enter_continues(paused):
     assert paused("enter")[0] == [AfterPause.CONTINUE_SITTING]
 
 
+@pytest.mark.slow
 def test_leaving_is_the_second_choice_and_the_first_after_a_request_to_leave(paused):
     assert paused("down", "enter")[0] == [AfterPause.END_SITTING]
     assert paused("enter", leaving=True)[0] == [AfterPause.END_SITTING]
@@ -36,6 +37,7 @@ def test_reason_and_answers_are_reported(paused):
     assert "Reason: asked for a pause. 37 answers are on the disk." in words
 
 
+@pytest.mark.slow
 def test_the_consent_is_taken_back_by_a_whole_word_only(paused):
     assert paused("down", "down", "enter", *"Withdraw", "enter")[0] == [AfterPause.WITHDRAW]
     heard, words = paused("down", "down", "enter", *"yes", "enter")
@@ -45,17 +47,20 @@ def test_the_consent_is_taken_back_by_a_whole_word_only(paused):
     assert heard == [] and "Nothing is erased." in words
 
 
+@pytest.mark.slow
 def test_a_note_goes_to_the_session_and_the_pause_continues(paused):
     heard, words = paused("n", *"cold hand", "ctrl+s")
     assert heard == [NoteAsked("participant", "cold hand", adverse=False)]
     assert "It goes into the log." in words
 
 
+@pytest.mark.slow
 def test_something_that_happened_is_an_adverse_event_by_whom_one_says(paused):
     heard, _ = paused("e", *"pain", "tab", "2", "enter", "enter", "enter")
     assert heard == [NoteAsked("experimenter", "pain", adverse=True)]
 
 
+@pytest.mark.slow
 def test_a_note_that_turns_out_to_be_an_adverse_event_can_say_so(paused):
     assert paused("n", *"pain", "tab", "tab", "y", "tab", "enter")[0] == [
         NoteAsked("participant", "pain", adverse=True)

@@ -36,6 +36,7 @@ from study.tui.screens.playing import PlayingScreen
 from study.tui.screens.practice_over import PracticeOverScreen
 from study.tui.screens.rest import RestScreen
 from study.tui.screens.trial import TrialScreen
+from tests.slow_instances import slow
 
 SIZES = ((80, 24), (132, 40))
 PICTURE = DirectionPicture("yz", (135.0, 45.0))
@@ -142,7 +143,8 @@ def test_a_screen_survives_any_size_and_a_resize(on_stage, name, size):
 
 
 @pytest.mark.parametrize(
-    "name", ["form_consent", "form_setup", "rest", "device_check", "pause", "confirm_view", "await_return", "note"]
+    "name",
+    ["rest", "await_return", *slow("form_consent", "form_setup", "device_check", "pause", "confirm_view", "note")],
 )
 def test_every_key_that_a_footer_names_does_something(on_stage, name):
     named = []

@@ -51,6 +51,7 @@ from study.tui.screens.practice_over import PracticeOverScreen
 from study.tui.screens.preparing import PreparingScreen
 from study.tui.screens.rest import RestScreen
 from study.tui.screens.trial import TrialScreen
+from tests.slow_instances import slow_after
 from tests.study.tui.screens.test_snapshots import INTERVAL, PICTURE, QUESTION
 
 LANGUAGES = ("de", "es")
@@ -194,7 +195,7 @@ def test_a_footer_fits_and_is_not_english(on_stage, name, code):
     on_stage(screen, story)
 
 
-@pytest.mark.parametrize("code", LANGUAGES)
+@pytest.mark.parametrize("code", slow_after(1, LANGUAGES))
 @pytest.mark.parametrize("kind", [kind for kind in FormKind if kind is not FormKind.HANDLE])
 def test_a_form_is_in_the_language_from_top_to_bottom(on_stage, kind, code):
     table = table_of(code)

@@ -56,6 +56,7 @@ def test_each_trial_is_reported_once_when_it_is_closed(views):
     assert sum(", reversal" in line for line in lines) == 3
 
 
+@pytest.mark.slow
 def test_nothing_is_told_twice(views):
     assert format_changes(views[-1], views[-1]) == []
 

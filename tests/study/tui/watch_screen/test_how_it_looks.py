@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.slow_instances import slow, slow_after
 from tests.study.tui.watch_screen.watched import ALARM, view
 
 HERE = Path(__file__).parents[1]
@@ -21,7 +22,7 @@ def test_the_screen_says_how_it_stands_and_that_it_only_watches(seated):
 
 
 @pytest.mark.parametrize("size", [(80, 24), (132, 40)])
-@pytest.mark.parametrize("theme", ["hapteq-dark", "hapteq-light"])
+@pytest.mark.parametrize("theme", slow_after(1, ["hapteq-dark", "hapteq-light"]))
 @pytest.mark.parametrize("alarms", [(), (ALARM,)])
 def test_the_screen_looks_as_it_did(seated, size, theme, alarms):
     """With HAPTEQ_WRITE_SCREENS set the pictures are written anew. Words are the same in every theme."""
@@ -36,7 +37,7 @@ def test_the_screen_looks_as_it_did(seated, size, theme, alarms):
     seated(story, view(alarms=alarms), size, theme)
 
 
-@pytest.mark.parametrize("size", [(40, 10), (60, 15), (80, 24), pytest.param((200, 60), marks=pytest.mark.slow)])
+@pytest.mark.parametrize("size", [(40, 10), (80, 24), *slow((60, 15), (200, 60))])
 def test_no_size_breaks_it(seated, size):
     async def story(seat):
         await seat.press("d", "d")

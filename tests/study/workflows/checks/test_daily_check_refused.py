@@ -108,6 +108,7 @@ def shaken(recording: Recording) -> Recording:
     return replace(recording, response=replace(recording.response, samples=samples))
 
 
+@pytest.mark.slow
 def test_a_baseline_that_tells_too_little_is_refused(device_like, monkeypatch):
     with device_like(1, {}) as (device, plan):
         assert daily_check._record_baseline_on(device, plan, QUIET)[0] == "baselines/1.h5"

@@ -106,9 +106,12 @@ def test_coupled_axes_give_symmetric_matrices(tmp_path):
 
 @pytest.mark.parametrize(
     ("model", "structure"),
-    [(device(0.4, 6.0, 900.0), "mass-spring"), (device(0.4, 6.0, 0.0, "velocity"), "motor"),
-     (device(1e-6, 6.0, 900.0), "massless")],
-)  # fmt: skip
+    [
+        pytest.param(device(0.4, 6.0, 900.0), "mass-spring", marks=pytest.mark.slow),
+        (device(0.4, 6.0, 0.0, "velocity"), "motor"),
+        (device(1e-6, 6.0, 900.0), "massless"),
+    ],
+)
 def test_auto_takes_the_structure_that_is_there(tmp_path, model, structure):
     done = fitted(tmp_path, recorded(model))
     assert done.choice.fit.kind == structure
@@ -170,6 +173,7 @@ def test_the_file_says_which_way_a_command_is_counted(tmp_path):
     assert compute_prediction_error(plain, model, "test").without_gain > 1
 
 
+@pytest.mark.slow
 def test_the_file_is_accepted_for_a_diagnosis(tmp_path):
     done = fitted(tmp_path, recorded(device(0.4, 6.0, 900.0)))
     found = read_given_model(done.plan.out, read_input([tmp_path / "rec.h5"], 1))
@@ -215,6 +219,7 @@ def test_the_command_prints_numbers_and_never_overwrites(tmp_path, capsys):
     assert "never overwritten" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_recording_whose_units_nothing_says_gets_a_model_and_what_was_assumed_is_reported(tmp_path):
     recording = recorded(device(0.4, 6.0, 300.0))
     plain = {"quantity": "1", "unit": "1"}

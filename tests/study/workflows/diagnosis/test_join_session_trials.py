@@ -46,6 +46,7 @@ def test_all_trials_are_one_recording_with_its_frequencies_one_after_the_other(s
     assert heard == sorted(heard) and set(heard) == {5, 25, 35}
 
 
+@pytest.mark.slow
 def test_before_each_trial_its_own_command_continues_with_nothing_to_compare(session):
     one = join_session_trials(session, seed=1).recording
     lead = round(LEAD_S * RATE_HZ)
@@ -68,6 +69,7 @@ def test_what_was_decided_is_played_and_the_spring_is_distinguished(session):
     )
 
 
+@pytest.mark.slow
 def test_without_positions_no_spring_is_known(session):
     one = read_recording(join_session_trials(session, seed=1).parents[1])
     assert estimate_spring_stiffness([one]) == pytest.approx(137, abs=1)
@@ -78,6 +80,7 @@ def test_without_positions_no_spring_is_known(session):
     )
 
 
+@pytest.mark.slow
 def test_levels_are_grouped_and_of_each_frequency_one_trial_in_four_is_a_test(session):
     one = join_session_trials(session, seed=1).recording
     groups = {}
@@ -101,6 +104,7 @@ def test_another_seed_keeps_other_trials_for_the_test(session):
     assert roles[0] == roles[1] != roles[2]
 
 
+@pytest.mark.slow
 def test_only_what_is_there_is_claimed(session):
     said = join_session_trials(session, seed=1).remarks
     assert "a hand on the handle" in said[0]
@@ -124,6 +128,7 @@ def test_trials_with_gaps_or_flags_are_left_out_and_reported(session, tmp_path):
     assert any(remark.startswith("2 trials were left out") for remark in less.remarks)
 
 
+@pytest.mark.slow
 def test_a_long_session_is_thinned_alike_at_all_levels(session, tmp_path):
     copy = copied(session, tmp_path)
     for path in (copy / "recordings").glob("*.h5"):
@@ -139,6 +144,7 @@ def test_a_long_session_is_thinned_alike_at_all_levels(session, tmp_path):
     assert found.remarks[0].startswith("16 of the 60 trials")
 
 
+@pytest.mark.slow
 def test_a_recording_that_was_changed_since_is_left_out(session, tmp_path):
     copy = copied(session, tmp_path)
     first, second, *_ = sorted((copy / "recordings").glob("*.h5"))

@@ -19,6 +19,7 @@ def folder(sitter):
     return sitter.whole().folder
 
 
+@pytest.mark.slow
 def test_the_reference_is_read_in_the_place_of_the_trials(folder):
     found = read_input([folder.path], seed=1)
     (recording,) = found.recordings

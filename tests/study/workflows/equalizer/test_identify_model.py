@@ -60,6 +60,7 @@ def device(folder):
     return device
 
 
+@pytest.mark.slow
 def test_the_model_on_disk_is_the_device(device, plants):
     model = read_identified_model(device.plan.out)
     assert (model.order, model.band_hz, model.place_m) == (20, (5.0, 35.0), (0.0, 0.0, 0.0))
@@ -132,6 +133,7 @@ def test_recordings_of_two_places_are_no_model_of_one(folder, plants, tmp_path):
     assert "different places; identify one model per place" in said.happened
 
 
+@pytest.mark.slow
 def test_the_spring_can_only_be_taken_in_where_the_excitation_is_known(folder, plants, tmp_path):
     write_recording(tmp_path / "total.h5", replace(swept(plants), excitation=None))
     said = refused(IdentifyPlan((tmp_path / "total.h5",), tmp_path / "m.h5", with_spring=True))
@@ -165,7 +167,7 @@ def test_recordings_of_two_grips_or_under_two_springs_make_no_one_model(plants, 
         identify_model(plan, lambda share: None)
 
 
-@pytest.mark.parametrize("hangs_at", [0.0, 9.81])
+@pytest.mark.parametrize("hangs_at", [0.0, pytest.param(9.81, marks=pytest.mark.slow)])
 def test_an_output_that_answers_nothing_is_named(plants, tmp_path, hangs_at):
     whole = swept(plants)
     samples = np.array(whole.response.samples)

@@ -64,6 +64,7 @@ def test_the_model_gives_the_transient_that_one_gain_misses(done):
     assert told[-1] == 1.0 and told == sorted(told)
 
 
+@pytest.mark.slow
 def test_no_force_acts_before_the_contact(done, folder):
     found, _ = done
     assert len(found.equalized.forces) == len(found.reference) > len(tap().signal)
@@ -171,6 +172,7 @@ def test_another_rate_is_refused(folder, tmp_path):
     assert "500 Hz" in refusal(folder, tmp_path, transient=tmp_path / "slow.csv").happened
 
 
+@pytest.mark.slow
 def test_the_command_says_what_was_measured(folder, tmp_path, capsys):
     files = ["contact", str(folder / "model.h5"), str(folder / "tap.csv"), "--out", str(tmp_path / "out")]
     assert main([*files, "--normal", "0", "0", "1", "--json"]) == 0

@@ -72,6 +72,7 @@ def refusal(plan, order=ORDER, error=StudyError) -> StudyError:
     return caught.value
 
 
+@pytest.mark.slow
 def test_repeats_make_it_better_and_say_so_play_by_play(done):
     found = summarise_repeats(done)
     assert found["errors"][0] > 0.08
@@ -99,6 +100,7 @@ def test_forces_and_how_they_were_found_are_written(done):
     assert summarise_repeats(done)["repeats"] == str(repeats_path(out))
 
 
+@pytest.mark.slow
 def test_a_later_run_continues_from_them(done, plan):
     again = repeat_trajectory(plan, replace(ORDER, repeats=1, earlier=done.equalized.plan.out), unheard)
     assert again.repeated.errors[0] < 0.4 * done.repeated.errors[0]
@@ -161,12 +163,14 @@ def test_an_uncertain_model_is_repeated_with_a_lower_gain(plan, tmp_path):
     assert summarise_repeats(done)["surviving_error"] < 1  # with this gain; with gain 1 it is 2.1
 
 
+@pytest.mark.slow
 def test_two_bands_are_not_repeated(plan, tmp_path):
     model = read_identified_model(plan.models[0])
     write_identified_model(tmp_path / "wide.h5", replace(model, band_hz=(5.0, 100.0)))
     assert "Two bands of one place" in refusal(replace(plan, models=(*plan.models, tmp_path / "wide.h5"))).happened
 
 
+@pytest.mark.slow
 def test_forces_at_the_cap_leave_no_room_to_correct(plan):
     write_trajectory(plan.out.with_name("loud.csv"), table(level=2.2))
     capped = replace(plan, trajectory=plan.out.with_name("loud.csv"), cap_n=1.6, constrain=True)

@@ -19,6 +19,7 @@ def test_no_schema_of_old_is_left():
     assert {path.name for path in (DOCS / "schemas").iterdir()} == {schema.file for schema in SCHEMAS}
 
 
+@pytest.mark.slow
 def test_every_effect_is_on_the_page():
     assert all(f"`{effect.name}`" in generate_documents()["formats.md"] for effect in EFFECT_NAMES)
 

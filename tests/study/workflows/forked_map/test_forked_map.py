@@ -50,6 +50,7 @@ def test_a_law_that_was_there_before_comes_back_as_it_is_and_from_where_it_was_f
     assert len({process for _, process in answers}) == 2
 
 
+@pytest.mark.slow
 def test_an_effect_without_references_is_not_kept_alive():
     law = make_law_effect(parse_law("2*vx", "force", "x"))
     address = id(law)

@@ -52,6 +52,7 @@ def test_without_an_effect_few_studies_find_one(run):
     assert point.coverage.value == pytest.approx(1.0 - point.primary.value)
 
 
+@pytest.mark.slow
 def test_the_published_verdict_is_that_of_the_pair_in_the_report():
     crowd, found = Crowd((5.0, 25.0, 45.0), (0.7, 0.7, 1.2)), []
     for number in range(4):
@@ -124,12 +125,14 @@ def test_a_run_that_was_killed_anywhere_goes_on_with_the_same_numbers(run, tmp_p
         assert run(plan, broken.name) == whole  # what it left is whole, too
 
 
+@pytest.mark.slow
 def test_a_folder_of_another_plan_is_left_alone(run):
     run(replace(PLAN, people=(4,), studies=10))
     with pytest.raises(StudyError, match="another power simulation"):
         run(replace(PLAN, people=(4,), studies=10, seed=4))
 
 
+@pytest.mark.slow
 def test_studies_of_sizes_that_are_no_longer_asked_for_are_not_counted(run, tmp_path):
     run(replace(PLAN, people=(2, 3), studies=2))
     counts: list[int] = []

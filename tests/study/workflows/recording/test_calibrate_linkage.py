@@ -41,6 +41,7 @@ def test_a_file_is_never_overwritten(path, capsys):
     assert "never overwritten" in capsys.readouterr().err and path.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_a_recording_is_made_on_the_device_of_a_calibration(path, tmp_path, capsys):
     """Of its own calibration, the simulated device is itself: the same samples to rounding."""
     outs = [tmp_path / "own.h5", tmp_path / "as_calibrated.h5"]

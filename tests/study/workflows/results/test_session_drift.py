@@ -70,6 +70,7 @@ def test_where_nothing_changes_nothing_is_named(probed):
     assert any("none in" in line for line in format_view(view))
 
 
+@pytest.mark.slow
 def test_a_session_without_probes_says_nothing_of_them(sitter):
     view = view_of(sitter.whole().folder)
     assert (view.probes, view.drifts) == (0, ())

@@ -112,6 +112,7 @@ def test_the_counts_stand_beside_each_trial_and_in_its_recording(sitter, heard):
     assert (meta["sensor"]["lost"], meta["acceleration_trusted"]) == (100, True)
 
 
+@pytest.mark.slow
 def test_a_trial_without_trustworthy_acceleration_counts_and_says_nothing_of_what_was_delivered(sitter, heard):
     heard[0][:] = [BAD, BAD, GOOD]
     done = sitter.whole()
@@ -121,6 +122,7 @@ def test_a_trial_without_trustworthy_acceleration_counts_and_says_nothing_of_wha
     assert done.state.closed
 
 
+@pytest.mark.slow
 def test_a_protocol_that_needs_the_accelerometer_has_such_trials_again(sitter, heard):
     sitter.protocol = replace(
         sitter.protocol, measurement=replace(sitter.protocol.measurement, accelerometer_needed=True)

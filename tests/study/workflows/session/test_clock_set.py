@@ -66,9 +66,10 @@ def notes(folder) -> list[str]:
     return [event.text for event in read_log(folder.log).events if isinstance(event, NoteTaken)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("hours", "said"),
-    [pytest.param(10, "set forward by 10 h 0 min", marks=pytest.mark.slow), (-3, "set back by 3 h 0 min")],
+    [(10, "set forward by 10 h 0 min"), (-3, "set back by 3 h 0 min")],
 )
 def test_a_clock_that_is_set_in_a_sitting_changes_nothing_and_is_said_everywhere(sitter, at, hours, said):
     seat = at(NOON, set_at=3, by_s=3600.0 * hours)
@@ -87,6 +88,7 @@ def test_a_clock_that_is_set_in_a_sitting_changes_nothing_and_is_said_everywhere
     assert fold_session(end.folder).state == end.state
 
 
+@pytest.mark.slow
 def test_a_clock_set_back_between_sittings_is_reported_when_the_session_continues(sitter, at):
     first = conduct_new(sitter.plan(), "simulated", at(NOON, leave_at=4))
     seat = at(NOON - timedelta(hours=2))
@@ -127,6 +129,7 @@ def test_a_second_session_on_the_same_day_continues_with_the_dose_of_the_first(s
     assert [event.dose_elsewhere.sessions for event in resumed] == [(first.folder.name,)]
 
 
+@pytest.mark.slow
 def test_a_session_that_cannot_be_read_is_named_where_its_dose_is_missing(sitter, at):
     first = sitter.whole()
     first.folder.log.write_bytes(b"no event\n" + first.folder.log.read_bytes())

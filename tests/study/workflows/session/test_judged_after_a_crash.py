@@ -19,6 +19,7 @@ def cut_after_answer(folder, presented: TrialPresented, session_logs) -> None:
     session_logs.cut(folder.path, answered + 1)
 
 
+@pytest.mark.slow
 def test_a_detection_trial_is_measured_along_the_direction_that_was_played(sitter, session_logs):
     """Its answer is an interval, whose number says nothing of the direction."""
     detection = DetectionSettings(frequencies_hz=(35.0,), interval_s=0.4, gap_s=0.2)
@@ -42,7 +43,10 @@ def test_a_detection_trial_is_measured_along_the_direction_that_was_played(sitte
     assert after.off_axis_mps2 == pytest.approx(before.off_axis_mps2, rel=1e-4)
 
 
-@pytest.mark.parametrize(("needed", "status"), [(False, TrialStatus.UNMEASURED), (True, TrialStatus.SPOILED)])
+@pytest.mark.parametrize(
+    ("needed", "status"),
+    [(False, TrialStatus.UNMEASURED), pytest.param(True, TrialStatus.SPOILED, marks=pytest.mark.slow)],
+)
 def test_a_trial_without_its_recording_is_void_where_the_accelerometer_is_needed(sitter, session_logs, needed, status):
     measurement = replace(sitter.protocol.measurement, accelerometer_needed=needed)
     sitter.protocol = replace(sitter.protocol, measurement=measurement)

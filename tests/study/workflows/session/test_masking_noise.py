@@ -76,6 +76,7 @@ def log_of(folder) -> list[str]:
     return told
 
 
+@pytest.mark.slow
 def test_it_plays_from_before_the_first_trial_to_the_end(sitter, sound):
     conducted = sitter.whole()
     told = log_of(conducted.folder)
@@ -84,6 +85,7 @@ def test_it_plays_from_before_the_first_trial_to_the_end(sitter, sound):
     assert not sound.playing
 
 
+@pytest.mark.slow
 def test_it_is_silent_in_a_pause_and_comes_back(sitter, sound):
     pause = lambda: Unanswered("a pause", ends_sitting=False, repeat_requested=True, pause=True)  # noqa: E731
     told = log_of(sitter.interrupted(after=2, instead=pause).folder)
@@ -92,6 +94,7 @@ def test_it_is_silent_in_a_pause_and_comes_back(sitter, sound):
     assert told.count("on") == told.count("off") == 2
 
 
+@pytest.mark.slow
 def test_a_session_that_is_left_and_resumed_begins_it_anew(sitter, sound):
     conducted = sitter.interrupted(after=2)
     assert log_of(conducted.folder)[-2:] == ["off", "left"] and not sound.playing
@@ -111,6 +114,7 @@ def test_noise_that_falls_silent_ends_the_sitting_before_the_next_trial_and_noth
     assert sitter.resumed(session).end_reason == ""
 
 
+@pytest.mark.slow
 def test_the_trial_in_which_the_noise_falls_silent_is_void_and_comes_again(sitter, sound):
     sound.fails_at = 8
     with pytest.raises(DeviceError, match="masking noise has stopped") as told:

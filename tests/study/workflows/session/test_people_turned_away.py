@@ -171,6 +171,7 @@ def test_a_watcher_sees_the_outcome_without_an_alarm(visit, form, outcome):
     assert INELIGIBILITY_REASONS[outcome] in view.reason
 
 
+@pytest.mark.slow
 def test_an_analysis_leaves_them_out_by_name(visit, tmp_path, sitter):
     visit("P01", consent="firm")
     visit("P02", exclusion="firm")

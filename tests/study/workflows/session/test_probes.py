@@ -72,12 +72,14 @@ def test_no_probe_is_stronger_than_its_own_cap_and_all_come_between_trials(probe
         assert not (open_trial and isinstance(event, ProbePlayed | ProbeMeasured))
 
 
+@pytest.mark.slow
 def test_levels_come_in_turn_and_never_sooner_than_the_protocol_says(probed):
     hand = [e for e in events_of(probed.whole().folder) if isinstance(e, ProbePlayed) and e.kind == "hand"]
     assert [e.level_n for e in hand] == [PROBES.levels_n[i % 3] for i in range(len(hand))]
     assert min(np.diff([e.monotonic_s for e in hand])) >= PROBES.interval_s
 
 
+@pytest.mark.slow
 def test_a_probes_answer_never_reaches_that_of_a_trial(sitter, sitter_of, tmp_path):
     plain = sitter.whole()
     protocol = with_probes(sitter.protocol)
@@ -85,6 +87,7 @@ def test_a_probes_answer_never_reaches_that_of_a_trial(sitter, sitter_of, tmp_pa
     assert trials_of(plain) == trials_of(other)
 
 
+@pytest.mark.slow
 def test_a_probe_is_on_the_disk_before_the_device_moves(probed, monkeypatch):
     calls, hold, append = [], SafeDevice.hold, EventLog.append
     monkeypatch.setattr(SafeDevice, "hold", lambda self, stimulus: calls.append("hold") or hold(self, stimulus))
@@ -105,7 +108,11 @@ def test_a_handle_that_is_still_held_gets_no_reference_and_the_session_goes_on(p
     assert any("seems to be held" in e.trouble for e in events if isinstance(e, ProbeMeasured))
 
 
-@pytest.mark.parametrize("factor", [-1.0, 0.0, np.nan], ids=["turned over", "dead", "no number"])
+@pytest.mark.parametrize(
+    "factor",
+    [pytest.param(-1.0, marks=pytest.mark.slow), 0.0, pytest.param(np.nan, marks=pytest.mark.slow)],
+    ids=["turned over", "dead", "no number"],
+)
 def test_a_sensor_that_is_wrong_never_frees_a_held_handle_and_ends_no_session(probed, monkeypatch, factor):
     hold = play_probe.release_device
 
@@ -124,6 +131,7 @@ def test_a_sensor_that_is_wrong_never_frees_a_held_handle_and_ends_no_session(pr
     assert all(e.apparent_mass_kg is None and e.trouble for e in events if isinstance(e, ProbeMeasured))
 
 
+@pytest.mark.slow
 def test_the_free_handle_is_compared_at_the_level_of_the_probe_in_the_hand(probed):
     events = [e for e in events_of(probed.whole().folder) if isinstance(e, ProbePlayed)]
     free = next(number for number, e in enumerate(events) if e.kind == "free")
@@ -156,6 +164,7 @@ def test_a_stop_while_the_hand_lets_go_plays_nothing(probed, monkeypatch):
     assert [e.kind for e in events_of(done.folder) if isinstance(e, ProbePlayed)] == ["hand"]
 
 
+@pytest.mark.slow
 def test_a_program_that_ends_within_a_probe_repeats_and_loses_none(probed, monkeypatch):
     show, shown = SimulatedDisplay.show_playing, []
 
@@ -218,6 +227,7 @@ def test_the_forces_are_odd_lines_one_axis_each_and_the_same_in_probe_and_refere
     ]
 
 
+@pytest.mark.slow
 def test_a_reference_that_is_cut_short_by_a_pause_lets_go_and_the_session_goes_on_held(probed, monkeypatch):
     glance, hands = SessionSupervisor.keep_alive, []
 

@@ -62,6 +62,7 @@ def test_what_was_drawn_is_what_the_device_played_and_both_levels_are_logged(rov
     assert fold_session(done.folder).state == done.state
 
 
+@pytest.mark.slow
 def test_the_staircase_follows_the_answers_alone_and_is_checked_against_them(roved, tmp_path):
     state = roved.whole().state
     trials, rule, rove_db = state.trials, roved.protocol.staircase, roved.protocol.stimulus.rove_db

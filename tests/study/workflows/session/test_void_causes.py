@@ -57,6 +57,7 @@ def test_a_stall_is_distinguished_from_other_faults():
     assert {get_void_cause(fault) for fault in Fault if fault is not Fault.STALLED} == {VoidCause.FAULT}
 
 
+@pytest.mark.slow
 def test_a_display_that_lets_a_used_up_repeat_through_is_asked_again(sitter):
     """It asks at every trial but a third: three in a run are heard, the others answered."""
     sitting = sitter.participant(0, lambda: REPEAT)

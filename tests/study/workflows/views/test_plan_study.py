@@ -102,6 +102,7 @@ def test_where_all_logs_are_gone_the_protocol_is_asked_for(sitter, begin):
         list_planned_studies(sitter.data, None, simulated=True)
 
 
+@pytest.mark.slow
 def test_the_document_holds_the_same_facts(sitter, begin):
     begin("P01", to_the_end=True)
     (study,) = summarise_plans(list_planned_studies(sitter.data, None, simulated=True))["studies"]

@@ -39,6 +39,7 @@ def test_thresholds_are_those_of_thresholds_csv(taken):
     ]
 
 
+@pytest.mark.slow
 def test_every_run_has_its_staircase_with_as_many_levels_as_answers(taken):
     view = make_session_view(taken)
     assert [s.title.split(":")[0] for s in view.staircases] == ["Run 1", "Run 2", "Run 3"]
@@ -118,6 +119,7 @@ def test_a_log_that_contradicts_its_rules_cannot_be_read_in_the_list_either(sess
     assert "trial" in make_session_line(SessionFolder(session)).remark
 
 
+@pytest.mark.slow
 def test_a_log_of_an_older_version_says_that_it_has_no_checksums(session, session_logs):
     lines = len((session / "events.jsonl").read_bytes().splitlines())
     assert dict(make_session_view(session).facts)["log"] == f"{lines} lines, with checksums, sealed to line {lines}"

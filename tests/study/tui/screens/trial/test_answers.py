@@ -24,6 +24,7 @@ def test_one_and_two_answer_and_are_marked_at_once(asked, key, answer):
     assert f"{answer} taken" in words
 
 
+@pytest.mark.slow
 def test_other_keys_can_answer_beside_the_digits(asked):
     (reply,), _ = asked("j", screen=TrialScreen(parse_keys("f,j")))
     assert reply.answer == 2
@@ -117,6 +118,7 @@ def test_help_is_left_to_the_application(asked):
     assert asked("f1")[0] == ["help"]
 
 
+@pytest.mark.slow
 def test_nothing_is_heard_before_it_is_armed_and_after_it_is_disarmed(on_stage):
     screen = TrialScreen()
 

@@ -25,6 +25,7 @@ from study.workflows.equalizer.controller.export_controller import (
 from tests.study.workflows.equalizer.controller.build import CHANNELS, build, compiled_cpp, run, write_model
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("band_hz", "order"), [((5.0, 35.0), 26), ((0.5, 499.5), 5)], ids=["three bands, order 26", "a single band"]
 )
@@ -61,6 +62,7 @@ def test_the_measured_tick_of_the_page_is_below_a_microsecond():
     assert all(0 < int(each) <= 1000 for each in measured.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("table", "share"), [("hapteq_gains", 0.05), ("hapteq_ahead", 0.0), ("hapteq_low_filter", 0.0)]
 )

@@ -12,6 +12,7 @@ import pytest
 from equalizer.tracking.lqr.changing_direction import play
 from equalizer.tracking.realtime.realtime_controller import RealtimeSettings
 from study.workflows.equalizer.controller.export_controller import ControllerPlan, export_controller
+from tests.slow_instances import slow
 from tests.study.workflows.equalizer.controller.build import build, compiled_cpp, run, write_model
 
 DOCS = Path(__file__).parents[5] / "docs"
@@ -91,6 +92,7 @@ def rows(exported):
     return play(exported.controller.transient, np.tile(rotation, (len(exported.controller.transient), 1, 1))).forces
 
 
+@pytest.mark.slow
 def test_the_example_compiles_as_it_is_and_ends_by_itself(vendor, exported):
     done = run(build(vendor, exported.plan.out, "example_loop.c"), "0.05")
     assert re.search(r"^\d+ ticks, \d+ missed, largest force on an axis .*limited 0 times$", done.stdout, re.MULTILINE)
@@ -104,6 +106,7 @@ def test_undisturbed_it_sends_each_row_once_and_then_zero(example, rows):
     assert not sent[-1].any() and "60 ticks, 0 missed" in done.stdout and "\nreleased\n" in done.stdout
 
 
+@pytest.mark.slow
 def test_ticks_that_were_missed_are_not_sent_one_after_the_other(example, rows):
     """14.5 ms late: the forces that were due meanwhile are gone, the waveform is where the time is."""
     done = example(stall_ms=15.5)
@@ -113,6 +116,7 @@ def test_ticks_that_were_missed_are_not_sent_one_after_the_other(example, rows):
     assert not sent[-1].any() and "60 ticks, 14 missed" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_loop_that_stood_still_sets_zero_and_ends(example, rows):
     done = example(stall_ms=21.5)
     assert done.returncode == 1
@@ -122,7 +126,7 @@ def test_a_loop_that_stood_still_sets_zero_and_ends(example, rows):
     assert "\nreleased\n" in done.stdout and "stood still" in done.stdout
 
 
-@pytest.mark.parametrize("signal", ["SIGINT", "SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize("signal", ["SIGTERM", *slow("SIGINT", "SIGHUP")])
 def test_a_signal_ends_the_example_with_zero_force(example, rows, signal):
     done = example(signal=signal)
     assert done.returncode == 0
@@ -142,7 +146,8 @@ def snippet(mentioned: str) -> str:
     return code
 
 
-@pytest.mark.parametrize("mentioned", ["chai3d.h", pytest.param("rclcpp/rclcpp.hpp", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("mentioned", ["chai3d.h", "rclcpp/rclcpp.hpp"])
 def test_the_snippets_of_the_page_compile(vendor, exported, tmp_path, mentioned):
     source = tmp_path / "snippet.cpp"
     source.write_text(snippet(mentioned))
@@ -217,6 +222,7 @@ def test_tap_and_floor_together_are_shortened_to_the_cap_and_keep_their_directio
     np.testing.assert_allclose(deep[:-1], wanted, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_position_beyond_all_numbers_is_no_force(chai3d):
     assert not chai3d(-1e300).any()
 
@@ -229,6 +235,7 @@ def test_in_chai3d_missed_ticks_are_not_sent_and_a_stall_ends_in_zero(chai3d):
     assert undisturbed[AFTER:].any() and len(stalled) == AFTER + 1 and not stalled[-1].any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cap_n", "compiles"), [(5.0, True), (5.5, False)])
 def test_a_controller_beyond_the_cap_of_all_forces_does_not_compile_in(vendor, tmp_path, cap_n, compiles):
     model, out = write_model(tmp_path / "model.h5"), tmp_path / "out"

@@ -35,6 +35,7 @@ def test_what_is_left_out_is_reported(plants, plan, tmp_path):
     assert any("lies outside the band and is not played" in line for line in format_equalization_lines(done))
 
 
+@pytest.mark.slow
 def test_too_strong_forces_are_refused_with_the_factor_or_solved_under_the_cap(plan):
     loud = replace(plan, trajectory=plan.trajectory.with_name("loud.csv"))
     refused = refusal(loud)
@@ -46,6 +47,7 @@ def test_too_strong_forces_are_refused_with_the_factor_or_solved_under_the_cap(p
     assert any("held at the cap have corners" in line for line in format_equalization_lines(done))
 
 
+@pytest.mark.slow
 def test_what_the_cap_costs_is_reported_in_one_figure(plan):
     done = equalize_trajectory(replace(plan, trajectory=plan.trajectory.with_name("loud.csv"), constrain=True))
     capped, lines = summarise_equalization(done)["capped"], format_equalization_lines(done)

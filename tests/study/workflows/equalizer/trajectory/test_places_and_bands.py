@@ -32,6 +32,7 @@ def test_two_places_are_blended(plants, plan):
     assert error < 0.85 * played_error(plants, blended, 0.1)
 
 
+@pytest.mark.slow
 def test_three_places_are_checked_with_the_middle_one_held_out(plants, plan):
     between = with_models(plan, "left", "centre", "right", at_m=(0.015, 0.0, 0.0))
     done = equalize_trajectory(between)
@@ -69,6 +70,7 @@ def test_blended_parts_are_capped_together(plan):
     assert np.linalg.norm(read_trajectory(loud.out).signal.samples, axis=1).max() <= 3.0
 
 
+@pytest.mark.slow
 def test_a_narrow_and_a_wide_model_of_one_place_play_bands(plants, plan, tmp_path):
     write_trajectory(tmp_path / "wide.csv", table(noise(plants, 2.0, 200.0)))
     banded = with_models(plan, "wide", "centre", trajectory=tmp_path / "wide.csv")

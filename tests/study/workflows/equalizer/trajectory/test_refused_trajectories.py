@@ -15,6 +15,7 @@ from study.workflows.equalizer.equalized_summary import format_equalization_line
 from tests.study.workflows.equalizer.trajectory.plans import model_of, noise, refusal, table, with_models
 
 
+@pytest.mark.slow
 def test_nothing_in_the_band_is_refused(plants, plan, tmp_path):
     write_trajectory(tmp_path / "high.csv", table(noise(plants, 80.0, 120.0)))
     high = replace(plan, trajectory=tmp_path / "high.csv")

@@ -26,6 +26,7 @@ def real_device(monkeypatch, tmp_path):
     monkeypatch.setattr(conduct_session, "open_device", opened)
 
 
+@pytest.mark.slow
 def test_a_device_that_was_not_checked_today_is_warned_of_and_that_is_logged(plan, small_protocol, seat, real_device):
     end = conduct_new(plan(small_protocol), "simulated", seat)
     (checked,) = of(end, DeviceChecked)

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import pytest
+
 from study.session.facts.events import (
     AnswerGiven,
     NoteTaken,
@@ -17,6 +19,7 @@ from study.workflows.session.conduct_session import Participant, conduct_new, co
 from tests.study.workflows.session.sitting.person import Person, of
 
 
+@pytest.mark.slow
 def test_a_pause_from_the_other_terminal_frees_the_hand_and_the_trial_comes_again(plan, full, seat, person, tmp_path):
     inbox = lambda: RequestInbox(tmp_path / "data" / "P01_001")  # noqa: E731
     person.at_question = lambda q: inbox().send(PauseAsked("experimenter")) if len(person.questions) == 3 else None
@@ -77,6 +80,7 @@ def test_a_note_is_on_the_disk_before_the_pause_is_over(plan, small_protocol, se
     assert "my thumb is numb" in seen[0]
 
 
+@pytest.mark.slow
 def test_notes_of_participant_and_experimenter_reach_the_log(plan, small_protocol, seat, person):
     def noted(question):
         if len(person.questions) == 2:
@@ -97,6 +101,7 @@ def test_a_withdrawal_in_a_pause_ends_the_sitting(plan, small_protocol, seat, pe
     assert end.end_reason == "the participant withdrew"
 
 
+@pytest.mark.slow
 def test_a_pause_asked_for_during_a_pause_makes_no_second_one(plan, small_protocol, seat, person):
     person.at_pause = lambda: seat.requests.send(PauseAsked("participant"))
     person.at_question = lambda q: seat.requests.send(PauseAsked("participant")) if len(person.questions) == 3 else None
@@ -104,6 +109,7 @@ def test_a_pause_asked_for_during_a_pause_makes_no_second_one(plan, small_protoc
     assert len(of(end, PauseTaken)) == 1
 
 
+@pytest.mark.slow
 def test_what_is_noted_during_the_goodbye_is_in_the_log(plan, small_protocol, seat, person):
     person.goodbye = lambda notice: seat.requests.send(NoteAsked("experimenter", "a rash", adverse=True))
     end = conduct_new(plan(small_protocol), "simulated", seat)
@@ -111,6 +117,7 @@ def test_what_is_noted_during_the_goodbye_is_in_the_log(plan, small_protocol, se
     assert [note.text for note in of(end, NoteTaken)] == ["a rash"]
 
 
+@pytest.mark.slow
 def test_ctrl_c_at_the_goodbye_of_a_finished_session_leaves_it_finished(plan, small_protocol, seat, person):
     def goodbye(notice):
         raise KeyboardInterrupt
