@@ -1,8 +1,8 @@
 """Measures of a free device from one recording: friction from slow strokes, frequency response, noise at rest.
 
-Friction is the work lost in a closed stroke over the length of its path, oint F dx / path (N). Forces of springs,
-weights and inertia do no net work over a closed path, so that no model is needed. Used by the daily check of a device
-(`compare_devices`).
+The mean friction force (N) is the work dissipated in a closed stroke, the integral of F dx along its path, divided by
+the length of the path. Springs, weights and inertia do no net work over a closed path, so that no model is needed. Used
+by the daily check of a device (`compare_devices`).
 """
 
 from dataclasses import dataclass, replace
@@ -21,7 +21,8 @@ STROKES_BELOW_HZ = 1.0
 stimulus of a study has 5 Hz."""
 
 MISSED_LIMIT = 0.02
-"""Largest share of missed ticks: the limit of a trial in the shipped protocols."""
+"""Largest share of missing samples (missed ticks of the control loop): the limit of a trial in the shipped
+protocols."""
 
 
 class NotMeasurableError(ValueError):
@@ -33,31 +34,34 @@ class DeviceMeasures:
     """Friction, frequency response and noise of a free device, from a single recording."""
 
     friction_n: FloatArray
-    """(axes,): mean force that resisted the strokes along each axis; NaN where the handle did not move."""
+    """(axes,): mean friction force during the strokes along each axis; NaN where the handle moved no further along the
+    axis than across it in any of its strokes."""
     friction_error_n: FloatArray
-    """(axes,): standard error of the friction, from the scatter between strokes."""
+    """(axes,): standard error of the mean friction, from the standard deviation between strokes."""
     response: FrequencyResponse
+    """Estimated frequency response from the commands to the responses."""
     noise: FloatArray
-    """(outputs,): rms of the response at rest about a straight line, in its unit."""
+    """(outputs,): rms of the response at rest after linear detrending, in the unit of the response."""
     noise_samples: int
     """Number of samples at rest from which the noise was computed."""
 
 
 def measure_device(recording: Recording) -> DeviceMeasures:
-    """Friction, frequency response and noise of a free device. recording: strokes and a broadband excitation along
-    every axis, with rests. Raises NotMeasurableError where any of the three cannot be computed."""
+    """Measure friction, frequency response and noise of a free device. recording: strokes and a broadband excitation
+    along every axis, with rests. Raises NotMeasurableError where any of the three cannot be computed."""
     recording = _interpolate_gaps(recording)
     response = _estimate_response(recording)
     friction = np.array([_measure_friction(recording, axis) for axis in range(len(recording.command.channels))])
-    rests = _select_settled_rests(recording)
-    if not rests:
+    rest_responses = _select_settled_rests(recording)
+    if not rest_responses:
         raise NotMeasurableError("the handle is never at rest, so the noise cannot be measured")
-    noise, samples = _measure_noise(recording, rests)
+    noise, samples = _measure_noise(recording, rest_responses)
     return DeviceMeasures(friction[:, 0], friction[:, 1], response, noise, samples)
 
 
 def _interpolate_gaps(recording: Recording) -> Recording:
-    """The recording with missed ticks interpolated: a period with a missing sample would otherwise be left out."""
+    """Interpolate missing samples: a period with one would otherwise be left out. Raises NotMeasurableError without a
+    position, or for too many missing samples."""
     if recording.position is None:
         raise NotMeasurableError("the recording contains no position signal")
     command, response = _fill_missing(recording.command, "command"), _fill_missing(recording.response, "response")
@@ -78,6 +82,7 @@ def _fill_missing(signal: Signal, name: str) -> Signal:
 
 
 def _estimate_response(recording: Recording) -> FrequencyResponse:
+    """Estimate the frequency response. Raises NotMeasurableError where no spectral line of it is reliable."""
     try:
         response = estimate_transfer([recording])
     except TransferEstimateError as refusal:
@@ -88,10 +93,10 @@ def _estimate_response(recording: Recording) -> FrequencyResponse:
 
 
 def _measure_friction(recording: Recording, axis: int) -> tuple[float, float]:
-    """Mean friction along an axis and its standard error, both in N: the work that a stroke loses, over its path.
+    """Measure the mean friction along an axis and its standard error, both in N, from the work dissipated in each
+    stroke.
 
-    Energy that springs, weights and inertia store is returned within a stroke, so that no model is needed. Raises
-    NotMeasurableError with fewer than two strokes along the axis.
+    One period of a slow sinusoid is a stroke. Raises NotMeasurableError with fewer than two strokes along the axis.
     """
     stroke_n = [
         _measure_loss_per_path(recording, start, start + segment.period, axis)
@@ -108,6 +113,7 @@ def _measure_friction(recording: Recording, axis: int) -> tuple[float, float]:
 
 
 def _is_stroke(recording: Recording, segment: Segment) -> bool:
+    """Whether a segment is a sinusoid below `STROKES_BELOW_HZ`."""
     return segment.kind == "sine" and segment.period * STROKES_BELOW_HZ > recording.sample_rate_hz
 
 
@@ -117,7 +123,8 @@ def _find_driven_axis(recording: Recording, segment: Segment) -> int:
 
 
 def _measure_loss_per_path(recording: Recording, start: int, stop: int, axis: int) -> float:
-    """Work per path (N) of one stroke along an axis; NaN where the handle moved no further along it than across it."""
+    """Work of the command force in one stroke, divided by the length of its path along the axis (N); NaN where the
+    handle moved no further along the axis than across it. start, stop: first sample of the stroke and of the next."""
     assert recording.position is not None
     position_m = recording.position.samples[start : stop + 1]
     force_n = recording.command.samples[start : start + len(position_m) - 1]
@@ -137,10 +144,10 @@ def _select_settled_rests(recording: Recording) -> list[FloatArray]:
     ]
 
 
-def _measure_noise(recording: Recording, rests: list[FloatArray]) -> tuple[FloatArray, int]:
+def _measure_noise(recording: Recording, rest_responses: list[FloatArray]) -> tuple[FloatArray, int]:
     """(outputs,): rms of the response about the least-squares line of each rest, and the number of samples."""
     squares, samples = np.zeros(len(recording.response.channels)), 0
-    for rest_response in rests:
+    for rest_response in rest_responses:
         index = np.arange(len(rest_response)) - (len(rest_response) - 1) / 2
         detrended = rest_response - rest_response.mean(axis=0)
         detrended = detrended - np.outer(index, index @ detrended / max(float(index @ index), 1.0))

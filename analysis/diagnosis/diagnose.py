@@ -26,7 +26,7 @@ from analysis.diagnosis.diagnosis_settings import BALANCE, DiagnosisSettings
 from analysis.diagnosis.errors.choose_measure import make_measure
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit
-from analysis.diagnosis.localisation.clean_floor import CleanFloor, NothingLearned
+from analysis.diagnosis.localisation.model_error_floor import IncomparableRecordingsError, ModelErrorFloor
 from analysis.diagnosis.result.assemble_findings import assemble_findings
 from analysis.diagnosis.result.candidates import (
     add_balances_with_fitted_model,
@@ -64,8 +64,8 @@ def diagnose(
 ) -> Findings:
     """Findings about the physics that the model lacks. recordings: of one device, with the same channels, units and
     rate; not checked here (see `input_checks`). map_: as `map`, may run in parallel. progress: receives a description
-    of the current step and the share that is done, 0 to 1. Raises NothingLearned where clean recordings cannot be
-    compared."""
+    of the current step and the share that is done, 0 to 1. Raises IncomparableRecordingsError where clean recordings
+    cannot be compared."""
     balances: tuple[Balance, ...] = ()
     if settings.fitted and not settings.clean:
         progress("testing laws in the force balance", 0.0)
@@ -102,7 +102,7 @@ def _diagnose_by_balance(
         search_laws = partial(search_by_balance, context, balances, repeats)
         result = settings.guard.run(BALANCE, "the fit of its laws", search_laws, None)
         if result is not None and not (fitting.narrow and has_open_parameter(result)):
-            return _assemble(recordings, settings, fitting, SearchOutcome(result, CleanFloor()), balances)
+            return _assemble(recordings, settings, fitting, SearchOutcome(result, ModelErrorFloor()), balances)
     return None
 
 
@@ -123,7 +123,7 @@ def _diagnose_by_model(
 
         fitting = choose_forces_of_balance(recordings, fitting, balances)
     if settings.fitted and is_too_short_to_name(recordings):
-        given_outcome = SearchOutcome(_evaluate_given_model(recordings, fitting, settings, map_), CleanFloor())
+        given_outcome = SearchOutcome(_evaluate_given_model(recordings, fitting, settings, map_), ModelErrorFloor())
         return _assemble(recordings, settings, fitting, given_outcome, balances)
     outcome = search_by_simulation(recordings, fitting, settings, map_, progress, balances)
     if not settings.fitted and not settings.clean:
@@ -167,7 +167,9 @@ def _diagnose_with_clean(
             return searched_findings
     given_result = _evaluate_given_model(recordings, fitting, settings, map_)
     progress("writing the results", 0.95)
-    floor = CleanFloor() if settings.fitted else learn_model_floor(settings.clean, model, recordings, map_, progress)
+    floor = (
+        ModelErrorFloor() if settings.fitted else learn_model_floor(settings.clean, model, recordings, map_, progress)
+    )
     findings = _assemble(recordings, settings, fitting, SearchOutcome(given_result, floor), ())
     return add_contrast(findings, contrast, recordings[0], FAULT_BEYOND)
 
@@ -196,7 +198,7 @@ def _search_with_clean(
     search_settings = replace(settings, without=(*settings.without, *tested_effects))
     try:
         outcome = search_by_simulation(recordings, fitting, search_settings, map_, progress, ())
-    except (NothingLearned, np.linalg.LinAlgError):
+    except (IncomparableRecordingsError, np.linalg.LinAlgError):
         return None
     context = outcome.result.context
     explanation = keep_identifiable(context, outcome.result.found, settings.time_left)

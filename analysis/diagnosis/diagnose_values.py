@@ -35,9 +35,8 @@ def diagnose_values(
     recordings: of one device, alike in channels, units and rate. model: None = a linear model is fitted to them, or to
     the clean recordings where there are any. settings: effects left out of the search, clean recordings of the device,
     compared signals. map_: as `map`, may run in parallel. progress: receives a description of the current step and the
-    share that is done. Raises NothingToDiagnose with the error in the recordings, NothingLearned where clean recordings
-    cannot be compared with them.
-    """
+    share that is done. Raises NothingToDiagnose with the error in the recordings, IncomparableRecordingsError where
+    clean recordings cannot be compared with them."""
     recording_list = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     settings = settings or DiagnosisSettings()
     names = settings.names or tuple(f"recording {number}" for number in range(1, len(recording_list) + 1))

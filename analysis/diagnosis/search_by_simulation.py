@@ -13,9 +13,9 @@ from analysis.diagnosis.confirm.require_gain import require_enough_gain, unname_
 from analysis.diagnosis.data.measured_motion import select_time_unit
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.tuning import make_tuning
-from analysis.diagnosis.localisation.clean_floor import CleanFloor
+from analysis.diagnosis.localisation.model_error_floor import ModelErrorFloor
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.search import HUM, FurtherSearches, move_model_further, search_effects
+from analysis.diagnosis.search.search import HUM, FurtherSearches, repeat_with_wider_bound, search_effects
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from analysis.diagnosis.search.verdict import SearchResult, judge
@@ -44,7 +44,7 @@ class SearchOutcome:
     """The result of a search, with the model error that was learned from clean recordings."""
 
     result: SearchResult
-    floor: CleanFloor
+    floor: ModelErrorFloor
     """Model error of the clean recordings; empty without any."""
 
 
@@ -71,7 +71,7 @@ def search_by_simulation(
 ) -> SearchOutcome:
     """Search by simulation for the missing effects. balances: force balances of the same recordings, if any; where they
     name a law, no effect is tried, else only effects of the actuator and the sensor that a balance cannot observe.
-    Raises NothingLearned with clean recordings from which no model error can be learned."""
+    Raises IncomparableRecordingsError with clean recordings from which no model error can be learned."""
     chosen, context = fitting.chosen, make_search_context(recordings[0], fitting, settings, map_)
     catalogue = _select_catalogue(settings, recordings[0], context.excluded)
     nameable_effects = [effect for effect in catalogue if effect.name not in context.excluded]
@@ -165,7 +165,8 @@ def _search_with_learned_error(
     progress: Progress,
 ) -> SearchOutcome:
     """Search while the model error on the clean recordings counts as noise. search_inputs: the shared state, the
-    effects to try, and the effects that may be named as sensor faults without a search. Raises NothingLearned."""
+    effects to try, and the effects that may be named as sensor faults without a search. Raises
+    IncomparableRecordingsError."""
     from analysis.diagnosis.reference.learn_model_error import learn_model_error
     from analysis.diagnosis.reference.model_free_faults import find_sensor_faults
     from analysis.diagnosis.reference.search_with_reference import search_with_reference
@@ -198,8 +199,8 @@ def _search(
     result = search_effects(context, catalogue, progress, settings.time_left, law_searches)
     # A model that was fitted to the recordings has no calibration, hence no bound to widen.
     if not settings.fitted:
-        result = move_model_further(context, result, catalogue, progress, settings.time_left)
-    return SearchOutcome(result, CleanFloor())
+        result = repeat_with_wider_bound(context, result, catalogue, progress, settings.time_left)
+    return SearchOutcome(result, ModelErrorFloor())
 
 
 def _skip_with_hum(add_laws: Callable[[SearchResult], SearchResult]) -> Callable[[SearchResult], SearchResult]:

@@ -63,7 +63,7 @@ UNKNOWN_NOISE_SHARE = 1e-3  # share of the signal that counts as noise where a r
 
 # How far the model's own parameters may move (`tuning`, `output_error`, `rigid_model`). By hand.
 RETUNING_BOUND = 4.0  # standard deviations of the calibration
-# the same for the repeated search, where a mismatch remains (`move_model_further`). Pairs of 101700
+# the same for the repeated search, where a mismatch remains (`repeat_with_wider_bound`). Pairs of 101700
 WIDER_RETUNING_BOUND = 12.0
 UNSTATED_SHARE = 0.1  # standard deviation without a stated tolerance, relative to the largest parameter at any axis
 UNSTATED_MODES = 0.02  # the same for a mode's frequency, relative to it

@@ -1,6 +1,7 @@
 """Periodicity checks of a recording: declared periods, detection of an undeclared period, and noise between periods.
 
-`overview` calls `find_repeats` and `check_repeats`."""
+Called by `overview`: `find_repeats`, then `check_repeats`.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,17 +16,19 @@ from analysis.wording import conjoin, typeset
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 
-REPEATS = "repeats"
-RIGHT_PERIOD, WRONG_PERIOD = 0.02, 0.2
-"""Rms difference of the command between declared periods, as a share of its rms: up to RIGHT_PERIOD the period is
-accepted, above WRONG_PERIOD it is an error, in between a notice is given."""
-NOISY_SHARE = 0.3
-"""Rms noise of a channel between repeats, as a share of its mean period's rms, above which a notice is given."""
+CHECK_NAME = "repeats"
+"""Name of these checks in the overview."""
+ACCEPTED_DIFFERENCE, WRONG_DIFFERENCE = 0.02, 0.2
+"""Limits of the relative difference (`_check_period`) of the command between declared periods: up to the first the
+period is accepted, above the second it is an error, in between a notice is given. Heuristic."""
+NOTABLE_NOISE = 0.3
+"""Rms noise of a channel between repeats, as a share of its mean period's rms, above which a notice is given.
+Heuristic."""
 
 
 @dataclass(frozen=True, slots=True)
 class RepeatNoise:
-    """Noise between the periods of one segment: rms deviation from the mean period."""
+    """Noise between the periods of one segment: standard deviation about the mean period."""
 
     segment: int
     """Number of the segment, from 1; 0 where the period was detected and not declared."""
@@ -36,7 +39,8 @@ class RepeatNoise:
     settled: bool
     """Whether the transient before the first period had decayed."""
     share: tuple[float, ...]
-    """Rms between repeats over rms of the mean period, per response channel."""
+    """Standard deviation between repeats over that of the mean period in time, per response channel; 0 where the
+    mean period is constant."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,17 +72,19 @@ def find_repeats(recording: Recording, stretches: Sequence[Stretch]) -> Repeats:
 
 
 def _compute_repeat_noise(recording: Recording, *, declared: bool) -> tuple[RepeatNoise, ...]:
+    """Compute the noise of each segment with two periods or more after its transient. declared: whether the periods are
+    those that the recording declares."""
     noises = []
     for periods in find_settled_periods(recording):
         if periods.count < 2:
             continue
-        by_period = stack_periods(recording.response.samples, periods)
-        mean = by_period.mean(axis=0)
+        stacked_periods = stack_periods(recording.response.samples, periods)
+        mean_period = stacked_periods.mean(axis=0)
         rms_between_repeats = np.sqrt(
-            np.sum((by_period - mean) ** 2, axis=(0, 1)) / ((periods.count - 1) * periods.length)
+            np.sum((stacked_periods - mean_period) ** 2, axis=(0, 1)) / ((periods.count - 1) * periods.length)
         )
-        mean_rms = np.array([compute_rms(column) for column in mean.T])
-        share = tuple((rms_between_repeats / np.where(mean_rms > 0, mean_rms, np.inf)).tolist())
+        mean_period_rms = np.array([compute_rms(column) for column in mean_period.T])
+        share = tuple((rms_between_repeats / np.where(mean_period_rms > 0, mean_period_rms, np.inf)).tolist())
         segment_number = periods.index + 1 if declared else 0
         noises.append(RepeatNoise(segment_number, periods.length, periods.count, periods.settled, share))
     return tuple(noises)
@@ -92,7 +98,7 @@ def check_repeats(recording: Recording, repeats: Repeats) -> tuple[Check, ...]:
         repeat_count = (repeats.period_range[1] - repeats.period_range[0]) / repeats.undeclared_period
         checks.append(
             Check(
-                REPEATS,
+                CHECK_NAME,
                 "notice",
                 f"The command repeats every {repeats.undeclared_period} samples "
                 f"({repeats.undeclared_period / recording.sample_rate_hz:.4g} s), {repeat_count:.3g} times, but no "
@@ -103,24 +109,27 @@ def check_repeats(recording: Recording, repeats: Repeats) -> tuple[Check, ...]:
         )
     if not repeats.noise:
         sentence = "Nothing repeats, so noise cannot be distinguished from errors of a model."
-        checks += [] if checks else [Check(REPEATS, "notice", sentence, "Record some periods more than once.")]
+        checks += [] if checks else [Check(CHECK_NAME, "notice", sentence, "Record some periods more than once.")]
         return tuple(checks)
     return (*checks, *_check_noise(recording, repeats.noise))
 
 
 def _check_noise(recording: Recording, noise: Sequence[RepeatNoise]) -> tuple[Check, ...]:
+    """Check the noise between repeats, per channel, in the segment where it is smallest."""
     channels = recording.response.channels
     shares = np.array([segment_noise.share for segment_noise in noise])
     sentence = conjoin([f"{typeset(f'{100 * shares[:, k].min():.2g}')} % of {name}" for k, name in enumerate(channels)])
-    noisy = [name for k, name in enumerate(channels) if shares[:, k].min() > NOISY_SHARE]
+    noisy_channels = [name for k, name in enumerate(channels) if shares[:, k].min() > NOTABLE_NOISE]
     text = (
         "The rms deviation of single periods from their mean (up to "
         f"{max(segment_noise.periods for segment_noise in noise)} periods) is at least {sentence}."
     )
     advice = (
-        f"{conjoin(noisy)} hardly repeat: average more periods, or drive the device more strongly." if noisy else ""
+        f"{conjoin(noisy_channels)} hardly repeat: average more periods, or drive the device more strongly."
+        if noisy_channels
+        else ""
     )
-    return (Check(REPEATS, "notice" if noisy else "fine", text, advice),)
+    return (Check(CHECK_NAME, "notice" if noisy_channels else "fine", text, advice),)
 
 
 def _check_periods(recording: Recording) -> list[Check | None]:
@@ -133,14 +142,17 @@ def _check_periods(recording: Recording) -> list[Check | None]:
 
 
 def _check_period(command: FloatArray, segment: Segment, number: int) -> Check | None:
+    """Check a declared period; None where it is accepted. The relative difference is the rms of command[n + period] -
+    command[n], divided by sqrt(2) and by the rms of the command: 1 for a period at which the command is
+    uncorrelated."""
     command_rms = compute_rms(command[np.isfinite(command).all(axis=1)])
     difference = command[segment.period :] - command[: -segment.period]
     relative_difference = float(np.sqrt(np.nanmean(difference**2) / 2)) / command_rms if command_rms > 0 else 0.0
-    if relative_difference <= RIGHT_PERIOD:
+    if relative_difference <= ACCEPTED_DIFFERENCE:
         return None
     return Check(
-        REPEATS,
-        "wrong" if relative_difference > WRONG_PERIOD else "notice",
+        CHECK_NAME,
+        "wrong" if relative_difference > WRONG_DIFFERENCE else "notice",
         f"Segment {number} states a period of {segment.period} samples, but its command differs by "
         f"{relative_difference:.1%} from one period to the next.",
         "Correct the period, or set it to 0.",

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from equalizer.signals.lockin import phasors
+from equalizer.signals.lockin import estimate_phasors
 from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray
 
@@ -179,7 +179,7 @@ def compute_phasor_ellipse(samples: FloatArray, sample_rate_hz: float, frequency
     """Compute the ellipse of the acceleration's fundamental. samples: (n, 3), m/s^2, in the test direction's frame.
     Raises ValueError for less than one period, or where nothing moves at this frequency."""
     harmonic_count = max(1, min(MOST_HARMONICS, math.ceil(sample_rate_hz / 2 / frequency_hz) - 1))
-    harmonic_phasors = phasors(samples, sample_rate_hz, frequency_hz, harmonic_count)
+    harmonic_phasors = estimate_phasors(samples, sample_rate_hz, frequency_hz, harmonic_count)
     fundamental = harmonic_phasors[0]
     # Re(p exp(i phi)) over all phi is the image of the unit circle under the matrix [Re p, -Im p]: the semi-axes of
     # the ellipse are the singular values of that matrix, along its left singular vectors.

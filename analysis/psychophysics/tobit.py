@@ -1,13 +1,14 @@
-"""Tobit model of reversal means: a sensitivity analysis in which a run that the cap cut is right-censored.
+"""Tobit model of reversal means: a sensitivity analysis in which runs that reached the force cap are right-censored.
 
     y_ij = mu_j + b_i + e_ij,    b_i ~ N(0, sd_people²),  e_ij ~ N(0, sd_error²)    person i, frequency j; y in dB
 
-y is the mean level at the reversals of a run. A run that the cap did not cut contributes the density of y to the
-likelihood; a cut run contributes P(Y >= y). The random effect b_i is integrated out by Gauss-Hermite quadrature.
+y is the mean level at the reversals of a staircase run. A run is censored where at least one of these reversals is
+a peak at the largest permitted force, the cap (`thresholds.is_censored`). An uncensored run contributes the density of
+y to the likelihood, a censored run P(Y >= y). The random effect b_i is integrated out by Gauss-Hermite quadrature.
 
-Limits: the mean of a cut run is not an exact lower bound, because its valleys lie below the cap, and means near the cap
-are biased low even without being cut. The model therefore removes only a part of the bias; `measured_coverage` holds
-the coverage that its intervals reach in simulations.
+Limits: the mean of a censored run is not an exact lower bound, because its valleys lie below the cap, and means near
+the cap are biased low even in uncensored runs. The model therefore removes only a part of the bias; `measured_coverage`
+holds the coverage that its intervals reach in simulations.
 
 Sources: J. Tobin, Econometrica 26 (1958), 24-36; quadrature: J. C. Pinheiro, D. M. Bates, J. Comput. Graph. Stat. 4
 (1995), 12-35. Called by `analysis.psychophysics.study_analysis`.
@@ -47,21 +48,29 @@ class TobitFit:
 
 
 def compute_tobit_contrasts(
-    frequencies_hz: Sequence[float], values_db: FloatArray, is_cut: NDArray[np.bool_], confidence: float
+    frequencies_hz: Sequence[float], values_db: FloatArray, is_censored: NDArray[np.bool_], confidence: float
 ) -> tuple[Contrast, ...]:
     """Compute the contrasts mu_j - mu_1 of each frequency with the first, with Wald intervals and p values of Student's
-    t with n - 1 degrees of freedom. values_db: (n, k), dB, NaN for a gap. cut: (n, k), whether the cap cut the run.
+    t with n - 1 degrees of freedom. values_db: (n, k), dB, NaN for a gap. is_censored: (n, k). confidence: level
+    of the intervals, 0 to 1.
 
-    A frequency without an uncut run is left out, because its likelihood has no maximum. Empty where no run is cut (the
-    analysis of the plain means then suffices), the first frequency is left out, or there are fewer than three people.
+    A frequency without an uncensored run is left out, because its likelihood has no maximum. Empty where no run is
+    censored (the analysis of the plain means then suffices), the first frequency is left out, or there are fewer than
+    three people.
     """
     is_measured = np.isfinite(values_db)
-    has_uncut: NDArray[np.bool_] = np.asarray((is_measured & ~is_cut).any(axis=0))
-    if not (is_cut & is_measured).any() or len(values_db) < 3 or not has_uncut[0]:
+    has_uncensored: NDArray[np.bool_] = np.asarray((is_measured & ~is_censored).any(axis=0))
+    if not (is_censored & is_measured).any() or len(values_db) < 3 or not has_uncensored[0]:
         return ()
-    frequencies_hz = [frequency_hz for frequency_hz, is_kept in zip(frequencies_hz, has_uncut, strict=True) if is_kept]
-    values_db, is_cut, is_measured = values_db[:, has_uncut], is_cut[:, has_uncut], is_measured[:, has_uncut]
-    fit = fit_tobit(values_db, is_cut)
+    frequencies_hz = [
+        frequency_hz for frequency_hz, is_kept in zip(frequencies_hz, has_uncensored, strict=True) if is_kept
+    ]
+    values_db, is_censored, is_measured = (
+        values_db[:, has_uncensored],
+        is_censored[:, has_uncensored],
+        is_measured[:, has_uncensored],
+    )
+    fit = fit_tobit(values_db, is_censored)
     frequency_count, df = len(frequencies_hz), len(values_db) - 1
     differences_db = fit.parameters[1:frequency_count] - fit.parameters[0]
     standard_errors_db = np.sqrt(
@@ -88,21 +97,21 @@ def compute_tobit_contrasts(
     )
 
 
-def fit_tobit(values_db: FloatArray, is_cut: NDArray[np.bool_]) -> TobitFit:
-    """Fit the Tobit model by maximum likelihood (L-BFGS-B). values_db: (n, k), dB, NaN for a gap; cut: (n, k). Each
-    column needs a value that is not cut. Raises LinAlgError where the Hessian is singular."""
+def fit_tobit(values_db: FloatArray, is_censored: NDArray[np.bool_]) -> TobitFit:
+    """Fit the Tobit model by maximum likelihood (L-BFGS-B). values_db: (n, k), dB, NaN for a gap; is_censored: (n,
+    k). Each column needs an uncensored value. Raises LinAlgError where the Hessian is singular."""
     frequency_count = values_db.shape[1]
     start_parameters = np.concatenate([np.nanmean(values_db, axis=0), [0.7, 0.7]])
 
     def compute_cost(parameters: FloatArray) -> float:
-        return -_compute_log_likelihood(parameters, values_db, is_cut)
+        return -_compute_log_likelihood(parameters, values_db, is_censored)
 
     bounds = [(None, None)] * frequency_count + [LOG_SD_BOUNDS] * 2
     solution = minimize(
         compute_cost, start_parameters, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-12, "gtol": 1e-6}
     )
     steps = DIFFERENCE_STEP * np.eye(frequency_count + 2)
-    curvature = (
+    hessian = (
         np.array(
             [
                 [_compute_second_difference(compute_cost, solution.x, row_step, column_step) for column_step in steps]
@@ -120,7 +129,7 @@ def fit_tobit(values_db: FloatArray, is_cut: NDArray[np.bool_]) -> TobitFit:
         ]
     )
     covariance = np.zeros((frequency_count + 2, frequency_count + 2))
-    covariance[np.ix_(is_free, is_free)] = np.linalg.inv(curvature[np.ix_(is_free, is_free)])
+    covariance[np.ix_(is_free, is_free)] = np.linalg.inv(hessian[np.ix_(is_free, is_free)])
     return TobitFit(solution.x, covariance, -float(solution.fun))
 
 
@@ -136,11 +145,18 @@ def _compute_second_difference(
     ) / 4.0
 
 
-def _compute_log_likelihood(parameters: FloatArray, values_db: FloatArray, is_cut: NDArray[np.bool_]) -> float:
-    """Compute the log-likelihood of the module's model at `parameters` (k + 2,); gaps contribute nothing."""
+def _compute_log_likelihood(parameters: FloatArray, values_db: FloatArray, is_censored: NDArray[np.bool_]) -> float:
+    """Compute the log-likelihood of the Tobit model at `parameters` (k + 2,), see `TobitFit`; gaps contribute
+    nothing."""
     frequency_count = values_db.shape[1]
-    person_sd, error_sd = math.exp(parameters[frequency_count]), math.exp(parameters[frequency_count + 1])
-    z = (values_db[:, :, None] - parameters[:frequency_count, None] - person_sd * QUADRATURE_NODES) / error_sd
-    log_density = -0.5 * z**2 - math.log(error_sd) - 0.5 * math.log(2.0 * math.pi)
-    log_likelihoods = np.where(np.isnan(z), 0.0, np.where(is_cut[:, :, None], log_ndtr(-z), log_density))
+    sd_people, sd_error = math.exp(parameters[frequency_count]), math.exp(parameters[frequency_count + 1])
+    standardised_residual = (
+        values_db[:, :, None] - parameters[:frequency_count, None] - sd_people * QUADRATURE_NODES
+    ) / sd_error
+    log_density = -0.5 * standardised_residual**2 - math.log(sd_error) - 0.5 * math.log(2.0 * math.pi)
+    log_likelihoods = np.where(
+        np.isnan(standardised_residual),
+        0.0,
+        np.where(is_censored[:, :, None], log_ndtr(-standardised_residual), log_density),
+    )
     return float(logsumexp(log_likelihoods.sum(axis=1), b=QUADRATURE_WEIGHTS / math.sqrt(2.0 * math.pi), axis=1).sum())

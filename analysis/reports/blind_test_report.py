@@ -7,7 +7,7 @@ proposed experiments, the controls, and the method. `analysis.evaluation.blind_t
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from analysis.evaluation.blind_test.confidence_intervals import Figure
+from analysis.evaluation.blind_test.confidence_intervals import IntervalEstimate
 from analysis.evaluation.blind_test.control_claims import ControlOutcome
 from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Outcome
@@ -144,7 +144,7 @@ def _make_miss_table(misses: Sequence[Outcome]) -> Table:
 def _make_figure_table(score: Score) -> Table:
     """Table of all scores with 95 % intervals, the expected calibration error last."""
     calibration = score.calibration
-    calibration_figure = Figure(
+    calibration_figure = IntervalEstimate(
         "expected calibration error, 10 bins of equal count", calibration.error, calibration.low, calibration.high,
         sum(probability_bin.of for probability_bin in calibration.bins),
     )  # fmt: skip

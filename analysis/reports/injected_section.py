@@ -7,7 +7,7 @@ and by recording, and every miss. `analysis.evaluation.blind_test.injected` judg
 
 from collections.abc import Sequence
 
-from analysis.evaluation.blind_test.confidence_intervals import Figure
+from analysis.evaluation.blind_test.confidence_intervals import IntervalEstimate
 from analysis.evaluation.blind_test.injected import (
     ANSWER_CLASSES,
     DETECTABLE,
@@ -98,7 +98,7 @@ def _format_change(change: float | None) -> str:
     return "unknown" if change is None else f"{change:.2f}"
 
 
-def format_rate(rate: Figure) -> str:
+def format_rate(rate: IntervalEstimate) -> str:
     """Format a share with its 95 % interval and number of cases: 88 % [69, 96] of 24; "none was drawn" without
     cases."""
     if rate.value is None or rate.low is None or rate.high is None:

@@ -1,7 +1,8 @@
 """Catalogue of all effects that a diagnosis can name and a simulation can include.
 
-Each module defines one `EFFECT`. A new effect needs its own module, an entry here and its name in
-`equalizer.plant.effect_vocabulary`, in the same order.
+Each module that is imported here defines one `EFFECT`. A new effect needs its own module, an entry here and its name in
+`equalizer.plant.effect_vocabulary`, in the same order. Read by the search for effects (`analysis.diagnosis`) and by
+`equalizer.effects.placing`; exported by `equalizer`.
 """
 
 from equalizer.effects import (
@@ -66,4 +67,4 @@ CATALOGUE: tuple[Effect, ...] = tuple(
 """Effects in the order of `equalizer.plant.effect_vocabulary`."""
 
 EFFECTS: dict[str, Effect] = {effect.name: effect for effect in CATALOGUE}
-"""The same effects by name."""
+"""Effects of `CATALOGUE` by name."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from equalizer.laws.parse import LawError, parse_formula
-from equalizer.laws.tree import Apply, Free, Node, Variable, format_formula, iterate_nodes
+from equalizer.laws.tree import Apply, FreeParameter, Node, Variable, format_formula, iterate_nodes
 
 ActsOn = Literal["force", "command", "response"]
 KINDS: tuple[ActsOn, ...] = get_args(ActsOn)
@@ -38,7 +38,7 @@ class Law:
             raise LawError(f"a law acts on {', '.join(KINDS)}; not on '{self.acts_on}'")
         if not self.axis:
             raise LawError("the law does not state the axis on which it acts; state its axis")
-        used_indices = {node.index for node in iterate_nodes(self.tree) if isinstance(node, Free)}
+        used_indices = {node.index for node in iterate_nodes(self.tree) if isinstance(node, FreeParameter)}
         if used_indices != set(range(len(self.numbers))):
             parameter_names = ", ".join(f"p{index}" for index in sorted(used_indices)) or "none"
             raise LawError(f"the law names the free numbers {parameter_names}, but {len(self.numbers)} are given")
@@ -47,7 +47,7 @@ class Law:
 
     @property
     def tree(self) -> Node:
-        """Syntax tree of the expression; its free parameters are nodes `Free` with their index."""
+        """Syntax tree of the expression; its free parameters are nodes `FreeParameter` with their index."""
         return parse_formula(self.expression, template=True)[0]
 
     @property
@@ -100,7 +100,7 @@ def find_parameter_roles(tree: Node) -> dict[int, Role]:
 
 def _collect_roles(node: Node, role: Role, role_by_index: dict[int, Role]) -> None:
     """Add the roles of the parameters in an expression, which itself has the role `role`, to `role_by_index`."""
-    if isinstance(node, Free):
+    if isinstance(node, FreeParameter):
         role_by_index.setdefault(node.index, role)
         return
     if not isinstance(node, Apply):

@@ -15,7 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from equalizer.laws.tree import Apply, Free, Node, Number, Variable
+from equalizer.laws.tree import Apply, FreeParameter, Node, Number, Variable
 
 FUNCTIONS: Mapping[str, int] = {
     "sin": 1, "cos": 1, "tan": 1, "exp": 1, "log": 1, "sqrt": 1, "abs": 1, "sign": 1, "tanh": 1, "atan": 1,
@@ -78,7 +78,7 @@ class _Reader:
         if isinstance(value, int) or self.template:
             return Number(number)
         self.numbers.append(number)
-        return Free(len(self.numbers) - 1)
+        return FreeParameter(len(self.numbers) - 1)
 
     def _read_name(self, node: ast.expr, name: str) -> Node:
         """A signal, pi, or a free parameter (in a template only)."""
@@ -87,7 +87,7 @@ class _Reader:
         if parameter_match := re.fullmatch(r"p(\d{1,3})", name):
             if not self.template:
                 raise LawError(f"{self._describe_position(node)} stands for a free number; write the number itself")
-            return Free(int(parameter_match[1]))
+            return FreeParameter(int(parameter_match[1]))
         if name in FUNCTIONS:
             raise LawError(f"{self._describe_position(node)} is a function; it takes its arguments in parentheses")
         return Variable(name)

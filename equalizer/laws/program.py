@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from equalizer.laws.parse import LawError
-from equalizer.laws.tree import Apply, Free, Node, Number, Variable
+from equalizer.laws.tree import Apply, FreeParameter, Node, Number, Variable
 from equalizer.signals.signal import FloatArray
 
 CODES = (
@@ -61,7 +61,7 @@ def _append_formula(tree: Node, program: Program, signals: Mapping[str, int]) ->
     match tree:
         case Number(value):
             return _append_row(program, "number", value)
-        case Free(place):
+        case FreeParameter(place):
             return replace(_append_row(program, "number", np.nan), free=(*program.free, (len(program.codes), place)))
         case Variable("pi"):
             return _append_row(program, "number", np.pi)

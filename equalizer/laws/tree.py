@@ -21,8 +21,8 @@ class Number:
 
 
 @dataclass(frozen=True, slots=True)
-class Free:
-    """A free parameter `p0`, `p1`, …, whose value a fit may change. index: 0, 1, …."""
+class FreeParameter:
+    """A free parameter `p0`, `p1`, …, whose value a fit may change. index: its number in the law, from 0."""
 
     index: int
 
@@ -43,7 +43,7 @@ class Apply:
     arguments: tuple["Node", ...]
 
 
-Node = Number | Free | Variable | Apply
+Node = Number | FreeParameter | Variable | Apply
 
 
 def iterate_nodes(tree: Node) -> Iterator[Node]:
@@ -64,7 +64,7 @@ def _format_node(tree: Node, numbers: Sequence[float] | None, digits: int | None
     match tree:
         case Number(value):
             return _format_signed(repr(float(value)).removesuffix(".0"))
-        case Free(index):
+        case FreeParameter(index):
             return (
                 (f"p{index}", _ATOM) if numbers is None else _format_signed(_format_free_number(numbers[index], digits))
             )
@@ -84,19 +84,24 @@ def _format_free_number(value: float, digits: int | None) -> str:
 
 
 def _format_signed(text: str) -> tuple[str, int]:
+    """The text of a number and its precedence: that of a sign for a negative number."""
     return text, _SIGN if text.startswith("-") else _ATOM
 
 
 def _format_negated(text: str, precedence: int) -> tuple[str, int]:
+    """Text and precedence of the negated operand, given its text and precedence; a double sign is removed."""
     if precedence < _PRODUCT:
         return f"-({text})", _SIGN
     return (text[1:], min(precedence, _SIGN)) if text.startswith("-") else (f"-{text}", min(precedence, _SIGN))
 
 
 _OPERATORS = {"+": _SUM, "-": _SUM, "*": _PRODUCT, "/": _PRODUCT, "**": _POWER}
+"""Precedence of the binary operators."""
 
 
 def _format_operation(name: str, left: tuple[str, int], right: tuple[str, int]) -> tuple[str, int]:
+    """Text and precedence of a binary operation. left, right: text and precedence of the operands. For a negative
+    second operand, `a + -b` is written `a - b`, and `a * -b` as `a*(-b)`."""
     precedence = _OPERATORS[name]
     if name == "**":
         return f"{_parenthesise(left, _ATOM)}**{_parenthesise(right, _SIGN)}", precedence
@@ -109,5 +114,6 @@ def _format_operation(name: str, left: tuple[str, int], right: tuple[str, int]) 
 
 
 def _parenthesise(formatted: tuple[str, int], min_precedence: int) -> str:
+    """The text, in parentheses if its precedence is below `min_precedence`. formatted: text and precedence."""
     text, precedence = formatted
     return text if precedence >= min_precedence else f"({text})"

@@ -7,7 +7,7 @@ parameter. Called by `equalizer.effects.discovered_law`.
 
 from collections.abc import Mapping, Sequence
 
-from equalizer.laws.tree import Apply, Free, Node, Number, Variable
+from equalizer.laws.tree import Apply, FreeParameter, Node, Number, Variable
 from equalizer.signals.unit_system import LINEAR, UnitSystem
 
 Dimension = tuple[float, float, float]
@@ -102,7 +102,7 @@ class _DimensionSolver:
         match node:
             case Number() | Variable("pi"):
                 return literal
-            case Free(index):
+            case FreeParameter(index):
                 return self.dimensions.get(index)
             case Variable(name):
                 return self.signals.get(name)
@@ -131,7 +131,7 @@ class _DimensionSolver:
         match node:
             case Number(value):
                 return value
-            case Free(index):
+            case FreeParameter(index):
                 return self.numbers[index]
             case Apply("neg", (inner,)):
                 magnitude = self._evaluate_exponent(inner)
@@ -141,7 +141,7 @@ class _DimensionSolver:
     def assign_dimension(self, node: Node, dimension: Dimension | None) -> None:
         """Pass the required dimension of an expression (None: not known) down to its parameters."""
         match node:
-            case Free(index):
+            case FreeParameter(index):
                 if dimension is not None:
                     self.dimensions.setdefault(index, dimension)
             case Apply("+" | "-" | "minimum" | "maximum" | "neg" | "abs", parts):

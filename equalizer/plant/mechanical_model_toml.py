@@ -81,7 +81,7 @@ def parse_mechanical_model(text: str) -> MechanicalModel:
 
 
 def format_mechanical_model(model: MechanicalModel) -> str:
-    """The model as TOML text, from which `parse_mechanical_model` reads the same values."""
+    """Format a model as TOML text, from which `parse_mechanical_model` reads the same values."""
     lines = ["[model]", f"name = {_format_value(model.name)}", f"quantity = {_format_value(model.quantity)}"]
     if model.rotational:
         lines.append("rotational = true")
@@ -103,7 +103,7 @@ def format_mechanical_model(model: MechanicalModel) -> str:
 
 
 def _convert_dates_to_text(value: Any) -> Any:
-    """The value with dates and times as ISO 8601 text: TOML has them, but results quote the provenance in JSON."""
+    """Convert dates and times in a value to ISO 8601 text: TOML has them, JSON results with the provenance do not."""
     if isinstance(value, dict):
         return {key: _convert_dates_to_text(entry) for key, entry in value.items()}
     if isinstance(value, list):
@@ -112,8 +112,8 @@ def _convert_dates_to_text(value: Any) -> Any:
 
 
 def _read_units(provenance: Mapping[str, Any]) -> UnitSystem | None:
-    """The unit system in the provenance, as `format_mechanical_model` writes it; None where there is none, that is for
-    SI."""
+    """Read the unit system in the provenance, as `format_mechanical_model` writes it; None where it is missing, which
+    means SI units."""
     stored_units = provenance.get(UNITS)
     stored_texts = (
         {key: value for key, value in stored_units.items() if isinstance(value, str)}
@@ -209,7 +209,7 @@ def _read_effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
                 "or left out for all axes"
             )
         effects.append(ModelEffect(kind, entry.get("axis") or None, numbers, law))
-    return () if problems else tuple(_with_float_parameters(effect) for effect in effects)
+    return () if problems else tuple(_convert_parameters_to_float(effect) for effect in effects)
 
 
 _LAW_KEYS = ("acts_on", "expression")
@@ -233,8 +233,8 @@ def _list_law_entries(effect: ModelEffect) -> dict[str, str]:
     return {} if effect.law is None else {"acts_on": effect.law.acts_on, "expression": effect.law.exact_text}
 
 
-def _with_float_parameters(effect: ModelEffect) -> ModelEffect:
-    """The effect with whole-number parameters converted to float."""
+def _convert_parameters_to_float(effect: ModelEffect) -> ModelEffect:
+    """Return the effect with all parameters as float; TOML integers are read as int."""
     numbers = {key: float(value) for key, value in effect.parameters.items()}
     return ModelEffect(effect.kind, effect.axis, numbers, effect.law)
 
@@ -285,8 +285,10 @@ def _format_value(value: Any) -> str:
         case float():
             return repr(float(value))
         case list() | tuple():
-            return f"[{', '.join(_format_value(part) for part in value if part is not None)}]"
+            return f"[{', '.join(_format_value(entry) for entry in value if entry is not None)}]"
         case Mapping():
-            parts = (f"{_format_key(key)} = {_format_value(part)}" for key, part in value.items() if part is not None)
-            return f"{{ {', '.join(parts)} }}" if value else "{}"
+            entries = (
+                f"{_format_key(key)} = {_format_value(entry)}" for key, entry in value.items() if entry is not None
+            )
+            return f"{{ {', '.join(entries)} }}" if value else "{}"
     raise TypeError(f"a value of type {type(value).__name__} cannot be written as TOML: {value!r}")

@@ -1,8 +1,11 @@
 """Lock-in detection: amplitude and phase of a sinusoid of known frequency in noisy samples, by linear least squares.
 
-Each channel is modelled as an offset, a linear drift, a fundamental and its harmonics, h = 1 to their number:
+Each channel is modelled as an offset, a linear drift, a fundamental and its harmonics, h = 1, 2, ...:
 
     x(t) = c + d t + sum over h of Re(a_h exp(2 pi i h f t))
+
+Used for the acceleration that a stimulus caused (`study.session.stimulus.delivered`) and for its ellipses
+(`analysis.psychophysics.ellipsoid`).
 """
 
 import numpy as np
@@ -10,13 +13,15 @@ import numpy as np
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 
-def phasors(samples: FloatArray, sample_rate_hz: float, frequency_hz: float, harmonics: int = 1) -> ComplexArray:
-    """Amplitude phasors a_h of the fundamental and its harmonics, fitted together with an offset and a linear drift.
+def estimate_phasors(
+    samples: FloatArray, sample_rate_hz: float, frequency_hz: float, harmonics: int = 1
+) -> ComplexArray:
+    """Estimate the complex amplitudes (phasors) a_h of the fundamental and its harmonics.
 
-    samples: (n, channels). Returns (harmonics, channels), in the unit of the samples: row h - 1 is a_h, time 0 at the
-    first sample. By a fit, not a sum over periods: the samples need not cover whole periods, and rows with a NaN
-    (missed ticks) are left out. Raises ValueError where the other rows cover less than one period, or a harmonic lies
-    at or above half the sample rate.
+    samples: (n, channels). harmonics: number of components, with the fundamental. Returns (harmonics, channels), in the
+    unit of the samples: row h - 1 is a_h, with t = 0 at the first sample. Because offset, drift and components are
+    fitted together, the samples need not cover whole periods, and rows with a NaN (missed samples) are left out. Raises
+    ValueError where the other rows cover less than one period, or a harmonic lies at or above half the sample rate.
     """
     is_complete = np.isfinite(samples).all(axis=1)
     if not covers_a_period(int(is_complete.sum()), sample_rate_hz, frequency_hz):
@@ -25,14 +30,14 @@ def phasors(samples: FloatArray, sample_rate_hz: float, frequency_hz: float, har
         )
     if harmonics * frequency_hz >= sample_rate_hz / 2:
         raise ValueError(f"harmonic {harmonics} of {frequency_hz} Hz is not below half of {sample_rate_hz} Hz")
-    samples, ticks = samples[is_complete], np.flatnonzero(is_complete)
-    n = len(ticks)
-    t = ticks / sample_rate_hz
-    drift = ticks / ticks[-1] - 0.5
-    angles = 2 * np.pi * frequency_hz * t[:, None] * np.arange(1, harmonics + 1)
+    samples, row_indices = samples[is_complete], np.flatnonzero(is_complete)
+    n = len(row_indices)
+    time_s = row_indices / sample_rate_hz
+    drift = row_indices / row_indices[-1] - 0.5
+    angles = 2 * np.pi * frequency_hz * time_s[:, None] * np.arange(1, harmonics + 1)
     basis = np.hstack([np.ones((n, 1)), drift[:, None], np.cos(angles), -np.sin(angles)])
-    fitted = np.linalg.lstsq(basis, samples, rcond=None)[0][2:]
-    return np.asarray(fitted[:harmonics] + 1j * fitted[harmonics:], dtype=np.complex128)
+    coefficients = np.linalg.lstsq(basis, samples, rcond=None)[0][2:]
+    return np.asarray(coefficients[:harmonics] + 1j * coefficients[harmonics:], dtype=np.complex128)
 
 
 def covers_a_period(n: int, sample_rate_hz: float, frequency_hz: float) -> bool:

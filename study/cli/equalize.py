@@ -1,4 +1,8 @@
-"""`hapteq equalize`: the forces that make the handle accelerate as wanted."""
+"""Command `hapteq equalize`: compute the feedforward forces for which the handle tracks an acceleration trajectory.
+
+Options and output only. The forces are computed by `study.workflows.equalizer.equalize_trajectory`, and improved by
+repeated plays on the device (iterative learning, `--repeat`) by `study.workflows.equalizer.repeat_trajectory`.
+"""
 
 import json
 from pathlib import Path
@@ -49,7 +53,8 @@ def equalize(
 ) -> None:
     """Compute the forces (time_s,fx,fy,fz) that give wanted accelerations (time_s,ax,ay,az), row by row.
 
-    Models of several places are interpolated at --at; a narrow and a wide one of one place play three bands.
+    Models of several places are interpolated at --at. Of one place, a narrow-band and a wide-band model may be given;
+    the forces are then computed in three frequency bands.
     """
     from study.workflows.equalizer.equalize_trajectory import EqualizePlan
     from study.workflows.equalizer.repeat_trajectory import RepeatOrder
@@ -60,12 +65,13 @@ def equalize(
     summary, lines = (
         _equalize_once(plan)
         if repeat is None or device is None
-        else _play_repeatedly(plan, RepeatOrder(repeat, device, earlier, seed), hands_off)
+        else _repeat_on_device(plan, RepeatOrder(repeat, device, earlier, seed), hands_off)
     )
     typer.echo(json.dumps(summary, indent=2) if as_json else "\n".join((str(out), *lines)))
 
 
 def _check_arguments(files: list[Path], repeat: int | None, device: str | None, earlier: Path | None) -> None:
+    """Raise WrongUseError for missing models or table, and for options that need each other."""
     from study.errors import WrongUseError
 
     if len(files) < 2 or files[-1].suffix.lower() in (".h5", ".hdf5"):
@@ -83,6 +89,7 @@ def _check_arguments(files: list[Path], repeat: int | None, device: str | None, 
 
 
 def _equalize_once(plan: "EqualizePlan") -> "tuple[dict[str, Any], tuple[str, ...]]":
+    """Compute and write the forces. Returns the summary for JSON, and the same as lines of text."""
     from study.workflows.equalizer.equalize_trajectory import equalize_trajectory
     from study.workflows.equalizer.equalized_summary import format_equalization_lines, summarise_equalization
 
@@ -90,9 +97,12 @@ def _equalize_once(plan: "EqualizePlan") -> "tuple[dict[str, Any], tuple[str, ..
     return summarise_equalization(equalized), format_equalization_lines(equalized)
 
 
-def _play_repeatedly(
+def _repeat_on_device(
     plan: "EqualizePlan", order: "RepeatOrder", hands_off: bool
 ) -> "tuple[dict[str, Any], tuple[str, ...]]":
+    """Compute the forces, play them on the device and correct them by the measured error, `order.repeats` times.
+    Returns the summary for JSON, and the same as lines of text. hands_off: whether the user has confirmed that no
+    person holds the handle."""
     from functools import partial
 
     from study.cli.progress import show_late_bar

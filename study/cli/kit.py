@@ -1,4 +1,8 @@
-"""`hapteq kit`: a laboratory's own blind test of the diagnosis, on a device that is changed on purpose."""
+"""Commands `hapteq kit`: a laboratory's own blind test of the diagnosis, on a device that is changed on purpose.
+
+Three steps: `draw` writes a table with the changes in random order, `seal` hashes the completed table before the
+diagnosis, `score` compares the diagnoses with it (docs/kit.md).
+"""
 
 from pathlib import Path
 from typing import Annotated
@@ -34,8 +38,8 @@ def draw(
     labels = draw_labels(out, repeats, seed)
     typer.echo(f"{len(labels)} recordings, {labels[0].recording} to {labels[-1].recording}: {out}")
     for change in CHANGES:
-        number = f" Write down the number, in {change.unit}, where you know it." if change.unit else ""
-        typer.echo(f"  {change.name}: {change.instruction}{number}")
+        number_request = f" Write down the number, in {change.unit}, where you know it." if change.unit else ""
+        typer.echo(f"  {change.name}: {change.instruction}{number_request}")
 
 
 @app.command("seal")

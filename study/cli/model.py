@@ -1,4 +1,7 @@
-"""`hapteq model`: a first mechanical model, without a file written by hand."""
+"""Command `hapteq model`: fit a mechanical model (masses, dampers, springs) to recordings of a device.
+
+Options and output only; `study.workflows.diagnosis.fit_first_model` fits the model and writes the file.
+"""
 
 import json
 from pathlib import Path

@@ -1,4 +1,8 @@
-"""`hapteq study`: take the study, as a person or as a simulated participant."""
+"""Command `hapteq study`: runs a new session of a study, with a person or a simulated participant.
+
+In a terminal, the session is shown on full screens; with `--plain`, without a terminal or with a simulated participant,
+line by line. Modules of the session are imported when the command runs, so that `hapteq --help` starts quickly.
+"""
 
 from pathlib import Path
 from typing import Annotated
@@ -45,14 +49,16 @@ def study(
         from study.tui.engine.to_engine import BeginSession, SessionOrder
 
         equalizer = "" if model is None else str(model)
-        order = None if subject is None else SessionOrder(protocol, device, subject, str(data), seed, equalizer)
-        first = None if order is None else BeginSession(order)
-        open_screen(AppStart(str(data), device, answer_keys, first, protocol, seed, equalizer), as_json)
+        session_order = None if subject is None else SessionOrder(protocol, device, subject, str(data), seed, equalizer)
+        begin_message = None if session_order is None else BeginSession(session_order)
+        open_screen(AppStart(str(data), device, answer_keys, begin_message, protocol, seed, equalizer), as_json)
         return
     from study.cli.conduct import SittingOptions, run_new_session
 
     if observer is None and not plain and not has_keys():
         typer.echo("No terminal here: a simulated participant ('ideal') takes the session.", err=True)
         observer = "ideal"
-    sitter = SittingOptions(observer=observer, subject=subject, keys=answer_keys, hands_off=hands_off)
-    run_new_session(sitter, protocol_name=protocol, device=device, data=data, seed=seed, as_json=as_json, model=model)
+    sitting_options = SittingOptions(observer=observer, subject=subject, keys=answer_keys, hands_off=hands_off)
+    run_new_session(
+        sitting_options, protocol_name=protocol, device=device, data=data, seed=seed, as_json=as_json, model=model
+    )

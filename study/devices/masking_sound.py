@@ -1,7 +1,7 @@
 """Masking noise from the computer's sound output, in a seamless loop, so that participants do not hear the device.
 
-The library (PortAudio through sounddevice) is imported only where a protocol asks for noise. It requests the samples in
-its own thread.
+The library sounddevice (PortAudio) is imported only where a protocol requires noise. It requests the samples through a
+callback, in its own thread. Called by `opening.make_masking_sound`.
 """
 
 import contextlib
@@ -15,8 +15,9 @@ from study.errors import DeviceError
 
 Samples = NDArray[np.int16]
 """Samples of the noise, (n,), 16-bit PCM, a single channel."""
-Fill = Callable[[Any, int, Any, Any], None]
-"""fill(out, frames, time, status): write the next samples into out (frames, 1). Called by the library's thread."""
+FillCallback = Callable[[Any, int, Any, Any], None]
+"""Callback of the output stream, fill(out, frames, time, status): writes the next samples into out (frames, 1). Called
+in the library's thread."""
 
 REMEDY = (
     "Install the extra (pip install '.[audio]'; on Linux also the package libportaudio2), connect a sound output and "
@@ -46,27 +47,31 @@ class Stream(Protocol):
 
 
 class MaskingSound:
-    """Masking noise on an opened output. samples (n,): repeated without a gap; rate_hz: their sample rate;
-    open_stream(rate_hz, fill): opens the output, returns it and its name, and raises what the library raises. The
-    constructor raises `DeviceError` where there is no output."""
+    """Masking noise on an opened output.
 
-    def __init__(self, samples: Samples, rate_hz: int, open_stream: Callable[[int, Fill], tuple[Stream, str]]) -> None:
+    samples: (n,), repeated without a gap. rate_hz: their sample rate. open_stream(rate_hz, fill): opens the output and
+    returns it and its name; any exception of the library becomes a `DeviceError`. `output`: name of the output.
+    """
+
+    def __init__(
+        self, samples: Samples, rate_hz: int, open_stream: Callable[[int, FillCallback], tuple[Stream, str]]
+    ) -> None:
         self._samples, self._next_sample = samples, 0
         self._playing = False
-        with _as_device_error("cannot be played"):
-            self._stream, self.output = open_stream(rate_hz, self._fill)
+        with _convert_to_device_error("cannot be played"):
+            self._stream, self.output = open_stream(rate_hz, self._fill_buffer)
 
     def start(self) -> None:
         """Play from the beginning. Raises `DeviceError`."""
         self._next_sample = 0
-        with _as_device_error("cannot be played"):
+        with _convert_to_device_error("cannot be played"):
             self._stream.start()
             self._playing = True
         self.check()
 
     def check(self) -> None:
         """Raise `DeviceError` where no noise is played: not started, stopped, or the output was unplugged."""
-        with _as_device_error("has stopped"):
+        with _convert_to_device_error("has stopped"):
             if not self._playing or not self._stream.active:
                 raise OSError(f"{self.output} plays no more" if self._playing else f"{self.output} plays nothing")
 
@@ -85,14 +90,14 @@ class MaskingSound:
         with contextlib.suppress(Exception):
             self._stream.close()
 
-    def _fill(self, buffer: Any, frames: int, time: Any, status: Any) -> None:
+    def _fill_buffer(self, buffer: Any, frames: int, time: Any, status: Any) -> None:
         """Write the next samples, continuing at the beginning after the last one."""
         sample_indices = (self._next_sample + np.arange(frames)) % len(self._samples)
         buffer[:, 0] = self._samples[sample_indices]
         self._next_sample = (self._next_sample + frames) % len(self._samples)
 
 
-def open_stream(rate_hz: int, fill: Fill) -> tuple[Stream, str]:
+def open_stream(rate_hz: int, fill: FillCallback) -> tuple[Stream, str]:
     """Open the system's default output: the stream and its name. Raises ImportError without the library, and what the
     library raises."""
     import sounddevice
@@ -102,8 +107,9 @@ def open_stream(rate_hz: int, fill: Fill) -> tuple[Stream, str]:
 
 
 @contextlib.contextmanager
-def _as_device_error(symptom: str) -> Iterator[None]:
-    """Context that converts any exception to a `DeviceError`, because the library's errors have no common class."""
+def _convert_to_device_error(symptom: str) -> Iterator[None]:
+    """Context manager that converts any exception to a `DeviceError`, because the library's errors have no common
+    class. symptom: predicate of the message, such as "has stopped"."""
     try:
         yield
     except Exception as error:

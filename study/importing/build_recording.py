@@ -26,7 +26,7 @@ from study.importing.map_format.import_map import ChannelMap, ComputedMap, Impor
 from study.importing.map_format.map_errors import ImportProblemError, ImportRefusedError
 from study.importing.map_format.map_files import PartFiles, assign_files
 from study.importing.map_format.map_segments import place_segments
-from study.importing.part_signals import Key, PartSignals, resample_part
+from study.importing.part_signals import ChannelKey, PartSignals, resample_part
 from study.importing.time_base import PLACEHOLDER_RATE_HZ, drop_doubled_rows, make_time_base
 
 _MAX_LISTED_PARTS = 3
@@ -160,7 +160,7 @@ class _ChannelUnit:
     quantity: str
 
 
-def _parse_units(import_map: ImportMap) -> dict[Key, _ChannelUnit]:
+def _parse_units(import_map: ImportMap) -> dict[ChannelKey, _ChannelUnit]:
     """Units of all channels; helpers are not written and need none. Raises ImportProblemError."""
     channels: tuple[ChannelMap | ComputedMap, ...] = (*import_map.channel, *import_map.computed)
     return {
@@ -192,7 +192,7 @@ def _list_unit_remarks(import_map: ImportMap) -> Iterator[str]:
         yield f"No time is known: samples are numbered, at {PLACEHOLDER_RATE_HZ:g} Hz."
 
 
-def _concatenate(import_map: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]) -> Recording:
+def _concatenate(import_map: ImportMap, parts: Sequence[_Part], units: dict[ChannelKey, _ChannelUnit]) -> Recording:
     """The recording of all parts, one after another. Raises ImportProblemError for different rates, or without command
     or response."""
     _require_one_rate(parts)
@@ -238,7 +238,7 @@ def _require_one_rate(parts: Sequence[_Part]) -> None:
 
 
 def _join_signal(
-    role: str, import_map: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]
+    role: str, import_map: ImportMap, parts: Sequence[_Part], units: dict[ChannelKey, _ChannelUnit]
 ) -> Signal | None:
     """All channels of a role in SI units, with parts concatenated; None without a channel of the role."""
     channels: tuple[ChannelMap | ComputedMap, ...] = (*import_map.channel, *import_map.computed)
@@ -260,7 +260,7 @@ def _join_signal(
 
 
 def _collect_facts_and_segments(
-    import_map: ImportMap, parts: Sequence[_Part], units: dict[Key, _ChannelUnit]
+    import_map: ImportMap, parts: Sequence[_Part], units: dict[ChannelKey, _ChannelUnit]
 ) -> tuple[list[dict[str, Any]], tuple[Segment, ...]]:
     """Facts of each part with its range of samples, and segments of all parts by samples of the recording. Amplitudes
     are converted to SI where all commands have the same factor."""

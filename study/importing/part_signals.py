@@ -24,16 +24,16 @@ _COMMAND_ADVICE = (
 )
 """Advice on the resampling of commands and on the matching `hold` of the map."""
 
-Key = tuple[str, str]
+ChannelKey = tuple[str, str]
 """Role and name of a channel."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PartSignals:
-    """Signals of one part on one grid, in the units of the map."""
+    """Channels of one part on a common time grid, in the units of the map."""
 
     grid: Grid
-    columns: Mapping[Key, FloatArray]
+    columns: Mapping[ChannelKey, FloatArray]
     """Samples by role and name, each (grid.count,); computed channels included."""
 
 
@@ -57,8 +57,8 @@ def resample_part(
     report: Callable[[str], None],
     on_channel: Callable[[], None],
 ) -> PartSignals:
-    """Put the channels of one part on its grid. `report` is called with a sentence for each deviation from the file,
-    `on_channel` after each channel. loggers: aligned to the first. Raises ImportProblemError."""
+    """Resample the channels of one part to a common time grid. `report` is called with a sentence for each deviation
+    from the file, `on_channel` after each channel. loggers: aligned to the first. Raises ImportProblemError."""
     logger_by_clock = {logger.clock.name: logger for logger in loggers}
     first_clock = loggers[0].clock.name
     sources: list[tuple[ChannelMap, Samples]] = []
@@ -67,7 +67,7 @@ def resample_part(
         values = _read_values(channel, logger, import_map)
         sources.append((channel, logger.base.make_samples(values)))
     grid = _make_grid(import_map, part, loggers, [samples for _, samples in sources])
-    columns: dict[Key, FloatArray] = {}
+    columns: dict[ChannelKey, FloatArray] = {}
     for channel, samples in sources:
         columns[channel.role, channel.name] = _put_on_grid(channel, samples, grid, report)
         on_channel()
@@ -85,8 +85,8 @@ def resample_part(
 
 
 def _read_values(channel: ChannelMap, logger: Logger, import_map: ImportMap) -> Value:
-    """Samples of a channel on its own clock; a single number is repeated. Raises ImportProblemError for another shape
-    or length, or infinite values."""
+    """Read the samples of a channel on its own clock; a single number is repeated. Raises ImportProblemError for
+    another shape or length, or infinite values."""
     subject = f"channel '{channel.name}'"
     try:
         values = logger.names.compute_value(channel.value, logger.base)
@@ -108,8 +108,8 @@ def _read_values(channel: ChannelMap, logger: Logger, import_map: ImportMap) -> 
 
 
 def _count_samples(logger: Logger, import_map: ImportMap) -> int:
-    """Number of samples of a clock: that of its stamps, otherwise of its first channel that is not constant; 0 without
-    one."""
+    """Count the samples of a clock: those of its time stamps, otherwise those of its first channel that is not
+    constant; 0 without one."""
     if logger.base.stamps_s is not None:
         return len(logger.base.stamps_s)
     first_clock = import_map.clock[0].name
@@ -122,7 +122,7 @@ def _count_samples(logger: Logger, import_map: ImportMap) -> int:
 
 
 def _make_grid(import_map: ImportMap, part: PartMap, loggers: tuple[Logger, ...], sources: list[Samples]) -> Grid:
-    """Grid over the time range common to all channels, at the stated rate or the highest of the clocks. Raises
+    """Make the grid over the time range common to all channels, at the stated rate or the highest of the clocks. Raises
     ImportProblemError for uneven stamps without a stated rate, and for too many or too few samples."""
     uneven_loggers = [logger for logger in loggers if not logger.base.rate_hz]
     if uneven_loggers and not import_map.rate_hz:
@@ -158,7 +158,7 @@ def _make_grid(import_map: ImportMap, part: PartMap, loggers: tuple[Logger, ...]
 
 
 def _put_on_grid(channel: ChannelMap, samples: Samples, grid: Grid, report: Callable[[str], None]) -> FloatArray:
-    """Samples of a channel on the grid (grid.count,): copied where they lie on it, otherwise resampled. Raises
+    """Put the samples of a channel on the grid (grid.count,): copied where they lie on it, otherwise resampled. Raises
     ImportProblemError where the map does not state how to resample."""
     first_index = (grid.start_s - float(samples.times_s[0])) * grid.rate_hz
     if _has_same_rate(samples, grid) and abs(first_index - round(first_index)) < TIME_TOLERANCE:

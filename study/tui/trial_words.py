@@ -8,7 +8,7 @@ from typing import Literal
 
 from protocols.trial import Phase
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.facts.void_reasons import ACCELERATION_MISSING, SCREEN_SILENT, is_computer_busy
+from study.session.facts.void_reasons import ACCELERATION_MISSING, SCREEN_UNRESPONSIVE, is_computer_busy
 from study.session.views.form_views import Form, Limits
 from study.session.views.views import DemoMenu, Progress, Question, Task, Welcome
 
@@ -65,7 +65,7 @@ def describe_void_trial(reason: str, words: Words = ENGLISH_WORDS) -> str:
     """Describe to the participant why a trial was void. reason: as in the session log."""
     if is_computer_busy(reason):
         return words["void_busy"]
-    if reason == SCREEN_SILENT:
+    if reason == SCREEN_UNRESPONSIVE:
         return words["void_screen"]
     if reason.endswith(ACCELERATION_MISSING):
         return words["void_sensor"]

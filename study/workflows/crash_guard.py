@@ -1,16 +1,17 @@
-"""Guard for the runs of users: if an effect or a figure crashes, it is left out and reported, and the run continues.
+"""Exception guard of a diagnosis: an effect or a figure that raises is left out and reported, and the run continues.
 
-In the project's own tests an environment variable turns the guard off, so that every crash is seen.
+Used by `workflows.diagnosis` and `evaluation.real`. The project's own tests turn the guard off by an environment
+variable, so that exceptions propagate.
 """
 
 import os
 
 from analysis.diagnosis.search.guard import Guard
 
-STRICT = "HAPTEQ_STRICT"
-"""Environment variable that turns the guard off, if it is not empty: exceptions then propagate."""
+STRICT_VARIABLE = "HAPTEQ_STRICT"
+"""Name of the environment variable that turns the guard off where it is set and not empty."""
 
 
-def crash_guard() -> Guard:
-    """A new guard, for a single run; see `analysis.diagnosis.search.guard.Guard`."""
-    return Guard(enabled=not os.environ.get(STRICT))
+def make_crash_guard() -> Guard:
+    """Make a guard for a single run; see `analysis.diagnosis.search.guard.Guard`."""
+    return Guard(enabled=not os.environ.get(STRICT_VARIABLE))

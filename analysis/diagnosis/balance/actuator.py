@@ -136,7 +136,7 @@ def find_actuator(
     inverse = InverseBalance(
         search, map_, any(entry.law.effect in HOLDING_LAWS and entry.gain_low > 0 for entry in balance.laws), target
     )
-    replacement = _replace_motion_laws(inverse, kinds, tuple(entry.place for entry in balance.named))
+    replacement = _replace_motion_laws(inverse, kinds, tuple(entry.law_index for entry in balance.named))
     if replacement is not None:
         return replacement
     # Laws of the position are left out where the balance is solved for it: they would reproduce it.

@@ -1,9 +1,9 @@
 """Laws of an actuator, static nonlinearities and slew limits, on grids of parameters that span the command's range.
 
-Laws of the motion are further columns of the regression of the commanded force. The laws in this file change that
-force itself, f = g(u), so that they are tested in the balance solved for the acceleration (`inverse_balance`). All
-constants below are set by hand: a grid need only be so fine that the best of its laws is refined to the true law
-(`vary_parameters`). Called by `actuator`.
+Laws of the motion, such as friction, are further columns of the regression of the commanded force. The laws in this
+file map the command u to the force, f = g(u), so that they are tested in the force balance solved for the acceleration
+(`inverse_balance`). All grids below are chosen by hand: a grid need only be so fine that the search from its best law
+(`vary_parameters`) reaches the true parameters. Called by `actuator`.
 
 Reference: Slotine and Li, Applied Nonlinear Control (1991), chapter 5 (dead zone, saturation, relay).
 """
@@ -51,7 +51,7 @@ class CommandLaw:
     its past) and the position."""
 
     effect: str
-    """Name of the vocabulary, or a new one in the same style for physics that it lacks."""
+    """Name of the effect in `equalizer.plant.effect_vocabulary`, or a new name in the same style where it has none."""
     values: dict[str, float]
     """Its fixed parameters by name, in SI units or relative."""
     columns: Callable[[FloatArray, dict[str, float]], FloatArray]
@@ -68,11 +68,12 @@ class CommandLaw:
 
     @property
     def sloped(self) -> int:
-        """See `inverse_balance.ForceOfCommand`."""
+        """Number of leading columns whose time derivative is a further regressor (a short lag): the first only."""
         return 1
 
     def compute_columns(self, command: FloatArray, position: FloatArray) -> FloatArray:
-        """Compute the columns (n, weights) at command and position (n,) each; in N (N m) only after `scale_to`."""
+        """Compute the columns (n, weights) at command and position (n,) each. A law with a formula gives the force in N
+        (N m) after `scale_to`."""
         columns = self.scale * self.columns(command, self.values)
         return (
             columns if self.position_factor is None else columns * self.position_factor(position, self.values)[:, None]
@@ -124,7 +125,8 @@ def make_command_laws(command: FloatArray) -> Iterator[CommandLaw]:
 def make_slew_laws(commands: Sequence[FloatArray], rate_hz: float) -> Iterator[CommandLaw]:
     """Make slew-rate limits: the output follows the command at a limited rate, as of a servo. commands: (n,) each. The
     rates range from the full stroke within the longest command to its fastest change. A rate is left out where the
-    limited output hardly ever reaches the command, so that only the sign of the command would matter."""
+    limited output rarely reaches the command (`SLEW_REACHED`), because the force would then depend on the command's
+    sign only."""
     fastest_rate = max(float(np.abs(np.diff(command)).max(initial=0.0)) for command in commands) * rate_hz
     slowest_rate = float(np.ptp(np.concatenate(commands))) * rate_hz / max(len(command) for command in commands)
     for rate in (
@@ -211,13 +213,13 @@ def _compute_deadband_force(command: FloatArray, parameters: dict[str, float]) -
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PiecewiseCommandLaw:
-    """A sum of simple functions that approximates every law of a kind: where this sum fits no better than the command
-    itself, the laws of that kind need not be tried."""
+    """A sum of piecewise linear functions that approximates every law of a kind: where this sum fits no better than the
+    command itself, no law of that kind does, and none need be tried."""
 
     columns: Callable[[FloatArray, FloatArray], FloatArray]
     """(n, k) of command and position (n,) each; the command itself first."""
     sloped: int
-    """See `inverse_balance.ForceOfCommand`."""
+    """Number of leading columns whose time derivative is a further regressor: a short lag, to first order."""
 
     def compute_columns(self, command: FloatArray, position: FloatArray) -> FloatArray:
         """Compute the columns (n, k) at command and position (n,) each."""

@@ -1,4 +1,4 @@
-"""The force balance solved for the acceleration: tests of laws of the actuator.
+"""Force balance solved for the acceleration, in which nonlinear laws of the actuator are fitted and compared.
 
 The force balance M a + D v + K x + (laws of the motion) = f(u) is a regression of the command u on the motion. A
 nonlinear actuator f(u) cannot be a regressor there, because u is the predicted quantity. Therefore the balance is
@@ -44,31 +44,41 @@ class ForceOfCommand(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InverseBalance:
-    """A balance solved for the acceleration along its axis, or for the quantity that the command sets."""
+    """Force balance of an axis, solved for the acceleration; for a servo, whose command is a reference position or
+    velocity, solved for that quantity."""
 
     search: StructureSearch
     """The search for laws of the motion, whose regression and base are used here."""
     map_: Mapper
+    """Like `map`; may run in parallel. Maps laws to their errors."""
     has_friction: bool
     """Whether friction is among the laws of the motion: samples at rest are then not used, because static friction
     balances any force up to its level."""
-    target: int | None = None
-    """Order of the position's time derivative that the command sets; None = it is a force."""
+    commanded_order: int | None = None
+    """Order of the position's time derivative that a servo's command is a reference for; None = the command is a
+    force."""
 
     @property
     def solved_column(self) -> int:
-        """Column that the balance is solved for: the quantity that the command sets, else the acceleration."""
+        """Column of the regression that the balance is solved for: the acceleration, or the quantity of a servo's
+        command."""
         regression = self.search.regression
         driven_channel, channel_count = regression.base_terms.driven_channel, len(regression.motions[0].channels)
-        column = driven_channel if self.target is None else (2 - self.target) * channel_count + driven_channel
+        column = (
+            driven_channel
+            if self.commanded_order is None
+            else (2 - self.commanded_order) * channel_count + driven_channel
+        )
         return column if column < regression.matrices else driven_channel
 
     def sum_errors_per_law(self, laws: Sequence[CommandLaw], motion_laws: Sequence[int]) -> list[float]:
-        """Compute `sum_errors` of each law. motion_laws: indices of laws of the motion that are fitted with it."""
+        """Sum the cross-validated squared errors of each law. motion_laws: indices of laws of the motion fitted with
+        it."""
         return cast(list[float], list(self.map_(partial(self.sum_errors, motion_laws=motion_laws), laws)))
 
     def sum_errors(self, law: CommandLaw, motion_laws: Sequence[int]) -> float:
-        """Sum the cross-validated squared errors of one law. motion_laws: see `sum_errors_per_law`."""
+        """Sum the cross-validated squared errors of one law. motion_laws: indices of laws of the motion fitted with
+        it."""
         return float(self.evaluate_law(law, motion_laws, False).sum())
 
     def fit_lower_bound(self, law: ForceOfCommand, motion_laws: Sequence[int]) -> float:
@@ -81,12 +91,12 @@ class InverseBalance:
             for block_sums, block in zip(products, fit, strict=True)
         )
 
-    def evaluate_law(self, law: CommandLaw, laws: Sequence[int], on_held_out: bool) -> FloatArray:
-        """Compute (blocks,): sums of squared errors with one law. laws: of the motion, by index. on_held_out: on the
-        held-out blocks if they are a valid test (`select_test_blocks`); else on each block to fit, with weights fitted
-        to the others (cross-validation)."""
+    def evaluate_law(self, law: CommandLaw, motion_laws: Sequence[int], on_held_out: bool) -> FloatArray:
+        """Compute (blocks,): sums of squared errors with one law. motion_laws: indices of laws of the motion.
+        on_held_out: on the held-out blocks if they are a valid test (`select_test_blocks`); else on each block to fit,
+        with weights fitted to the others (cross-validation)."""
         uses_held_out = on_held_out and select_test_blocks(self.search.regression) is self.search.regression.test
-        fit, test = self._build_blocks(self._build_rows(law, laws), uses_held_out)
+        fit, test = self._build_blocks(self._build_rows(law, motion_laws), uses_held_out)
         columns = list(range(len(fit[0].cross)))
         total = sum_products(fit, columns)
         if uses_held_out:
@@ -113,8 +123,8 @@ class InverseBalance:
         motion."""
         regression = self.search.regression
         motions, solved_column = regression.motions, self.solved_column
-        targets = [columns[:, solved_column] for columns in regression.columns]
-        fit, test = (
+        predicted = [columns[:, solved_column] for columns in regression.columns]
+        fit_masks, test_masks = (
             [
                 motion.mask_valid_samples(mask & is_moving)
                 for motion, mask, is_moving in zip(motions, masks, motion_masks, strict=True)
@@ -122,10 +132,10 @@ class InverseBalance:
             for motion_masks in [self._find_moving_samples()]
             for masks in ([m.fit for m in motions], [m.test for m in motions])
         )
-        mean = float(np.concatenate([target[mask] for target, mask in zip(targets, fit, strict=True)]).mean())
-        units = compute_scale(regressors, fit), mean
-        return build_blocks(regressors, targets, fit, units), build_blocks(
-            regressors, targets, test, units
+        mean = float(np.concatenate([target[mask] for target, mask in zip(predicted, fit_masks, strict=True)]).mean())
+        units = compute_scale(regressors, fit_masks), mean
+        return build_blocks(regressors, predicted, fit_masks, units), build_blocks(
+            regressors, predicted, test_masks, units
         ) if uses_held_out else ()
 
     def _find_moving_samples(self) -> list[Mask]:
@@ -138,13 +148,13 @@ class InverseBalance:
         least_squared_speed = STILL_SHARE * float(np.mean(fit_velocity**2)) if self.has_friction else -1.0
         return [speed**2 > least_squared_speed for speed in speeds]
 
-    def _build_rows(self, law: ForceOfCommand, laws: Sequence[int]) -> list[FloatArray]:
+    def _build_rows(self, law: ForceOfCommand, motion_laws: Sequence[int]) -> list[FloatArray]:
         """Build the columns (n, columns) of each motion: those of the law, their time derivatives, the other axes'
         commands, and the laws of the motion."""
-        regression, rows = self.search.regression, []
+        regression, regressors = self.search.regression, []
         # Columns of the base that are filtered copies of the predicted quantity would reproduce it.
         excluded_columns = {self.solved_column, *range(regression.matrices, regression.base - 1)}
-        law_columns = [column for column in regression.select_columns(laws) if column not in excluded_columns]
+        law_columns = [column for column in regression.select_columns(motion_laws) if column not in excluded_columns]
         for motion, columns in zip(regression.motions, regression.columns, strict=True):
             force = law.compute_columns(
                 motion.force[:, regression.axis], motion.position[:, regression.base_terms.driven_channel]
@@ -153,5 +163,5 @@ class InverseBalance:
             command_columns = np.hstack(
                 [force, np.gradient(force[:, : law.sloped], 1 / motion.rate_hz, axis=0), other_commands]
             )
-            rows.append(np.hstack([motion.decimate(command_columns), columns[:, law_columns]]))
-        return rows
+            regressors.append(np.hstack([motion.decimate(command_columns), columns[:, law_columns]]))
+        return regressors

@@ -1,4 +1,4 @@
-"""A law of a force balance with the result of its test on blocks of samples that its parameters were not fitted to.
+"""A law of a force balance with the result of its test on held-out blocks of samples.
 
 The test compares two sums of squared force errors E over these blocks: of the chosen laws, and of the same laws without
 this one. Its gain is 1 - E(with it) / E(without it); the lower bound of the gain is from a bootstrap over blocks
@@ -33,9 +33,9 @@ own."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JudgedLaw:
-    """A law with its parameters, its gain on unseen blocks, and the reason not to name it, if there is one."""
+    """A law with its parameters, its gain on held-out blocks, and the reason not to name it, if there is one."""
 
-    place: int
+    law_index: int
     """Index of the law in the regression; `NO_COLUMN` for a law of the command."""
     law: Law
     values: dict[str, float]
@@ -73,7 +73,7 @@ class JudgedLaw:
     @property
     def has_column(self) -> bool:
         """Whether the law is a term of the regression, rather than a law of the command."""
-        return self.place != NO_COLUMN
+        return self.law_index != NO_COLUMN
 
     @property
     def named(self) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.fft import irfft, rfft, rfftfreq
 
 from analysis.diagnosis.balance.band import compute_band_begin_hz, compute_band_end_hz
-from analysis.diagnosis.data.measured_motion import fill_gaps, is_quasi_static, is_read_as_free
+from analysis.diagnosis.data.measured_motion import fill_gaps, is_free_motion, is_quasi_static
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.settings import MOTION_EDGE_PERIODS, MOTION_OVERSAMPLED, MOVING_BAND_SHARE
 from analysis.diagnosis.types import Mask
@@ -186,7 +186,7 @@ def _compute_motion(
         _differentiate_in_band(samples, rate_hz, (band_hz, lowest_hz), derivative_order - order, advance_s)
         for derivative_order in range(3)
     )
-    if is_read_as_free(record.recording):
+    if is_free_motion(record.recording):
         # The command of a free motion was computed from its acceleration, so that no law may use the acceleration.
         acceleration = np.zeros_like(acceleration)
     return Motion(

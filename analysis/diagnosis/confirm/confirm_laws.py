@@ -169,7 +169,7 @@ def _fit_from_starts(
     parameters of the balance, or, where that fit is not confirmed, from those of the model if these do better.
     reference_fits: the re-tuned model, and the better model without laws on held-out samples."""
     retuned, baseline = reference_fits
-    balance_deviations = compute_starting_deviations(context.tuning, balances, [law.place for _, law in named_laws])
+    balance_deviations = compute_starting_deviations(context.tuning, balances, [law.law_index for _, law in named_laws])
     steps = _fit_steps(context, retuned, named_laws, balance_deviations)
     with_laws = context.with_test_score(steps[-1])
     if np.any(balance_deviations) and not _lowers_held_out_error(baseline, with_laws):

@@ -1,11 +1,12 @@
-"""Decides by the error on held-out samples which effects a search with a given model names.
+"""Decide, by the error on held-out samples, which of the effects that a search with a given model found are reported
+as named.
 
-Used where residuals exceed the noise. Where repeats show that the noise is about as large as the residual, the
-likelihood decides (`verdict`). Otherwise the residual of a real device is far above its noise, and remains so even with
-a true law. An effect is then named if it removes enough of the held-out error power, with a 95 % interval by block
-bootstrap (`held_out_gain`): compared with the model without it and with its best rival. An effect that removes less
-than half of the power must also be named by the force balance. `find_objection` tests these conditions in this order.
-Called by `diagnose`.
+Called by `diagnose` after the search, where residuals exceed the noise. Where repeats show that the noise is about as
+large as the residual, the decision by likelihood (`verdict`) is kept. Otherwise the residual of a real device is far
+above its noise, even with the true law. An effect is then named if the model with it has a sufficiently smaller
+held-out error power than the model without it, and than the model with the best rival effect (95 % intervals by block
+bootstrap, `held_out_gain`). Where all effects together remove less than half of the power, the force balance must
+confirm them as well. `find_objection` tests these conditions.
 """
 
 from collections.abc import Sequence
@@ -34,7 +35,7 @@ from equalizer.signals.recording import Recording
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ResultWithModel:
-    """A search's result after the decision by held-out gain, and the force balances that were used for it."""
+    """Result of a search after the decision by held-out error, and the force balances that were used for it."""
 
     result: SearchResult
     balances: tuple[Balance, ...] = ()
@@ -44,14 +45,16 @@ class ResultWithModel:
 def decide_with_model(
     recordings: Sequence[Recording], fitting: FittingMeasure, result: SearchResult, time_left: TimeBudget
 ) -> ResultWithModel:
-    """The result after the decision, and the force balances with the model as their base. result: of the search by
-    simulation, with errors compared sample by sample, after which some error is unexplained."""
-    known_noise = all(floor.method == "repeats" for floor in fitting.chosen.floors)
+    """Decide which effects are named. result: of the search by simulation, with errors compared sample by sample, after
+    which some error is unexplained; it is returned unchanged if it names effects already. If its effects cannot be
+    named, those of a search by force balance are tried; if these cannot be named either, the best candidates are listed
+    as unconfirmed, with the reason. Also returns the force balances, with the given model as their base."""
+    is_noise_known = all(floor.method == "repeats" for floor in fitting.chosen.floors)
     balances = find_balances_with_model(recordings, fitting.model, result.context.excluded, time_left)
-    near_noise = float(np.nanmax(result.found.retuned.score.test, initial=0.0)) <= NAMED_ERROR
+    is_residual_near_noise = float(np.nanmax(result.found.retuned.score.test, initial=0.0)) <= NAMED_ERROR
     if result.judgement.named or result.found.barred:
         return ResultWithModel(result, balances)
-    if known_noise and near_noise:
+    if is_noise_known and is_residual_near_noise:
         reason = "the noise is known here, and the residual with it is larger than the noise"
         return ResultWithModel(
             replace(result, unconfirmed=(*result.unconfirmed, *_list_unconfirmed(result, reason))), balances
@@ -59,7 +62,7 @@ def decide_with_model(
     reason = find_objection(result, balances)
     if result.found.steps and not reason:
         return ResultWithModel(replace(result, judgement=Judgement("partly_explained", True)), balances)
-    balance_result = search_by_balance(result.context, balances, known_noise) if balances else None
+    balance_result = search_by_balance(result.context, balances, is_noise_known) if balances else None
     if balance_result is not None and not find_objection(balance_result, balances):
         judgement = replace(balance_result.judgement, verdict="partly_explained")
         return ResultWithModel(replace(balance_result, judgement=judgement, remarks=result.remarks), balances)
@@ -69,7 +72,9 @@ def decide_with_model(
 
 
 def find_objection(result: SearchResult, balances: Sequence[Balance]) -> str:
-    """Reason not to name the effects that were found, as a sentence; empty where they are named."""
+    """Find the reason not to name the effects that were found, as a sentence; empty where they are named. Conditions in
+    order: data held out; gain above its variation and above `FURTHER_LAW_OF_ALL`; no parameter at its tolerance; better
+    than the best rival; confirmed by the force balance, where the gain is below `NAMED_OF_CEILING`."""
     context, explanation = result.context, result.found
     if not explanation.steps:
         return "it explains too little of the error to be added"
@@ -103,8 +108,8 @@ def _is_indistinguishable(context: SearchContext, rival: FittedCandidate, with_e
 
 
 def _find_best_rival(context: SearchContext, result: SearchResult) -> FittedCandidate | None:
-    """The best rival of the last effect that is no refinement of it, scored on held-out samples; None without a
-    rival."""
+    """Find the best other candidate of the round that added the last effect, scored on held-out samples; refinements of
+    that effect are left out. None without one."""
     steps = result.found.steps
     if len(result.found.rounds) < len(steps):
         return None
@@ -130,13 +135,14 @@ def _is_named_by_balance(claim: Claim, balances: Sequence[Balance]) -> bool:
 
 
 def _list_unconfirmed(result: SearchResult, reason: str) -> tuple[Unconfirmed, ...]:
-    """The best candidates of the round in which the search ended, the largest gain first."""
+    """List the best candidates of the round in which the search ended that have a positive held-out gain, at most one
+    per effect, the largest gain first. reason: why the best of them is not named."""
     rounds = [fitted_candidates for fitted_candidates in result.found.rounds if fitted_candidates]
     if not rounds:
         return ()
-    round_number = max(min(len(result.found.steps), len(rounds)) - 1, 0)
+    round_index = max(min(len(result.found.steps), len(rounds)) - 1, 0)
     best_by_effect: dict[str, FittedCandidate] = {}
-    for candidate in rounds[round_number]:
+    for candidate in rounds[round_index]:
         best_by_effect.setdefault(candidate.newest, candidate)
     unconfirmed = []
     for rank, candidate in enumerate([*best_by_effect.values()][:CANDIDATES_WITH_GAIN]):
@@ -151,7 +157,7 @@ def _list_unconfirmed(result: SearchResult, reason: str) -> tuple[Unconfirmed, .
 
 
 def _explain_not_best(gain: HeldOutGain) -> str:
-    """Reason, as a sentence, why a candidate other than the best is not named."""
+    """Explain, as a sentence, why a candidate other than the best is not named."""
     if gain.low <= 0:
         return "its gain on held-out data is not larger than its variation between stretches of the recording"
     return "another candidate has a smaller error on the data that were fitted"

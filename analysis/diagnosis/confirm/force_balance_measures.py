@@ -15,7 +15,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance
 from analysis.diagnosis.confirm.fitting_measures import CONSTANT_ADDED, FittingMeasure, shift_to_mean_force
-from analysis.diagnosis.data.measured_motion import is_quasi_static, is_read_as_free
+from analysis.diagnosis.data.measured_motion import is_free_motion, is_quasi_static
 from analysis.diagnosis.errors.choose_measure import Compared, MeasureChoice, make_force_measure, make_measure
 from analysis.diagnosis.first_model.model_from_balance import build_first_model, compute_law_power_share
 from analysis.diagnosis.first_model.reduced_recordings import is_reduction_needed, reduce_recordings
@@ -43,7 +43,7 @@ def list_fitting_measures(
     if not any(balance.named for balance in balances):
         return
     chosen = make_measure(recordings, model)
-    if is_quasi_static(recordings[0]) or is_read_as_free(recordings[0]):
+    if is_quasi_static(recordings[0]) or is_free_motion(recordings[0]):
         yield FittingMeasure(model, chosen)
         return
     if (chosen.measure.name == "free simulation" or chosen.measure.name.startswith("windows")) and compared != "force":
@@ -77,7 +77,7 @@ def choose_forces_of_balance(
     """
     given_measure = fitting.chosen.measure
     has_named_law, first = any(balance.named for balance in balances), recordings[0]
-    if not balances or has_named_law or is_quasi_static(first) or is_read_as_free(first):
+    if not balances or has_named_law or is_quasi_static(first) or is_free_motion(first):
         return fitting
     if not isinstance(given_measure, PredictedForce):
         return fitting

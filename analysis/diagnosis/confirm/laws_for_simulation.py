@@ -57,9 +57,9 @@ def refit_laws(balances: Sequence[Balance], named_laws: Sequence[tuple[int, Judg
             continue
         regression = balances[axis].search.regression
         law_indices = [
-            other_law.place for other_axis, other_law in named_laws if other_axis == axis and other_law.has_column
+            other_law.law_index for other_axis, other_law in named_laws if other_axis == axis and other_law.has_column
         ]
-        values = fit_values(regression, law_indices)[law_indices.index(law.place)]
+        values = fit_values(regression, law_indices)[law_indices.index(law.law_index)]
         refitted.append((axis, law if values is None else _with_values(law, values)))
     return refitted
 
@@ -82,7 +82,7 @@ def find_special_case(
     for law_index, law in enumerate(balances[axis].search.regression.laws):
         is_unnamed = law.channel == judged_law.law.channel and law.effect not in named_effects
         if refining_effect is not None and is_unnamed and law.effect in refining_effect.simpler:
-            return axis, replace(judged_law, place=law_index, law=law)
+            return axis, replace(judged_law, law_index=law_index, law=law)
     return None
 
 

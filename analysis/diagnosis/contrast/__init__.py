@@ -4,7 +4,7 @@ A base is a linear model of the device that fits recordings with and without fau
 (recordings as arrays) -> `bases` (chooses among `force_base`, `autoregressive_base` and `sensor_base`) ->
 `mechanism_faults`, `actuator_faults` and `sensor_faults` (possible faults, each as a transformation that undoes it,
 `fault`) -> `compared_base`, `joint_products` (least squares of one base on both sets, with a fault undone in one) ->
-`try_faults` (the best size of each fault) -> `rank_faults` (compares it with differences between stretches of one set;
+`fit_faults` (the best size of each fault) -> `rank_faults` (compares it with differences between stretches of one set;
 result: `comparison`) -> `decide` (which fault may be named). `likely_delays` suggests delays and clock rates by
 cross-correlation; `signal_faults` finds hum, white noise and a quantized command without a base. Begin at
 `rank_faults.py`.

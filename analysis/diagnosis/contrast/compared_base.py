@@ -1,4 +1,4 @@
-"""A base model fitted to two sets of recordings, clean and possibly faulty, for `try_faults` and `rank_faults`.
+"""A base model fitted to two sets of recordings, clean and possibly faulty, for `fit_faults` and `rank_faults`.
 
 A base predicts a signal y from regressors x, y(t) = x(t)' w + e(t); a row is (y, x). The errors are correlated in time:
 one autoregressive filter A(q) for both sets, fitted to their errors (Yule-Walker), makes them white. With s the rms of

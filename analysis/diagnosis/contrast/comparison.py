@@ -1,7 +1,9 @@
-"""Result of a comparison with reference recordings, fault by fault: gains, excess errors, and whether the sets differ.
+"""Result of a comparison of a faulty with a clean set of recordings: gain of each possible fault, and excess error.
 
-With E the sum of squared whitened errors of one base fitted to both sets, and E0 that of separate bases, the excess is
-E / E0 - 1. It is compared with the excess between stretches of one set, in which nothing should differ.
+A base is a linear model of the device (`bases`) that predicts a signal from others. With E the sum of squared whitened
+errors of one base fitted to both sets, and E0 that of a separate base for each set, the excess is E / E0 - 1. It is
+compared with the excess between stretches of a single set (negative control), where the device is the same. Undoing a
+fault means to transform the recorded signals to those without it (`fault`). Made by `rank_faults`, read by `decide`.
 """
 
 from dataclasses import dataclass
@@ -13,48 +15,52 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JudgedFault:
-    """A fault with its values, its gain, and its gains between stretches of one set."""
+    """A fault with its fitted parameters, its gain, and its gains in the negative control (between stretches of one
+    set)."""
 
     fault: Fault
     values: dict[str, float]
     """Fitted parameters of the effect by name, in SI units."""
     spread: dict[str, float]
-    """Standard error of each value, by leaving out sixths of either set: variation within the clean set counts as well
-    as that within the faulty set."""
+    """Standard error of each parameter: jackknife that leaves out a sixth of either set, so that the variation within
+    the clean set counts as well as that within the faulty set."""
     errors: FloatArray
-    """(blocks,): sums of squares with the fault undone, of the faulty set, then of the clean one."""
+    """(blocks,): sums of squared errors of one base for both sets with the fault undone, blocks of the faulty set, then
+    of the clean one; times 1 + the median gain in the negative control."""
     gain: float
-    """Error with the fault over the error with it undone, less 1."""
+    """Sum of squared errors with no fault undone, over the sum of `errors`, less 1."""
     control_gain: float
-    """The largest gain between stretches of one set, less their median: the gain due to the flexibility of the fault
-    alone."""
+    """The largest gain in the negative control, less the median: the gain that the free parameters of the fault yield
+    where there is no fault."""
     share: float
-    """Share of the excess error that the fault explains; excess: see `Comparison.excess`."""
+    """Share of the excess error (`Comparison.excess`) that is removed with the fault undone."""
     held_out_squares: float
-    """Cross-validated sum of squares of the faulty set."""
+    """Cross-validated sum of squared errors of the faulty set, with the fault undone."""
     gain_low: float
-    """Lower confidence bound of the gain less the median gain between stretches of a set, by bootstrap over blocks."""
+    """Lower confidence bound of `gain`, by bootstrap over blocks."""
     control_excess: float
-    """The largest excess between stretches of one set, in the faulty one with the fault undone; see `Comparison`."""
+    """The largest excess between stretches of one set, with the fault undone in the faulty set."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """All tested faults with their gains, the errors with nothing undone, and those between stretches of one set."""
+    """All tested faults with their gains, the errors with no fault undone, and the excess errors of the negative
+    control."""
 
     faults: tuple[JudgedFault, ...]
-    """The best first."""
+    """The best fault first."""
     errors: FloatArray
-    """(blocks,): sums of squares with nothing undone, as `JudgedFault.errors`."""
+    """(blocks,): sums of squared errors of one base for both sets, with no fault undone; blocks as in
+    `JudgedFault.errors`."""
     samples: int
-    """Number of samples: the sum of squares with separate bases, because errors are scaled to white noise with rms
-    1."""
+    """Number of samples of both sets. It is also E0, because the errors of separate bases are scaled to white noise
+    with rms 1."""
     faulty_samples: int
     """Number of samples of the faulty set."""
     held_out_squares: float
-    """Cross-validated sum of squares of the faulty set, with nothing undone."""
+    """Cross-validated sum of squared errors of the faulty set, with no fault undone."""
     faulty_share: float
-    """Rms error of the faulty set with its own base, relative to the predicted quantity."""
+    """Rms error of a base fitted to the faulty set alone, relative to the rms of the predicted signal."""
     control_excess: float
     """The largest `excess` between stretches of one set."""
     clean_control_excess: float
@@ -62,24 +68,26 @@ class Comparison:
     by_force: bool
     """Whether the bases of the device are force balances; else they are autoregressions."""
     step_s: float
-    """Time from one row to the next, in s."""
+    """Time (s) between consecutive samples of the bases."""
     complete: bool
-    """Whether all faults were tested before the time ran out."""
+    """Whether all faults were tested before the time limit."""
 
     @property
     def excess(self) -> float:
-        """Sum of squares of one base for both sets over that of separate bases, less 1; 0 = no difference."""
+        """E / E0 - 1: sum of squared errors of one base for both sets over that of separate bases, less 1; 0 = the sets
+        do not differ."""
         return float(self.errors.sum()) / self.samples - 1
 
     @property
-    def differ(self) -> bool:
+    def sets_differ(self) -> bool:
         """Whether the two sets differ by more than stretches of one set do."""
         return self.excess > max(SETS_AS_ONE, SETS_APART * self.control_excess)
 
-    def differ_but_for(self, fault: JudgedFault) -> bool:
-        """Whether the two sets differ by more than stretches of one set, with the fault undone between those of the
-        faulty set, because an intermittent fault makes these differ too. A fault that no base absorbs raises all errors
-        of the faulty set, and shows only in the lower bound of its gain; so the larger of both is compared."""
+    def sets_differ_without(self, fault: JudgedFault) -> bool:
+        """Whether the two sets differ by more than stretches of one set do, where the stretches of the faulty set are
+        compared with the fault undone: an intermittent fault makes them differ, too. The difference of the sets is the
+        larger of `excess` and the lower bound of the gain of the fault: a fault that a separate base cannot fit raises
+        all errors of the faulty set, and so does not raise `excess`."""
         return max(self.excess, fault.gain_low) > max(
             SETS_AS_ONE, SETS_APART * max(self.clean_control_excess, fault.control_excess)
         )

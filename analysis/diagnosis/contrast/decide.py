@@ -59,7 +59,7 @@ class Decision:
 
 def choose_fault(comparison: Comparison, response_count: int) -> Decision:
     """Choose the fault or class to name, and list the other candidates. response_count: number of response channels."""
-    tested = [(fault, _find_objection(fault, comparison.differ_but_for(fault))) for fault in comparison.faults]
+    tested = [(fault, _find_objection(fault, comparison.sets_differ_without(fault))) for fault in comparison.faults]
     accepted = [fault for fault, note in tested if note == ""]
     unnamed = tuple((fault, note) for fault, note in tested if fault.gain > 0 and note)
     if not accepted:

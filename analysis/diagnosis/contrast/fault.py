@@ -41,7 +41,7 @@ class Variant:
     curve: Curve | None = None
     """Map of single readings that undoes the fault, where there is one: its slope scales the errors, too."""
     noise_factor: float = 1.0
-    """Factor by which interpolation alone reduces the prediction errors: see `interpolation.noise_gain`."""
+    """Factor by which interpolation alone reduces the prediction errors: see `interpolation.compute_noise_gain`."""
     column_change: ColumnChange | None = None
     """Change of the predicted command by the fault, where known. Undoing a gain or a lag in the recorded command
     instead would also reduce errors that the fault did not cause."""

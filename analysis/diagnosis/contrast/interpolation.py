@@ -1,8 +1,10 @@
 """Interpolation between samples by splines, and the factor by which it reduces one-step prediction errors.
 
-By Kolmogorov's formula the one-step prediction error variance of a signal is the geometric mean of its spectrum over
-frequency, so that a filter multiplies prediction errors by the geometric mean of its gain. Delays and clock rates are
-undone by interpolation (`sensor_faults`), and their gain must not include this factor.
+`sensor_faults` and `actuator_faults` undo delays and deviating clock rates by interpolation. Interpolation attenuates
+high frequencies, and thereby reduces the prediction errors even where there is no such fault; the reduction that is
+credited to a fault must not include this factor. By the Kolmogorov-Szegő formula the one-step prediction error variance
+of a signal is the geometric mean of its spectrum over frequency, so that a filter multiplies prediction errors by the
+geometric mean of its gain.
 """
 
 from functools import cache
@@ -13,36 +15,40 @@ from scipy.interpolate import make_interp_spline
 from equalizer.signals.signal import FloatArray
 
 SPLINE_DEGREE = 5
-"""Degree of the splines. They act locally, whereas a phase shift of the spectrum rings at the ends of a signal, and
-attenuate high frequencies far less than linear interpolation."""
-FRACTIONS = np.linspace(0.0, 1.0, 41)
-"""Fractions of a sample at which the factor is tabulated."""
+"""Degree of the splines. Their effect is local, whereas a phase shift of the spectrum rings at the ends of a signal,
+and they attenuate high frequencies far less than linear interpolation."""
+DELAY_FRACTIONS = np.linspace(0.0, 1.0, 41)
+"""Delays, in fractions of a sample, at which the factor is tabulated."""
 
 
-def resample(samples: FloatArray, times: FloatArray) -> FloatArray:
-    """Samples (n,) interpolated at times `times` (n,), in samples; held beyond the ends."""
+def resample(samples: FloatArray, positions: FloatArray) -> FloatArray:
+    """Interpolate the samples (n,) at `positions` (n,), real-valued sample indices; the first and last sample are held
+    beyond the ends."""
     spline = make_interp_spline(np.arange(len(samples)), samples, SPLINE_DEGREE)
-    return np.asarray(spline(np.clip(times, 0, len(samples) - 1)))
+    return np.asarray(spline(np.clip(positions, 0, len(samples) - 1)))
 
 
 def shift_samples(samples: FloatArray, delay: float) -> FloatArray:
-    """Samples (n, k) delayed by `delay` samples, a real number; continued beyond both ends as an odd function."""
+    """Delay the samples (n, k) by `delay` samples, a real number. Beyond both ends the signal is continued by point
+    reflection (odd extension)."""
     margin = int(np.ceil(abs(delay))) + SPLINE_DEGREE
     padded = np.pad(samples, ((margin, margin), (0, 0)), mode="reflect", reflect_type="odd")
     spline = make_interp_spline(np.arange(-margin, len(samples) + margin), padded, SPLINE_DEGREE)
     return np.asarray(spline(np.arange(len(samples)) - delay))
 
 
-def noise_gain(times: FloatArray | float) -> float:
-    """Factor (at most about 1) by which interpolation at `times`, in samples, multiplies one-step prediction errors:
-    the geometric mean of its gain over frequency (Kolmogorov's formula) and over the times."""
-    return float(np.exp(np.mean(np.interp(np.mod(times, 1.0), FRACTIONS, _log_gains()))))
+def compute_noise_gain(positions: FloatArray | float) -> float:
+    """Compute the factor, at most about 1, by which interpolation at `positions` (real-valued sample indices)
+    multiplies one-step prediction errors: the geometric mean of its gain over frequency and over the positions."""
+    return float(np.exp(np.mean(np.interp(np.mod(positions, 1.0), DELAY_FRACTIONS, _tabulate_log_gains()))))
 
 
 @cache
-def _log_gains() -> FloatArray:
-    """Mean logarithm of the interpolation's gain over frequency, at each of `FRACTIONS`."""
+def _tabulate_log_gains() -> FloatArray:
+    """Tabulate the mean logarithm of the interpolation's gain over frequency, at each of `DELAY_FRACTIONS`: by FFT of
+    the delayed unit impulse, far from both ends of 401 samples, zero-padded to 4096; gains are limited to 1e-6
+    below."""
     impulse = np.zeros((401, 1))
     impulse[200] = 1.0
-    gains = [np.abs(np.fft.rfft(shift_samples(impulse, fraction)[:, 0], 4096)) for fraction in FRACTIONS]
+    gains = [np.abs(np.fft.rfft(shift_samples(impulse, fraction)[:, 0], 4096)) for fraction in DELAY_FRACTIONS]
     return np.array([np.mean(np.log(np.maximum(gain, 1e-6))) for gain in gains])

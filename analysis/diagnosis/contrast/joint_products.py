@@ -3,7 +3,7 @@
 The base is fitted to both sets at once, so that it is never extrapolated to states that only one set has visited.
 Undoing a fault changes the rows of one set by (size) x (change for size 1): exactly where the fault is linear, and to
 first order about size 1 elsewhere. The products of the rows and of their changes, block by block, are sufficient
-statistics. `rank_faults` and `try_faults` call this.
+statistics. `rank_faults` and `fit_faults` call this.
 """
 
 from collections.abc import Sequence

@@ -30,6 +30,7 @@ from analysis.diagnosis.contrast.bases import (
 from analysis.diagnosis.contrast.compared_base import Base, ComparedBase, compare_base, undo_fault_in_rows
 from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
 from analysis.diagnosis.contrast.fault import Fault, Rows, Variant
+from analysis.diagnosis.contrast.fit_faults import ALL_BLOCKS, FaultFits, FittedVariant, fit_faults, restrict_sizes
 from analysis.diagnosis.contrast.force_base import ForceBase
 from analysis.diagnosis.contrast.joint_products import (
     Fit,
@@ -44,7 +45,6 @@ from analysis.diagnosis.contrast.mechanism_faults import make_mechanism_faults
 from analysis.diagnosis.contrast.part import Part, split_into_parts
 from analysis.diagnosis.contrast.sensor_base import build_sensor_bases
 from analysis.diagnosis.contrast.sensor_faults import make_misalignment_fault, make_sensor_faults, make_shared_faults
-from analysis.diagnosis.contrast.try_faults import ALL_BLOCKS, TriedFaults, TriedVariant, restrict_sizes, try_faults
 from analysis.diagnosis.data.correlated_residuals import draw_bootstrap_blocks
 from analysis.diagnosis.settings import BALANCE_HOLDS, BOOTSTRAP_LEVEL, CONTRAST_BLOCKS, LATE_STEP, LEAST_FAULT_GAIN
 from analysis.diagnosis.types import Mask, TimeBudget
@@ -75,9 +75,11 @@ def rank_faults(
     for bases, motions in bases_of(*sides):
         with suppress(np.linalg.LinAlgError, ValueError):
             compared_bases, faults = _prepare_bases(*sides, bases, motions)
-            trials = try_faults(compared_bases, [fault for fault in faults if fault.effect not in excluded], time_left)
-            if not isinstance(bases[0], ForceBase) or _are_forces_balanced(compared_bases, trials.tried):
-                return _judge_faults(compared_bases, trials)
+            fault_fits = fit_faults(
+                compared_bases, [fault for fault in faults if fault.effect not in excluded], time_left
+            )
+            if not isinstance(bases[0], ForceBase) or _are_forces_balanced(compared_bases, fault_fits.variants):
+                return _judge_faults(compared_bases, fault_fits)
     return None
 
 
@@ -115,14 +117,17 @@ def _prepare_bases(
     return compared_bases, faults
 
 
-def _judge_faults(compared_bases: Sequence[ComparedBase], trials: TriedFaults) -> Comparison:
-    """All tried faults with their gains, the smallest error first, and the errors with no fault undone."""
-    unchanged_pairs = trials.unchanged_pairs
+def _judge_faults(compared_bases: Sequence[ComparedBase], fault_fits: FaultFits) -> Comparison:
+    """All fitted faults with their gains, the smallest error first, and the errors with no fault undone."""
+    unchanged_pairs = fault_fits.unchanged_pairs
     baseline_fit = fit_sizes(unchanged_pairs, None)
     faulty_sample_count = sum(compared.faulty.count for compared in compared_bases)
     sample_count = faulty_sample_count + sum(compared.clean.count for compared in compared_bases)
     judged_faults = sorted(
-        (_judge_fault(compared_bases, tried_variant, baseline_fit, sample_count) for tried_variant in trials.tried),
+        (
+            _judge_fault(compared_bases, fitted_variant, baseline_fit, sample_count)
+            for fitted_variant in fault_fits.variants
+        ),
         key=lambda judged_fault: float(judged_fault.errors.sum()),
     )
     folds = zip(SIXTHS, _leave_out_sixths(unchanged_pairs), strict=True)
@@ -143,13 +148,13 @@ def _judge_faults(compared_bases: Sequence[ComparedBase], trials: TriedFaults) -
         clean_control_excess=control_excesses[0],
         by_force=isinstance(first_base.base, ForceBase),
         step_s=first_base.row_s,
-        complete=trials.complete,
+        complete=fault_fits.complete,
     )
 
 
-def _are_forces_balanced(compared_bases: Sequence[ComparedBase], trials: Sequence[TriedVariant]) -> bool:
-    """Whether the force balances fit the faulty set, either with no fault or with the best fault undone. trials: the
-    best first."""
+def _are_forces_balanced(compared_bases: Sequence[ComparedBase], fitted_variants: Sequence[FittedVariant]) -> bool:
+    """Whether the force balances fit the faulty set, either with no fault or with the best fault undone.
+    fitted_variants: the best first."""
     force_bases = [compared for compared in compared_bases if isinstance(compared.base, ForceBase)]
     if all(
         compute_unexplained_share_of_rows(axis_base.base, axis_base.faulty.rows, axis_base.faulty.masks) < BALANCE_HOLDS
@@ -161,13 +166,13 @@ def _are_forces_balanced(compared_bases: Sequence[ComparedBase], trials: Sequenc
             compute_unexplained_share_of_rows(axis_base.base, *_undo_fault(axis_base, best_variant)) < BALANCE_HOLDS
             for axis_base in force_bases
         )
-        for best_variant in trials[:1]
+        for best_variant in fitted_variants[:1]
     )
 
 
-def _undo_fault(compared: ComparedBase, tried_variant: TriedVariant) -> tuple[list[FloatArray], list[Mask]]:
+def _undo_fault(compared: ComparedBase, fitted_variant: FittedVariant) -> tuple[list[FloatArray], list[Mask]]:
     """Rows of the faulty set with a fault undone at its fitted sizes, and masks of the rows with known values."""
-    fit, fault, variant, _ = tried_variant
+    fit, fault, variant, _ = fitted_variant
     undone_rows = undo_fault_in_rows(compared, compared.faulty, fault, variant)
     rows, masks = list(compared.faulty.rows), list(compared.faulty.masks)
     for k, (unchanged_rows, mask) in enumerate(zip(compared.faulty.rows, compared.faulty.masks, strict=True)):
@@ -193,11 +198,11 @@ def _yield_control_excesses(sides: Sequence[FloatArray]) -> Iterator[float]:
 
 
 def _judge_fault(
-    compared_bases: Sequence[ComparedBase], tried_variant: TriedVariant, baseline_fit: Fit, sample_count: int
+    compared_bases: Sequence[ComparedBase], fitted_variant: FittedVariant, baseline_fit: Fit, sample_count: int
 ) -> JudgedFault:
     """The fault with its values and their standard errors, its gain, and the gains of the negative control.
     baseline_fit: the fit with no fault undone. sample_count: in both sets, over all bases."""
-    fit, fault, variant, pairs = tried_variant
+    fit, fault, variant, pairs = fitted_variant
     folds = _leave_out_sixths(pairs)
     fold_fits = [fit_sizes(fold_pairs, variant) for fold_pairs in folds]
     # Errors count at the size that was accepted; only the standard errors need the free size of a timing fault.

@@ -35,7 +35,7 @@ from analysis.diagnosis.contrast.fault import (
     fix_size,
     proportional_parameter,
 )
-from analysis.diagnosis.contrast.interpolation import noise_gain, resample, shift_samples
+from analysis.diagnosis.contrast.interpolation import compute_noise_gain, resample, shift_samples
 from analysis.diagnosis.contrast.part import Part
 from analysis.diagnosis.settings import CLOCK_FASTEST, REVERSAL_OF_GAP
 from equalizer.effects.simulation.dry_friction_kernel import compute_bristle_deflection
@@ -219,7 +219,7 @@ def _make_logger_offset(channel: _Channel, time_s: float, rate_hz: float) -> Var
         return replace(undone, known=part.known & (np.arange(len(part.known)) < len(part.known) - delay_samples))
 
     at_size = lambda size: _make_logger_offset(channel, size * time_s, rate_hz)  # noqa: E731
-    noise_factor = noise_gain(time_s * rate_hz)
+    noise_factor = compute_noise_gain(time_s * rate_hz)
     return Variant(
         (undo,), proportional_parameter("offset", time_s), *SIZE_RANGE, noise_factor=noise_factor,
         at_size=at_size, exact=True,
@@ -273,7 +273,7 @@ def _make_skew(channel: _Channel, rate_error: float, runs_on: bool, parts: Seque
         return replace(undone, known=part.known & (times >= 0) & (times <= len(times) - 1))
 
     at_size = lambda size: _make_skew(channel, size * rate_error, runs_on, parts)  # noqa: E731
-    noise_factor = noise_gain(np.concatenate([compute_read_times(part) for part in parts]))
+    noise_factor = compute_noise_gain(np.concatenate([compute_read_times(part) for part in parts]))
     return Variant(
         (undo,), proportional_parameter("ppm", 1e6 * rate_error), *SIZE_RANGE, noise_factor=noise_factor,
         at_size=at_size, exact=True,

@@ -1,6 +1,9 @@
-"""Faults that a signal's own spectrum or values show: mains hum or white noise in a response that neither the clean
-recordings nor the command have, and a quantized command. Called by
-`reference.compare_with_reference`."""
+"""Detects faults from the spectrum or the values of a single signal, without a model of the device.
+
+Mains hum and white noise in a response are faults where neither the clean recordings nor, for hum, the commands have
+them; a quantized command is one where its step is coarser than that of the clean commands. Called by
+`reference.compare_with_reference`. Limits are in `analysis.diagnosis.settings`; other numbers are chosen by hand.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,19 +28,20 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SignalFault:
-    """A fault of responses or of commands that needs no model."""
+    """A fault of the responses or of the commands that is detected without a model."""
 
     effect: str
-    """Name of the vocabulary."""
+    """Name of the effect in `equalizer.plant.effect_vocabulary`."""
     place: Place
     channels: tuple[int, ...]
+    """Indices of the channels that have the fault."""
     values: dict[str, float]
-    """Parameters of the channel with the largest fault, in SI units."""
+    """Parameters of the effect for the channel with the largest fault, by name, in SI units."""
 
 
 def find_hum(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
-    """Find mains hum that is in the faulty parts alone, with the amplitude and frequency (Hz) of its strongest channel;
-    None where there is none."""
+    """Find mains hum that only the faulty parts have, with the amplitude (unit of the response) and frequency (Hz) of
+    its strongest channel; None where there is none."""
     mains_lines = [
         (*mains_line, channel)
         for channel in range(faulty[0].response.shape[1])
@@ -51,8 +55,9 @@ def find_hum(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | Non
 
 
 def find_sensor_noise(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
-    """Find added white noise, which has about the same power in the highest eighth of the spectrum as in the eighth
-    above its middle; None where there is none."""
+    """Find white noise that was added to responses, with the rms (unit of the response) of the noisiest channel; None
+    where there is none. Added noise is louder in every faulty stretch than in any clean one, and white: its power is
+    about the same in the highest eighth of the spectrum as in the eighth above its middle."""
     noisy_channels: list[tuple[float, int]] = []
     for channel in range(faulty[0].response.shape[1]):
         faulty_floors, clean_floors = (
@@ -79,8 +84,8 @@ def find_sensor_noise(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFa
 
 
 def find_quantization(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFault | None:
-    """Find a command whose values are multiples of a coarser step than those of the clean command; None where there is
-    none. Clean commands with few different values, such as steps, are not used."""
+    """Find the first command whose values are multiples of a coarser step (N) than those of the clean command; None
+    where there is none. Commands are not compared unless the clean one has more than twice as many distinct values."""
     for channel in range(faulty[0].command.shape[1]):
         faulty_values, clean_values = (
             np.concatenate([part.command[:, channel] for part in parts]) for parts in (faulty, clean)
@@ -93,8 +98,8 @@ def find_quantization(faulty: Sequence[Part], clean: Sequence[Part]) -> SignalFa
 
 
 def _split_into_stretches(part: Part) -> list[slice]:
-    """Split a part into about `NOISE_STRETCHES` stretches of at least 64 samples; those with missing samples are left
-    out."""
+    """Split a part into about `NOISE_STRETCHES` stretches of at least 64 samples, so that an eighth of the spectrum has
+    four lines; stretches with missing samples are left out."""
     stretch_length = max(len(part.response) // NOISE_STRETCHES, 64)
     starts = range(0, len(part.response) - stretch_length + 1, stretch_length)
     return [
@@ -103,21 +108,22 @@ def _split_into_stretches(part: Part) -> list[slice]:
 
 
 def _estimate_noise_floors(samples: FloatArray, stretch: slice) -> tuple[float, float]:
-    """Estimate the variance of white noise in the highest eighth of the spectrum, and in the eighth above its middle,
-    by the median power. samples: (n,)."""
+    """Estimate the variance of white noise from the median power in the highest eighth of the spectrum, and from that
+    in the eighth above its middle (Hann window). samples: (n,)."""
     stretch_samples = samples[stretch]
     window = np.hanning(len(stretch_samples))
     detrended = stretch_samples - np.linspace(stretch_samples[0], stretch_samples[-1], len(stretch_samples))
     power = np.abs(np.fft.rfft(detrended * window)) ** 2 / float(np.sum(window**2))
     eighth = len(power) // 8
-    # The median of a power with two degrees of freedom lies at log 2 of its mean.
+    # The median of a power with two degrees of freedom (exponential distribution) is log 2 times its mean.
     highest, middle = (float(np.median(power[-k * eighth : (1 - k) * eighth or None])) / np.log(2) for k in (1, 4))
     return highest, middle
 
 
 def _find_mains_line(faulty: Sequence[Part], clean: Sequence[Part], channel: int) -> tuple[float, float] | None:
-    """Find the largest mains line of a response: its amplitude and frequency (Hz). None where no line exceeds the
-    spectrum around it, or the clean recordings or the commands have it as well."""
+    """Find the largest mains line of a response in the longest faulty part: its amplitude (unit of the response) and
+    frequency (Hz). None where no line exceeds the spectrum around it, or where the clean recordings or the commands
+    have it as well. Mains frequencies above 0.4 of the sample rate are not tested."""
     longest = max(faulty, key=lambda part: len(part.response))
     strongest: tuple[float, float] | None = None
     for mains_hz in MAINS_HZ:
@@ -136,8 +142,10 @@ def _find_mains_line(faulty: Sequence[Part], clean: Sequence[Part], channel: int
 
 
 def _measure_mains_line(samples: FloatArray, rate_hz: float, mains_hz: float) -> tuple[float, float, float]:
-    """Measure the largest line near `mains_hz`: its power over the median around it, its amplitude and its frequency
-    (Hz). Ratio and amplitude are 0 where the spectrum has no line there, or none around it."""
+    """Measure the largest spectral line within `MAINS_OFF_HZ` of `mains_hz` (Hann window): the ratio of its power to
+    the median power around it, its amplitude (unit of the samples) and its frequency (Hz). The median is over lines
+    within 6 Hz, or 24 lines if these are more, without those near the mains frequency. Ratio and amplitude are 0 where
+    the spectrum has no line there, or none around it. samples: (n,)."""
     window = np.hanning(len(samples))
     detrended = samples - np.linspace(samples[0], samples[-1], len(samples))
     power = np.abs(np.fft.rfft((detrended - detrended.mean()) * window)) ** 2

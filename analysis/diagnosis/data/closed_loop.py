@@ -1,8 +1,8 @@
 """Tests whether a recording was made in closed loop: commands depend on the responses (controller, virtual spring).
 
-Where the excitation was recorded, its difference from the command shows the feedback. Otherwise the test is that of
+Where the excitation was recorded, its difference from the command is the feedback. Otherwise the test is that of
 Granger (Econometrica 37 (1969), 424): whether past responses improve the prediction of the command from its own past.
-The choice of error measures and of first models uses the result.
+`error_measure_rule`, `choose_structure` and `rigid_model` choose error measure and first model by the result.
 """
 
 import numpy as np
@@ -14,7 +14,8 @@ from equalizer.signals.signal import FloatArray
 PAST_SAMPLES = 6
 """Number of past samples of each signal from which the command is predicted. Set by hand."""
 _LEAST_SAMPLES = 200
-"""Fewest rows with all samples known; with fewer, the test is not made and the loop counts as open."""
+"""Fewest rows with all samples known, for `PAST_SAMPLES`; with fewer, the test is not made and the loop counts as open.
+Set by hand."""
 
 
 def is_in_closed_loop(recording: Recording) -> bool:
@@ -49,7 +50,7 @@ def _is_predicted_by_responses(command: FloatArray, recording: Recording) -> boo
         _compute_residual_rms(command[rows], own_past),
         _compute_residual_rms(command[rows], np.hstack([own_past, response_past])),
     )
-    # A smooth command is predicted by its own past alone, so that the test has no power.
+    # A smooth command is predicted by its own past to within rounding, so that the test has no power.
     return bool(own_past_rms > 1e-6 * _compute_rms(command[:, None]) and full_rms < PREDICTED_SHARE * own_past_rms)
 
 

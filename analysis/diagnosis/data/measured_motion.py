@@ -1,8 +1,8 @@
-"""The measured motion of the driven axes with its noise, and tests of what drives it.
+"""Measured motion of the driven axes with its noise, and which signal drives a recording: force, motion or none.
 
-A recording may be driven by a force, by an imposed motion (the force is then the response; `as_force_driven` exchanges
-the two), or not at all (free motion). Positions are needed by the force balance (`balance.motion`) and by
-the package `forces`.
+A recording may be driven by a force, by an imposed motion (the force is then the response; `convert_to_force_driven`
+exchanges the two), or not at all (free motion). Positions are used by the packages `forces` and `balance`;
+`is_free_motion`, `is_driven` and `is_quasi_static` also by `first_model`, `confirm` and `errors`.
 """
 
 from collections.abc import Sequence
@@ -16,10 +16,10 @@ from equalizer.plant.mechanical_model import DERIVATIVE_OF_QUANTITY, MechanicalM
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-_FORCES = frozenset({"force", "torque"})
-"""Quantities of force: a recording with such a response was driven by an imposed motion."""
+_FORCE_QUANTITIES = frozenset({"force", "torque"})
+"""Quantities that count as forces: a recording with such a response was driven by an imposed motion."""
 
-FREE = "free"
+FREE_MOTION = "free"
 """Value of `meta["imposed"]` of a free (undriven) motion."""
 
 
@@ -78,8 +78,9 @@ def fill_gaps(samples: FloatArray) -> FloatArray:
 
 
 def is_quasi_static(recording: Recording) -> bool:
-    """Whether the time axis is unknown, and either a position or no motion was measured: forces are then compared with
-    positions, sample by sample. Where only speeds or accelerations were measured, samples are counted as time."""
+    """Whether the time axis is unknown, and either a position or no motion was measured: each force is then compared
+    with the position at the same sample, without velocity or acceleration. Where only speeds or accelerations were
+    measured, the result is False, and the sample number serves as time."""
     quantities = [
         quantity for signal in (recording.position, recording.response) if signal for quantity in signal.quantities
     ]
@@ -87,10 +88,10 @@ def is_quasi_static(recording: Recording) -> bool:
     return not recording.is_timed and min(orders, default=0) == 0
 
 
-def is_read_as_free(recording: Recording) -> bool:
-    """Whether the motion was free (not driven). The command is then the force per unit mass that the motion implies;
-    see `first_model.free_motion`."""
-    return recording.meta.get("imposed") == FREE
+def is_free_motion(recording: Recording) -> bool:
+    """Whether the motion was free (not driven), by the mark that `first_model.free_motion` sets in `meta`. The command
+    is then the force per unit mass that the motion implies."""
+    return recording.meta.get("imposed") == FREE_MOTION
 
 
 def select_time_unit(recording: Recording) -> str:
@@ -105,11 +106,11 @@ def is_driven(recordings: Sequence[Recording]) -> bool:
     return len(commands) == 0 or bool(np.any(np.ptp(commands, axis=0) != 0))
 
 
-def as_force_driven(recording: Recording) -> Recording:
+def convert_to_force_driven(recording: Recording) -> Recording:
     """Exchange command and response of a recording with an imposed motion: the measured force becomes the command, the
     motion the response, and `imposed` is set in its meta. Other recordings are returned unchanged."""
     is_motion_command = set(recording.command.quantities) <= set(DERIVATIVE_OF_QUANTITY) - {"voltage"}
-    is_force_response = set(recording.response.quantities) <= _FORCES
+    is_force_response = set(recording.response.quantities) <= _FORCE_QUANTITIES
     if not (
         is_motion_command and is_force_response and len(recording.command.channels) >= len(recording.response.channels)
     ):
@@ -124,5 +125,5 @@ def as_force_driven(recording: Recording) -> Recording:
 
 
 def convert_all_to_force_driven(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
-    """Convert each recording by `as_force_driven`."""
-    return tuple(as_force_driven(recording) for recording in recordings)
+    """Exchange command and response of each recording with an imposed motion (`convert_to_force_driven`)."""
+    return tuple(convert_to_force_driven(recording) for recording in recordings)

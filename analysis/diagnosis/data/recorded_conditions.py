@@ -11,7 +11,7 @@ from math import isfinite
 
 import numpy as np
 
-from analysis.diagnosis.data.measured_motion import fill_gaps, is_read_as_free
+from analysis.diagnosis.data.measured_motion import fill_gaps, is_free_motion
 from analysis.diagnosis.settings import MOST_GROWTH
 from equalizer.effects.command_sign import with_reversed_commands
 from equalizer.effects.effect import PlacedEffect
@@ -66,7 +66,7 @@ def apply_conditions(effects: Sequence[PlacedEffect], recording: Recording) -> t
 def as_recorded(model: MechanicalModel, recording: Recording) -> MechanicalModel:
     """The model for the commands as they were recorded. model: for the recording as it is compared, in which commands
     may have been reversed. For a free motion, whose command is a force per unit mass, the model with unit masses."""
-    if is_read_as_free(recording):
+    if is_free_motion(recording):
         return replace(model, mass=np.eye(len(model.mass)))
     channels, reversed_channels = recording.command.channels, recording.meta.get(REVERSED_CHANNELS)
     if not isinstance(reversed_channels, Sequence) or not set(reversed_channels) & set(channels):

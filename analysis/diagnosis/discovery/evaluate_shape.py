@@ -13,7 +13,7 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.laws.evaluate import evaluate
 from equalizer.laws.law import Law
 from equalizer.laws.parse import MEMORY_OPERATORS, parse_formula
-from equalizer.laws.tree import Apply, Free, Node, Number, iterate_nodes
+from equalizer.laws.tree import Apply, FreeParameter, Node, Number, iterate_nodes
 from equalizer.signals.signal import FloatArray
 
 _NUMPY_FUNCTIONS: Mapping[str, Callable[..., FloatArray]] = {
@@ -51,7 +51,7 @@ def _evaluate_node(node: Node, parameters: Sequence[float], columns: Columns) ->
     match node:
         case Number(value):
             return np.float64(value)  # type: ignore[return-value]
-        case Free(parameter_index):
+        case FreeParameter(parameter_index):
             return np.float64(parameters[parameter_index])  # type: ignore[return-value]
         case Apply(name, arguments):
             return _NUMPY_FUNCTIONS[name](*(_evaluate_node(argument, parameters, columns) for argument in arguments))

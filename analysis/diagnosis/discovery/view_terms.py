@@ -1,8 +1,9 @@
-"""Candidate terms of one view: for a force along an axis those of the grammar, for a reading those of a sensor's error.
+"""Candidate terms of the sparse regression that discovers the formula of an unknown effect, for one output (`View`).
 
-Terms of a reading are its sign, powers, soft limits, dead zones, hysteresis (play), drift, and products with other
-channels. What is linear in the readings, such as a gain, a lag or a cross-axis share, is left to the effects of the
-catalogue.
+A view is the filtered residual either of the force along an axis, with the terms of `grammar`, or of the reading of one
+response channel, with terms of sensor errors: sign, powers, soft limits, dead zones, hysteresis (play), drift, and
+products with other channels. Terms that are linear in the readings (gain, lag, cross-axis sensitivity) are left out,
+because the effects of the catalogue describe them. Start values are chosen by hand. Called by `discover`.
 """
 
 from collections.abc import Iterator
@@ -26,7 +27,8 @@ from analysis.diagnosis.discovery.matched_filter import View
 
 
 def list_view_terms(view: View) -> tuple[Term, ...]:
-    """All terms of a view. Spatial periods and frequencies of periodic terms are estimated from its first recording."""
+    """List all candidate terms of a view. Spatial periods and frequencies of periodic terms are estimated from its
+    first recording."""
     record = view.records[0]
     if view.acts_on == "response":
         return list_reading_terms(record.columns, view.axis, len(record.reading_units))
@@ -39,8 +41,8 @@ def list_view_terms(view: View) -> tuple[Term, ...]:
 
 
 def list_reading_terms(columns: Columns, channel: int, channel_count: int) -> tuple[Term, ...]:
-    """All terms for one channel of a response. columns: signals by name; channel: its index; channel_count: of all.
-    Thresholds start at shares of the channel's largest reading."""
+    """List all candidate terms of one response channel. columns: signals (n,) by name; channel: index of the channel;
+    channel_count: number of response channels. Thresholds start at fractions of the channel's largest magnitude."""
     names = [f"a{axis}" for axis in AXES[:channel_count]]
     reading, other_readings = names[channel], [name for name in names if name != names[channel]]
     largest_reading = max(float(np.abs(columns[reading]).max()), 1e-12)
@@ -48,7 +50,8 @@ def list_reading_terms(columns: Columns, channel: int, channel_count: int) -> tu
 
 
 def _generate_own_terms(reading: str, largest_reading: float) -> Iterator[Term]:
-    """Terms of one channel's own reading. largest_reading: its largest magnitude."""
+    """Generate the terms that contain only the channel's own reading (and time t). reading: name of the signal;
+    largest_reading: its largest magnitude, in its unit."""
     yield Term(f"sign({reading})")
     for start in (0.5, 1.5, 2.0, 3.0, 5.0):
         yield Term(format_odd_power(reading, 0), (start,), (POWER_BOUNDS,), (0,))
@@ -65,13 +68,13 @@ def _generate_own_terms(reading: str, largest_reading: float) -> Iterator[Term]:
     yield from (Term(shape) for shape in (f"{reading}*t", "t"))
 
 
-def _generate_cross_terms(a: str, other_readings: list[str]) -> Iterator[Term]:
-    """Products and powers up to the third order that involve other channels of the response. a: name of the channel's
-    own reading."""
-    for b in other_readings:
+def _generate_cross_terms(reading: str, other_readings: list[str]) -> Iterator[Term]:
+    """Generate the products and powers up to the third order that contain readings of other response channels. reading:
+    name of the channel's own reading."""
+    for other in other_readings:
         shapes = (
-            f"{a}*{b}", f"{b}**2", f"{b}*abs({b})", f"abs({b})", f"{a}*abs({b})",
-            f"abs({a})*{b}", f"{a}*{b}**2", f"{a}**2*{b}", f"{b}**3",
+            f"{reading}*{other}", f"{other}**2", f"{other}*abs({other})", f"abs({other})", f"{reading}*abs({other})",
+            f"abs({reading})*{other}", f"{reading}*{other}**2", f"{reading}**2*{other}", f"{other}**3",
         )  # fmt: skip
         yield from (Term(shape) for shape in shapes)
     yield from (

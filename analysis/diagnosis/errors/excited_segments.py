@@ -1,7 +1,7 @@
-"""Selects the segments of a record in which one axis is driven.
+"""Selects the segments of a recording in which a given axis is driven.
 
-The first fit of an effect with impacts (`search.impacts`) uses only these segments: they contain the information about
-that axis, and their simulation takes less time than that of the whole record.
+The first fit of play (backlash) with impacts (`search.impacts`) uses only these segments: they contain the information
+about that axis, and simulating them takes less time than simulating the whole recording.
 """
 
 from dataclasses import replace
@@ -14,14 +14,15 @@ from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from equalizer.signals.recording import Segment
 
 EXCITED_SHARE = 0.5
-"""Least rms command of the axis, relative to that of the strongest axis in a segment."""
+"""Least rms command of the axis, relative to that of the axis with the largest rms in the segment. Chosen by hand."""
 LONGEST_S = 6.0
-"""Longest part of a segment that is used (s); of a periodic segment at least one period."""
+"""Longest part of a segment that is used (s); of a periodic segment at least one period. Chosen by hand."""
 
 
 def select_excited_segments(measure: FreeSimulation, axis: int) -> FreeSimulation:
-    """The error measure on the segments that excite an axis, each a record simulated from rest. Segments without
-    samples to fit or to choose by are left out; the measure is unchanged where no segment remains."""
+    """Select the segments that excite an axis, each as a record that is simulated from rest, and return the error
+    measure on them. Segments without samples for fitting (`fit`) or for choosing among effects (`choose`) are left out;
+    where no segment remains, the measure is returned unchanged. axis: index of the command."""
     segment_records = tuple(
         _cut_record(record, segment)
         for record in measure.records
@@ -41,14 +42,14 @@ def _is_excited(record: Observed, segment: Segment, axis: int) -> bool:
 
 
 def _cut_record(record: Observed, segment: Segment) -> Observed:
-    """The record of the first `LONGEST_S` of a segment; of a periodic segment, of as many whole periods as fit in this
-    time, but at least one."""
+    """Cut the first `LONGEST_S` of a segment out of a record; of a periodic segment, of as many whole periods as fit in
+    this time, but at least one."""
     max_samples = int(LONGEST_S * record.recording.sample_rate_hz)
     if segment.period:
         max_samples = max(max_samples // segment.period, 1) * segment.period
-    first, last = segment.start, min(segment.stop, segment.start + max_samples)
-    samples = slice(first, last)
+    start, stop = segment.start, min(segment.stop, segment.start + max_samples)
+    samples = slice(start, stop)
     return Observed(
-        cut_part(record.recording, first, last), record.command[samples], record.measured[samples],
+        cut_part(record.recording, start, stop), record.command[samples], record.measured[samples],
         record.fit[samples], record.choose[samples], record.test[samples],
     )  # fmt: skip

@@ -1,6 +1,8 @@
-"""Prediction error of a finished model on a recording that it was not fitted to, without and with a fitted gain factor.
+"""Prediction error of a model on a recording, without and with a fitted gain factor.
 
-The signals that are compared, and how, are chosen by `choose_measure` as in a diagnosis.
+No parameter of the model is fitted. Which signals are compared, and how, is chosen by `choose_measure` as in a
+diagnosis. Called by `reference.compare_with_reference`, and by `study.evaluation.real` to check an improved model on
+recordings that it was not fitted to.
 """
 
 from collections.abc import Iterator
@@ -15,13 +17,13 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
-Part = Literal["all", "test"]
-"""Samples that are predicted: all, or only those to test by."""
+PredictedSamples = Literal["all", "test"]
+"""Samples on which errors are computed: all that the measure uses, or only the held-out ones (to test by)."""
 
 
 @dataclass(frozen=True, slots=True)
 class ChannelRms:
-    """Rms signal and rms error of one channel, in the unit of the recording."""
+    """Standard deviation of the signal and rms error of one channel, in the unit of the recording."""
 
     name: str
     unit: str
@@ -33,34 +35,38 @@ class ChannelRms:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PredictionError:
-    """Normalised rms errors: sqrt(mean over channels of (rms error / standard deviation of the signal)²); None where
-    they are not finite."""
+    """Normalised rms errors, dimensionless: sqrt(mean over channels of (rms error / standard deviation of signal)²).
+    None where they are not finite or no sample is compared."""
 
     error: str
     """Name of the error measure, as in `diagnosis.json`."""
     without_gain: float | None
     """The error of the model without any gain factor."""
     with_gain: float | None
-    """The error with one gain factor for all channels, fitted to the samples that are not tested, or to all."""
+    """The error with one gain factor for all channels, fitted to the samples that are not held out; to all where all
+    are compared. None also where no gain can be fitted."""
     channels: tuple[ChannelRms, ...]
-    """Errors by channel, without the gain factor; empty where they are not finite."""
+    """Errors of each response channel, without the gain factor; empty where they are not finite, no sample is compared,
+    or other signals than the responses are compared."""
 
 
-def compute_prediction_error(recording: Recording, model: MechanicalModel, part: Part) -> PredictionError:
-    """Error of a finished model, with its own effects, on a recording. part: the samples that are predicted; of "test",
-    the gain factor is fitted to the other samples."""
+def compute_prediction_error(
+    recording: Recording, model: MechanicalModel, selection: PredictedSamples
+) -> PredictionError:
+    """Compute the error of a model, with the effects that it contains, on a recording. selection: samples on which the
+    error is computed; with "test", the gain factor is fitted to the other samples."""
     measure = make_measure((recording,), model).measure
     measured, predicted, tested, fitted = [], [], [], []
     for record, residual in zip(measure.records, measure.residuals(model, ()), strict=True):
         is_complete = np.isfinite(record.measured).all(axis=1)
         measured.append(record.measured)
         predicted.append(record.measured - residual * measure.unit)
-        tested.append((record.test if part == "test" else record.test | record.fit | record.choose) & is_complete)
+        tested.append((record.test if selection == "test" else record.test | record.fit | record.choose) & is_complete)
         fitted.append((record.fit | record.choose) & is_complete)
     # y: measured, f: predicted, (n, c) each.
     y, f = np.vstack(measured), np.vstack(predicted)
     test, fit = np.concatenate(tested), np.concatenate(fitted)
-    gain = _fit_gain(y, f, fit if part == "test" and fit.any() else test)
+    gain = _fit_gain(y, f, fit if selection == "test" and fit.any() else test)
     return PredictionError(
         measure.name,
         _compute_normalised_rms(y, f, test),
@@ -70,7 +76,7 @@ def compute_prediction_error(recording: Recording, model: MechanicalModel, part:
 
 
 def _compute_channel_errors(recording: Recording, y: FloatArray, f: FloatArray) -> Iterator[ChannelRms]:
-    """Errors of the response channels, where responses were compared."""
+    """Yield the errors of the response channels, where responses were compared. y: measured, f: predicted, (n, c)."""
     signal = recording.response
     if y.shape[1] < len(signal.channels) or not len(y) or not np.isfinite(f).all():
         return
@@ -79,8 +85,8 @@ def _compute_channel_errors(recording: Recording, y: FloatArray, f: FloatArray) 
 
 
 def _fit_gain(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
-    """Least-squares gain from prediction f to measurement y, (n, c) each, every channel in units of its rms; None where
-    the prediction is zero or not finite."""
+    """Fit the least-squares gain from prediction f to measurement y, (n, c) each, every channel in units of its rms;
+    None where the prediction is zero or not finite."""
     channel_rms = np.maximum(np.sqrt(np.mean(y[mask] ** 2, axis=0)), np.finfo(float).tiny)
     predicted, measured = (f[mask] / channel_rms).ravel(), (y[mask] / channel_rms).ravel()
     predicted_power = float(predicted @ predicted)
@@ -90,7 +96,8 @@ def _fit_gain(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
 
 
 def _compute_normalised_rms(y: FloatArray, f: FloatArray, mask: Mask) -> float | None:
-    """Normalised rms error of prediction f of y, (n, c) each: sqrt(mean over channels of (rms error / std of y)²)."""
+    """Compute the normalised rms error of prediction f of y, (n, c) each: sqrt(mean over channels of (rms error /
+    standard deviation of y)²). None where the mask is empty or the error is not finite."""
     if not mask.any():
         return None
     with np.errstate(over="ignore", invalid="ignore"):

@@ -1,9 +1,11 @@
-"""Fits the model that a diagnosis starts from where the user gave none.
+"""Fit the mechanical model that a diagnosis starts from where the user gave none.
 
-In this order: the weights of the force balances, where these name laws along the motion of one body per command; rigid
-bodies fitted to forces, for recordings in closed loop or of an imposed motion (`fit_rigid_model`); a mechanical model
-fitted to frequency responses (`mechanical_fit`), which takes longest. Their tolerances are wide, because missing
-physics biases the fitted parameters. Called by `study/workflows/diagnosis/fit_without_model`.
+Methods, in the order in which they are tried: a spring per axis by force balance, for quasi-static recordings without
+time; the coefficients of the force balances, where these name laws along the motion of one body per command; mass,
+damper and spring by force balance, for a free motion; rigid bodies fitted to forces, for recordings in closed loop or
+of an imposed motion (`fit_rigid_model`); a mechanical model fitted to frequency responses (`mechanical_fit`), which
+takes longest. Tolerances are wide, because unmodelled physics biases the fitted parameters. Called by `diagnose_values`
+and `study.workflows.diagnosis.fit_without_model`.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,7 +16,7 @@ import numpy as np
 from analysis.diagnosis.balance.balances import find_balances
 from analysis.diagnosis.balance.motion import NoMotionError
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
-from analysis.diagnosis.data.measured_motion import fill_gaps, is_quasi_static, is_read_as_free
+from analysis.diagnosis.data.measured_motion import fill_gaps, is_free_motion, is_quasi_static
 from analysis.diagnosis.data.recorded_conditions import has_carried_weight
 from analysis.diagnosis.first_model.first_model import FirstModel
 from analysis.diagnosis.first_model.model_from_balance import build_plain_model
@@ -57,18 +59,18 @@ FREE_REMARK = (
 
 def fit_first_model(
     recordings: Sequence[Recording],
-    without: Sequence[str],
+    excluded_effects: Sequence[str],
     time_left: TimeBudget,
     on_progress: Progress,
     map_: Mapper = map,
 ) -> FirstModel:
-    """The first model, from the force balance where that names laws along the motion of one body per command; else by a
-    fit to spectra, which takes longer. recordings: in the form of `one_motion_per_force`. Raises NothingToDiagnose
-    where no model can be fitted."""
+    """Fit the first model: by force balance where that is possible, else by `fit_first_linear_model`, which takes
+    longer. recordings: as converted by `one_motion_per_force`. excluded_effects: names of effects that the balance must
+    not name. map_: a possibly parallel `map`. Raises NothingToDiagnose where no model can be fitted."""
     _require_no_weight(recordings)
     on_progress("testing laws in the force balance", 0.0)
-    balances = find_balances(recordings, frozenset(without), time_left, map_)
-    is_free = is_read_as_free(recordings[0])
+    balances = find_balances(recordings, frozenset(excluded_effects), time_left, map_)
+    is_free = is_free_motion(recordings[0])
     if (
         not is_free
         and any(map(is_quasi_static, recordings))
@@ -77,7 +79,7 @@ def fit_first_model(
         return FirstModel(static_model, (UNTIMED_REMARK,), balances)
     model = build_plain_model(balances, recordings[0], "fitted to these recordings")
     if is_free and (free_model := model or _fit_free_model(recordings)) is not None:
-        return FirstModel(_hold_mass(free_model), (FREE_REMARK,), balances)
+        return FirstModel(_fix_mass(free_model), (FREE_REMARK,), balances)
     if model is not None:
         return FirstModel(model, (BALANCE_REMARK,), balances)
     on_progress("fitting a linear model, as none was given", 0.5)
@@ -87,21 +89,22 @@ def fit_first_model(
     return FirstModel(model, remarks, balances)
 
 
-def _hold_mass(model: MechanicalModel) -> MechanicalModel:
-    """The model with a mass tolerance so small (`FIXED_SHARE`) that re-tuning does not change the mass."""
+def _fix_mass(model: MechanicalModel) -> MechanicalModel:
+    """Return the model with a mass tolerance so small (`FIXED_SHARE` of the largest mass) that re-tuning does not
+    change the mass."""
     assert model.tolerance is not None
     return replace(model, tolerance=replace(model.tolerance, mass_kg=FIXED_SHARE * float(np.abs(model.mass).max())))
 
 
 def _fit_free_model(recordings: Sequence[Recording]) -> MechanicalModel | None:
-    """A mass with damper and spring for a free motion, or without the spring where that fit fails; None without
-    both."""
+    """Fit a mass with damper and spring to a free motion, or without the spring where that fit fails; None where both
+    fail."""
     return _fit_structure_by_balance(recordings, "mass-spring") or _fit_structure_by_balance(recordings, "motor")
 
 
 def _fit_structure_by_balance(recordings: Sequence[Recording], kind: Kind) -> MechanicalModel | None:
-    """The model of a structure, fitted by force balance; None where no motion was measured along the commands, or where
-    the fit fails."""
+    """Fit the model of a structure by force balance; None where no motion was measured along the commands, or where the
+    fit fails."""
     try:
         return fit_structure(balance_recordings(recordings), kind).model
     except (StructureRefused, NoMotionError):
@@ -111,8 +114,9 @@ def _fit_structure_by_balance(recordings: Sequence[Recording], kind: Kind) -> Me
 def fit_first_linear_model(
     recordings: Sequence[Recording], on_progress: Callable[[float], None], source: str = "these recordings"
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
-    """A linear model fitted by forces or spectra, with remarks. source: the recordings in words. Raises
-    NothingToDiagnose where no model can be fitted."""
+    """Fit a linear model to forces (`fit_rigid_model`) or to frequency responses. Returns the model and remarks, as
+    sentences. source: the recordings in words, for the remarks. Raises NothingToDiagnose where no model can be
+    fitted."""
     _require_no_weight(recordings)
     if should_use_rigid_model(recordings) and (rigid := _try_rigid_model(recordings, source)) is not None:
         return rigid, (RIGID_REMARK,)
@@ -135,8 +139,9 @@ def fit_first_linear_model(
 
 
 def _responds_to_commands(model: MechanicalModel, recording: Recording) -> bool:
-    """Whether the commands move the model at all. Where the response depends on them less than on the initial state, as
-    on an axis that friction holds, the fitted masses and springs grow without bound."""
+    """Whether the commands move the model: whether on some channel the simulated standard deviation is at least
+    `LEAST_MODEL_ANSWER` of the measured one. For an axis that friction holds at rest, the fitted masses and springs
+    grow without bound, and the model hardly moves."""
     simulated = simulate_response(
         model, fill_gaps(recording.command.samples), recording.sample_rate_hz, (), recording.hold
     )
@@ -156,7 +161,7 @@ def _require_no_weight(recordings: Sequence[Recording]) -> None:
 
 
 def _try_rigid_model(recordings: Sequence[Recording], source: str) -> MechanicalModel | None:
-    """A rigid body per command; None where the recordings do not determine it."""
+    """Fit a rigid body per command; None where the recordings do not determine it."""
     if not can_be_rigid(recordings):
         return None
     try:

@@ -13,7 +13,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.band import compute_band_end_hz
 from analysis.diagnosis.balance.motion import differentiate
-from analysis.diagnosis.data.measured_motion import FREE, fill_gaps, is_driven, is_quasi_static
+from analysis.diagnosis.data.measured_motion import FREE_MOTION, fill_gaps, is_driven, is_quasi_static
 from analysis.diagnosis.data.observed import find_moving_spans
 from analysis.diagnosis.data.observed_parts import find_parts
 from analysis.diagnosis.settings import DECAY_LEAST_CYCLES, DECAY_MOST_LEVELS
@@ -58,7 +58,7 @@ def read_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recording, 
             any(segment.role for segment in recording.segments) or len({s.amplitude for s in recording.segments}) > 1
         )
         segments = recording.segments if has_levels else _levels(recording, samples)
-        meta = {**recording.meta, "imposed": FREE}
+        meta = {**recording.meta, "imposed": FREE_MOTION}
         converted.append(replace(recording, command=command, excitation=None, segments=segments, meta=meta))
     unit_mass = "inertia (1 kg m^2)" if is_rotational else "mass (1 kg)"
     return tuple(converted), (

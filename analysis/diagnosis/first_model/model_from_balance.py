@@ -33,7 +33,7 @@ def build_first_model(balances: Sequence[Balance], recording: Recording, name: s
         [_fit_matrix_rows(balance, laws, driven_channels) for balance, laws in zip(balances, law_choices, strict=True)]
         for law_choices in (
             [()] * command_count,
-            [tuple(law.place for law in balance.named if law.place >= 0) for balance in balances],
+            [tuple(law.law_index for law in balance.named if law.law_index >= 0) for balance in balances],
         )
     )
     matrices = [np.array([rows[matrix_index] for rows in without_laws]) for matrix_index in range(3)]
@@ -88,7 +88,7 @@ def compute_law_power_share(balances: Sequence[Balance], band_hz: float) -> floa
     shares = [1.0]
     for balance in balances:
         regression = balance.search.regression
-        laws = [law.place for law in balance.named if law.place >= 0]
+        laws = [law.law_index for law in balance.named if law.law_index >= 0]
         weights, first_weight = regression.fit_weights(regression.select_columns(laws)), regression.base
         for place in (regression.places[law] for law in laws):
             law_weights = weights[first_weight : first_weight + place.stop - place.start]

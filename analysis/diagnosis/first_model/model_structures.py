@@ -14,7 +14,7 @@ import numpy as np
 from analysis.diagnosis.balance.law import measure_scales
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motions
 from analysis.diagnosis.balance.regression import Regression
-from analysis.diagnosis.data.measured_motion import is_read_as_free, select_time_unit
+from analysis.diagnosis.data.measured_motion import is_free_motion, select_time_unit
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.first_model.joint_fit import PARTS, JointFit, Part, build_regressions, fit_jointly
 from analysis.diagnosis.settings import MASSLESS_SHARE, MODEL_FLOOR, RICHER_STRUCTURE_ERRORS, RICHER_STRUCTURE_GAIN
@@ -117,7 +117,7 @@ def balance_recordings(recordings: Sequence[Recording]) -> BalancedRecordings:
     turns = any(measure_scales(motions, axis, first.is_rotational).turns for axis in range(count))
     untimed = not np.isfinite(motions[0].band_hz)
     return BalancedRecordings(
-        first, build_regressions(motions, turns), untimed, turns, first.is_rotational, is_read_as_free(first)
+        first, build_regressions(motions, turns), untimed, turns, first.is_rotational, is_free_motion(first)
     )
 
 

@@ -72,9 +72,9 @@ def _compute_other_linear_force(balance: Balance, motion: Motion) -> FloatArray:
     """(n,), N (N m): linear force of the balance without the driven motion's own mass, damping and stiffness. The named
     laws are part of the regression, but not of this force."""
     regression, motion_count = balance.search.regression, len(motion.channels)
-    linear_laws = [judged_law.place for judged_law in balance.laws if judged_law.law.linear]
+    linear_laws = [judged_law.law_index for judged_law in balance.laws if judged_law.law.linear]
     weights = regression.fit_weights(
-        regression.select_columns([*linear_laws, *(judged_law.place for judged_law in balance.named)])
+        regression.select_columns([*linear_laws, *(judged_law.law_index for judged_law in balance.named)])
     )
     # The constant force of the base stays in the command, for the later fit.
     weights = np.delete(weights, regression.base - 1)

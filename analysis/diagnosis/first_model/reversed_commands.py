@@ -5,7 +5,7 @@ A passive device has no negative mass and no negative damping. The force of each
 balanced with both signs of the command, with m >= 0 and d >= 0 in either. The sign is reversed where that lowers the
 cross-validated error by more than `REVERSED_SIGN_GAIN` and `improves_significantly`. A spring alone does not determine
 the sign, because k may have either. The reversed commands are listed in the recording's `meta`; a model is
-written for the commands as they were recorded (`recorded_conditions`).
+written for the commands as they were recorded (`recorded_conditions`). Called by `one_motion_per_force`.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ import numpy as np
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motions
 from analysis.diagnosis.balance.regression import build_regression
 from analysis.diagnosis.balance.structures import Structure, improves_significantly
-from analysis.diagnosis.data.measured_motion import convert_all_to_force_driven, is_read_as_free
+from analysis.diagnosis.data.measured_motion import convert_all_to_force_driven, is_free_motion
 from analysis.diagnosis.data.observed_parts import observe_parts
 from analysis.diagnosis.data.recorded_conditions import REVERSED_CHANNELS
 from analysis.diagnosis.settings import REVERSED_SIGN_GAIN
@@ -26,30 +26,32 @@ from equalizer.signals.signal import FloatArray, Signal
 
 
 def reverse_commands(recordings: tuple[Recording, ...]) -> tuple[tuple[Recording, ...], str]:
-    """The recordings with such commands reversed, and a sentence about them. Unchanged, and "", where no sign is
-    reversed or the forces cannot be balanced. Where the motion was imposed, the response (force) is negated
-    instead. recordings: alike in channels, units and rate. A free motion has no command."""
-    if is_read_as_free(recordings[0]):
+    """Negate the commands whose sign is opposite to the motion that they drive; returns the recordings and a sentence
+    about these commands. Unchanged, and "", where there are none, the forces cannot be balanced, or the motion was free
+    (no command). Where the motion was imposed, the response (force) is negated instead. recordings: alike in channels,
+    units and rate."""
+    if is_free_motion(recordings[0]):
         return recordings, ""
     driven = convert_all_to_force_driven(recordings)
-    count = len(driven[0].command.channels)
+    axis_count = len(driven[0].command.channels)
     try:
         motions = compute_motions(observe_parts(driven, len(driven[0].response.channels)))
-        if len(motions[0].channels) != count:
+        if len(motions[0].channels) != axis_count:
             return recordings, ""
-        reversed_axes = [axis for axis in range(count) if _is_reversed(motions, axis)]
+        reversed_axes = [axis for axis in range(axis_count) if _is_reversed(motions, axis)]
     except (NoMotionError, np.linalg.LinAlgError):
         return recordings, ""
     if not reversed_axes:
         return recordings, ""
     names = [driven[0].command.channels[axis] for axis in reversed_axes]
-    imposed = driven[0] is not recordings[0]
-    sign = np.ones(count)
-    sign[reversed_axes] = -1.0
+    is_motion_imposed = driven[0] is not recordings[0]
+    signs = np.ones(axis_count)
+    signs[reversed_axes] = -1.0
     verb = "is" if len(names) == 1 else "are"
-    note = {REVERSED_CHANNELS: names}
+    added_meta = {REVERSED_CHANNELS: names}
     reversed_recordings = tuple(
-        _reverse(replace(recording, meta={**recording.meta, **note}), imposed, sign) for recording in recordings
+        _multiply_forces(replace(recording, meta={**recording.meta, **added_meta}), is_motion_imposed, signs)
+        for recording in recordings
     )
     return reversed_recordings, (
         f"{conjoin(names)} {verb} counted against the motion: as recorded, the device would deliver work instead of "
@@ -72,14 +74,14 @@ def _is_reversed(motions: Sequence[Motion], axis: int) -> bool:
     )
 
 
-def _reverse(recording: Recording, imposed: bool, sign: FloatArray) -> Recording:
-    """The recording with each force times `sign` (m,): its response where the motion was imposed, else its commands."""
-    if imposed:
-        return replace(recording, response=_scale_channels(recording.response, sign))
-    excitation = None if recording.excitation is None else _scale_channels(recording.excitation, sign)
-    return replace(recording, command=_scale_channels(recording.command, sign), excitation=excitation)
+def _multiply_forces(recording: Recording, is_motion_imposed: bool, signs: FloatArray) -> Recording:
+    """Multiply each force by its sign, `signs` (m,): the response where the motion was imposed, else the commands."""
+    if is_motion_imposed:
+        return replace(recording, response=_scale_channels(recording.response, signs))
+    excitation = None if recording.excitation is None else _scale_channels(recording.excitation, signs)
+    return replace(recording, command=_scale_channels(recording.command, signs), excitation=excitation)
 
 
-def _scale_channels(signal: Signal, sign: FloatArray) -> Signal:
-    """The signal with its channels times `sign` (channels,)."""
-    return replace(signal, samples=signal.samples * sign)
+def _scale_channels(signal: Signal, factors: FloatArray) -> Signal:
+    """Multiply the channels of a signal by `factors` (channels,)."""
+    return replace(signal, samples=signal.samples * factors)

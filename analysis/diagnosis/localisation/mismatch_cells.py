@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from analysis.diagnosis.data.spectral_lines import Band, compute_noncentral_f_sf
-from analysis.diagnosis.localisation.clean_floor import CleanFloor
+from analysis.diagnosis.localisation.model_error_floor import ModelErrorFloor
 from analysis.diagnosis.localisation.residual_lines import Observation, ResidualLines, compute_residual_lines
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE, MODEL_FLOOR
@@ -35,7 +35,7 @@ class Margin:
     """Equivalence margin: a share of the signal in a cell and the share of clean recordings, squares added."""
 
     share: float = MODEL_FLOOR
-    learned: CleanFloor = field(default_factory=CleanFloor)
+    learned: ModelErrorFloor = field(default_factory=ModelErrorFloor)
 
     def compute_share(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
         """Return the margin of a cell, as a share of its signal."""
@@ -173,16 +173,18 @@ def adjust_cell_p_values(cells: Sequence[MismatchCell]) -> tuple[MismatchCell, .
     return tuple(replace(cell, adjusted_p_value=float(p)) for cell, p in zip(cells, p_values, strict=True))
 
 
-def learn_floor(clean_cells: Sequence[Sequence[MismatchCell]]) -> CleanFloor:
+def learn_floor(clean_cells: Sequence[Sequence[MismatchCell]]) -> ModelErrorFloor:
     """Return the largest share of each cell over clean recordings and levels, times a factor that is larger for fewer
-    recordings (`CleanFloor.margin_factor`). clean_cells: the cells of each recording."""
+    recordings (`ModelErrorFloor.margin_factor`). clean_cells: the cells of each recording."""
     shares: dict[tuple[str, str, str, Band], float] = {}
     for cells in clean_cells:
         for cell in cells:
             cell_key = (cell.output, cell.quantity, cell.input, cell.band_hz)
             shares[cell_key] = max(shares.get(cell_key, 0.0), cell.share)
-    factor = CleanFloor(recordings=len(clean_cells)).margin_factor
-    return CleanFloor({cell_key: factor * share for cell_key, share in shares.items()}, recordings=len(clean_cells))
+    factor = ModelErrorFloor(recordings=len(clean_cells)).margin_factor
+    return ModelErrorFloor(
+        {cell_key: factor * share for cell_key, share in shares.items()}, recordings=len(clean_cells)
+    )
 
 
 def adjust_nested_p_values(p_values: FloatArray, families: Sequence[tuple[Hashable, ...]], level: float) -> FloatArray:

@@ -19,7 +19,6 @@ from analysis.diagnosis.document import Mismatch
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.fit_score import FitScore
 from analysis.diagnosis.errors.output_error import Fitted
-from analysis.diagnosis.localisation.clean_floor import CleanFloor
 from analysis.diagnosis.localisation.mismatch_cells import (
     Margin,
     MismatchCell,
@@ -27,6 +26,7 @@ from analysis.diagnosis.localisation.mismatch_cells import (
     adjust_cell_p_values,
     compute_mismatch_cells,
 )
+from analysis.diagnosis.localisation.model_error_floor import ModelErrorFloor
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.types import Mapper
 
@@ -57,7 +57,7 @@ def build_mismatch_maps(
     measure: ErrorMeasure,
     stages: Mapping[str, Fitted],
     floors: tuple[NoiseFloor, ...],
-    learned: CleanFloor | None = None,
+    learned: ModelErrorFloor | None = None,
     map_: Mapper = map,
 ) -> Maps:
     """Maps of all stages, tested against noise, the mismatch of clean recordings (learned), and the error of the stage
@@ -119,11 +119,11 @@ def compute_cells(
     measure: ErrorMeasure,
     fitted: Fitted,
     floors: tuple[NoiseFloor, ...],
-    learned: CleanFloor | None = None,
+    learned: ModelErrorFloor | None = None,
     held_out: bool = False,
 ) -> Cells:
     """Cells of all records for one fit. held_out: only the samples that nothing was fitted to."""
-    margin = Margin(learned=learned or CleanFloor())
+    margin = Margin(learned=learned or ModelErrorFloor())
     cells: list[MismatchCell] = []
     for part, (record, residuals, floor) in enumerate(zip(measure.records, fitted.residuals, floors, strict=True)):
         p = record.recording.response.samples.shape[1]

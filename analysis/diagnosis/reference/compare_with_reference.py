@@ -64,7 +64,7 @@ class Contrast:
         explains the difference."""
         if self.comparison is None or self.decision is None or self.decision.named is not None:
             return False
-        return self.comparison.differ
+        return self.comparison.sets_differ
 
     @property
     def named_effects(self) -> frozenset[str]:
@@ -88,7 +88,7 @@ class Contrast:
         """
         if self.named_effects:
             return not (residual_is_noise or names & self.named_effects)
-        differ = self.comparison is None or self.comparison.differ
+        differ = self.comparison is None or self.comparison.sets_differ
         return not differ and bool(names & self.tested_effects)
 
     @property

@@ -21,9 +21,9 @@ from analysis.diagnosis.errors.whitened_measure import (
     fit_whitening_filter,
     whiten_measure,
 )
-from analysis.diagnosis.localisation.clean_floor import CleanFloor, NothingLearned
 from analysis.diagnosis.localisation.mismatch_cells import MismatchCell, learn_floor
 from analysis.diagnosis.localisation.mismatch_maps import compute_cells
+from analysis.diagnosis.localisation.model_error_floor import IncomparableRecordingsError, ModelErrorFloor
 from analysis.diagnosis.search.explain import retune_alone
 from analysis.diagnosis.search.reference_recordings import ReferenceRecordings, prepare_reference_recording
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
@@ -66,7 +66,7 @@ class _RetunedFit:
 class LearnedError:
     """A model's error on clean recordings: its size by cell, its spectrum as a whitening filter, and the recordings."""
 
-    floor: CleanFloor
+    floor: ModelErrorFloor
     whitening: WhiteningFilter
     share: FloatArray
     """(c,): rms of the whitened residual over the signal's; see `_compute_signal_level`."""
@@ -84,8 +84,8 @@ def learn_model_error(
 ) -> LearnedError:
     """Learn the residual spectrum of the re-tuned model on clean recordings, as noise for the search. clean: of the
     same device, alike in channels and units; the model is re-tuned to each separately, because recordings of different
-    days differ. diagnosed: the recordings to diagnose, with the same measure. Raises NothingLearned where the measures
-    differ."""
+    days differ. diagnosed: the recordings to diagnose, with the same measure. Raises IncomparableRecordingsError where
+    the measures differ."""
     measure_name = make_measure(diagnosed, model, clean).measure.name
     fits: list[_RetunedFit] = []
     for number, recording in enumerate(clean):
@@ -101,25 +101,25 @@ def learn_model_error(
 
 def learn_model_floor(
     clean: Sequence[Recording], model: MechanicalModel, diagnosed: Sequence[Recording], map_: Mapper, progress: Progress
-) -> CleanFloor:
+) -> ModelErrorFloor:
     """Return only the floor of `learn_model_error`; an empty one where the clean recordings cannot be compared."""
     try:
         return learn_model_error(clean, model, diagnosed, map_, progress).floor
-    except (NothingLearned, np.linalg.LinAlgError):
-        return CleanFloor()
+    except (IncomparableRecordingsError, np.linalg.LinAlgError):
+        return ModelErrorFloor()
 
 
 def require_same_measure(clean_measure: str, diagnosed_measure: str) -> None:
     """Require that clean and diagnosed recordings have the same error measure, each given by its name. Raises
-    NothingLearned where they differ."""
+    IncomparableRecordingsError where they differ."""
     if clean_measure != diagnosed_measure:
-        raise NothingLearned(
+        raise IncomparableRecordingsError(
             f"the clean recordings can only be compared by {clean_measure}, those to diagnose by {diagnosed_measure}, "
             "so their errors are not comparable; give clean recordings that were made in the same way"
         )
 
 
-def _learn_spectrum(floor: CleanFloor, fits: Sequence[_RetunedFit], map_: Mapper) -> LearnedError:
+def _learn_spectrum(floor: ModelErrorFloor, fits: Sequence[_RetunedFit], map_: Mapper) -> LearnedError:
     """Fit the whitening filter of all residuals, and compute the whitened residual's share of the signal (the largest
     of all recordings) and the clean recordings as references."""
     residuals = [record_residual for fit in fits for record_residual in fit.residuals]
@@ -177,7 +177,7 @@ def _compute_channel_shares(measure: ErrorMeasure, retuned: FittedCandidate) -> 
     )
 
 
-def add_learned_noise(measure: ErrorMeasure, floor: CleanFloor) -> ErrorMeasure:
+def add_learned_noise(measure: ErrorMeasure, floor: ModelErrorFloor) -> ErrorMeasure:
     """Return the measure with the learned residual counted as noise; unchanged without a learned share per channel."""
     return measure.with_floor(np.array(floor.channels) * _compute_signal_rms(measure)) if floor.channels else measure
 

@@ -17,10 +17,10 @@ from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.error_measure_rule import IN_SAMPLES
 from analysis.diagnosis.errors.tuning import Tuning
-from analysis.diagnosis.localisation.clean_floor import CleanFloor, describe_clean_floor
 from analysis.diagnosis.localisation.localisation import Localisation
 from analysis.diagnosis.localisation.mismatch_maps import Maps, build_mismatch_maps, summarise_worst_channel
 from analysis.diagnosis.localisation.mismatch_rows import list_mismatch_rows
+from analysis.diagnosis.localisation.model_error_floor import ModelErrorFloor, describe_model_error_floor
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.error_table import collect_channel_errors, compute_fit_errors, is_held_out_still
 from analysis.diagnosis.result.findings import Findings, TimeSeries
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 
 def assemble_findings(
-    result: SearchResult, floors: tuple[NoiseFloor, ...], names: Sequence[str], learned: CleanFloor
+    result: SearchResult, floors: tuple[NoiseFloor, ...], names: Sequence[str], learned: ModelErrorFloor
 ) -> Findings:
     """The findings of a search. result.found.after: the model with the named effects, or the re-tuned model without
     any. names: of the recordings. learned: the residual of clean recordings, counted as noise."""
@@ -73,7 +73,10 @@ def assemble_findings(
         signatures=examination.signatures,
         black_box=examination.black_box,
         remarks=_collect_remarks(
-            (_describe_rest(measure), describe_clean_floor(learned, channels), in_samples), time_series, tuning, floors
+            (_describe_rest(measure), describe_model_error_floor(learned, channels), in_samples),
+            time_series,
+            tuning,
+            floors,
         ),
         maps=maps.cells,
         localisation=examination.local,

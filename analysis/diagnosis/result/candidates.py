@@ -203,7 +203,7 @@ def collect_balance_errors(
     for axis, balance in enumerate(balances):
         letter = shorten_axis_name(channels[axis], channels)
         names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
-        laws = [law.place for law in balance.laws if law.simulated_as in names]
+        laws = [law.law_index for law in balance.laws if law.simulated_as in names]
         named_error = balance.compute_error(laws) if laws else balance.linear
         has_prior = balance.search.regression.prior is not None
         errors.append(

@@ -19,15 +19,15 @@ from equalizer.signals.signal import FloatArray
 
 Item = TypeVar("Item")
 RESAMPLE_COUNT = 2000
-"""Resamples of a bootstrap interval."""
+"""Number of resamples of a bootstrap interval."""
 _QUANTILES = (0.025, 0.975)
 _GROUP_SEED, _VALUE_SEED = 21, 20
 """Fixed seeds: the same cases always give the same interval."""
 
 
 @dataclass(frozen=True, slots=True)
-class Figure:
-    """A share, or a statistic of values, with its 95 % confidence interval."""
+class IntervalEstimate:
+    """Estimate of a share, or of a statistic of values, with its 95 % confidence interval."""
 
     name: str
     value: float | None
@@ -42,14 +42,14 @@ class Figure:
     """Number of cases that count towards a share; None for a statistic."""
 
 
-def compute_share(name: str, items: Sequence[Item], is_hit: Callable[[Item], bool]) -> Figure:
+def compute_share(name: str, items: Sequence[Item], is_hit: Callable[[Item], bool]) -> IntervalEstimate:
     """Compute the share of the items among `items` for which `is_hit` is true, with Wilson's interval; without a value
     where there are no items."""
     hits, count = sum(is_hit(item) for item in items), len(items)
     if not count:
-        return Figure(name, None, None, None, 0, 0)
+        return IntervalEstimate(name, None, None, None, 0, 0)
     low, high = compute_wilson_interval(hits, count)
-    return Figure(name, hits / count, low, high, count, hits)
+    return IntervalEstimate(name, hits / count, low, high, count, hits)
 
 
 def compute_wilson_interval(hits: float, trials: int) -> tuple[float, float]:
@@ -59,16 +59,16 @@ def compute_wilson_interval(hits: float, trials: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def pool_share(name: str, groups: Sequence[Sequence[bool]]) -> Figure:
+def pool_share(name: str, groups: Sequence[Sequence[bool]]) -> IntervalEstimate:
     """Compute the share of true items in all groups together, whose items depend on each other: the interval resamples
     groups as a whole (cluster bootstrap). Empty groups are left out; without a value where all are empty."""
     group_hits = np.array([sum(group) for group in groups if group], dtype=np.float64)
     group_sizes = np.array([len(group) for group in groups if group], dtype=np.float64)
     if not len(group_sizes):
-        return Figure(name, None, None, None, 0, 0)
+        return IntervalEstimate(name, None, None, None, 0, 0)
     resamples = np.random.default_rng(_GROUP_SEED).integers(len(group_sizes), size=(RESAMPLE_COUNT, len(group_sizes)))
     low, high = np.quantile(group_hits[resamples].sum(axis=1) / group_sizes[resamples].sum(axis=1), _QUANTILES)
-    return Figure(
+    return IntervalEstimate(
         name,
         float(group_hits.sum() / group_sizes.sum()),
         float(low),
@@ -78,15 +78,17 @@ def pool_share(name: str, groups: Sequence[Sequence[bool]]) -> Figure:
     )
 
 
-def compute_statistic(name: str, values: Iterable[float], reduce: Callable[..., FloatArray]) -> Figure:
+def compute_statistic(name: str, values: Iterable[float], reduce: Callable[..., FloatArray]) -> IntervalEstimate:
     """Compute a statistic of the finite values, with its bootstrap interval; without a value where none is finite.
 
     reduce: function of an array (resamples, values) and `axis=1`, such as np.median or np.mean.
     """
-    finite = np.array([value for value in values if np.isfinite(value)], dtype=np.float64)
-    if not len(finite):
-        return Figure(name, None, None, None, 0)
-    value = float(reduce(finite[None, :], axis=1)[0])
-    resamples = np.random.default_rng(_VALUE_SEED).integers(len(finite), size=(RESAMPLE_COUNT, len(finite)))
-    low, high = np.quantile(reduce(finite[resamples], axis=1), _QUANTILES)
-    return Figure(name, value, float(low), float(high), len(finite))
+    finite_values = np.array([value for value in values if np.isfinite(value)], dtype=np.float64)
+    if not len(finite_values):
+        return IntervalEstimate(name, None, None, None, 0)
+    value = float(reduce(finite_values[None, :], axis=1)[0])
+    resamples = np.random.default_rng(_VALUE_SEED).integers(
+        len(finite_values), size=(RESAMPLE_COUNT, len(finite_values))
+    )
+    low, high = np.quantile(reduce(finite_values[resamples], axis=1), _QUANTILES)
+    return IntervalEstimate(name, value, float(low), float(high), len(finite_values))

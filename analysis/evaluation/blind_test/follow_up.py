@@ -8,7 +8,7 @@ makes the recordings; `score` computes the figures.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from analysis.evaluation.blind_test.confidence_intervals import Figure, compute_share
+from analysis.evaluation.blind_test.confidence_intervals import IntervalEstimate, compute_share
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class FollowUp:
         return self.after_drawn == (self.effect,)
 
 
-def compute_follow_up_figures(follow_ups: Sequence[FollowUp]) -> tuple[Figure, ...]:
+def compute_follow_up_figures(follow_ups: Sequence[FollowUp]) -> tuple[IntervalEstimate, ...]:
     """Shares of ambiguous diagnoses that the proposed or the random recording resolved: of all, then of those with a
     proposal."""
     with_proposal = [follow_up for follow_up in follow_ups if follow_up.proposed]

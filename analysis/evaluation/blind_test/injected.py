@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
-from analysis.evaluation.blind_test.confidence_intervals import Figure, compute_share
+from analysis.evaluation.blind_test.confidence_intervals import IntervalEstimate, compute_share
 
 DETECTABLE = 1.25
 """Factor by which a fault must change the held-out error of the device's base model, up or down, to count as
@@ -93,7 +93,7 @@ def read_outcome(label: Mapping[str, Any], answer: Mapping[str, Any]) -> Injecte
     )
 
 
-def score_injections(outcomes: Sequence[InjectedOutcome]) -> tuple[Figure, ...]:
+def score_injections(outcomes: Sequence[InjectedOutcome]) -> tuple[IntervalEstimate, ...]:
     """Shares of right and wrong answers, with Wilson's 95 % intervals."""
     faults = [outcome for outcome in outcomes if outcome.detectable]
     undetectable = [outcome for outcome in outcomes if outcome.effects and not outcome.detectable]
@@ -123,8 +123,8 @@ class Tally:
     """Number of injected faults, detectable or not."""
     counts: tuple[int, ...]
     """Number of detectable faults per entry of `ANSWER_CLASSES` without its last."""
-    right: Figure
-    faultless: Figure
+    right: IntervalEstimate
+    faultless: IntervalEstimate
     """Cases without a fault in which nothing was named."""
 
 

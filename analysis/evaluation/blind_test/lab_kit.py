@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from analysis.diagnosis.document import Diagnosis
-from analysis.evaluation.blind_test.confidence_intervals import Figure, compute_share
+from analysis.evaluation.blind_test.confidence_intervals import IntervalEstimate, compute_share
 
 CONTROL_CHANGE, MISSING = "nothing", "missing"
 """Name of the change that changes nothing (control); verdict of a recording without a diagnosis."""
@@ -136,7 +136,7 @@ def _is_in_interval(value: float | None, change: Change, diagnosis: Diagnosis) -
     return None
 
 
-def compute_kit_figures(rows: Sequence[Scored]) -> tuple[Figure, ...]:
+def compute_kit_figures(rows: Sequence[Scored]) -> tuple[IntervalEstimate, ...]:
     """Rates with Wilson's 95 % intervals."""
     changed_rows = [row for row in rows if row.change != CONTROL_CHANGE]
     kinds = [change.name for change in CHANGES if any(row.change == change.name for row in changed_rows)]

@@ -14,7 +14,12 @@ import numpy as np
 
 from analysis.diagnosis.document import NamedEffect
 from analysis.evaluation.blind_test.calibration import Calibration, compute_calibration
-from analysis.evaluation.blind_test.confidence_intervals import Figure, compute_share, compute_statistic, pool_share
+from analysis.evaluation.blind_test.confidence_intervals import (
+    IntervalEstimate,
+    compute_share,
+    compute_statistic,
+    pool_share,
+)
 from analysis.evaluation.blind_test.follow_up import FollowUp, compute_follow_up_figures
 from analysis.evaluation.blind_test.outcome import Concealed, Outcome
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
@@ -79,7 +84,7 @@ BANKS = ("main", "dirty", "engine")
 class Score:
     """Figures of a bank with their intervals, the calibration of its stated probabilities, and its misses."""
 
-    figures: tuple[Figure, ...]
+    figures: tuple[IntervalEstimate, ...]
     calibration: Calibration
     misses: tuple[Outcome, ...]
     """Outcomes with a wrong answer (`is_wrong_answer`); a missing name for an undetectable effect is not wrong."""
@@ -105,7 +110,7 @@ def _select_detectable(outcomes: Sequence[Outcome]) -> list[Outcome]:
     return [outcome for outcome in outcomes if outcome.detectable]
 
 
-def _compute_single_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+def _compute_single_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEstimate]:
     """Figures on cases with a single concealed effect: its name, place and axis, and the returned set of names."""
     bank_words = {"main": "", "dirty": ", dirty bank", "engine": ", second engine"}
     for bank in BANKS:
@@ -133,7 +138,7 @@ def _compute_single_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     yield compute_share("not detectable, yet a wrong name", undetectable, has_wrong_name)
 
 
-def _compute_null_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+def _compute_null_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEstimate]:
     """False alarms on cases without a concealed effect."""
     yield compute_share("nothing missing, yet named", _select_kind(outcomes, "nothing"), lambda case: bool(case.named))
     nothing_missing = _select_kind(outcomes, "nothing")
@@ -142,7 +147,7 @@ def _compute_null_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     )
 
 
-def _compute_open_set_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+def _compute_open_set_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEstimate]:
     """Figures on cases whose true effect is outside the catalogue, or was excluded from it."""
     outside = _select_detectable(_select_kind(outcomes, "outside"))
     yield compute_share("outside the catalogue, not explained", outside, lambda case: case.verdict in ADMITS_MISMATCH)
@@ -152,14 +157,14 @@ def _compute_open_set_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
     yield compute_share("without the true effect, yet explained", excluded, lambda case: case.verdict == "explained")
 
 
-def _compute_pair_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+def _compute_pair_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEstimate]:
     """Figures on cases with two concealed effects."""
     pairs = _select_detectable(_select_kind(outcomes, "pair"))
     yield compute_share("pairs, both and no other", pairs, lambda case: case.right)
     yield compute_share("pairs, at least one", pairs, lambda case: bool(set(case.names) & set(case.named_names)))
 
 
-def _compute_number_figures(outcomes: Sequence[Outcome]) -> Iterator[Figure]:
+def _compute_number_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEstimate]:
     """Parameter errors and interval coverage of single effects named right, the remaining error, and run times."""
     right_cases = [case for case in _select_detectable(_select_kind(outcomes, "single")) if case.right]
     errors = [compute_main_error(case.concealed[0], case.named[0]) for case in right_cases]

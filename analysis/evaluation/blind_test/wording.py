@@ -1,10 +1,10 @@
 """Texts for reports of a blind test: scores with confidence intervals, concealed effects, and answers."""
 
-from analysis.evaluation.blind_test.confidence_intervals import Figure
+from analysis.evaluation.blind_test.confidence_intervals import IntervalEstimate
 from analysis.evaluation.blind_test.outcome import Outcome
 
 
-def format_figure(figure: Figure) -> str:
+def format_figure(figure: IntervalEstimate) -> str:
     """A score with its 95 % interval and its number of cases, in per cent where it is a share, such as
     "95.7 % [90, 98], 110 of 115"; "none drawn" where it has no value."""
     if figure.value is None or figure.low is None or figure.high is None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.evaluation.blind_test.confidence_intervals import Figure, compute_share, compute_statistic
+from analysis.evaluation.blind_test.confidence_intervals import IntervalEstimate, compute_share, compute_statistic
 from analysis.evaluation.laws.law_outcome import LawOutcome
 
 
@@ -18,7 +18,7 @@ from analysis.evaluation.laws.law_outcome import LawOutcome
 class LawScore:
     """Figures of a bank of laws with their intervals, and the outcomes that count as wrong (`LawOutcome.missed`)."""
 
-    figures: tuple[Figure, ...]
+    figures: tuple[IntervalEstimate, ...]
     misses: tuple[LawOutcome, ...]
 
 

@@ -2,7 +2,7 @@
 
 Objective: sum of the persons' log marginal likelihoods (`marginal`) plus the log density of a weak prior (`Prior`),
 which keeps standard deviations, lapse rate and means finite where the answers do not determine them. The maximum is
-found by L-BFGS-B with the exact gradient; `refine` starts from it.
+found by L-BFGS-B with the exact gradient of Laplace's approximation; `refine` starts from it. Called by `fit`.
 """
 
 from dataclasses import dataclass
@@ -22,14 +22,15 @@ from equalizer.signals.signal import FloatArray
 class Prior:
     """Prior distributions of the population parameters, weak enough for the answers of a study to outweigh them."""
 
-    lapse_right: float = 40.0
-    lapse_wrong: float = 1.0
-    """Beta distribution of the lapse rate, as a density of its logit: as if one lapse had been seen in 41 trials far
-    above threshold. Attentive adults lapse in 0 to 5 %; some hundred trials above threshold outweigh the prior."""
-    spread: float = 1.0
-    """The log prior of each standard deviation is spread * log SD. With 1.0 it is the limit, for a rate towards 0, of a
-    gamma distribution with shape 2 (Y. Chung et al., Psychometrika 78 (2013), 685-709), which moves an estimate that
-    would be 0 by about one standard error."""
+    lapse_beta: float = 40.0
+    lapse_alpha: float = 1.0
+    """Shape parameters of the beta distribution of the lapse rate p, as a density of logit p: p^alpha (1 - p)^beta up
+    to a constant. Equivalent to one lapse in 41 trials far above threshold. Attentive adults lapse in 0 to 5 %; some
+    hundred trials above threshold outweigh the prior."""
+    log_sd_weight: float = 1.0
+    """The log prior of each standard deviation is log_sd_weight * log SD. With 1.0 it is the limit, for a rate towards
+    0, of a gamma distribution with shape 2 (Y. Chung et al., Psychometrika 78 (2013), 685-709), which moves an estimate
+    that would be 0 by about one standard error."""
     mean_sd_db: float = 30.0
     """SD (dB) of a normal distribution of each mean around the average level played. It keeps a mean finite that the
     answers do not determine (all guess at the cap); a mean 10 dB away from that level moves by 0.01 dB."""
@@ -43,44 +44,46 @@ LAPSE_BOUNDS = (float(logit(1e-4)), float(logit(0.3)))
 
 
 class Objective:
-    """Minus the penalized log marginal likelihood with its gradient, as a function to minimise."""
+    """Minus the penalized log marginal likelihood with its gradient, as a function to minimise. `start`: starting
+    values (size,) of the parameters in the order of `Layout`."""
 
     def __init__(self, answers: Answers, family: Family, prior: Prior) -> None:
         self.answers, self.family = answers, family
         self.prior, self.layout = prior, Layout(len(answers.frequencies_hz))
-        start = find_starting_parameters(answers, family)
+        start = choose_starting_parameters(answers, family)
         k = self.layout.k
-        latent = np.tile(np.concatenate([start[:k], [start[self.layout.slope], 0.0]]), (answers.persons, 1))
-        self.marginal = Marginal(TrialLikelihood(answers, family), latent)
+        latent_start = np.tile(np.concatenate([start[:k], [start[self.layout.slope], 0.0]]), (answers.persons, 1))
+        # (persons, k + 2): each person's thresholds (dB), log-slope and criterion, from the population's values.
+        self.marginal = Marginal(TrialLikelihood(answers, family), latent_start)
         self.start = start
         self._mean_level_db = float(np.average(answers.level_db, weights=answers.right + answers.wrong))
 
     def __call__(self, parameters: FloatArray) -> tuple[float, FloatArray]:
         """Value and gradient (size,) at the parameters (size,) of `Layout`."""
         value, scores = self.marginal.evaluate(parameters)
-        log_prior, prior_gradient = self.log_prior(parameters)
+        log_prior, prior_gradient = self.evaluate_log_prior(parameters)
         return -float(value.sum()) - log_prior, -scores.sum(axis=0) - prior_gradient
 
-    def log_prior(self, parameters: FloatArray) -> tuple[float, FloatArray]:
-        """Log density of the prior up to a constant, and its gradient (size,)."""
+    def evaluate_log_prior(self, parameters: FloatArray) -> tuple[float, FloatArray]:
+        """Evaluate the log density of the prior, up to a constant, and its gradient (size,)."""
         layout, prior = self.layout, self.prior
         lapse = float(expit(parameters[layout.lapse]))
         gradient = np.zeros(layout.size)
-        gradient[layout.log_sds] = prior.spread
+        gradient[layout.log_sds] = prior.log_sd_weight
         deviation = parameters[: layout.k] - self._mean_level_db
         gradient[: layout.k] = -deviation / prior.mean_sd_db**2
-        gradient[layout.lapse] = prior.lapse_wrong * (1.0 - lapse) - prior.lapse_right * lapse
-        value = prior.lapse_wrong * np.log(lapse) + prior.lapse_right * np.log1p(-lapse)
+        gradient[layout.lapse] = prior.lapse_alpha * (1.0 - lapse) - prior.lapse_beta * lapse
+        value = prior.lapse_alpha * np.log(lapse) + prior.lapse_beta * np.log1p(-lapse)
         value -= 0.5 * float(deviation @ deviation) / prior.mean_sd_db**2
-        return float(value + prior.spread * parameters[layout.log_sds].sum()), gradient
+        return float(value + prior.log_sd_weight * parameters[layout.log_sds].sum()), gradient
 
-    def log_prior_hessian(self, parameters: FloatArray) -> FloatArray:
-        """(size, size): Hessian of the log density of the prior, which is diagonal."""
+    def compute_log_prior_hessian(self, parameters: FloatArray) -> FloatArray:
+        """Compute the Hessian (size, size) of the log density of the prior, which is diagonal."""
         layout, prior = self.layout, self.prior
         lapse = float(expit(parameters[layout.lapse]))
         diagonal = np.zeros(layout.size)
         diagonal[: layout.k] = -1.0 / prior.mean_sd_db**2
-        diagonal[layout.lapse] = -(prior.lapse_wrong + prior.lapse_right) * lapse * (1.0 - lapse)
+        diagonal[layout.lapse] = -(prior.lapse_alpha + prior.lapse_beta) * lapse * (1.0 - lapse)
         return np.diag(diagonal)
 
     @property
@@ -93,8 +96,9 @@ class Objective:
         return bounds
 
 
-def find_starting_parameters(answers: Answers, family: Family) -> FloatArray:
-    """Starting values of the population parameters (k + 6,): means from the levels played, else usual values."""
+def choose_starting_parameters(answers: Answers, family: Family) -> FloatArray:
+    """Choose starting values (k + 6,) of the population parameters, in the order of `Layout`: for the means the average
+    level played (dB) at each frequency, for the others typical values, as logarithms or logits."""
     k = len(answers.frequencies_hz)
     trials = answers.right + answers.wrong
     frequency_index = answers.run % k
@@ -108,8 +112,8 @@ def find_starting_parameters(answers: Answers, family: Family) -> FloatArray:
 
 
 def maximise(objective: Objective, start: FloatArray, fixed_index: int | None = None) -> OptimizeResult:
-    """Maximise the penalised likelihood from `start` (size,), first clipped to the bounds. fixed_index: index of a
-    parameter that is fixed at its value in `start` (profile likelihood)."""
+    """Maximise the penalised likelihood by minimising `objective`, from `start` (size,), which is first clipped to the
+    bounds. fixed_index: index of a parameter that is fixed at its value in `start` (profile likelihood)."""
     bounds = objective.bounds
     if fixed_index is not None:
         bounds[fixed_index] = (float(start[fixed_index]), float(start[fixed_index]))

@@ -138,14 +138,14 @@ class QuadratureSearch:
     def _evaluate(self, parameters: FloatArray, moments: Moments, counts: NodeCounts) -> QuadratureEvaluation:
         """Evaluate the cost with derivatives at the parameters, by nodes placed by the moments."""
         integrals = integrate(self._quadrature, parameters, moments, counts)
-        log_prior, prior_gradient = self.objective.log_prior(parameters)
+        log_prior, prior_gradient = self.objective.evaluate_log_prior(parameters)
         log_likelihood = float(integrals.value.sum())
         return QuadratureEvaluation(
             parameters=parameters,
             cost=-log_likelihood - log_prior,
             log_likelihood=log_likelihood,
             scores=integrals.scores,
-            curvature=-integrals.hessian - self.objective.log_prior_hessian(parameters),
+            curvature=-integrals.hessian - self.objective.compute_log_prior_hessian(parameters),
             slope=-integrals.scores.sum(axis=0) - prior_gradient,
             moments=integrals.moments,
             converged=True,

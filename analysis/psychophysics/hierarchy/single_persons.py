@@ -73,7 +73,7 @@ def fit_single_persons(
     objective(parameters)  # sets `marginal.latent` to the persons' most probable values at this lapse rate
     lapse = float(expit(parameters[layout.lapse]))
     persons = estimate_persons(answers.subjects, objective.marginal.latent, cap_db)
-    lapses = tuple(float(lapse) for lapse in beta.ppf(LAPSE_QUANTILES, prior.lapse_wrong, prior.lapse_right))
+    lapses = tuple(float(lapse) for lapse in beta.ppf(LAPSE_QUANTILES, prior.lapse_alpha, prior.lapse_beta))
     nuisance = Nuisance(STARTING_SLOPE[family], 0.0, lapses, SLOPE_LOG_SD, CRITERION_SD)
     runs = compute_run_likelihoods(answers, [nuisance] * answers.persons, cap_db, family, confidence)
     return SinglePersons(family, answers.frequencies_hz, confidence, persons, lapse, runs)

@@ -104,7 +104,7 @@ def simulate_bodies(
     """
     linear, stepping, ports = _prepare_steps(bodies, actuator_force, counts, step_s)
     stride = len(actuator_force.mean) // counts[0]
-    output_matrix = _assemble_output_matrix(linear, stepping.outward, ports, with_motion)
+    output_matrix = _assemble_output_matrix(linear, stepping.state_from_modal, ports, with_motion)
     motion_rows, port_forces = (
         np.empty((counts[0], output_matrix.shape[1])),
         np.zeros((counts[0], bodies.ports.shape[1] if with_motion else 0)),
@@ -134,7 +134,7 @@ def simulate_bodies(
             )
             np.matmul(inputs, output_matrix, out=motion_rows[first:stop])
             if with_motion:
-                port_forces[first:stop, list(ports)] = inputs[:, len(stepping.outward) : force_columns]
+                port_forces[first:stop, list(ports)] = inputs[:, len(stepping.state_from_modal) : force_columns]
     return motion_rows, port_forces
 
 
@@ -148,7 +148,7 @@ def simulate_states(
     """Simulate, from rest, the positions and velocities (k, 2n) of the structure's coordinates just before the samples
     `sample_indices` (k,). Other arguments as for `simulate_bodies`."""
     _, stepping, _ = _prepare_steps(bodies, actuator_force, counts, step_s)
-    states, rows = np.zeros((len(sample_indices), len(stepping.outward))), stepping.rows
+    states, rows = np.zeros((len(sample_indices), len(stepping.state_from_modal))), stepping.rows
     mean_force = actuator_force.mean.reshape(counts[0] * rows, -1)
     with np.errstate(over="ignore", invalid="ignore"):
         for first, stop in _iterate_blocks(counts[0], stepping.block, None):
@@ -156,7 +156,8 @@ def simulate_states(
             stepping.run(rows_of_block, first)
             in_block = (sample_indices >= first) & (sample_indices < stop)
             states[in_block] = (
-                rows_of_block[(sample_indices[in_block] - first) * rows, : len(stepping.outward)] @ stepping.outward.T
+                rows_of_block[(sample_indices[in_block] - first) * rows, : len(stepping.state_from_modal)]
+                @ stepping.state_from_modal.T
             )
     return states
 
@@ -205,7 +206,7 @@ def extend_state(structure: MechanicalModel, state: FloatArray, joints: FloatArr
 
 
 def _assemble_output_matrix(
-    linear: DiscreteModel, outward: FloatArray, ports: tuple[int, ...], with_motion: bool
+    linear: DiscreteModel, state_from_modal: FloatArray, ports: tuple[int, ...], with_motion: bool
 ) -> FloatArray:
     """Assemble the matrix (s + f + m, rows) from state, forces at the f ports and commands at an instant to the rows
     that `simulate_bodies` returns."""
@@ -214,7 +215,7 @@ def _assemble_output_matrix(
     from_state = np.vstack((linear.motion, linear.response, linear.position))[first_row:]
     from_force = np.vstack((linear.motion_by_axis_force, linear.response_by_axis_force, np.zeros((p, r))))[first_row:]
     from_command = np.vstack((linear.motion_by_command, linear.response_by_command, np.zeros((p, m))))[first_row:]
-    return np.vstack([(from_state @ outward).T, from_force.T[list(ports)], from_command.T])
+    return np.vstack([(from_state @ state_from_modal).T, from_force.T[list(ports)], from_command.T])
 
 
 def pack_kernel_forces(bodies: Bodies, ports: tuple[int, ...]) -> Forces:

@@ -1,8 +1,8 @@
-"""Block-diagonal (modal) form of a linear step: 2 x 2 blocks, each of a pair of eigenvalues, decoupled from the others.
+"""Real block-diagonal (modal) form of a discrete-time state transition: 2 x 2 blocks, each of a pair of eigenvalues.
 
 With x = W z, the step x[k+1] = A x[k] becomes z[k+1] = W^-1 A W z[k]. Each pair of columns of W spans the invariant
 plane of two eigenvalues of A (a complex pair, or two real ones), so that a step costs O(s) instead of O(s²). A is
-balanced first. Where the planes are ill-conditioned, the full matrix is kept.
+balanced first. Where W is ill-conditioned, the full matrix is kept. Called by `stepping`.
 """
 
 from collections.abc import Iterator
@@ -16,36 +16,37 @@ from equalizer.signals.signal import FloatArray
 LARGEST_CONDITION = 1e4
 """Largest condition number of W for the balanced matrix; above it rounding errors would be too large, and the full
 matrix is used."""
-LARGEST_REST = 1e-12
+LARGEST_COUPLING = 1e-12
 """Largest residual coupling between the pairs that is neglected (magnitude of the elements outside the blocks)."""
-NEARLY_ONE = 1e-3
+PARALLEL_RATIO = 1e-3
 """Ratio of the singular values of a pair's two directions below which they count as parallel; they are then replaced by
 a basis of the invariant plane."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepForm:
-    """Coordinates z with x = outward z, z = inward x, and the matrix of one step without inputs in them."""
+    """Modal coordinates z with x = state_from_modal z and z = modal_from_state x, and the matrix of one step without
+    inputs in these coordinates. s: number of states."""
 
-    advance: FloatArray
+    step_matrix: FloatArray
     """Pairs: (4, s / 2), z_i becomes a_0i z_i + a_1i z_j and z_j becomes a_2i z_i + a_3i z_j, where j = i + s / 2. Else
     (s, s), transposed."""
-    outward: FloatArray
+    state_from_modal: FloatArray
     """(s, s): from z to x."""
-    inward: FloatArray
+    modal_from_state: FloatArray
     """(s, s): from x to z."""
 
 
-def step_form(advance: FloatArray) -> StepForm:
-    """Form in which to compute the step advance (s, s), s even: pairs where these are well-conditioned, else the full
-    matrix; also for a matrix that is not finite."""
-    size = len(advance)
-    dense = StepForm(np.ascontiguousarray(advance.T), np.eye(size), np.eye(size))
-    if not np.isfinite(advance).all():
+def build_step_form(transition: FloatArray) -> StepForm:
+    """Build the form in which to compute x[k+1] = transition x[k]. transition: (s, s), s even. Returns pairs if W is
+    well-conditioned and decouples them; else, and for a matrix that is not finite, the full matrix."""
+    size = len(transition)
+    dense = StepForm(np.ascontiguousarray(transition.T), np.eye(size), np.eye(size))
+    if not np.isfinite(transition).all():
         return dense
-    balanced, scale = matrix_balance(advance, permute=False, separate=True)
+    balanced, scale = matrix_balance(transition, permute=False, separate=True)
     # Columns: the first directions of all planes, then all second ones, as `StepForm.advance` pairs them.
-    basis = np.stack(list(_planes(balanced)), axis=2).reshape(size, size)
+    basis = np.stack(list(_iterate_invariant_planes(balanced)), axis=2).reshape(size, size)
     if not np.linalg.cond(basis) < LARGEST_CONDITION:
         return dense
     inverse = np.linalg.inv(basis)
@@ -57,14 +58,15 @@ def step_form(advance: FloatArray) -> StepForm:
     )
     for rows, columns in ((first, first), (first, second), (second, first), (second, second)):
         transformed[rows, columns] = 0.0
-    if np.abs(transformed).max() > LARGEST_REST:
+    if np.abs(transformed).max() > LARGEST_COUPLING:
         return dense
     return StepForm(blocks, scale[0][:, None] * basis, inverse / scale[0])
 
 
-def _planes(advance: FloatArray) -> Iterator[FloatArray]:
-    """(s, 2) each: orthonormal basis of the invariant plane of a pair of eigenvalues."""
-    values, vectors = np.linalg.eig(advance)
+def _iterate_invariant_planes(transition: FloatArray) -> Iterator[FloatArray]:
+    """Iterate over orthonormal bases (s, 2) of the invariant planes of pairs of eigenvalues: complex pairs first, then
+    real eigenvalues, paired in ascending order."""
+    values, vectors = np.linalg.eig(transition)
     complex_pairs = np.flatnonzero(values.imag > 0)
     real_values = np.flatnonzero(values.imag == 0)
     real_values = real_values[np.argsort(values[real_values].real)]
@@ -74,9 +76,13 @@ def _planes(advance: FloatArray) -> Iterator[FloatArray]:
         for i, j in zip(real_values[::2], real_values[1::2], strict=False)
     ]
     for first_vector, second_vector, first, second in pairs:
-        plane, sizes, _ = np.linalg.svd(np.column_stack([first_vector, second_vector]), full_matrices=False)
-        if sizes[1] < NEARLY_ONE * sizes[0]:
+        plane, singular_values, _ = np.linalg.svd(np.column_stack([first_vector, second_vector]), full_matrices=False)
+        if singular_values[1] < PARALLEL_RATIO * singular_values[0]:
             # Null space of (A - a I)(A - b I), for the eigenvalues a and b of nearly parallel eigenvectors.
-            square = advance @ advance - (first + second).real * advance + (first * second).real * np.eye(len(advance))
-            plane = np.linalg.svd(square)[2][-2:].T
+            annihilator = (
+                transition @ transition
+                - (first + second).real * transition
+                + (first * second).real * np.eye(len(transition))
+            )
+            plane = np.linalg.svd(annihilator)[2][-2:].T
         yield plane

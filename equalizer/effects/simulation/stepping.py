@@ -23,7 +23,7 @@ import numpy as np
 from equalizer.effects.simulation.instant import BLOCK_SIZE, LENGTH
 from equalizer.effects.simulation.linear_step_kernel import advance_unforced
 from equalizer.effects.simulation.mechanism_kernel import FORCE_ROWS, PORT_ROWS, Integers, step_mechanism
-from equalizer.effects.simulation.modal_form import step_form
+from equalizer.effects.simulation.modal_form import build_step_form
 from equalizer.plant.linear_simulation import DiscreteModel
 from equalizer.signals.signal import FloatArray
 
@@ -61,7 +61,7 @@ class Stepping:
     input_matrix: FloatArray
     """(inputs, s + r): from a row of the drive to its contributions to the state, and to the accelerations of the r
     ports with forces."""
-    outward: FloatArray
+    state_from_modal: FloatArray
     """(2n, s): from the stepped coordinates to positions and velocities."""
     block: int
     """Samples stepped per call."""
@@ -81,35 +81,39 @@ def step_without_forces(linear: DiscreteModel, steps: int, stride: int) -> Stepp
     for _ in range(steps - 1):
         responses.append(linear.transition @ responses[-1])
     by_command = np.hstack(responses[::-1]) if stride > 1 else np.sum(responses, axis=0)
-    form = step_form(np.linalg.matrix_power(linear.transition, steps))
-    state = np.zeros(len(form.inward))
+    form = build_step_form(np.linalg.matrix_power(linear.transition, steps))
+    state = np.zeros(len(form.modal_from_state))
 
     def run(rows: FloatArray, first: int) -> None:
-        advance_unforced(form.advance, rows, state)
+        advance_unforced(form.step_matrix, rows, state)
 
     def set_state(initial_state: FloatArray) -> None:
-        state[:] = form.inward @ initial_state
+        state[:] = form.modal_from_state @ initial_state
 
-    return Stepping(1, (form.inward @ by_command).T, form.outward, BLOCK, run, set_state)
+    return Stepping(1, (form.modal_from_state @ by_command).T, form.state_from_modal, BLOCK, run, set_state)
 
 
 def step_with_forces(linear: DiscreteModel, forces: Forces, steps: int, stride: int, commands: FloatArray) -> Stepping:
     """Stepping under motion-dependent forces. steps: steps of `linear` per sample; stride: commands per sample, 1 where
     a command is held over all steps. commands: (L * stride, m), for laws that read them."""
-    form = step_form(linear.transition)
+    form = build_step_form(linear.transition)
     port_indices, axis_count = np.array(forces.ports), linear.by_axis_force.shape[1]
     output = linear.motion[np.concatenate([port_indices, axis_count + port_indices, 2 * axis_count + port_indices])]
     by_force = linear.by_axis_force[:, port_indices]
     per_newton = output @ by_force
     per_newton[2 * len(port_indices) :] = linear.motion_by_axis_force[2 * axis_count + port_indices][:, port_indices]
     law_output = output if forces.acceleration else output[: 2 * len(port_indices)]
-    outward, inward = law_output @ form.outward, (form.inward @ by_force).T
-    step_matrices = (form.advance, _contiguous(outward), _contiguous(inward), _contiguous(per_newton.T))
+    port_output, force_input = law_output @ form.state_from_modal, (form.modal_from_state @ by_force).T
+    step_matrices = (form.step_matrix, _contiguous(port_output), _contiguous(force_input), _contiguous(per_newton.T))
     input_matrix = np.hstack(
-        [(form.inward @ linear.by_command).T, linear.motion_by_command[2 * axis_count + port_indices].T]
+        [(form.modal_from_state @ linear.by_command).T, linear.motion_by_command[2 * axis_count + port_indices].T]
     )
     read_commands = np.ascontiguousarray(commands, dtype=np.float64) if forces.reads_all_axes else np.empty((0, 0))
-    state, ports, memory = np.zeros(len(form.inward)), np.zeros((PORT_ROWS, len(port_indices))), forces.memory.copy()
+    state, ports, memory = (
+        np.zeros(len(form.modal_from_state)),
+        np.zeros((PORT_ROWS, len(port_indices))),
+        forces.memory.copy(),
+    )
 
     force_history = np.zeros((FORCE_ROWS, len(forces.places)))
     at = np.zeros(LENGTH + BLOCK_SIZE * len(port_indices) if forces.reads_all_axes else LENGTH)
@@ -123,12 +127,12 @@ def step_with_forces(linear: DiscreteModel, forces: Forces, steps: int, stride: 
         )  # fmt: skip
 
     def set_state(initial_state: FloatArray) -> None:
-        state[:] = form.inward @ initial_state
+        state[:] = form.modal_from_state @ initial_state
         # No extrapolation from the forces before the restart. The laws' memory is kept.
         force_history[:] = 0.0
         ports[:2] = (output[: 2 * len(port_indices)] @ initial_state).reshape(2, -1)
 
-    return Stepping(stride, input_matrix, form.outward, BLOCK_UNDER_FORCES, run, set_state)
+    return Stepping(stride, input_matrix, form.state_from_modal, BLOCK_UNDER_FORCES, run, set_state)
 
 
 def _contiguous(matrix: FloatArray) -> FloatArray:

@@ -1,4 +1,6 @@
-"""Instrumental-variable estimate of the response at the lines that a set of experiments shares, with its errors.
+"""Instrumental-variable estimate of a frequency response at the spectral lines common to a set of experiments.
+
+Called by `transfer_estimate`, once for each set of experiments with equal lines. The result contains error variances.
 
 G = Y R^H (U R^H)^-1 at each line, with one column per experiment: U (inputs, experiments) the total commands, Y
 (outputs, experiments) the responses, R (inputs, experiments) the excitations as instruments. Noise that a feedback adds
@@ -26,11 +28,12 @@ _RANK_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SharedLines:
-    """Instrumental-variable estimate at the lines that several experiments share, with its noise."""
+    """Instrumental-variable estimate at the spectral lines common to several experiments, with its noise variance."""
 
     frequency_hz: FloatArray
+    """(lines,): lines at which the response can be estimated."""
     response: ComplexArray
-    """(lines, outputs, inputs)"""
+    """(lines, outputs, inputs): G, in units of the response per unit of the command."""
     noise_variance: FloatArray
     """(lines, outputs, inputs): expected |error|² of each entry of `response`."""
     coherence: FloatArray
@@ -95,7 +98,7 @@ def solve_shared_lines(
 
 
 def _stack_columns(experiments: Sequence[Experiment]) -> _Columns:
-    """Weighted mean spectra of the experiments as the columns of U, Y and R."""
+    """Stack the weighted mean spectra of the experiments as the columns of U, Y and R."""
 
     def stack(name: str) -> ComplexArray:
         weighted = [
@@ -122,8 +125,9 @@ def _has_full_rank(columns: _Columns) -> BoolArray:
 def _estimate_density_from_periods(
     experiments: Sequence[Experiment], is_solvable: BoolArray, response: ComplexArray
 ) -> FloatArray | None:
-    """Noise density (lines, outputs, experiments) from the variance of the residuals Y - G U between periods. An
-    experiment with a single period takes the mean of the others; None where all experiments have a single period."""
+    """Estimate the noise density (lines, outputs, experiments) from the variance of the residuals Y - G U between
+    periods. An experiment with a single period takes the mean of the others; None where all experiments have a single
+    period."""
     densities: list[FloatArray | None] = []
     for experiment in experiments:
         residuals = experiment.response[:, is_solvable] - np.einsum(
@@ -142,8 +146,8 @@ def _estimate_density_from_periods(
 
 
 def _estimate_density_from_residuals(columns: _Columns, response: ComplexArray) -> FloatArray | None:
-    """Noise density (lines, outputs, experiments) from the residual power over all experiments per degree of freedom,
-    the same for each; None for fewer than inputs + 2 experiments."""
+    """Estimate the noise density (lines, outputs, experiments) from the residual power over all experiments per degree
+    of freedom, the same for each; None for fewer than inputs + 2 experiments."""
     inputs, experiments = columns.command.shape[1:]
     if experiments < inputs + 2:
         return None

@@ -35,8 +35,8 @@ _DAMPING_RATIOS = (0.01, 0.05, 0.25)
 _INTENDED_ROWS = 6000
 """Intended number of rows of the regression over all groups; a larger number is reduced to one between this and twice
 this."""
-_LEAST_ROOT_MASS = 0.02
-"""Least starting value of the root of the mode's mass over the mass scale, as the linear estimate may be zero or
+_MIN_RELATIVE_ROOT_MASS = 0.02
+"""Least starting value of the root of the mode's mass over the mass scale, because the linear estimate may be zero or
 negative. Heuristic."""
 
 
@@ -50,10 +50,12 @@ class ModeStart:
 
 
 def estimate_mode_starts(
-    groups: Sequence[LineGroup], current: RefinedFit[Structure], band_hz: tuple[float, float], most_starts: int = 2
+    groups: Sequence[LineGroup], current: RefinedFit[Structure], band_hz: tuple[float, float], max_starts: int = 2
 ) -> tuple[ModeStart, ...]:
-    """Starting values of a further oscillator, at the `most_starts` frequencies that explain most, best first;
-    frequencies differ by more than 10 % (0.1 in the natural logarithm)."""
+    """Estimate starting values of a further oscillator, at the `max_starts` frequencies whose oscillators reduce the
+    residual most, best first; frequencies differ by more than 10 % (0.1 in the natural logarithm). band_hz: band of the
+    frequency responses; the grid extends beyond it by a factor of 1.5, because a mode outside also acts inside. Both
+    factors are heuristic."""
     thinned_groups = [_thin_group(group.exclude_held_out(), len(groups)) for group in groups]
     model = current.structure.build_model(current.unknowns)
     misfit = stack_real(compute_misfits(thinned_groups, model))
@@ -73,13 +75,14 @@ def estimate_mode_starts(
     for candidate in sorted(candidates, key=lambda item: -item[0]):
         if all(abs(np.log(candidate[1] / accepted[1])) > 0.1 for accepted in chosen_candidates):
             chosen_candidates.append(candidate)
-    return tuple(_make_start(current, *candidate[1:]) for candidate in chosen_candidates[:most_starts])
+    return tuple(_make_start(current, *candidate[1:]) for candidate in chosen_candidates[:max_starts])
 
 
 def _compute_tangent_basis(
     groups: Sequence[LineGroup], current: RefinedFit[Structure], misfit: FloatArray
 ) -> FloatArray:
-    """(rows, parameters): orthonormal basis of the changes of the residuals by the present unknowns, to first order."""
+    """Compute an orthonormal basis (rows, parameters) of the first-order changes of the residuals by the present
+    unknowns."""
     upper_bounds = np.full(current.structure.parameters, np.inf)
     jacobian = compute_numerical_jacobian(
         lambda unknowns: stack_real(compute_misfits(groups, current.structure.build_model(unknowns))),
@@ -91,7 +94,7 @@ def _compute_tangent_basis(
 
 
 def _thin_group(group: LineGroup, group_count: int) -> LineGroup:
-    """The group on every k-th line, with k such that `group_count` groups of this size have fewer than twice
+    """Return the group on every k-th line, with k such that `group_count` groups of this size have fewer than twice
     `_INTENDED_ROWS` rows together."""
     rows = 2 * group.target[0].size * len(group.frequency_hz)
     is_chosen = np.zeros(len(group.frequency_hz), dtype=bool)
@@ -116,14 +119,18 @@ class _ModelMotion:
 
 
 def _compute_model_motion(group: LineGroup, model: MechanicalModel, structure: Structure) -> _ModelMotion:
-    """Response and axis motion of the model at the lines of a group."""
-    order = DERIVATIVE_OF_QUANTITY[structure.quantity]
+    """Compute the response and axis motion of the model at the lines of a group."""
+    derivative_order = DERIVATIVE_OF_QUANTITY[structure.quantity]
     s = np.asarray(2j * np.pi * group.frequency_hz, dtype=np.complex128)
     z = np.exp(s / group.rate_hz)
     response = compute_sampled_response(model, group.frequency_hz, group.rate_hz, group.hold)
     # A held force appears in an acceleration one sample later, in velocity and position half a sample later.
-    delay_samples = (1.0 if order == 2 else 0.5) if group.hold.value == "zero-order" else 0.0
-    sensor = compute_sensor_response(model.sensor.bandwidth_hz, z, group.rate_hz) * z ** (-delay_samples) * s**order
+    delay_samples = (1.0 if derivative_order == 2 else 0.5) if group.hold.value == "zero-order" else 0.0
+    sensor = (
+        compute_sensor_response(model.sensor.bandwidth_hz, z, group.rate_hz)
+        * z ** (-delay_samples)
+        * s**derivative_order
+    )
     axis_motion = response[:, : structure.inputs] * np.array(structure.signs)[:, None] / sensor[:, None, None]
     return _ModelMotion(group, s, response, sensor, axis_motion)
 
@@ -131,8 +138,9 @@ def _compute_model_motion(group: LineGroup, model: MechanicalModel, structure: S
 def _compute_mode_columns(
     motions: Sequence[_ModelMotion], structure: Structure, natural_rad_s: float, damping_ratio: float
 ) -> FloatArray:
-    """Change of the weighted modelled response, (rows, columns): first per entry of L Lᵀ (lower triangle), then per
-    entry of (sensor shape) Lᵀ, sensor by sensor. natural_rad_s: natural frequency in rad/s."""
+    """Compute the change of the weighted modelled response, (rows, columns), by the oscillator, to first order: first
+    per entry of L Lᵀ (lower triangle, kg), then per entry of (sensor shape) Lᵀ, sensor by sensor. natural_rad_s:
+    natural frequency in rad/s."""
     inputs, outputs = structure.inputs, structure.outputs
     group_columns = []
     for motion in motions:
@@ -162,8 +170,8 @@ def _compute_mode_columns(
 def _make_start(
     current: RefinedFit[Structure], frequency_hz: float, damping_ratio: float, coefficients: FloatArray
 ) -> ModeStart:
-    """Starting values of the structure with a further oscillator. frequency_hz, damping_ratio: of the oscillator;
-    coefficients: of the columns of `_compute_mode_columns`."""
+    """Make the starting values of the structure with a further oscillator. frequency_hz, damping_ratio: of the
+    oscillator; coefficients: of the columns of `_compute_mode_columns`."""
     structure, inputs = current.structure, current.structure.inputs
     extended = replace(structure, modes=structure.modes + 1)
     unknowns = structure.convert_unknowns(current.unknowns, extended)
@@ -181,7 +189,7 @@ def _make_start(
         else np.linalg.eigh(mass_matrix)[1][:, -1]
     )
     participation = direction * max(
-        np.sqrt(max(direction @ mass_matrix @ direction, 0.0)), _LEAST_ROOT_MASS * root_mass
+        np.sqrt(max(direction @ mass_matrix @ direction, 0.0)), _MIN_RELATIVE_ROOT_MASS * root_mass
     )
     sensor_shape = sensor_rows @ participation / (participation @ participation)
     log_frequency = np.log(2 * np.pi * frequency_hz / structure.speed_scale)

@@ -82,7 +82,7 @@ class Identified(SummaryDisplay):
     chosen: Candidate
     relaxed: tuple[SlowPole, ...]
     """Poles with a longer decay than the ordinary bound, which the data require; slowest first."""
-    bound_costs: bool
+    is_bound_binding: bool
     """Whether the requested bound on the decay prevents a fit of the data."""
     remarks: tuple[str, ...]
     """Remarks for the user, as sentences; `misfit_causes` has likely causes of a misfit."""
@@ -126,7 +126,7 @@ def identify(
     _refuse_foreign_records(records, responses[0])
 
     if initial is not None:
-        refit = RelaxedFit(refine_and_tighten(initial, lines, settings), bound_costs=False)
+        refit = RelaxedFit(refine_and_tighten(initial, lines, settings), is_bound_binding=False)
         return _assess_model((refit.candidate,), refit, lines, responses[0], settings)
     candidates = _search(lines, settings, records, lambda share: report(FIRST_SEARCH_PROGRESS * share))
     relaxed_fit = relax_poles(
@@ -217,9 +217,9 @@ def _assess_model(
         candidates=candidates,
         chosen=chosen,
         relaxed=relaxed_poles,
-        bound_costs=relaxed_fit.bound_costs,
+        is_bound_binding=relaxed_fit.is_bound_binding,
         remarks=(
-            *describe_misfit_causes(cost, misfit, relaxed_poles, relaxed_fit.bound_costs, settings),
+            *describe_misfit_causes(cost, misfit, relaxed_poles, relaxed_fit.is_bound_binding, settings),
             *write_outside_gain_remark(chosen),
         ),
     )

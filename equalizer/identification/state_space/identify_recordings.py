@@ -89,7 +89,7 @@ def _add_causes(
     misfit = compute_estimate_misfit(identified.model, result.estimate) if averaged else identified.misfit
     misfit = misfit if has_repeats else replace(misfit, smooth=None)
     cost = misfit.cost if averaged else identified.cost
-    causes = describe_misfit_causes(cost, misfit, identified.relaxed, identified.bound_costs, settings)
+    causes = describe_misfit_causes(cost, misfit, identified.relaxed, identified.is_bound_binding, settings)
     remarks = (*([SMOOTHED] if averaged else []), *causes, *write_outside_gain_remark(identified.chosen))
     return replace(result, identified=replace(identified, misfit=misfit, remarks=remarks))
 
@@ -141,5 +141,5 @@ def _fit_smoothed(
         identified = identify(fitted, bounded, recordings, report)
     report(1.0)
     # For the same reason the cost of the bound cannot be tested on averaged lines.
-    bound_costs = unsmoothed is not None and unsmoothed.bound_costs
-    return IdentifiedRecordings(estimate, fitted, replace(identified, bound_costs=bound_costs))
+    is_bound_binding = unsmoothed is not None and unsmoothed.is_bound_binding
+    return IdentifiedRecordings(estimate, fitted, replace(identified, is_bound_binding=is_bound_binding))

@@ -31,23 +31,27 @@ CLIPPED_PAIRS = 10
 
 
 def describe_misfit_causes(
-    cost: float, misfit: Misfit, relaxed_poles: Sequence[SlowPole], bound_costs: bool, settings: IdentificationSettings
+    cost: float,
+    misfit: Misfit,
+    relaxed_poles: Sequence[SlowPole],
+    is_bound_binding: bool,
+    settings: IdentificationSettings,
 ) -> list[str]:
     """Remarks on the fit alone, as sentences without full stop. Those on the decay bound come first, because its effect
-    resembles the other causes. bound_costs: see `RelaxedFit`."""
+    resembles the other causes. cost: residual power over noise power. is_bound_binding: see `RelaxedFit`."""
     bound_s, order = settings.decay_s, settings.order
     remarks = [
         f"the resonance at {pole.frequency_hz:.2f} Hz (damping ratio {100 * pole.damping_ratio:.2g} %) rings longer "
         f"than the ordinary bound of {bound_s:g} s allows; its pole was relaxed to a decay of {pole.decay_s:.2f} s"
         for pole in relaxed_poles
     ]
-    if bound_costs:
+    if is_bound_binding:
         remarks.append(
             f"a pole is at the bound of the decay, {bound_s:g} s, and without it the fit would improve beyond noise: "
             "a resonance rings longer, or a sweep without two counted periods contains the transient of its start; "
             "record three periods of every sweep, or raise --longest-decay"
         )
-    if cost > UNEXPLAINED_COST and not bound_costs:
+    if cost > UNEXPLAINED_COST and not is_bound_binding:
         residual_text = f"the residual of the model is {np.sqrt(cost):.2g} times the noise"
         if misfit.smooth is None:
             remarks.append(

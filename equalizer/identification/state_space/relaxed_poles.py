@@ -33,7 +33,7 @@ SIGNIFICANCE_LEVEL = 1e-3
 RELAXED_SUFFIX = ", poles relaxed"
 """Suffix of the name of a candidate whose poles were relaxed."""
 
-Search = Callable[[IdentificationSettings], Sequence[Candidate]]
+CandidateSearch = Callable[[IdentificationSettings], Sequence[Candidate]]
 """Search for candidates from new starting models, under the given settings."""
 
 
@@ -54,23 +54,24 @@ class RelaxedFit:
 
     candidate: Candidate
     """The candidate with its poles relaxed; the given candidate where no pole needs a longer decay."""
-    bound_costs: bool
-    """Whether a pole is at the bound although the fit would improve beyond noise without it."""
+    is_bound_binding: bool
+    """Whether the bound is a binding constraint: a pole is at the bound although the fit would improve by more than
+    noise explains without it."""
 
 
 def relax_poles(
-    chosen: Candidate, search: Search, lines: WeightedLines, settings: IdentificationSettings
+    chosen: Candidate, search: CandidateSearch, lines: WeightedLines, settings: IdentificationSettings
 ) -> RelaxedFit:
     """Relax the decay bound for the poles of a candidate that need it, up to `compute_longest_resolved_decay_s`. Where
     the settings state `longest_decay_s`, the candidate is returned unchanged. search: finds candidates under the
     relaxed bound."""
     limit_s = compute_longest_resolved_decay_s(lines)
     if limit_s <= settings.decay_s:
-        return RelaxedFit(chosen, bound_costs=False)
+        return RelaxedFit(chosen, is_bound_binding=False)
     limit_radius = compute_pole_radius(limit_s, lines.sample_rate_hz)
-    bound_costs = _is_bound_costly(chosen, limit_radius, lines, settings)
-    if settings.longest_decay_s is not None or not (bound_costs or _has_outlying_line(chosen, lines)):
-        return RelaxedFit(chosen, bound_costs)
+    is_bound_binding = _is_bound_binding(chosen, limit_radius, lines, settings)
+    if settings.longest_decay_s is not None or not (is_bound_binding or _has_outlying_line(chosen, lines)):
+        return RelaxedFit(chosen, is_bound_binding)
     relaxed_settings = replace(settings, longest_decay_s=limit_s)
     relaxed_candidate = choose_best(
         [*search(relaxed_settings), refine_candidate(chosen.name, chosen.fitted, lines, settings, limit_radius)]
@@ -79,7 +80,9 @@ def relax_poles(
     is_accepted = tightened_candidate.has_acceptable_gain >= chosen.has_acceptable_gain and _lowers_cost(
         tightened_candidate, chosen, lines
     )
-    return RelaxedFit(tightened_candidate, bound_costs=False) if is_accepted else RelaxedFit(chosen, bound_costs)
+    return (
+        RelaxedFit(tightened_candidate, is_bound_binding=False) if is_accepted else RelaxedFit(chosen, is_bound_binding)
+    )
 
 
 def refine_and_tighten(candidate: Candidate, lines: WeightedLines, settings: IdentificationSettings) -> Candidate:
@@ -122,7 +125,7 @@ def _compute_pole_radii(fitted: FittedForm) -> FloatArray:
     return np.asarray(poles.max(axis=0))
 
 
-def _is_bound_costly(
+def _is_bound_binding(
     chosen: Candidate, limit_radius: float, lines: WeightedLines, settings: IdentificationSettings
 ) -> bool:
     """Whether lifting the bound for the poles at it lowers the cost by more than noise does, judged from a limited

@@ -27,8 +27,8 @@ class OutsideBandError(ValueError):
 def compute_regularised_inverse(
     model: IdentifiedModel, frequency_hz: FloatArray, weight: float = WEIGHT, spring: VirtualSpring = NO_SPRING
 ) -> ComplexArray:
-    """Commands per reference output, (lines, m, p), N per unit of the output. `weight` acts on the total force that
-    enters the plant, H of the module docstring; the part of it that the virtual spring supplies is subtracted."""
+    """Compute the commands per reference output, (lines, m, p), N per unit of the output: H = (G* G + weight I)^-1 G*,
+    the total force that enters the plant, less the part of it that the virtual spring supplies."""
     G = model_response(model, frequency_hz)
     H = invert_regularised(G, weight)
     if spring == NO_SPRING:
@@ -38,7 +38,7 @@ def compute_regularised_inverse(
 
 
 def invert_regularised(G: ComplexArray, weight: float) -> ComplexArray:
-    """(G* G + weight I)^-1 G*, line by line. G: (lines, p, m); returns (lines, m, p)."""
+    """Compute (G* G + weight I)^-1 G* at each spectral line. G: (lines, p, m); returns (lines, m, p)."""
     adjoint = np.conj(np.swapaxes(G, 1, 2))
     return np.asarray(np.linalg.solve(adjoint @ G + weight * np.eye(G.shape[2]), adjoint))
 
@@ -52,9 +52,9 @@ def compute_periodic_command(
     channels or units other than the model's.
     """
     check_reference(model, reference)
-    n = len(reference)
+    sample_count = len(reference)
     spectrum = np.fft.rfft(reference.samples, axis=0)
-    frequency_hz = np.fft.rfftfreq(n, 1.0 / reference.sample_rate_hz)
+    frequency_hz = np.fft.rfftfreq(sample_count, 1.0 / reference.sample_rate_hz)
     magnitude = np.abs(spectrum).max(axis=1)
     is_used = magnitude > ROUNDING_SHARE * magnitude.max()
     check_band(model, frequency_hz[is_used])
@@ -62,7 +62,7 @@ def compute_periodic_command(
     if is_used.any():
         H = compute_regularised_inverse(model, frequency_hz[is_used], weight, spring)
         force_spectrum[is_used] = np.einsum("lmp,lp->lm", H, spectrum[is_used])
-    samples = np.fft.irfft(force_spectrum, n, axis=0)
+    samples = np.fft.irfft(force_spectrum, sample_count, axis=0)
     return Signal(samples, reference.sample_rate_hz, "force", "N", model.input_channels)
 
 
@@ -89,9 +89,9 @@ def check_reference(model: IdentifiedModel, reference: Signal) -> None:
             f"the model runs at {model.sample_rate_hz:g} Hz, not at {reference.sample_rate_hz:g} Hz; "
             "resample what is wanted"
         )
-    p = model.C.shape[0]
-    if reference.samples.shape[1] != p:
-        raise ValueError(f"the model has {p} outputs, but {reference.samples.shape[1]} are wanted")
+    output_count = model.C.shape[0]
+    if reference.samples.shape[1] != output_count:
+        raise ValueError(f"the model has {output_count} outputs, but {reference.samples.shape[1]} are wanted")
     units = set(reference.units)
     if units != set([model.output_unit] if isinstance(model.output_unit, str) else model.output_unit):
         raise ValueError(f"the model answers in {model.output_unit}, but {', '.join(sorted(units))} is wanted")

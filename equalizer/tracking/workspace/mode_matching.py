@@ -21,7 +21,8 @@ UNMATCHED_COST = 0.6
 LEAST_MAC = 0.5
 """Least MAC (0 to 1) of two modes that are matched."""
 LEAST_COST_MARGIN = 0.1
-"""Least additional cost of the best matching that forbids a pair; below it, the pair is ambiguous."""
+"""Least additional cost of the best matching without a given pair; below it, the pair counts as ambiguous.
+Heuristic."""
 WEAK_SHARE = 0.1
 """Share of the response (`BandMode.share`) below which a mode may stay without a partner."""
 

@@ -22,18 +22,18 @@ from typing import Any
 from study.session.views.views import DeviceFinding
 
 PRIORITY = 40
-"""Priority of the loop's thread under SCHED_FIFO of Linux, 1 to 99: below interrupt threads (50)."""
-SWITCH_S = 0.0005
+"""Real-time priority of the loop's thread under SCHED_FIFO of Linux, 1 to 99: below interrupt threads (50)."""
+SWITCH_INTERVAL_S = 0.0005
 """Switch interval of the interpreter (s): time for which another Python thread keeps the interpreter lock after the
 loop has requested it. Python's default is 5 ms."""
 
-PRESENT_WHEN_TOUCHED = 1 | 4
-"""MCL_CURRENT | MCL_ONFAULT: lock the pages mapped now, each when it is first used, so that reserved memory is not
-filled."""
+LOCK_CURRENT_ON_FAULT = 1 | 4
+"""Flags MCL_CURRENT | MCL_ONFAULT of mlockall(2): lock the pages that are mapped now, each at its first use, so that
+reserved but unused memory occupies no RAM."""
 
-FUTURE_TOO = 2
-"""MCL_FUTURE: lock pages mapped later as well. Used only where locked memory has no limit: allocations beyond a limit
-would fail and end the program."""
+LOCK_FUTURE = 2
+"""Flag MCL_FUTURE of mlockall(2): lock pages mapped later as well. Used only where locked memory has no limit:
+allocations beyond a limit would fail and end the program."""
 
 RT_RUNTIME = Path("/proc/sys/kernel/sched_rt_runtime_us")
 """File with the time in µs per period (by default 1 s) that Linux grants to real-time threads; -1: all of it."""
@@ -43,7 +43,7 @@ STARVING_ADVICE = (
     "what would stop it may never run. As administrator: sysctl -w kernel.sched_rt_runtime_us=950000"
 )
 
-TIME_CRITICAL = 15
+WINDOWS_TIME_CRITICAL = 15
 """THREAD_PRIORITY_TIME_CRITICAL of Windows."""
 
 LINUX_ADVICE = (
@@ -64,8 +64,8 @@ class GrantedRights:
     """How to get what was not granted; empty where all was."""
 
 
-class _Users:
-    """Counts the users of settings of the whole program (switch interval, memory lock, timer): the first user changes
+class _SettingsUsers:
+    """Reference counter for settings of the whole program (switch interval, memory lock, timer): the first user changes
     them, the last to end restores them."""
 
     def __init__(self) -> None:
@@ -80,7 +80,7 @@ class _Users:
             granted, undo = _request_class()  # for each user: the class belongs to a thread, memory grows
             if self._count == 0:
                 self._switch_s = sys.getswitchinterval()
-                sys.setswitchinterval(min(SWITCH_S, self._switch_s))
+                sys.setswitchinterval(min(SWITCH_INTERVAL_S, self._switch_s))
             self._count += 1
             self._undos.append(undo)
             return granted
@@ -95,14 +95,14 @@ class _Users:
                 sys.setswitchinterval(self._switch_s)
 
 
-_USERS = _Users()
+_USERS = _SettingsUsers()
 """The only counter of this program, because its threads share the settings."""
 
 
 @contextlib.contextmanager
 def real_time_class() -> Iterator[GrantedRights]:
-    """Give the calling thread the real-time class until it ends, and lock the program's memory until the last user
-    ends. Raises nothing."""
+    """Context manager that gives the calling thread the real-time class until the thread ends, and locks the program's
+    memory until the last user leaves its context. Yields the rights that were granted; a refusal raises nothing."""
     granted = _USERS.add_user()
     try:
         yield granted
@@ -122,16 +122,16 @@ def check_real_time_rights() -> DeviceFinding:
     thread.start()
     thread.join()
     (granted,) = granted_rights
-    texts = [
+    clauses = [
         "the loop goes before all other programs" if granted.scheduled else "other programs may delay the loop",
         "its memory stays" if granted.locked else "its memory may be swapped",
     ]
-    starving = granted.scheduled and _may_starve_others()
-    if starving:
-        texts.append("a loop that hangs may starve them")
-    fine = granted.scheduled and granted.locked and not starving
-    advice = " ".join(filter(None, (granted.advice, STARVING_ADVICE if starving else "")))
-    return DeviceFinding("Priority", "; ".join(texts), fine, advice, warning=not fine)
+    may_starve = granted.scheduled and _may_starve_others()
+    if may_starve:
+        clauses.append("a loop that hangs may starve them")
+    has_all_rights = granted.scheduled and granted.locked and not may_starve
+    advice = " ".join(filter(None, (granted.advice, STARVING_ADVICE if may_starve else "")))
+    return DeviceFinding("Priority", "; ".join(clauses), has_all_rights, advice, warning=not has_all_rights)
 
 
 def _may_starve_others() -> bool:
@@ -163,7 +163,7 @@ def _request_on_linux(library: Any) -> tuple[GrantedRights, Callable[[], None]]:
     except (OSError, AttributeError):  # AttributeError: a Python without these functions
         scheduled = False
     try:
-        locked = library.mlockall(PRESENT_WHEN_TOUCHED | (FUTURE_TOO if _has_unlimited_memory() else 0)) == 0
+        locked = library.mlockall(LOCK_CURRENT_ON_FAULT | (LOCK_FUTURE if _has_unlimited_memory() else 0)) == 0
     except AttributeError:
         locked = False
     advice = "" if scheduled and locked else LINUX_ADVICE
@@ -178,12 +178,12 @@ def _has_unlimited_memory() -> bool:
 
 
 def _request_on_windows(windows: Any) -> tuple[GrantedRights, Callable[[], None]]:
-    """Request a timer resolution of 1 ms instead of 16 ms, and the priority `TIME_CRITICAL` for the calling thread. The
-    memory of a whole program is not locked on Windows."""
-    fine_sleep = windows.winmm.timeBeginPeriod(1) == 0
+    """Request a timer resolution of 1 ms instead of 16 ms, and the priority `WINDOWS_TIME_CRITICAL` for the calling
+    thread. The memory of a whole program is not locked on Windows."""
+    has_fine_timer = windows.winmm.timeBeginPeriod(1) == 0
     kernel = windows.kernel32
     kernel.GetCurrentThread.restype = ctypes.c_void_p
-    scheduled = bool(kernel.SetThreadPriority(ctypes.c_void_p(kernel.GetCurrentThread()), TIME_CRITICAL))
+    scheduled = bool(kernel.SetThreadPriority(ctypes.c_void_p(kernel.GetCurrentThread()), WINDOWS_TIME_CRITICAL))
     advice = "Windows locks no program's memory: close other programs, and leave memory free."
-    undo = (lambda: windows.winmm.timeEndPeriod(1)) if fine_sleep else (lambda: None)
-    return GrantedRights(scheduled and fine_sleep, False, advice), undo
+    undo = (lambda: windows.winmm.timeEndPeriod(1)) if has_fine_timer else (lambda: None)
+    return GrantedRights(scheduled and has_fine_timer, False, advice), undo

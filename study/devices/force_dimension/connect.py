@@ -1,6 +1,6 @@
-"""Connects to a device by model: opens it, checks power and calibration, arms the watchdog, enables forces.
+"""Connect to a Force Dimension device: open it, check power and calibration, arm the watchdog, enable forces.
 
-Each failure is a `DeviceError` that says what is missing and what to do. If opening fails, the device is closed again;
+Each failure is a `DeviceError` that states the cause and the remedy. If opening fails, the device is closed again;
 after `open_model`, closing is the caller's task. Called by `rigs` (sessions), `findings` (`hapteq doctor`) and
 `linkage`.
 """
@@ -19,8 +19,8 @@ WATCHDOG_S = 0.03
 late by 10 ms on a busy computer; a force that remains for 30 ms moves a handle without a hand by a few millimetres."""
 
 MAX_DEVICES = 16
-"""Largest number of devices that are tried on a computer. A higher count of the library is not trusted; the error for a
-device that was not found then says so."""
+"""Largest number of devices that are opened in the search for a model. Where the library counts more, the error for a
+device that was not found states both numbers."""
 
 CALIBRATION_ADVICE = (
     "Push the handle gently into its calibration position, as the device's manual shows (or run the vendor's "

@@ -14,13 +14,13 @@ from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.newest_sample import (
-    CLIPPED,
-    COUNT,
+    ARRIVAL_S,
+    IS_CLIPPED,
     MAX_AGE_S,
-    REST_ACCELERATION,
-    ROWS,
-    SENSED,
-    TAKEN_S,
+    REST_MPS2,
+    RING_SIZE,
+    SAMPLE_COUNT,
+    SENSED_MPS2,
 )
 from study.devices.drive.compiled_drive import CALLS, SENSE_SIGNATURE, WRITE_SIGNATURE
 from study.devices.force_dimension.handle import REPEATED_READING
@@ -87,16 +87,16 @@ LOCK_S = 0.002
 def _sense_acceleration(samples: FloatArray, time_s: float, reading: FloatArray) -> None:
     """Read the accelerometer in compiled code, as `study.devices.accelerometer.newest_sample.NewestSample.read_zeroed`
     does in Python."""
-    count = samples[0, COUNT]
+    count = samples[0, SAMPLE_COUNT]
     while count > 0.0:
-        row = 1 + int(count - 1.0) % ROWS
-        is_recent = not time_s - samples[row, TAKEN_S] > MAX_AGE_S
+        row = 1 + int(count - 1.0) % RING_SIZE
+        is_recent = not time_s - samples[row, ARRIVAL_S] > MAX_AGE_S
         for i in range(3):
-            value = samples[row, SENSED + i] - samples[0, REST_ACCELERATION + i]
+            value = samples[row, SENSED_MPS2 + i] - samples[0, REST_MPS2 + i]
             reading[ACCELERATION.start + i] = value if is_recent else math.nan
-        reading[SENSOR_CLIPPED] = 1.0 if is_recent and samples[row, CLIPPED] != 0.0 else 0.0
-        newer = samples[0, COUNT]
-        if newer - count < ROWS - 1:
+        reading[SENSOR_CLIPPED] = 1.0 if is_recent and samples[row, IS_CLIPPED] != 0.0 else 0.0
+        newer = samples[0, SAMPLE_COUNT]
+        if newer - count < RING_SIZE - 1:
             break
         count = newer
 

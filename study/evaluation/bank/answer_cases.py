@@ -4,6 +4,7 @@
 It gets only the folder of open cases. It reads a case name per line on standard input, writes answer.json into the
 case's folder, and prints the name when that is done. So that the test is blind, an audit hook stops the process from
 importing the code that made the cases, and from opening its files or any other file of the bank, such as the labels.
+Other modules use only its hashes: `follow_up`, `write_proof` and `inject_real`.
 """
 
 import hashlib
@@ -36,7 +37,8 @@ that this module has built."""
 
 
 def main(arguments: list[str]) -> None:
-    """Read case names from standard input until it ends; answer each and print its name."""
+    """Read case names from standard input until it ends; answer each and print its name. arguments: the folder of open
+    cases."""
     open_folder = Path(arguments[0]).resolve()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal's Ctrl-C reaches all; the parent ends this process
     isolate_process(open_folder)

@@ -1,5 +1,9 @@
-"""Summary of a blind test (`hapteq prove`) for the terminal and as JSON: misses and failed controls first, then the
-shares with their intervals. `study.cli.prove` writes both; `write_proof` takes `list_remarks`."""
+"""Summary of a blind test of the diagnosis (`hapteq prove`), as lines for the terminal and as JSON values.
+
+A blind test diagnoses a bank of simulated cases with concealed effects, whose labels are sealed (hashed) beforehand. A
+miss is a case with a wrong answer; a control is an altered input for which the correct answer is known. Called by
+`study.cli.prove`; `write_proof` adds `list_remarks` to its report.
+"""
 
 import math
 from collections.abc import Iterator
@@ -16,8 +20,8 @@ from study.evaluation.bank.prove import BlindTest
 
 
 def format_blind_test(result: BlindTest) -> Iterator[str]:
-    """Lines for the terminal: every miss, the controls, each share with its 95 % interval, the expected calibration
-    error of the probabilities, remarks, the seal of the labels."""
+    """Format the summary as lines for the terminal: every miss, failed controls, each share with its 95 % confidence
+    interval, the expected calibration error of the probabilities, remarks, and the seal of the labels (SHA-256)."""
     score = result.score
     yield f"{len(score.misses)} misses in {len(result.outcomes)} cases"
     for miss in score.misses:
@@ -39,8 +43,8 @@ def format_blind_test(result: BlindTest) -> Iterator[str]:
 
 
 def format_controls(result: BlindTest) -> Iterator[str]:
-    """Lines with the number of controls that held (were answered as expected), and each failed control with its
-    answers."""
+    """Format the number of controls that were answered as expected, and each other control with its answers, as
+    lines."""
     if result.controls:
         yield f"{sum(outcome.held for outcome in result.controls)} of {len(result.controls)} controls held"
     for control in result.controls:
@@ -49,8 +53,8 @@ def format_controls(result: BlindTest) -> Iterator[str]:
 
 
 def list_remarks(result: BlindTest) -> Iterator[str]:
-    """Sentences on what limits this blind test: cases that were left out or have no answer, answers by several versions
-    of the code."""
+    """List the limitations of this blind test as sentences: cases that were left out or have no answer, answers of
+    several versions of the code."""
     if result.omitted_cases:
         yield (
             f"{result.omitted_cases} cases of the second physics engine were left out: MuJoCo is not installed "
@@ -75,13 +79,14 @@ def list_remarks(result: BlindTest) -> Iterator[str]:
 
 
 def count_unanswered_cases(result: BlindTest) -> int:
-    """Number of cases whose process died or was killed at every attempt: they have no duration, whereas a diagnosis
-    that failed by itself has a duration."""
+    """Count the cases whose process ended without an answer or was killed at every attempt: they have no duration
+    (NaN), whereas a diagnosis that raised an error has one."""
     return sum(outcome.diagnosis is None and math.isnan(outcome.seconds) for outcome in result.outcomes)
 
 
 def summarise_blind_test(result: BlindTest) -> dict[str, Any]:
-    """The summary as JSON values; of each share its value, 95 % interval and number of cases."""
+    """Summarise the blind test as JSON values; each share with its value, 95 % confidence interval and number of
+    cases."""
     return {
         "folder": str(result.folder.path),
         "cases": len(result.outcomes),

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.diagnosis.document import Diagnosis
-from analysis.evaluation.blind_test.confidence_intervals import Figure
+from analysis.evaluation.blind_test.confidence_intervals import IntervalEstimate
 from analysis.evaluation.blind_test.lab_kit import (
     MISSING,
     Label,
@@ -35,7 +35,7 @@ class KitScore:
 
     rows: tuple[Scored, ...]
     """One row per label, including labels without a diagnosis."""
-    figures: tuple[Figure, ...]
+    figures: tuple[IntervalEstimate, ...]
     """Rates with their 95 % confidence intervals."""
     sha256: str
     """SHA-256 of the table of labels."""
@@ -66,7 +66,7 @@ def score_lines(score: KitScore) -> tuple[str, ...]:
     return (*figures, *rows, f"Labels: SHA-256 {score.sha256}, {score.compared_with}.")
 
 
-def _format_figure(figure: Figure) -> str:
+def _format_figure(figure: IntervalEstimate) -> str:
     """A rate in percent, with its 95 % confidence interval in brackets."""
     if figure.value is None or figure.low is None or figure.high is None:
         return f"{figure.name}: none"

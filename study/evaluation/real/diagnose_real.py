@@ -21,7 +21,7 @@ from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.prediction_error import PredictionError, compute_prediction_error
 from analysis.diagnosis.first_model.first_model import FirstModel
 from analysis.diagnosis.first_model.one_motion_per_force import convert_to_driven_motions
-from analysis.diagnosis.localisation.clean_floor import NothingLearned
+from analysis.diagnosis.localisation.model_error_floor import IncomparableRecordingsError
 from analysis.diagnosis.prepare_recordings import keep_common_signals, prepare_recordings
 from analysis.diagnosis.real_answer.answer_of_findings import describe_named_effects, make_real_answer
 from analysis.diagnosis.real_answer.real_answer import FurtherTest, HeldOutStretch, PairOutcome, RealAnswer
@@ -94,7 +94,7 @@ def diagnose_real(
         answer = make_real_answer(findings, case.recording, names, diagnosis.nominal)
     except StudyError as refusal:
         return RealDiagnosis(_make_refusal(real_recording, f"{refusal.title}: {refusal.happened}"), None, parents)
-    except (NothingLearned, MechanicalModelError, np.linalg.LinAlgError) as refusal:
+    except (IncomparableRecordingsError, MechanicalModelError, np.linalg.LinAlgError) as refusal:
         return RealDiagnosis(_make_refusal(real_recording, f"The fits broke down: {refusal}."), None, parents)
     further_tests = tuple(_test_on_further(test, real_recording, findings) for test in real_recording.tests)
     pair = None if case.reference is None else _compare_pair(real_recording, case, findings)

@@ -41,7 +41,7 @@ from study.store.disk.new_folder import new_folder
 from study.store.disk.provenance import Provenance
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.real_answer_file import read_answer_and_origin, write_real_answer
-from study.workflows.crash_guard import crash_guard
+from study.workflows.crash_guard import make_crash_guard
 from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
 from study.workflows.forked_map import measure_processor_s, without_forking
 from study.workflows.run_on_executor import run_tasks
@@ -239,7 +239,7 @@ def _diagnose_and_write(
 ) -> RealAnswer:
     """Diagnose one recording and write its results. budget_s: processor time for the search, used where `plan.seconds`
     is given. A crash is written as an answer, unless the crash guard is off."""
-    start_s, processor_start_s, guard = clock.now_s(), measure_processor_s(), crash_guard()
+    start_s, processor_start_s, guard = clock.now_s(), measure_processor_s(), make_crash_guard()
     time_budget: TimeBudget = lambda: measure_processor_s() - processor_start_s < budget_s  # noqa: E731
     time_left = CountedBudget(MAX_EVALUATIONS) if plan.seconds is None else time_budget
 

@@ -1,44 +1,48 @@
-"""Reasons for void trials that the computer caused, as they are logged and shown, and the sentences made of them.
+"""Texts of the reasons for which a trial is void or remarked on, as logged and shown, and sentences made of them.
 
-A computer that is too busy delays the 1 kHz control loop or the screen; such trials are void and repeated. That the
-computer was the cause is recognised by the text of the logged reason (`is_computer_busy`).
+Most of these trials are void because the computer was too busy, which delays the 1 kHz control loop or the screen; they
+are repeated. `is_computer_busy` recognises this cause by the text of the logged reason, so that the texts must not
+change. Used by `judge_trial` and `present_trial` (to log), by the screens and by the alarms of `hapteq watch`.
 """
 
-SCREEN_SILENT = "the screen gave no sign of life"
-"""The screen process was suspended, hung, or waited for a processor; which of these is unknown."""
-SCREEN_LATE = f"{SCREEN_SILENT}: the computer was too busy"
-"""As `SCREEN_SILENT`, where the load of the computer or the delay of the engine shows the cause."""
+SCREEN_UNRESPONSIVE = "the screen gave no sign of life"
+"""The screen process did not respond: it was suspended, hung, or waited for a processor; which of these is unknown."""
+SCREEN_DELAYED_BY_LOAD = f"{SCREEN_UNRESPONSIVE}: the computer was too busy"
+"""As `SCREEN_UNRESPONSIVE`, where the load of the computer or the delay of the engine shows the cause."""
 PROGRAM_STALLED = "the program gave no sign of life, so the force was faded out"
-"""The process of the session gave no sign of life within the device's limit `watchdog_s`."""
+"""The process of the session did not reset the device's watchdog within its time limit `watchdog_s`."""
 TICKS_MISSED = "of the 1 kHz ticks were missed"
 TICKS_LATE = "of the 1 kHz ticks were late or missed"
-TICK_HELD = "late was the latest 1 kHz tick"
-"""Ends of the reasons for missed or late ticks; the logged reason begins with the share or the delay."""
+LATEST_TICK_LATE = "late was the latest 1 kHz tick"
+"""Ends of the reasons for missed or late ticks of the control loop. The logged reason begins with the share in percent,
+for `LATEST_TICK_LATE` with the delay in ms."""
 
 ACCELERATION_MISSING = "of the acceleration is missing"
-"""End of the reason, which begins with the missing share: packets of the accelerometer were lost or garbled."""
+"""End of the reason, which begins with the missing share: packets of the accelerometer were lost or corrupted."""
 
-HARDLY_ARRIVED = "less motion arrived than any hand leaves of the force"
-"""Remark on a trial that counts; possible causes: motors without force, a blocked handle, a defective
-accelerometer."""
+TOO_LITTLE_MOTION = "less motion arrived than any hand leaves of the force"
+"""Remark on a trial that counts: the measured motion is less than the stimulus force causes with any impedance of the
+hand. Possible causes: motors without force, a blocked handle, a defective accelerometer."""
 
 LOAD_PER_PROCESSOR = 0.75
-"""Load average per processor above which tasks often have to wait for a processor."""
+"""Load average per processor above which tasks often have to wait for a processor. Chosen by hand."""
 
 ENGINE_LATE_S = 0.1
 """A delay of the engine's own wake-up (s) that shows a busy computer: more than twice the polling interval."""
 
 
 def explain_silent_screen(engine_late_s: float, load_per_processor: float | None) -> str:
-    """The reason to log for a silent screen. engine_late_s: delay of the engine's own wake-up (s); load_per_processor:
-    load average per processor, None if unknown."""
-    loaded = load_per_processor is not None and load_per_processor > LOAD_PER_PROCESSOR
-    return SCREEN_LATE if loaded or engine_late_s >= ENGINE_LATE_S else SCREEN_SILENT
+    """Return the reason to log where the screen process did not respond. engine_late_s: delay of the engine's own
+    wake-up (s); load_per_processor: load average per processor, None if unknown."""
+    is_loaded = load_per_processor is not None and load_per_processor > LOAD_PER_PROCESSOR
+    return SCREEN_DELAYED_BY_LOAD if is_loaded or engine_late_s >= ENGINE_LATE_S else SCREEN_UNRESPONSIVE
 
 
 def is_computer_busy(reason: str) -> bool:
-    """Whether this reason states that the computer was too busy; False also where the cause is unknown."""
-    return reason in (SCREEN_LATE, PROGRAM_STALLED) or reason.endswith((TICKS_MISSED, TICKS_LATE, TICK_HELD))
+    """Whether a logged reason has a busy computer as its cause; False also where the cause is unknown."""
+    return reason in (SCREEN_DELAYED_BY_LOAD, PROGRAM_STALLED) or reason.endswith(
+        (TICKS_MISSED, TICKS_LATE, LATEST_TICK_LATE)
+    )
 
 
 TOO_BUSY = "the computer is too busy"
@@ -46,17 +50,19 @@ TOO_BUSY = "the computer is too busy"
 
 
 def explain_many_voids(reasons: tuple[str, ...]) -> str:
-    """Reason why a sitting ends after several void trials in a row. reasons: of these trials, at least one."""
+    """Return the reason why a sitting ends after several void trials in a row. reasons: logged reasons of these trials,
+    at least one."""
     void_text = f"{len(reasons)} trials in a row were void"
     if all(map(is_computer_busy, reasons)):
         return f"{TOO_BUSY}: {void_text} because of it, not because of the participant (the last because {reasons[-1]})"
-    if all(is_computer_busy(reason) or reason == SCREEN_SILENT for reason in reasons):
+    if all(is_computer_busy(reason) or reason == SCREEN_UNRESPONSIVE for reason in reasons):
         return f"{void_text}, the last because {reasons[-1]}: the computer may be too busy"
     return f"{void_text}, the last because {reasons[-1]}"
 
 
 def describe_busy_voids(voids: int) -> str:
-    """Summary for the experimenter at the end of a sitting. voids: number of trials void because of a busy computer."""
+    """Return a summary for the experimenter at the end of a sitting. voids: number of trials that were void because of
+    a busy computer."""
     trials = "1 trial was" if voids == 1 else f"{voids} trials were"
     return (
         f"The computer was too busy: {trials} void because of it in this sitting and repeated. Close other programs; "

@@ -4,6 +4,9 @@ A probe is a known multisine force of about a second, played between two trials;
 the apparent mass of the handle with the hand on it, and so shows whether device or grip changed during the session. A
 reference is a longer force with no hand on the handle, played once per sitting and again after a long pause; it shows
 the device alone. Their forces: `study.session.stimulus.probe_stimulus`; their settings: `[probes]` of a protocol.
+
+`machine` calls `find_due_probe` and `find_due_reference`; `fold` calls the others, which map a state and an event to
+the next state.
 """
 
 from __future__ import annotations
@@ -25,18 +28,19 @@ is never underestimated."""
 
 @dataclass(frozen=True, slots=True)
 class ProbeState:
-    """State of the probes and references of a session, as far as they decide what is due next."""
+    """State of the probes and references of a session that determines which of them is due next."""
 
     probe_count: int = 0
-    """Number of probes in the session: with a hand, tests of a free handle, and references."""
+    """Number of probes of all kinds so far: with a hand, tests of a free handle, and references. Serves as the next
+    number."""
     hand_probe_count: int = 0
     """Number of probes with the hand on the handle, which determines the level of the next."""
     open: ProbePlayed | None = None
     """The probe whose measurement is not in the log: it is playing, or the program ended while it played."""
-    since_s: float | None = None
-    """Seconds since the last probe with a hand in this sitting; None before the first, and after a long pause."""
-    referenced: bool = False
-    """Whether the reference of this sitting, since its last long pause, was played, tried or declined."""
+    since_probe_s: float | None = None
+    """Time (s) since the last probe with a hand in this sitting; None before the first, and after a long pause."""
+    is_reference_done: bool = False
+    """Whether the reference that is due once in this sitting, and again after a long pause, was begun or declined."""
     hand_mass_kg: float | None = None
     """Apparent mass of the handle with the hand at the last such probe since a long pause; None where not known."""
     hand_level_n: float = 0.0
@@ -56,22 +60,23 @@ class Reference:
     """A reference is due, with no hand on the handle."""
 
 
-def find_due_probe(probing: ProbeState, settings: ProbeSettings) -> Probe | None:
-    """The next probe with a hand; None where none is due yet, or the protocol has none. The levels are used in turn."""
-    if not settings.levels_n or (probing.since_s is not None and probing.since_s < settings.interval_s):
+def find_due_probe(state: ProbeState, settings: ProbeSettings) -> Probe | None:
+    """Find the next probe with a hand; None where none is due yet, or the protocol has none. The levels are used in
+    turn."""
+    if not settings.levels_n or (state.since_probe_s is not None and state.since_probe_s < settings.interval_s):
         return None
-    return Probe(settings.levels_n[probing.hand_probe_count % len(settings.levels_n)])
+    return Probe(settings.levels_n[state.hand_probe_count % len(settings.levels_n)])
 
 
-def find_due_reference(probing: ProbeState, settings: ProbeSettings) -> Reference | None:
-    """The reference, due once in a sitting; only after the first probe with a hand, because a comparison with that
-    probe shows whether the handle is free. None where it was played, declined, or the protocol has none."""
-    is_due = settings.reference_s > 0 and not probing.referenced and probing.since_s is not None
+def find_due_reference(state: ProbeState, settings: ProbeSettings) -> Reference | None:
+    """Return the reference if it is due: once in a sitting, and only after the first probe with a hand, because a
+    comparison with that probe shows whether the handle is free. None where it is not due or the protocol has none."""
+    is_due = settings.reference_s > 0 and not state.is_reference_done and state.since_probe_s is not None
     return Reference() if is_due else None
 
 
-def begin_probe(probing: ProbeState, event: ProbePlayed, settings: ProbeSettings) -> ProbeState:
-    """The state while this probe plays.
+def begin_probe(state: ProbeState, event: ProbePlayed, settings: ProbeSettings) -> ProbeState:
+    """Return the state after the event that a probe or a reference begins to play.
 
     Raises LogContradiction where the protocol has no probes, the force is above its cap, or the number is not the next.
     """
@@ -81,32 +86,32 @@ def begin_probe(probing: ProbeState, event: ProbePlayed, settings: ProbeSettings
         raise LogContradiction(f"a probe of {event.level_n:g} N, but the protocol has no probes")
     if event.level_n > highest_n:
         raise LogContradiction(f"a probe of {event.level_n:g} N, but the protocol allows {highest_n:g} N at most")
-    if event.number != probing.probe_count:
-        raise LogContradiction(f"probe {event.number}, but probe {probing.probe_count} is the next")
+    if event.number != state.probe_count:
+        raise LogContradiction(f"probe {event.number}, but probe {state.probe_count} is the next")
     return replace(
-        probing,
-        probe_count=probing.probe_count + 1,
-        hand_probe_count=probing.hand_probe_count + is_hand_probe,
+        state,
+        probe_count=state.probe_count + 1,
+        hand_probe_count=state.hand_probe_count + is_hand_probe,
         open=event,
-        since_s=0.0 if is_hand_probe else probing.since_s,
-        referenced=probing.referenced or not is_hand_probe,
+        since_probe_s=0.0 if is_hand_probe else state.since_probe_s,
+        is_reference_done=state.is_reference_done or not is_hand_probe,
     )
 
 
-def end_probe(probing: ProbeState, event: ProbeMeasured) -> ProbeState:
-    """The state after the measurement of a probe, or after a reference that the experimenter declined (it has the next
-    number and no recording). Raises LogContradiction where this probe is not playing."""
-    is_declined = event.number == probing.probe_count and event.recording is None
-    if not is_declined and (probing.open is None or probing.open.number != event.number):
+def end_probe(state: ProbeState, event: ProbeMeasured) -> ProbeState:
+    """Return the state after the measurement of a probe, or after a reference that the experimenter declined (it has
+    the next number and no recording). Raises LogContradiction where this probe is not playing."""
+    is_declined = event.number == state.probe_count and event.recording is None
+    if not is_declined and (state.open is None or state.open.number != event.number):
         raise LogContradiction(f"a measurement of probe {event.number}, which is not playing")
-    updated = replace(probing, open=None, referenced=probing.referenced or is_declined)
-    if probing.open is None or probing.open.kind != "hand":
+    updated = replace(state, open=None, is_reference_done=state.is_reference_done or is_declined)
+    if state.open is None or state.open.kind != "hand":
         return updated
-    return replace(updated, hand_mass_kg=event.apparent_mass_kg, hand_level_n=probing.open.level_n)
+    return replace(updated, hand_mass_kg=event.apparent_mass_kg, hand_level_n=state.open.level_n)
 
 
-def apply_break(probing: ProbeState, event: PauseTaken | RestTaken, settings: ProbeSettings) -> ProbeState:
-    """The state after a pause or a rest.
+def apply_break(state: ProbeState, event: PauseTaken | RestTaken, settings: ProbeSettings) -> ProbeState:
+    """Return the state after a pause or a rest.
 
     After `reference_after_pause_s` or longer the grip may have changed: a probe and a reference are due again. After a
     shorter pause the interval to the next probe starts anew, because the participant has just taken the handle again. A
@@ -114,7 +119,7 @@ def apply_break(probing: ProbeState, event: PauseTaken | RestTaken, settings: Pr
     """
     break_s = event.paused_s if isinstance(event, PauseTaken) else event.rested_s
     if break_s >= settings.reference_after_pause_s:
-        return replace(probing, referenced=False, since_s=None, hand_mass_kg=None)
-    if isinstance(event, RestTaken) or probing.since_s is None:
-        return probing
-    return replace(probing, since_s=0.0)
+        return replace(state, is_reference_done=False, since_probe_s=None, hand_mass_kg=None)
+    if isinstance(event, RestTaken) or state.since_probe_s is None:
+        return state
+    return replace(state, since_probe_s=0.0)

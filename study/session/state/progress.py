@@ -1,6 +1,7 @@
-"""Progress of a session for the participant, estimated from completed runs and counted trials.
+"""Estimates the progress of a session that the participant sees, from completed runs and the number of trials.
 
-Levels are not used, because the display would reveal the state of the staircase and so the participant's performance.
+Stimulus levels are not used, because the display would reveal the state of the staircase and so the participant's
+performance. Called by `run_session` (rests) and `present_trial`.
 """
 
 import math
@@ -12,15 +13,17 @@ from study.session.state.state import SessionState
 from study.session.views.views import Progress
 
 TYPICAL_STAIRCASE_TRIALS = 65
-"""Typical number of trials of a staircase with 13 reversals; about 60 with few errors, 110 for pure guessing."""
+"""Typical number of trials of a staircase with 13 reversals; about 60 with few errors, 110 for pure guessing.
+Approximate, chosen by hand: only the displayed progress depends on it."""
 TRIALS_PER_REVERSAL = TYPICAL_STAIRCASE_TRIALS / 13
 """Typical number of trials per reversal."""
 
 
 RECENT_ANSWERS = 30
-"""Number of the most recent valid trials from which the time per trial is estimated."""
+"""Number of the most recent valid trials from which the time per trial is estimated. Chosen by hand."""
 MIN_ANSWERS = 8
-"""Number of answers in this sitting before which no time is estimated, because the first answers are slow."""
+"""Number of answers in this sitting before which no time is estimated, because the first answers are slow. Chosen by
+hand."""
 
 
 def estimate_progress(state: SessionState) -> Progress:
@@ -29,15 +32,16 @@ def estimate_progress(state: SessionState) -> Progress:
     expected_trials = [_estimate_run_trials(state, run) for run in state.runs]
     trials_done = sum(expected_trials[: state.run])
     if not state.finished:
-        # A run that takes more trials than is typical must not be shown as completed.
+        # A run that takes more trials than is typical is shown as at most 95 % done, not as completed.
         trials_done += min(state.trial, 0.95 * expected_trials[state.run])
     share = trials_done / sum(expected_trials)
     return Progress(share_done=share, minutes_left=_estimate_minutes_left(state, sum(expected_trials) - trials_done))
 
 
 def _estimate_run_trials(state: SessionState, run: Run) -> float:
-    """Typical number of trials of a run: the window of answers that is judged in practice, the number of trials of a
-    Bayesian rule, else by the number of reversals; at most the trial limit of a training run."""
+    """Estimate the number of trials of a run: in practice the number of answers that its criterion considers, else the
+    number of trials of a Bayesian rule, or the reversals times `TRIALS_PER_REVERSAL`; at most the trial limit of a
+    training run."""
     protocol = state.protocol
     if run.practice:
         return protocol.practice.of_last
@@ -48,9 +52,9 @@ def _estimate_run_trials(state: SessionState, run: Run) -> float:
 
 
 def _estimate_minutes_left(state: SessionState, trials_left: float) -> int | None:
-    """Minutes left for `trials_left` trials and later rests, rounded up; None before `MIN_ANSWERS` answers in this
-    sitting. Estimated from the median response time, not from the clock, because forms, instructions and pauses do not
-    predict the time of further trials."""
+    """Estimate the minutes left for `trials_left` trials and later rests, rounded up; None before `MIN_ANSWERS` answers
+    in this sitting. Estimated from the median response time, not from the clock, because forms, instructions and pauses
+    do not predict the time of further trials."""
     answers_in_sitting = state.answers - state.sitting.answers_before
     response_times_s = [
         trial.response_time_s for trial in state.trials if trial.is_valid and trial.response_time_s is not None

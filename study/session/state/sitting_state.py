@@ -111,7 +111,7 @@ def resume_sitting(sitting: SittingState, answers: int) -> SittingState:
         busy_voids=0,
         ineligibility="",
         answers_before=answers,
-        probing=replace(sitting.probing, since_s=None, referenced=False, open=None, hand_mass_kg=None),
+        probing=replace(sitting.probing, since_probe_s=None, is_reference_done=False, open=None, hand_mass_kg=None),
     )
 
 
@@ -120,11 +120,11 @@ def pass_time(sitting: SittingState, moment: Moment, resumed: bool = False) -> S
     compared with earlier values."""
     last = Moment(sitting.last.utc) if resumed else sitting.last
     passed_s, step = compute_elapsed_s(last, moment), find_clock_step(last, moment, between_sittings=resumed)
-    since_s = sitting.probing.since_s
+    since_probe_s = sitting.probing.since_probe_s
     advanced = replace(
         sitting,
         last=moment,
-        probing=replace(sitting.probing, since_s=None if since_s is None else since_s + passed_s),
+        probing=replace(sitting.probing, since_probe_s=None if since_probe_s is None else since_probe_s + passed_s),
         sat_s=None if sitting.sat_s is None else sitting.sat_s + passed_s,
         still_s=None if sitting.still_s is None else sitting.still_s + passed_s,
     )

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from equalizer.signals.lockin import covers_a_period, phasors
+from equalizer.signals.lockin import covers_a_period, estimate_phasors
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
@@ -47,7 +47,7 @@ def measure_delivered(recording: Recording, unit_vector: FloatArray, frequency_h
     measured = int(np.isfinite(recording.response.samples).all(axis=1).sum())
     if not covers_a_period(measured, recording.sample_rate_hz, frequency_hz):
         return None
-    acceleration = phasors(recording.response.samples, recording.sample_rate_hz, frequency_hz)[0]
+    acceleration = estimate_phasors(recording.response.samples, recording.sample_rate_hz, frequency_hz)[0]
     along_direction = acceleration @ unit_vector
     off_axis = acceleration - along_direction * unit_vector
     return Delivered(
@@ -69,8 +69,8 @@ def has_hardly_moved(
     force and acceleration along the direction; friction_n: force that may cause no motion; device_kg: effective mass of
     the device alone. Raises ValueError for less than one period."""
     rate_hz, w = recording.sample_rate_hz, 2 * math.pi * frequency_hz
-    force_n = abs(phasors(recording.command.samples, rate_hz, frequency_hz)[0] @ unit_vector)
-    along_mps2 = abs(phasors(recording.response.samples, rate_hz, frequency_hz)[0] @ unit_vector)
+    force_n = abs(estimate_phasors(recording.command.samples, rate_hz, frequency_hz)[0] @ unit_vector)
+    along_mps2 = abs(estimate_phasors(recording.response.samples, rate_hz, frequency_hz)[0] @ unit_vector)
     opposed = STIFFEST_N_PER_M + STRONGEST_DAMPING_N_S_PER_M * w + (HEAVIEST_KG + device_kg) * w**2
     least_mps2 = (force_n - friction_n) * w**2 / opposed
     return bool(least_mps2 >= LEAST_MPS2 and along_mps2 < least_mps2)
@@ -83,5 +83,5 @@ def _harmonics(recording: Recording, frequency_hz: float) -> float | None:
     if highest < 2:
         return None
     # A separate fit, so that the fundamental is the same as in earlier sessions, which were fitted without harmonics.
-    harmonic_phasors = phasors(recording.response.samples, recording.sample_rate_hz, frequency_hz, highest)
+    harmonic_phasors = estimate_phasors(recording.response.samples, recording.sample_rate_hz, frequency_hz, highest)
     return float(np.linalg.norm(harmonic_phasors[1:]))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from protocols.trial import Phase, Trial, TrialStatus
 from study.session.facts.log_time import Moment, compute_elapsed_s, compute_wall_clock_s
-from study.session.facts.void_reasons import HARDLY_ARRIVED, is_computer_busy
+from study.session.facts.void_reasons import TOO_LITTLE_MOTION, is_computer_busy
 from study.session.watching.followed_session import FollowedSession
 from study.session.watching.live import Live
 from study.session.watching.watch_view import RUNNING_STATUSES, Alarm, DriftRecord, Exposure, SittingStatus
@@ -231,12 +231,13 @@ def _check_computer_load(situation: Situation) -> Alarm | None:
 
 
 def _check_handle_motion(situation: Situation) -> Alarm | None:
-    """Alarm where the handle moved less than with any hand in some of the latest presentations (`HARDLY_ARRIVED`)."""
+    """Alarm where the handle moved less than with any hand in some of the latest presentations
+    (`TOO_LITTLE_MOTION`)."""
     remarks = situation.watched.remarks[-TRIAL_WINDOW:]
-    still_count = sum(HARDLY_ARRIVED in remark for remark in remarks)
+    still_count = sum(TOO_LITTLE_MOTION in remark for remark in remarks)
     if not still_count:
         return None
-    text = f"In {still_count} of the last {len(remarks)} presentations {HARDLY_ARRIVED}"
+    text = f"In {still_count} of the last {len(remarks)} presentations {TOO_LITTLE_MOTION}"
     advice = "Pause, and look at motors, handle and accelerometer."
     return Alarm("still", f"{text}. {advice}", situation.watched.last_utc)
 

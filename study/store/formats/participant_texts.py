@@ -1,7 +1,8 @@
 """Tables of the texts that participants read: one TOML file per language, with a text for every key of `ENGLISH`.
 
 A protocol selects a shipped language by its code ("de"), or a laboratory's own table by the path of a file. The texts
-are copied into the protocol, so that its hash and every log contain them.
+are copied into the protocol, so that its hash and every log contain them. Called by `protocol_files` when a protocol is
+read, and by `study.cli.protocol` to print a table for translation.
 """
 
 import json
@@ -29,9 +30,9 @@ KIND = "table of texts"
 
 
 def read_language(language: str, folder: Path | None = None) -> tuple[str, dict[str, str]]:
-    """The language's name, and its texts by key. language: a code such as "de", or the path of a TOML file, relative
-    to `folder`. Raises WrongUseError (no such language), CannotReadError, and UnusableFileError with all keys that are
-    missing or wrong."""
+    """Read the language's name, and its texts by key. language: a code such as "de", or the path of a TOML file,
+    relative to `folder`. Raises WrongUseError (no such language), CannotReadError, and UnusableFileError with all keys
+    that are missing or wrong."""
     if language == "en":
         return language, dict(ENGLISH)
     if language in LANGUAGES:
@@ -49,14 +50,14 @@ def read_language(language: str, folder: Path | None = None) -> tuple[str, dict[
         table = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise UnusableFileError(path, KIND, (f"it is not TOML: {error}",)) from error
-    if wrong := find_table_problems(table, require_all=True):
-        raise UnusableFileError(path, KIND, tuple(map(str, wrong)))
+    if problems := find_table_problems(table, require_all=True):
+        raise UnusableFileError(path, KIND, tuple(map(str, problems)))
     return path.stem, table
 
 
 def load_in_language(text: str, source: str, folder: Path | None) -> tuple[Protocol, str]:
-    """A protocol with all its participants' texts, and the TOML text of this protocol: `text` itself where no texts had
-    to be filled in.
+    """Load a protocol and fill in the participants' texts of its language. Returns the protocol and its TOML text:
+    `text` itself where no texts had to be filled in.
 
     text: of the protocol file; source: its name for messages; folder: of the file, None for a shipped protocol. Raises
     ProtocolError, CannotReadError, UnusableFileError.
@@ -64,11 +65,11 @@ def load_in_language(text: str, source: str, folder: Path | None) -> tuple[Proto
     try:
         values = tomllib.loads(text)
     except (ValueError, RecursionError):
-        return load_protocol(text, source), text  # It raises ProtocolError with the cause.
-    language, words = find_language(values), find_own_words(values)
-    if wrong := find_table_problems(words, require_all=False):
-        raise ProtocolError(source, tuple(problem.below("text.words") for problem in wrong))
-    if language == "en" or words.keys() >= ENGLISH.keys():
+        return load_protocol(text, source), text  # raises ProtocolError with the cause
+    language, own_texts = find_language(values), find_own_words(values)
+    if problems := find_table_problems(own_texts, require_all=False):
+        raise ProtocolError(source, tuple(problem.below("text.words") for problem in problems))
+    if language == "en" or own_texts.keys() >= ENGLISH.keys():
         return load_protocol(text, source), text
     try:
         name, table = read_language(language, folder)
@@ -80,8 +81,8 @@ def load_in_language(text: str, source: str, folder: Path | None) -> tuple[Proto
 
 
 def make_language_template(language: str) -> str:
-    """A table as TOML text, to be translated. Above each text that differs from the English text, a comment holds the
-    latter. Raises as `read_language`."""
+    """Make a table as TOML text, to be translated. Above each text that differs from the English text, a comment holds
+    the latter. Raises as `read_language`."""
     name, table = read_language(language)
     lines = [f"# Participants' texts of hapteq, {LANGUAGES.get(name, name)}. What stands in braces is filled in."]
     for key, english in ENGLISH.items():

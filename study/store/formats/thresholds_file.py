@@ -1,5 +1,7 @@
 """Read and write tables of thresholds: `thresholds.csv`, and `detection.csv` for detection runs.
 
+Called by `session_results` (tables of a session), `analyze_data` (of a study) and `recognisers` (to identify a file).
+
 One row per run. The columns are the fields of `analysis.psychophysics.thresholds.Threshold`, which states how each is
 computed; units are part of the names (`_n`: newtons, `_db`: dB re 1 N).
 """
@@ -29,8 +31,8 @@ def write_thresholds(path: Path, thresholds: Iterable[Threshold]) -> None:
 
 
 def read_thresholds(path: Path) -> tuple[Threshold, ...]:
-    """Read the table. Raises CannotReadError where the file cannot be read, UnusableFileError where it is not such a
-    table."""
+    """Read the table. Raises CannotReadError where the file cannot be read, UnusableFileError where it is not a table
+    of thresholds."""
     try:
         return parse_csv_table(read_text(path), Threshold)
     except CsvError as error:

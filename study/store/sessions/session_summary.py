@@ -1,7 +1,7 @@
-"""Read `session.json`, the summary of a session, for readers that do not evaluate the whole log.
+"""Reads `session.json`, the summary of a session, without evaluating the whole log.
 
-The summary is derived from the log. It states what the log contained when it was written, and so reveals a log whose
-end was lost later.
+The summary is derived from the log and states what the log contained when it was written; a comparison with it shows
+whether the end of the log was lost later. Called by `fold_session` and `session_results`, which also writes the file.
 """
 
 from pathlib import Path
@@ -16,7 +16,7 @@ SUMMARY_FORMAT, SUMMARY_VERSION = "hapteq-session-summary", 1
 
 
 def read_summary(folder: Path) -> dict[str, Any] | None:
-    """The summary without its provenance; None if the file is missing, unreadable or of another format."""
+    """Read the summary without its provenance; None if the file is missing, unreadable or of another format."""
     try:
         summary = read_json(folder / SUMMARY_NAME, SUMMARY_FORMAT, SUMMARY_VERSION)
     except StudyError:
@@ -26,8 +26,8 @@ def read_summary(folder: Path) -> dict[str, Any] | None:
 
 
 def read_closed_and_presentations(summary: dict[str, Any] | None) -> tuple[bool, int]:
-    """Whether the session was closed when the summary was written, and the number of presentations that its log had
-    then. False and 0 without a summary."""
+    """Read from a summary whether the session was closed when it was written, and the number of stimulus presentations
+    in the log then. False and 0 without a summary."""
     if summary is None:
         return False, 0
     presentations = summary.get("presentations")

@@ -116,7 +116,7 @@ class HapteqApp(App[None]):
         self.outcome = self._stop_panel = None
         self._archive.clear()
         self._sitting = SittingScreens(self, self._engine.send, self._start.keys, self._keys.forget_earlier)
-        await self._sitting.prepare()
+        await self._sitting.show_preparing()
         self._engine.send(first)
 
     async def on_engine_message(self, event: EngineMessage) -> None:
@@ -231,9 +231,9 @@ class HapteqApp(App[None]):
         return action not in ("watch", "note", "pause") or self._sitting is not None
 
     def get_system_commands(self, screen: Screen[Any]) -> Iterable[SystemCommand]:
-        from study.tui.app.app_commands import commands
+        from study.tui.app.app_commands import generate_commands
 
-        return commands(self, screen)
+        return generate_commands(self, screen)
 
     def on_trial_screen_replied(self, event: Any) -> None:
         reply: TrialReply = event.reply

@@ -1,6 +1,7 @@
-"""The command palette: all actions of the present screen, each with its key and its command-line equivalent.
+"""Entries of the command palette: all actions of the current screen, each with its key and its equivalent command line.
 
-Thus an action can be found by its name, and a user learns how to do the same without the screen.
+Users find an action by its name, and learn the shell command that does the same. Called by `app` when Textual opens the
+palette.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Any
 from textual.app import App, SystemCommand
 from textual.screen import Screen
 
-EQUIVALENT_LAWS = {
+EQUIVALENT_COMMAND_LINES = {
     "begin": "hapteq study --subject CODE",
     "resume": "hapteq resume SESSION",
     "decide('resume')": "hapteq resume SESSION",
@@ -33,7 +34,7 @@ EQUIVALENT_LAWS = {
     "note(True)": "hapteq note --adverse SESSION TEXT",
     "quit": "Ctrl-C in line mode",
 }
-"""Command-line equivalent of an action, by the name of the action in its binding."""
+"""Equivalent shell command of an action, by the name of the action in its key binding."""
 
 TITLES = {
     "let_go": "Take the force off and leave",
@@ -51,18 +52,20 @@ TITLES = {
 hides the action."""
 
 
-def commands(app: App[Any], screen: Screen[Any]) -> Iterator[SystemCommand]:
-    """The enabled actions of this screen and of the application, each once, as entries of the palette."""
-    listed = set()
-    for active in screen.active_bindings.values():
-        binding = active.binding
+def generate_commands(app: App[Any], screen: Screen[Any]) -> Iterator[SystemCommand]:
+    """Generate the entries of the palette: the enabled actions of a screen and of the application, each once."""
+    listed_actions = set()
+    for active_binding in screen.active_bindings.values():
+        binding = active_binding.binding
         action = binding.action.removeprefix("app.").removeprefix("screen.")
         title = TITLES.get(action, binding.tooltip or binding.description)
-        hidden = not binding.show and action not in TITLES
-        if hidden or not title or not active.enabled or action in listed:
+        is_hidden = not binding.show and action not in TITLES
+        if is_hidden or not title or not active_binding.enabled or action in listed_actions:
             continue
-        listed.add(action)
+        listed_actions.add(action)
         key = app.get_key_display(binding)
-        twin = EQUIVALENT_LAWS.get(action)
-        run = partial(app.run_action, binding.action, active.node)
-        yield SystemCommand(title, f"Key: {key}.{f' In a terminal: {twin}' if twin else ''}", run)
+        command_line = EQUIVALENT_COMMAND_LINES.get(action)
+        run_action = partial(app.run_action, binding.action, active_binding.node)
+        yield SystemCommand(
+            title, f"Key: {key}.{f' In a terminal: {command_line}' if command_line else ''}", run_action
+        )

@@ -1,7 +1,7 @@
 """Shows the screens of one sitting in the terminal, on request of the engine, and sends the replies.
 
 The engine runs the session in another process. Each of its requests (`ScreenRequest`) opens a screen above the trial's
-screen, which stays open underneath; the screen's result is sent back with the number of the request.
+screen, which stays open underneath; the screen's result is sent back with the number of the request. Used by `app`.
 """
 
 from __future__ import annotations
@@ -56,26 +56,26 @@ SCREENS: dict[DisplayCall, Callable[[Any, Words], Screen[Any]]] = {
     DisplayCall.AWAIT_RETURN: AwaitReturnScreen,
     DisplayCall.GOODBYE: GoodbyeScreen,
 }
-"""Screen of each request of the engine that needs only the content and the texts. `screen_for` makes those of the other
-requests, except the trial's."""
+"""Screen for each request of the engine that needs only the content and the texts. `make_screen` makes the screens of
+the other requests, except that of a trial."""
 
 
-def screen_for(ask: ScreenRequest, keys: AnswerKeys, words: Words) -> Screen[Any]:
-    """A new screen for a request other than a trial, whose screen is kept between requests. The screen is dismissed
-    with the reply as its result."""
-    if ask.call is DisplayCall.WELCOME:
-        return InstructionsScreen(ask.content, keys, words)
-    if ask.call is DisplayCall.CHOOSE_DEMO:
-        return DemoScreen(ask.content, keys, words)
-    if ask.call is DisplayCall.PAUSE:
-        return PauseScreen(ask.content, ask.content.reason == LEAVING.reason, words)
-    return SCREENS[ask.call](ask.content, words)
+def make_screen(request: ScreenRequest, keys: AnswerKeys, words: Words) -> Screen[Any]:
+    """Make a new screen for a request other than a trial, whose screen is kept between requests. The screen is
+    dismissed with the reply as its result."""
+    if request.call is DisplayCall.WELCOME:
+        return InstructionsScreen(request.content, keys, words)
+    if request.call is DisplayCall.CHOOSE_DEMO:
+        return DemoScreen(request.content, keys, words)
+    if request.call is DisplayCall.PAUSE:
+        return PauseScreen(request.content, request.content.reason == LEAVING.reason, words)
+    return SCREENS[request.call](request.content, words)
 
 
 def clear_render_caches(app: App[Any]) -> None:
-    """Clear caches of Textual 8.2 that keep removed widgets alive; call it when screens change. Otherwise garbage
-    collection of these widgets blocks the event loop for longer with every trial, finally for more than the half second
-    after which a screen counts as dead."""
+    """Clear caches of Textual 8.2 that hold references to removed widgets; call it when screens change. Otherwise
+    garbage collection of these widgets blocks the event loop for longer with every trial, finally for more than the
+    half second after which the engine treats the screen as unresponsive."""
     # Textual caches 1024 lookups of two colours, each with the whole rendering of a widget as key.
     StylesCache.get_inner_outer.cache_clear()
     for screen in app.screen_stack:
@@ -84,20 +84,20 @@ def clear_render_caches(app: App[Any]) -> None:
             footer.mutate_reactive(Footer.compact)
 
 
-TROUBLE_FOR_S = 8.0
+WARNING_DURATION_S = 8.0
 """Time for which a warning is shown (s)."""
 
 
 class SittingScreens:
     """Shows the screens that the engine requests in one sitting, and sends the replies. Every reply carries the number
-    of its request and is sent once."""
+    of its request and is sent only once."""
 
     def __init__(
         self,
         app: App[Any],
         send: Callable[[ToEngine], None],
         keys: AnswerKeys,
-        forget_earlier: Callable[[], None],
+        discard_earlier_keys: Callable[[], None],
     ) -> None:
         """send: sends a message to the engine. forget_earlier: discards keys that were pressed before the call."""
         self.path = ""
@@ -107,102 +107,109 @@ class SittingScreens:
         self._app = app
         self._send = send
         self._keys = keys
-        self._forget_earlier = forget_earlier
-        self._number = 0
+        self._discard_earlier_keys = discard_earlier_keys
+        self._pending_number = 0
         """Number of the request that waits for a reply; 0 where none does."""
         self._request_screen: Screen[Any] | None = None
         self._trial: TrialScreen | None = None
-        self._preparing: PreparingScreen | None = None
+        self._preparing_screen: PreparingScreen | None = None
 
     async def handle_message(self, message: FromEngine) -> None:
         """Handle one message of the engine, in the order of arrival."""
         match message:
             case ScreenRequest():
-                await self._ask(message)
-            case CloseRequest(number=number) if number == self._number:
-                self._drop()
+                await self._open_request_screen(message)
+            case CloseRequest(number=number) if number == self._pending_number:
+                self._close_request_screen()
             case HandleUpdate():
                 self._update_handle(message)
             case Feedback(correct=correct) if self._trial is not None:
                 self._trial.show_saved()
                 self._trial.show_feedback(correct)
             case UserNotice(sentence=sentence):
-                self._show_trouble(sentence)
+                self._show_warning(sentence)
             case SessionReady(path=path):
                 self.path = path
             case ParticipantWords(words=words):
                 self.words = words
-                if self._preparing is not None:
-                    self._preparing.set_language(words)
+                if self._preparing_screen is not None:
+                    self._preparing_screen.set_language(words)
             case PreparationStarted(sentence=sentence):
-                await self.prepare(sentence)
+                await self.show_preparing(sentence)
 
     def send_trial_reply(self, reply: TrialReply) -> None:
-        """Send the answer to a trial. Called by the trial's screen, which then takes no further keys by itself."""
-        self._reply(reply)
+        """Send the answer to a trial. Called on a message of the trial's screen, which accepts no further answer
+        then."""
+        self._send_reply(reply)
 
-    async def prepare(self, sentence: str = "") -> None:
-        """Show that the device is being prepared, while no request waits. sentence: empty before the language is
-        known."""
-        self._number, self._request_screen, self._trial = 0, None, None
-        if self._preparing is None:
-            self._preparing = PreparingScreen(sentence)
-            await self._app.push_screen(self._preparing)
+    async def show_preparing(self, sentence: str = "") -> None:
+        """Show that the device is being prepared, while no request is open. sentence: current step, empty before the
+        language is known."""
+        self._pending_number, self._request_screen, self._trial = 0, None, None
+        if self._preparing_screen is None:
+            self._preparing_screen = PreparingScreen(sentence)
+            await self._app.push_screen(self._preparing_screen)
             return
-        covered = self._app.screen is not self._preparing
-        while self._app.screen is not self._preparing and self._preparing in self._app.screen_stack:
+        was_covered = self._app.screen is not self._preparing_screen
+        while self._app.screen is not self._preparing_screen and self._preparing_screen in self._app.screen_stack:
             self._app.pop_screen()
-        self._preparing.say(sentence, afresh=covered)
+        self._preparing_screen.say(sentence, afresh=was_covered)
 
-    async def _ask(self, ask: ScreenRequest) -> None:
-        """Replace the previous request's screen by that of a new request."""
-        self._drop()
-        self._number = ask.number
-        if self._preparing is not None and self._app.screen is self._preparing:
+    async def _open_request_screen(self, request: ScreenRequest) -> None:
+        """Replace the screen of the previous request by that of a new request."""
+        self._close_request_screen()
+        self._pending_number = request.number
+        if self._preparing_screen is not None and self._app.screen is self._preparing_screen:
             # Cover the preparing screen: only an empty screen must show in the moment between two others.
             await self._app.push_screen(Screen())
-        if ask.call is DisplayCall.ASK:
-            trial = self._trial if self._trial is not None else await self._trial_screen()
-            trial.arm(ask.content)
+        if request.call is DisplayCall.ASK:
+            trial = self._trial if self._trial is not None else await self._open_trial_screen()
+            trial.arm(request.content)
             return
-        self._request_screen = screen_for(ask, self._keys, self.words)
-        await self._app.push_screen(self._request_screen, partial(self._reply_once_dismissed, ask.number))
+        self._request_screen = make_screen(request, self._keys, self.words)
+        await self._app.push_screen(self._request_screen, partial(self._send_screen_result, request.number))
         # Keys pressed before this screen could be read must not answer it.
-        self._forget_earlier()
+        self._discard_earlier_keys()
 
-    async def _trial_screen(self) -> TrialScreen:
+    async def _open_trial_screen(self) -> TrialScreen:
+        """Open the screen of all trials; it stays open until the device is prepared again."""
         self._trial = TrialScreen(self._keys, self.words)
         await self._app.push_screen(self._trial)
         return self._trial
 
     def _update_handle(self, update: HandleUpdate) -> None:
-        if update.number == self._number and isinstance(self._request_screen, HandleScreen):
+        """Show a new position of the handle, if its request is still open."""
+        if update.number == self._pending_number and isinstance(self._request_screen, HandleScreen):
             self._request_screen.update_view(update.view)
 
-    def _show_trouble(self, sentence: str) -> None:
+    def _show_warning(self, sentence: str) -> None:
+        """Show a warning on the trial's screen; as a notification where there is none, or another screen covers it."""
         sentence = self.words.translate_fact(sentence)
         if self._trial is not None:
             self._trial.show_trouble(sentence)
         if self._trial is None or self._request_screen is not None:
-            self._app.notify(sentence, severity="warning", timeout=TROUBLE_FOR_S, markup=False)
+            self._app.notify(sentence, severity="warning", timeout=WARNING_DURATION_S, markup=False)
 
-    def _reply_once_dismissed(self, number: int, value: Any) -> None:
-        if number == self._number:
+    def _send_screen_result(self, number: int, value: Any) -> None:
+        """Send the result of a dismissed screen as the reply, if its request (`number`) is still open."""
+        if number == self._pending_number:
             self._request_screen = None
-            self._reply(value)
+            self._send_reply(value)
 
-    def _reply(self, value: Any) -> None:
-        if self._number:
-            self._send(Reply(self._number, value))
-        self._number = 0
+    def _send_reply(self, value: Any) -> None:
+        """Send the reply to the open request, if there is one, and close the request."""
+        if self._pending_number:
+            self._send(Reply(self._pending_number, value))
+        self._pending_number = 0
 
-    def _drop(self) -> None:
-        """Remove the previous request's screen and everything above it (help, commands)."""
-        self._number = 0
+    def _close_request_screen(self) -> None:
+        """Close the screen of the previous request and every screen above it (help, command palette), and take no
+        further answer on the trial's screen."""
+        self._pending_number = 0
         if self._trial is not None:
             self._trial.show_saved()  # the engine continues only after the answer is on disk
             self._trial.disarm()
-        screen, self._request_screen = self._request_screen, None
-        while screen is not None and screen in self._app.screen_stack:
+        request_screen, self._request_screen = self._request_screen, None
+        while request_screen is not None and request_screen in self._app.screen_stack:
             self._app.pop_screen()
         clear_render_caches(self._app)

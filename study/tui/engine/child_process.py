@@ -1,6 +1,7 @@
-"""A process beside the one that draws, and a pipe to it.
+"""Start a child process of the terminal interface, connected by a pipe. Called by `client` and `watch_feed`.
 
-Not `multiprocessing`: that hands the terminal on, and cannot start anything while Textual holds stdout and stderr.
+`multiprocessing` is not used to start it: its child would inherit the terminal, and it cannot start a process while
+Textual has replaced stdout and stderr.
 """
 
 import socket
@@ -13,12 +14,14 @@ from typing import IO
 def start_child(
     module: str, function: str, *arguments: str, output: IO[bytes] | int = subprocess.DEVNULL
 ) -> tuple[Connection, "subprocess.Popen[bytes]"]:
-    """Run `function(descriptor of its end of the pipe, *arguments)` in a new process. It is named by text because its
-    module is not loaded here. What it prints goes to `output`.
+    """Run a function of a module in a new process; returns this process's end of the pipe, and the process.
 
-    The process has a session of its own: the terminal's Ctrl-C and Ctrl-Z do not reach it, and it cannot write on the
-    screen. It uses this process's import path. It sees the end of the pipe when this process ends for any reason.
-    Raises OSError where the system refuses.
+    The function is called with the file descriptor of the child's end of the pipe, then `arguments`. Module and
+    function are given by name, so that the module is not imported here. output: receives what the child prints.
+
+    The child has its own POSIX session: the terminal's Ctrl-C and Ctrl-Z do not reach it, and it cannot write to the
+    screen. It uses this process's import path. When this process ends for any reason, the pipe closes, which the child
+    reads as end of file. Raises OSError where the process cannot be started.
     """
     own_end, child_end = socket.socketpair()
     with child_end:

@@ -1,7 +1,8 @@
 """Confirmation before the experimenter's view opens on a screen that the participant may see.
 
 The view shows levels and which answers were right; a participant who has seen these is no longer a naive observer.
-Therefore the session's name must be typed: a single key that is pressed by mistake does not open the view.
+Therefore the session's name must be typed: a single key that is pressed by mistake does not open the view. Called by
+`study.tui.watch.watch_in_app`.
 """
 
 from __future__ import annotations

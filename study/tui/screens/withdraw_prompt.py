@@ -1,6 +1,7 @@
-"""Confirmation of a participant's withdrawal: the code must be typed, so that no single key erases data.
+"""Dialog that confirms a participant's withdrawal of consent before data are erased.
 
-Only asks: the data are erased by the caller, if the prompt returns True.
+The participant's code must be typed, so that no single key erases data. Shown by `study.tui.screens.session`, which
+requests the erasure if the dialog returns True; the dialog itself erases nothing.
 """
 
 from typing import ClassVar
@@ -26,12 +27,12 @@ Type the code and press Enter to erase. **Esc** leaves everything as it is.
 
 In a terminal: `hapteq withdraw SESSION`.
 """
-"""Help of the prompt, in Markdown."""
+"""Help page of the dialog, in Markdown."""
 
 
 class WithdrawPrompt(ModalScreen[bool]):
-    """Asks for the participant's code before all sessions with that code are erased: Enter compares the text with the
-    code, Esc keeps everything. Returns True if the code was typed, False after Esc."""
+    """Dialog that asks for the participant's code before all sessions with that code are erased. Enter compares the
+    typed text with the code and returns True if they are equal; Esc returns False. subject: the participant's code."""
 
     HELP = HELP
     CSS = """

@@ -1,7 +1,7 @@
 """Widget that shows the position of the handle relative to the circle within which a trial may start.
 
-The circle is drawn with 40 % of the available radius, so that a handle outside it is shown at its place up to almost
-2.5 times the radius.
+The circle is drawn with 40 % of the available radius, so that a handle outside it is shown to scale up to almost 2.5
+times the radius. Used by `screens.handle`.
 """
 
 import math
@@ -18,7 +18,7 @@ from study.tui.drawing.braille import Canvas
 
 class HandleTarget(Widget):
     """Draws the circle within which a trial may start, a cross in its centre, and the handle as a disc. Right and up
-    are those of the picture of the directions. A handle that is too far away is drawn at the edge, in its direction."""
+    are as in the picture of the stimulus directions. A handle too far away is drawn at the edge, in its direction."""
 
     DEFAULT_CSS = """
     HandleTarget { height: 1fr; min-height: 5; }
@@ -41,18 +41,20 @@ BOLD = Style(bold=True)
 
 
 def _draw_target(view: HandleView, columns: int, rows: int) -> list[str]:
-    """The drawing as lines of braille characters. columns, rows: size in cells."""
+    """Draw the target as lines of braille characters. columns, rows: size in character cells. Lengths without a unit
+    are in braille dots; the circle is two dots thick, and the disc has 1/14 of the available radius, at least 2
+    dots."""
     canvas = Canvas(columns, rows)
     x, y = canvas.centre
-    edge = min(x, y)
-    dots_per_mm = 0.4 * edge / max(view.radius_mm, 1e-9)
+    max_distance = min(x, y)
+    dots_per_mm = 0.4 * max_distance / max(view.radius_mm, 1e-9)
     for radius in (dots_per_mm * view.radius_mm, dots_per_mm * view.radius_mm + 1):
         canvas.draw_circle((x, y), radius)
     canvas.draw_line((x - 3, y), (x + 3, y))
     canvas.draw_line((x, y - 3), (x, y + 3))
     right_mm, up_mm = view.offset_mm
-    size = max(2.0, edge / 14)
+    disc_radius = max(2.0, max_distance / 14)
     distance = dots_per_mm * math.hypot(right_mm, up_mm)
-    shrink = min(1.0, (edge - size) / distance) if distance > 0 else 1.0
-    canvas.draw_disc((x + shrink * dots_per_mm * right_mm, y - shrink * dots_per_mm * up_mm), size)
+    inward_factor = min(1.0, (max_distance - disc_radius) / distance) if distance > 0 else 1.0
+    canvas.draw_disc((x + inward_factor * dots_per_mm * right_mm, y - inward_factor * dots_per_mm * up_mm), disc_radius)
     return canvas.render_lines()

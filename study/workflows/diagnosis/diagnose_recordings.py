@@ -17,7 +17,7 @@ from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.choose_measure import Compared
 from analysis.diagnosis.first_model.first_model import FirstModel
-from analysis.diagnosis.localisation.clean_floor import NothingLearned
+from analysis.diagnosis.localisation.model_error_floor import IncomparableRecordingsError
 from analysis.diagnosis.result.findings import Findings
 from analysis.diagnosis.search.guard import Guard
 from analysis.diagnosis.types import Mapper, Progress, TimeBudget
@@ -28,7 +28,7 @@ from equalizer.plant.mechanical_model import MechanicalModel, suggest_word
 from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
 from study.store.disk.new_folder import new_folder, require_new_folder
-from study.workflows.crash_guard import crash_guard
+from study.workflows.crash_guard import make_crash_guard
 from study.workflows.diagnosis.diagnosis_input import (
     DiagnosisInput,
     make_not_diagnosable_error,
@@ -127,7 +127,7 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
     inputs, clean = _add_clean(plan, read_input(plan.sources, plan.seed, for_force_balance, plan.force_constants))
     on_progress("reading", READ_SHARE)
     has_time_left = _start_time_budget(plan)
-    guard = crash_guard()
+    guard = make_crash_guard()
     first_model = _choose_model(plan, inputs, clean, (has_time_left, guard), on_progress)
     # A model that was fitted to these recordings already contains the spring.
     spring_n_per_m = inputs.spring_n_per_m if plan.model is not None or inputs.simulated else 0.0
@@ -139,7 +139,7 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
         findings = engine(
             inputs.recordings, model, settings, map_forked, _scale_progress(on_progress, start_share, DIAGNOSED_SHARE)
         )
-    except NothingLearned as refusal:
+    except IncomparableRecordingsError as refusal:
         raise make_not_diagnosable_error(
             (str(refusal),), "Leave --clean out, or record the device in order in the same way."
         ) from refusal

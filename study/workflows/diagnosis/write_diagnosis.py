@@ -17,7 +17,7 @@ from study.store.disk.provenance import Provenance, gather_provenance
 from study.store.disk.text_file import write_text
 from study.store.formats.diagnosis_file import DIAGNOSIS_NAME, MODEL_NAME, PAGE_NAME, write_diagnosis
 from study.store.formats.mechanical_model_file import write_mechanical_model
-from study.workflows.crash_guard import crash_guard
+from study.workflows.crash_guard import make_crash_guard
 from study.workflows.forked_map import map_forked
 from study.workflows.picture_files import DrawnPicture, draw_picture, write_drawn
 
@@ -29,7 +29,7 @@ def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Pat
     write_diagnosis(folder / DIAGNOSIS_NAME, findings.diagnosis, origin)
     improved = replace(findings.improved, provenance=origin.as_dict())
     write_mechanical_model(folder / MODEL_NAME, improved)
-    guard = crash_guard()
+    guard = make_crash_guard()
     parts = [replace(part, work=partial(_draw_pictures, part.work)) for part in list_drawings(findings)]
     drawn_pictures = [
         drawn_picture for part_pictures in guard.run_parts(map_forked, parts) for drawn_picture in part_pictures

@@ -1,7 +1,9 @@
-"""The band of an equalizer from a study: its upper end is the frequency up to which people tell directions apart.
+"""Reads the direction limit of a study from `anova.json`, as the upper end of the band of an identified model.
 
-Above the direction limit a direction need not be right, so that a model need not be good there: the narrow band of the
-full equalizer ends at it, and a wider model renders the strength alone. Called by `hapteq identify`.
+The direction limit is the frequency (Hz) at which the median threshold for telling directions apart reaches the force
+cap (docs/statistics.md). Above it, most participants cannot tell directions apart at forces below the cap: a model
+identified up to this limit renders strength and direction, and a second model with a wider band renders the strength
+alone. Called by `hapteq identify`.
 """
 
 import json
@@ -17,22 +19,23 @@ from study.store.disk.text_file import read_text
 FORMAT = "hapteq-anova"
 """Format of anova.json."""
 KIND = "analysis of a study"
-"""Name of such a file in messages."""
+"""Kind of the file, as stated in error messages."""
 ANALYSIS_ADVICE = "Give the anova.json that `hapteq analyze` writes for a study with two participants or more."
 
 
 @dataclass(frozen=True, slots=True)
 class StudyBand:
-    """A frequency band that ends at the direction limit found by a study."""
+    """A frequency band (Hz) whose upper end is the direction limit estimated by a study."""
 
     band_hz: tuple[float, float]
     origin: str
-    """Where the upper end comes from, in a sentence."""
+    """Source of the upper end, with its confidence interval, in a sentence or two."""
 
 
 def read_study_band(path: Path, lowest_hz: float) -> StudyBand:
     """Read the band from `lowest_hz` to the direction limit of an analysis. path: its anova.json. Raises
-    CannotReadError, and UnusableFileError where it is no such file, has no limit, or one not above `lowest_hz`."""
+    CannotReadError, and UnusableFileError where the file is no such analysis, states no limit, or a limit not above
+    `lowest_hz`."""
     try:
         document = load_json(read_text(path))
     except ValueError as error:

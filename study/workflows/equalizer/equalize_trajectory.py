@@ -1,7 +1,8 @@
-"""`hapteq equalize`: a table of forces from a table of target accelerations and identified models of the device.
+"""Computes the feedforward forces that make a device follow a table of target accelerations (`hapteq equalize`).
 
-The forces are the feedforward of an LQR tracker (`equalizer.tracking.feedforward`) under the cap. With `--physics`, the
-forces of known nonlinear effects along the predicted motion are added. Each refusal names its cause and a remedy.
+The forces are the feedforward of a finite-horizon LQR tracker (`equalizer.tracking.feedforward`) for identified models
+of the device, under a force cap. With `--physics`, the forces of known nonlinear effects along the predicted motion are
+added. Each error states its cause and a remedy. Called by `study.cli.equalize` and `repeat_trajectory`.
 """
 
 import math
@@ -29,14 +30,15 @@ MAX_ACCELERATION_MPS2 = 1e4
 MAX_TRACKING_ERROR = 0.5
 """Predicted tracking error, relative to the wanted signal, above which forces are refused."""
 MIN_WEIGHT_RATIO = 1e-7
-"""Ratio of the root of the force's weight to the model's peak gain below which the weight is lost in rounding."""
+"""Ratio of the square root of the weight of the forces to the model's peak gain, below which the weight has no effect:
+its square, added to the squared gain, is lost in rounding."""
 
 
 @dataclass(frozen=True, slots=True)
 class EqualizePlan:
-    """Request of an equalization: files of identified models, table of target accelerations, table of forces to write.
-    at_m: place in the workspace (m). cap_n: largest force (N). constrain: keep the forces below the cap at the cost of
-    accuracy, instead of refusing."""
+    """Request of an equalization. models: files of identified models. trajectory: table of target accelerations. out:
+    table of forces to write. at_m: place in the workspace (m), needed for models of several places. cap_n: largest
+    force (N). constrain: keep the forces below the cap at the cost of accuracy, instead of raising an error."""
 
     models: tuple[Path, ...]
     trajectory: Path

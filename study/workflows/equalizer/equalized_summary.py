@@ -18,7 +18,8 @@ MIN_REPORTED_SHARE = 0.01
 
 
 def summarise_equalization(equalized: EqualizedTrajectory) -> dict[str, Any]:
-    """The results as plain values, for a JSON document; units by the suffix of a key, errors as fractions."""
+    """Return the results as plain values for a JSON document. Units are stated by the suffix of a key; errors and
+    shares are fractions, not percentages."""
     feedforward, bands, compensation = equalized.feedforward, equalized.bands, equalized.compensation
     values: dict[str, Any] = {
         "forces": str(equalized.plan.out),
@@ -57,8 +58,9 @@ def summarise_equalization(equalized: EqualizedTrajectory) -> dict[str, Any]:
 
 
 def _summarise_interpolation(equalized: EqualizedTrajectory) -> dict[str, Any]:
-    """Method that interpolates models of several places, and the errors of both methods at places left out of the
-    interpolation (cross-validation). Empty where the models are of a single place."""
+    """Return the method by which models of several places are interpolated, and the errors of both available methods at
+    places left out of the interpolation (leave-one-out cross-validation). Empty where the models are of a single
+    place."""
     choice = equalized.models.choice
     if choice is None:
         return {}
@@ -76,7 +78,7 @@ def _summarise_interpolation(equalized: EqualizedTrajectory) -> dict[str, Any]:
 
 
 def format_equalization_lines(equalized: EqualizedTrajectory) -> tuple[str, ...]:
-    """The results as lines of text for the terminal."""
+    """Format the results as lines of text for the terminal."""
     feedforward = equalized.feedforward
     lines = [
         *_format_quality_lines(equalized),
@@ -105,26 +107,28 @@ def format_equalization_lines(equalized: EqualizedTrajectory) -> tuple[str, ...]
 
 
 def _format_quality_lines(equalized: EqualizedTrajectory) -> list[str]:
-    """Lines on the measured quality of the models: of a single model, or of the nearest (of two bands, the narrow) and
-    the worst."""
+    """Format lines on the measured quality of the models. Of several models: that of the model nearest to the place, or
+    of the narrower of two bands, and that of the worst model where it differs."""
     models = equalized.models
     worst_quality = models.quality
     if len(models.all_models) == 1:
         return [write_quality_sentence(worst_quality), *(worst_quality.remarks if worst_quality else ())]
     model_role = "narrower" if models.two_bands is not None else "nearest"
-    nearest_quality, worst = models.nearest.quality, worst_quality
+    nearest_quality, poorest_quality = models.nearest.quality, worst_quality
     lines = [f"Of the {model_role} model: {write_quality_sentence(nearest_quality)}"]
-    if worst != nearest_quality:
-        lines.append(f"Of the worst of the {len(models.all_models)} models: {write_quality_sentence(worst)}")
+    if poorest_quality != nearest_quality:
+        lines.append(f"Of the worst of the {len(models.all_models)} models: {write_quality_sentence(poorest_quality)}")
     return [
         *lines,
-        *dict.fromkeys(remark for quality in (nearest_quality, worst) if quality for remark in quality.remarks),
+        *dict.fromkeys(
+            remark for quality in (nearest_quality, poorest_quality) if quality for remark in quality.remarks
+        ),
     ]
 
 
 def get_predicted_error(equalized: EqualizedTrajectory) -> float:
-    """Relative rms error that the model predicts. Under an active cap this is `TrackingLoss.error_capped`, the error of
-    the capped forces, so that it can be compared with the error without a cap."""
+    """Return the relative rms error that the model predicts. Under an active cap this is `TrackingLoss.error_capped`,
+    the error of the capped forces, so that it can be compared with the error without a cap."""
     loss = equalized.feedforward.loss
     return equalized.feedforward.error if loss is None else loss.error_capped
 
@@ -147,7 +151,7 @@ def _format_prediction_line(equalized: EqualizedTrajectory) -> str:
 
 
 def _compute_out_of_band_force_share(equalized: EqualizedTrajectory) -> float:
-    """Fraction (rms) of the forces outside the model's band."""
+    """Compute the fraction (rms) of the forces outside the model's frequency band."""
     forces = equalized.forces.signal.samples
     out_of_band_forces = forces - extract_band(equalized.models.nearest, forces)
     return float(np.linalg.norm(out_of_band_forces) / np.linalg.norm(forces))

@@ -122,7 +122,7 @@ def summarise_repeats(result: RepeatedTrajectory) -> dict[str, Any]:
         "verdict": repeated.verdict.name.lower(),
         "remark": repeated.remark,
         "gain": result.gain,
-        "surviving_error": None if result.convergence is None else float(result.convergence.surviving.max()),
+        "surviving_error": None if result.convergence is None else float(result.convergence.remaining_share.max()),
     }
 
 
@@ -163,7 +163,7 @@ def _describe_convergence(result: RepeatedTrajectory) -> str:
         return "Convergence was not tested before playing: the model does not contain its uncertainty."
     return (
         "If the device is linear and within the models' uncertainty, at most "
-        f"{100 * result.convergence.surviving.max():.1f} % of an error remains after a repeat "
+        f"{100 * result.convergence.remaining_share.max():.1f} % of an error remains after a repeat "
         f"({result.convergence.worst_hz:.1f} Hz); with friction more remains. Gain {result.gain:.2f}."
     )
 
@@ -190,8 +190,8 @@ def _test_gain(equalized: EqualizedTrajectory, spring: VirtualSpring) -> tuple[f
     gain = min(1.0, SAFE_GAIN_FRACTION * convergence.safe_beta)
     if gain < LOWEST_GAIN:
         raise not_repeated(
-            f"Repeats would not converge: at {convergence.worst_hz:.1f} Hz {convergence.surviving.max():.2f} of an "
-            "error can remain after each with gain 1, within the models' uncertainty; a safe gain is below "
+            f"Repeats would not converge: at {convergence.worst_hz:.1f} Hz {convergence.remaining_share.max():.2f} of "
+            "an error can remain after each with gain 1, within the models' uncertainty; a safe gain is below "
             f"{LOWEST_GAIN:g}.",
             "Record and identify at the place itself, or with more sweeps.",
         )

@@ -54,7 +54,8 @@ def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = SESSION_RECO
 
 
 def _find_idle_commands(validation: Validation) -> tuple[str, ...]:
-    """Remark on the commands of a valid recording that are zero or missing in every sample; empty without any."""
+    """Return a remark on the commands of a valid recording that are zero or missing in every sample; empty without
+    any."""
     if validation.problems or not validation.kind.startswith("recording, "):
         return ()
     command = read_recording(validation.path).command
@@ -89,33 +90,33 @@ def _validate(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
     except StudyError as error:
         return Validation(path, "unreadable", (error.happened,))
     kind, problem = _describe_unknown(content)
-    unknown = Validation(path, kind, (problem[0].upper() + problem[1:] + ".",))
-    foreign = path.is_file() and path.suffix.lower() in (*FOREIGN, *HDF5)
-    if not foreign or content.hdf5_format or content.json_format:
-        return unknown
-    return _validate_foreign(path, kind, unknown.problems)
+    unknown_validation = Validation(path, kind, (problem[0].upper() + problem[1:] + ".",))
+    may_be_foreign = path.is_file() and path.suffix.lower() in (*FOREIGN, *HDF5)
+    if not may_be_foreign or content.hdf5_format or content.json_format:
+        return unknown_validation
+    return _validate_foreign(path, kind, unknown_validation.problems)
 
 
 def _is_foreign(path: Path) -> bool:
-    """Whether an existing file has a type in which hapteq stores nothing, by its extension."""
-    kind = path.suffix.lower()
+    """Whether a file exists whose extension belongs to recordings of other programs, and to no file of hapteq."""
+    extension = path.suffix.lower()
     try:
-        return kind in FOREIGN and kind not in (*TABLES, *RECORDS) and path.is_file()
+        return extension in FOREIGN and extension not in (*TABLES, *RECORDS) and path.is_file()
     except OSError:  # not a possible file name
         return False
 
 
-def _validate_foreign(path: Path, kind: str = "", unknown: tuple[str, ...] = ()) -> Validation:
-    """Validation as a recording of another program, read as an import would read it. kind, unknown: kind and problems
-    to report if the import refuses the file, because it may be a damaged hapteq file."""
+def _validate_foreign(path: Path, kind: str = "", unknown_problems: tuple[str, ...] = ()) -> Validation:
+    """Validation as a recording of another program, read as an import would read it. kind, unknown_problems: kind
+    and problems to report if the import refuses the file, because it may be a damaged hapteq file."""
     # Imported here: the import takes longer to load than most files take to check.
     from study.workflows.recording.import_recording import read_foreign
 
     try:
         imported = read_foreign((path,), None)
-    except StudyError as refused:
-        problem = f"{refused.title}: {refused.happened}"
-        return Validation(path, kind or "recording of others", (*unknown, problem))
+    except StudyError as refusal:
+        problem = f"{refusal.title}: {refusal.happened}"
+        return Validation(path, kind or "recording of others", (*unknown_problems, problem))
     text = f"recording of others, {describe_recording(imported.recording)}"
     return Validation(path, text, tuple(find_silent_segments(imported.recording)), imported.notes)
 

@@ -1,8 +1,8 @@
-"""Calibration of a device's linkage (`hapteq calibrate`): read it over a grid of positions, check it, complete it,
-write it.
+"""Calibrates the linkage of a delta device, that is the arms between motors and handle (`hapteq calibrate`).
 
-Positions that cannot be read are filled in from their mirror positions. The result is an HDF5 file, which `hapteq twin
---calibration` reads.
+Joint angles, Jacobian, inertia and gravity are read from the device's library over a grid of handle positions, checked
+for consistency, and filled in from mirror positions where the library gives none. The result is an HDF5 file, which
+`hapteq twin --calibration` reads. Called by `study.cli.calibrate`.
 """
 
 from collections.abc import Callable
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 ERROR_TITLE = "The linkage was not calibrated"
 """Title of each error of this command."""
 NOTHING_DONE = "Nothing moved and nothing was written."
+"""What each error states about the device and the files."""
 MAX_GRID_SIZE_M = 0.2
 """Largest radius and depth of the grid (m); chosen by hand."""
 MAX_LISTED_PROBLEMS = 3
@@ -60,17 +61,18 @@ class CalibrationPlan:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WrittenCalibration:
-    """A calibration of a device's linkage that was written to `plan.out`, and warnings about its symmetry."""
+class CalibrationResult:
+    """A calibration of a device's linkage, as `calibrate_linkage` writes it to `plan.out`, and warnings about its
+    symmetry."""
 
     plan: CalibrationPlan
     calibration: LinkageCalibration
     warnings: tuple[str, ...]
     unknown_count: int
-    """Positions of the grid that could be neither read nor filled in."""
+    """Number of grid positions that could be neither read nor filled in."""
 
 
-def calibrate_linkage(plan: CalibrationPlan, on_progress: Callable[[float], None]) -> WrittenCalibration:
+def calibrate_linkage(plan: CalibrationPlan, on_progress: Callable[[float], None]) -> CalibrationResult:
     """Read, check, complete and write the calibration. Nothing moves: the device's library computes Jacobian, inertia
     and gravity. on_progress: called with the fraction of the positions that were read. Raises StudyError; nothing is
     written then."""
@@ -91,7 +93,7 @@ def calibrate_linkage(plan: CalibrationPlan, on_progress: Callable[[float], None
             linkage.check_frame()
             result = _read_grid(linkage, plan, on_progress)
     except CalibrationError as error:
-        raise _make_refusal(plan.device, error.problems) from error
+        raise _make_inconsistency_error(plan.device, error.problems) from error
     except DeviceError as error:
         error.saved = NOTHING_DONE
         raise
@@ -100,8 +102,9 @@ def calibrate_linkage(plan: CalibrationPlan, on_progress: Callable[[float], None
     return result
 
 
-def summarise_calibration(result: WrittenCalibration) -> dict[str, Any]:
-    """The calibration as plain values, for a JSON document; units by the suffix of a key."""
+def summarise_calibration(result: CalibrationResult) -> dict[str, Any]:
+    """Summarise a calibration as plain values for a JSON document; units by the suffix of a key. difference and
+    asymmetry are relative."""
     calibration = result.calibration
     centre_index = int(np.argmin(np.linalg.norm(calibration.position_m, axis=1)))
     masses_kg = np.linalg.eigvalsh(calibration.inertia_kg)
@@ -128,8 +131,8 @@ def summarise_calibration(result: WrittenCalibration) -> dict[str, Any]:
     }
 
 
-def format_calibration_lines(result: WrittenCalibration) -> tuple[str, ...]:
-    """The same as lines of text for the terminal."""
+def format_calibration_lines(result: CalibrationResult) -> tuple[str, ...]:
+    """Format the summary of a calibration as lines of text for the terminal."""
     summary = summarise_calibration(result)
     positions, (least_kg, most_kg) = summary["positions"], summary["mass_kg"]
     inertia_text = ", ".join(f"{summary['centre']['inertia_kg'][axis][axis]:.3g}" for axis in range(3))
@@ -147,9 +150,9 @@ def format_calibration_lines(result: WrittenCalibration) -> tuple[str, ...]:
 
 def _read_grid(
     linkage: "LinkageSource", plan: CalibrationPlan, on_progress: Callable[[float], None]
-) -> WrittenCalibration:
-    """The calibration over the whole grid. All readings are checked before an error is raised, so that it can list all
-    problems. Raises CalibrationError, DeviceError."""
+) -> CalibrationResult:
+    """Read the calibration over the whole grid, without writing it. All readings are checked before an error is raised,
+    so that it can list all problems. Raises CalibrationError, DeviceError."""
     azimuths = estimate_arm_azimuths(_read_centre_jacobian(linkage))
     readings, unread_positions_m, largest_error = [], [], 0.0
     problems: list[str] = []
@@ -181,14 +184,14 @@ def _read_grid(
         difference=largest_error,
         provenance=gather_provenance().as_dict(),
     )
-    return WrittenCalibration(
+    return CalibrationResult(
         plan, calibration, write_asymmetry_warnings(asymmetry, worst_position_m, line_deg), len(unknown_positions_m)
     )
 
 
 def _read_centre_jacobian(linkage: "LinkageSource") -> FloatArray:
-    """(3, 3): the checked Jacobian at the centre, from which the azimuths of the arms are computed. Raises
-    CalibrationError, DeviceError."""
+    """Read and check the Jacobian (3, 3) at the centre (m/rad), from which the azimuths of the arms are computed.
+    Raises CalibrationError, DeviceError."""
     centre = linkage.compute_reading_at(np.zeros(3))
     if centre is None:
         raise CalibrationError(("the centre of the workspace is out of its reach",))
@@ -199,9 +202,9 @@ def _read_centre_jacobian(linkage: "LinkageSource") -> FloatArray:
 
 
 def _compute_difference_error(linkage: "LinkageSource", reading: LinkageReading) -> float:
-    """Difference between the device's Jacobian and that of its joint angles by central differences, relative to the
-    largest entry of the latter. 0 where a neighbouring position is out of reach, or where a value is not finite, which
-    `check_reading` rejects."""
+    """Compute the difference between the device's Jacobian and that of its joint angles by central differences,
+    relative to the largest entry of the latter. 0 where a neighbouring position is out of reach, or where a value is
+    not finite, which `check_reading` rejects."""
     positions_m = list_difference_positions(reading.position_m)
     angle_rows = [
         angle_row for position_m in positions_m if (angle_row := linkage.compute_angles_at(position_m)) is not None
@@ -217,14 +220,14 @@ def _compute_difference_error(linkage: "LinkageSource", reading: LinkageReading)
 
 
 def _stack_readings(readings: list[LinkageReading]) -> dict[str, Any]:
-    """Arrays of all readings, with the position along the first dimension, by the names of the fields of
+    """Stack the arrays of all readings along a new first dimension, by the names of the fields of
     `LinkageCalibration`."""
     names = ("position_m", "joint_angle_rad", "jacobian", "inertia_kg", "gravity_n")
     return {name: np.stack([getattr(reading, name) for reading in readings]) for name in names}
 
 
-def _make_refusal(device_name: str, problems: tuple[str, ...]) -> DeviceError:
-    """Error for a linkage with inconsistent readings; lists the first `MAX_LISTED_PROBLEMS` problems."""
+def _make_inconsistency_error(device_name: str, problems: tuple[str, ...]) -> DeviceError:
+    """Make the error for a linkage with inconsistent readings; it lists the first `MAX_LISTED_PROBLEMS` problems."""
     remainder_text = f"; and {len(problems) - MAX_LISTED_PROBLEMS} more" if len(problems) > MAX_LISTED_PROBLEMS else ""
     return DeviceError(
         ERROR_TITLE,

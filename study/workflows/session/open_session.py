@@ -1,6 +1,8 @@
-"""Opening of a session: its folder, and a log whose first event states everything that determines the session.
+"""Open a session: create its folder and its log, whose first event states everything that determines the session.
 
 These are the protocol, seed, device, equalizer and software versions: an interrupted session is resumed from its log.
+`open_session` is called by `conduct_session`; a `SessionPlan` is made by `plan_sitting`, `simulate_session` and
+`rehearse_study`.
 """
 
 import secrets
@@ -27,16 +29,21 @@ from study.workflows.session.participant_number import find_participant_number
 
 @dataclass(frozen=True, slots=True)
 class SessionPlan:
-    """Decisions that are made before the participant starts."""
+    """What determines a new session, apart from the device: fixed before the participant starts."""
 
     protocol: StudyProtocol
     protocol_text: str
+    """Complete text of the protocol (TOML), for the log."""
     protocol_locked: bool
+    """Whether the protocol has a lock file, whose hash it matches (`protocols.document.lock`)."""
     subject: str
+    """Participant code, such as P01."""
     observer: str | None
     """Name of the simulated participant; None for a person."""
     seed: int
-    data: Path
+    """Seed of all random draws of the session."""
+    data_folder: Path
+    """Folder in which the session folder is created."""
     participant_number: int | None = None
     """Place in a balanced order of conditions; None = counted from the participants in the data folder."""
     model: Path | None = None
@@ -59,14 +66,16 @@ def draw_seed() -> int:
 
 @contextmanager
 def open_session(
-    plan: SessionPlan, device: DeviceInfo, equalized: SessionEqualizer, clock: Clock
+    plan: SessionPlan, device: DeviceInfo, session_equalizer: SessionEqualizer, clock: Clock
 ) -> Iterator[OpenedSession]:
     """Create a session: its folder, a copy of the model, and its log with the first event. The session is locked, and
-    the log open, while the context lasts."""
-    number = plan.participant_number
-    if number is None:
-        number = find_participant_number(plan.data, plan.subject, plan.protocol.name, plan.observer is not None)
-    folder = create_session_folder(plan.data, plan.subject)
+    the log open, while the context lasts. Raises StudyError where the folder or the log cannot be created."""
+    participant_number = plan.participant_number
+    if participant_number is None:
+        participant_number = find_participant_number(
+            plan.data_folder, plan.subject, plan.protocol.name, plan.observer is not None
+        )
+    folder = create_session_folder(plan.data_folder, plan.subject)
     utc = clock.utc()
     session_opened = SessionOpened(
         utc=utc,
@@ -74,22 +83,22 @@ def open_session(
         version=SESSION_VERSION,
         session=folder.name,
         subject=plan.subject,
-        participant_number=number,
+        participant_number=participant_number,
         observer=plan.observer,
         protocol_text=plan.protocol_text,
         protocol_hash=protocol_hash(plan.protocol),
         protocol_locked=plan.protocol_locked,
         seed=plan.seed,
         device=collect_device_facts(device),
-        equalizer=equalized.equalizer.name,
+        equalizer=session_equalizer.equalizer.name,
         versions=list_versions(),
-        equalized=equalized.facts,
+        equalized=session_equalizer.facts,
         monotonic_s=clock.now_s(),
         dose_elsewhere=dose_before(folder, plan.observer, device.simulated, utc),
         rules=LATEST,
     )
     with hold_session_lock(folder.path):
-        copy_model(equalized, folder)
+        copy_model(session_equalizer, folder)
         log = EventLog.create(folder.log)
         try:
             log.append(session_opened)
@@ -99,7 +108,7 @@ def open_session(
 
 
 def collect_device_facts(info: DeviceInfo) -> DeviceFacts:
-    """Facts about the device, as the log keeps them when a session is opened or resumed."""
+    """Collect the facts about the device that the log records when a session is opened or resumed."""
     return DeviceFacts(
         name=info.name, simulated=info.simulated, sample_rate_hz=info.sample_rate_hz, details=info.details
     )

@@ -79,7 +79,7 @@ def plan_sitting(
         subject=check_subject(subject),
         observer=observer,
         seed=draw_seed() if seed is None else seed,
-        data=data,
+        data_folder=data,
         model=model,
     )
     check_model_for_protocol(plan.protocol, model)

@@ -170,7 +170,7 @@ def _play_new_session(rehearsal: Rehearsal, number: int) -> ConductedSitting:
         subject=make_subject_code(number),
         observer=observer.name,
         seed=seed,
-        data=rehearsal.data,
+        data_folder=rehearsal.data,
         participant_number=number,
         model=rehearsal.model,
     )

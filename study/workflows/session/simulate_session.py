@@ -37,7 +37,7 @@ def simulate_session(
         subject=subject,
         observer=observer,
         seed=seed,
-        data=Path(data),
+        data_folder=Path(data),
         model=None if model is None else Path(model),
     )
     conducted = conduct_new(plan, "simulated", make_simulated_participant(observer, seed, VirtualClock()))

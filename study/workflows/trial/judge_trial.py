@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from protocols.definition.measurement import MeasurementSettings
 from protocols.trial import VoidCause
 from study.devices.device import Fault, Health
-from study.session.facts.void_reasons import ACCELERATION_MISSING, TICK_HELD, TICKS_LATE, TICKS_MISSED
+from study.session.facts.void_reasons import ACCELERATION_MISSING, LATEST_TICK_LATE, TICKS_LATE, TICKS_MISSED
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ def _describe_lateness(health: Health, settings: MeasurementSettings) -> str:
     if late_share > settings.late_ticks_limit:
         return f"{100 * late_share:.1f} % {TICKS_LATE}"
     latest_ms = 1000 * health.latest_s
-    return f"{latest_ms:.1f} ms {TICK_HELD}" if latest_ms > settings.longest_late_ms else ""
+    return f"{latest_ms:.1f} ms {LATEST_TICK_LATE}" if latest_ms > settings.longest_late_ms else ""
 
 
 def _describe_missing_acceleration(health: Health, settings: MeasurementSettings) -> str:

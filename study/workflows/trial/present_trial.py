@@ -14,7 +14,7 @@ from protocols.definition.exposure import GateSettings
 from protocols.trial import Phase, VoidCause
 from study.devices.device import Fault, PlaybackResult
 from study.session.facts.events import AnswerGiven, OnsetPulsed
-from study.session.facts.void_reasons import HARDLY_ARRIVED
+from study.session.facts.void_reasons import TOO_LITTLE_MOTION
 from study.session.state.due_trial import PresentTrial, has_swapped_labels
 from study.session.state.progress import estimate_progress
 from study.session.state.state import SessionState, count_repeats_left
@@ -189,7 +189,7 @@ def _log_answered_trial(
     measured = recording if values is not None else None
     device_kg = sitting.device.info.effective_mass_kg
     if measured is not None and has_hardly_moved(measured, vector, due_trial.frequency_hz, friction_n, device_kg):
-        verdict = replace(verdict, flags=(*verdict.flags, HARDLY_ARRIVED))
+        verdict = replace(verdict, flags=(*verdict.flags, TOO_LITTLE_MOTION))
     outcome = Outcome(play_result, values, verdict.flags, vector, verdict.measured)
     state = log_and_apply(state, record_measured_trial(due_trial, outcome, state, sitting), sitting)
     return AfterTrial(state, correct, end_reason=end_reason, fault=fault)

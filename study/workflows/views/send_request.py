@@ -1,6 +1,7 @@
 """Send a request (stop, pause or note) to a running session in another process, and wait until it is received.
 
-A request is a file in the session's folder (`RequestInbox`); the session removes it when it takes the request.
+A request is a file in the session's folder (`RequestInbox`); the session removes it when it takes the request. Called
+by `hapteq watch` (`study.cli.watch`), the screens (`study.tui.engine.engine_commands`) and `take_note`.
 """
 
 from study.devices.clock import Clock

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.diagnosis.data.measured_motion import as_force_driven
+from analysis.diagnosis.data.measured_motion import convert_to_force_driven
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.choose_measure import make_measure
@@ -46,7 +46,7 @@ def test_a_positioning_axis_is_compared_by_forces(shared: Path) -> None:
 
 
 def test_a_rack_that_was_driven_by_its_speed_is_compared_by_forces(shared: Path) -> None:
-    recording = as_force_driven(read_foreign((find_folder(shared, "rack_drive"),), "rack_drive").recording)
+    recording = convert_to_force_driven(read_foreign((find_folder(shared, "rack_drive"),), "rack_drive").recording)
     model = fit_rigid_model([recording], "fitted")
     assert model.mass[0, 0] == pytest.approx(24.7, rel=0.15)
     assert make_measure([recording], model).measure.name == "predicted force"

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from equalizer.laws.evaluate import evaluate
 from equalizer.laws.law import Law, parse_law
 from equalizer.laws.parse import LawError, parse_formula
-from equalizer.laws.tree import Apply, Free, Node, Number, Variable, format_formula
+from equalizer.laws.tree import Apply, FreeParameter, Node, Number, Variable, format_formula
 
 
 def test_numbers_with_a_point_are_free_and_whole_ones_are_form():
@@ -37,7 +37,7 @@ def test_other_numbers_keep_their_sign_where_they_stand():
 LEAVES = st.one_of(
     st.sampled_from(["x", "vy", "fz"]).map(Variable),
     st.integers(0, 9).map(lambda value: Number(float(value))),
-    st.integers(0, 2).map(Free),
+    st.integers(0, 2).map(FreeParameter),
 )
 SMOOTH = ("sin", "cos", "tanh", "atan", "abs", "neg", "exp", "sign", "sqrt", "log", "tan")
 
@@ -63,7 +63,7 @@ def by_numpy(tree: Node, numbers: list[float]) -> np.ndarray:
     match tree:
         case Number(value):
             return np.full(17, value)
-        case Free(place):
+        case FreeParameter(place):
             return np.full(17, numbers[place])
         case Variable(name):
             return COLUMNS[name]
@@ -73,7 +73,7 @@ def by_numpy(tree: Node, numbers: list[float]) -> np.ndarray:
 def law_with(tree: Node, numbers: list[float]) -> Law:
     """With every number used, for any tree."""
     for place in range(3):
-        tree = Apply("+", (tree, Apply("*", (Number(0.0), Free(place)))))
+        tree = Apply("+", (tree, Apply("*", (Number(0.0), FreeParameter(place)))))
     return Law(format_formula(tree), tuple(numbers), (), "force", "x")
 
 

@@ -135,8 +135,8 @@ def _extract_balance_series(balance: "Balance", diagnosis: Diagnosis, letter: st
     the named ones, else all that were chosen."""
     regression = balance.search.regression
     names = {effect.effect for effect in diagnosis.effects if effect.axis in (letter, None, "")}
-    named_laws = [law.place for law in balance.laws if law.simulated_as in names]
-    laws = named_laws or [law.place for law in balance.laws]
+    named_laws = [law.law_index for law in balance.laws if law.simulated_as in names]
+    laws = named_laws or [law.law_index for law in balance.laws]
     linear, completed = (regression.compute_residuals(regression.select_columns(law_set)) for law_set in ((), laws))
     axis = min(regression.axis, len(regression.motions[0].channels) - 1)
     motions = regression.motions

@@ -1,5 +1,8 @@
-"""Motion along one command of a recording: position, velocity and acceleration, from which `injections` computes the
-forces of injected faults."""
+"""Motion along one axis of a recording: position, velocity and acceleration by differentiation of a measured signal.
+
+`injections` computes from it the forces of faults that it injects into real recordings. Units are those of the recorded
+signal: m or rad, in V where voltages were recorded, and their time derivatives.
+"""
 
 from dataclasses import dataclass
 
@@ -13,17 +16,17 @@ DERIVATIVE_ORDERS = {
     "position": 0, "displacement": 0, "angle": 0, "velocity": 1, "speed": 1, "acceleration": 2, "voltage": 0,
     "angular velocity": 1, "angular speed": 1, "angular acceleration": 2,
 }  # fmt: skip
-"""Time derivative of the position that a quantity is; voltage counts as position."""
+"""Order of the time derivative of position that a quantity is (0 = position); voltage counts as position."""
 MAX_CUTOFF_SHARE, MIN_SIGNAL_TO_NOISE = 0.15, 30.0
-"""Cutoff of differentiation: at most this fraction of the sample rate, and the last frequency with this many times the
-noise power. Chosen by hand."""
+"""Cutoff of the low pass in differentiation: at most this fraction of the sample rate, and the highest frequency with
+this many times the noise power. Chosen by hand."""
 MIN_TAKE_SAMPLES = 16
-"""Fewest samples of a take that is differentiated by itself."""
+"""Fewest samples of a take that is differentiated separately. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AxisMotion:
-    """Generalised position, velocity, acceleration and command of one axis; all (n,)."""
+    """Position q, velocity v, acceleration a and command of one axis; all (n,)."""
 
     q: FloatArray
     v: FloatArray
@@ -42,53 +45,58 @@ class AxisMotion:
         return len(self.q) / self.rate_hz
 
     @property
-    def share_of_time(self) -> FloatArray:
-        """Time from 0 to 1, (n,)."""
+    def normalised_time(self) -> FloatArray:
+        """(n,): time from 0 at the first sample to 1 at the last."""
         return np.linspace(0.0, 1.0, len(self.q))
 
 
 def _find_bandwidth_hz(samples: FloatArray, rate_hz: float) -> float:
-    """Highest frequency (Hz) at which the power exceeds the noise floor, the median of the last quarter of the
-    spectrum; at least 20 lines, at most `MAX_CUTOFF_SHARE` of the rate."""
+    """Find the highest frequency (Hz) at which the power density (Welch, segments of up to 2048 samples) exceeds
+    `MIN_SIGNAL_TO_NOISE` times the noise floor, the median of the last quarter of the spectrum; at least 20 cycles per
+    take, at most `MAX_CUTOFF_SHARE` of the rate. samples: (n,), without missing samples."""
     frequency, power = welch(samples, rate_hz, nperseg=min(len(samples), 2048))
     above_noise = np.flatnonzero(power > MIN_SIGNAL_TO_NOISE * np.median(power[3 * len(power) // 4 :]))
-    last_hz = float(frequency[above_noise[-1]]) if len(above_noise) else 0.0
-    return float(np.clip(last_hz, 20 * rate_hz / len(samples), MAX_CUTOFF_SHARE * rate_hz))
+    highest_hz = float(frequency[above_noise[-1]]) if len(above_noise) else 0.0
+    return float(np.clip(highest_hz, 20 * rate_hz / len(samples), MAX_CUTOFF_SHARE * rate_hz))
 
 
 def find_takes(recording: Recording) -> tuple[tuple[int, int], ...]:
-    """Takes of a recording, (start, stop) in order: split where a part of its `meta` begins or ends. They cover the
-    recording; a border within `MIN_TAKE_SAMPLES` of another or of the end is ignored."""
+    """Find the takes of a recording (stretches recorded without interruption), as (start, stop) in samples, in order. A
+    boundary is where an entry of `meta["parts"]` begins or ends; ignored within `MIN_TAKE_SAMPLES` of another boundary
+    or of the end. The takes cover the recording."""
     parts = [part for part in recording.meta.get("parts", ()) if isinstance(part, dict)]
-    edges = sorted({int(part[side]) for part in parts for side in ("start", "stop") if side in part})
+    boundaries = sorted({int(part[side]) for part in parts for side in ("start", "stop") if side in part})
     starts = [0]
-    for edge in edges:
-        if starts[-1] + MIN_TAKE_SAMPLES <= edge <= len(recording) - MIN_TAKE_SAMPLES:
-            starts.append(edge)
+    for boundary in boundaries:
+        if starts[-1] + MIN_TAKE_SAMPLES <= boundary <= len(recording) - MIN_TAKE_SAMPLES:
+            starts.append(boundary)
     return tuple(zip(starts, [*starts[1:], len(recording)], strict=True))
 
 
 def compute_axis_motion(recording: Recording, axis: int) -> AxisMotion | None:
-    """Motion of one axis, differentiated within each take; None where no signal of the recording measures it."""
+    """Compute the motion of one axis, differentiated within each take; None where no signal of the recording measures
+    it. Of position and response, the signal with the lowest order of derivative is used. axis: index of the command."""
     signals = [candidate for candidate in (recording.position, recording.response) if candidate is not None]
     axis_count = recording.command.samples.shape[1]
+    # Order 9 stands for a quantity that is no derivative of position.
     for signal in sorted(signals, key=lambda candidate: DERIVATIVE_ORDERS.get(candidate.quantities[0], 9)):
-        orders = {DERIVATIVE_ORDERS.get(quantity, 9) for quantity in signal.quantities}
-        if (signal.samples.shape[1] == axis_count or axis_count == 1) and max(orders) < 9:
+        quantity_orders = {DERIVATIVE_ORDERS.get(quantity, 9) for quantity in signal.quantities}
+        if (signal.samples.shape[1] == axis_count or axis_count == 1) and max(quantity_orders) < 9:
             samples, order = signal.samples[:, axis], DERIVATIVE_ORDERS[signal.quantities[axis]]
-            takes = [
+            take_motions = [
                 _differentiate(samples[start:stop], order, recording.sample_rate_hz)
                 for start, stop in find_takes(recording)
             ]
-            q, v, a = (np.concatenate(pieces) for pieces in zip(*takes, strict=True))
+            q, v, a = (np.concatenate(take_arrays) for take_arrays in zip(*take_motions, strict=True))
             return AxisMotion(q, v, a, recording.command.samples[:, axis], recording.sample_rate_hz)
     return None
 
 
 def _differentiate(samples: FloatArray, order: int, rate_hz: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Position, velocity and acceleration: differentiate or integrate in the frequency domain after odd mirroring at
-    both ends; missing samples are interpolated linearly, and zero where none is known. order: derivative that
-    `samples` are."""
+    """Compute position, velocity and acceleration in the frequency domain, from samples (n,) that are the derivative of
+    position of this order. Missing samples are interpolated linearly; all are zero where none is known. The straight
+    line through both ends is subtracted and the rest mirrored (odd), so that it is periodic. The low pass is the
+    squared magnitude of a fourth-order Butterworth filter; integration removes frequencies below 4 cycles per take."""
     index, is_finite = np.arange(len(samples)), np.isfinite(samples)
     interpolated = np.interp(index, index[is_finite], samples[is_finite]) if is_finite.any() else np.zeros(len(samples))
     trend = np.interp(index, [0, len(interpolated) - 1], [interpolated[0], interpolated[-1]])

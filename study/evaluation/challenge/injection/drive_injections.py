@@ -157,7 +157,7 @@ DRIVE_INJECTIONS: tuple[ForceInjection, ...] = (
     ForceInjection(
         "force_gain_drift",
         lambda motion, strength, random: {"change": float(random.choice((-0.5, 1.0))) * 0.05 * 20.0**strength},
-        lambda motion, values: motion.command / (1 + values["change"] * motion.share_of_time),
+        lambda motion, values: motion.command / (1 + values["change"] * motion.normalised_time),
         actuator=True,
     ),
 )

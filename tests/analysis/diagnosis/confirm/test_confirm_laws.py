@@ -148,7 +148,7 @@ def test_without_new_physics_stands_what_foretells_better(given, retuned, plain)
 )
 def test_a_law_that_foretells_no_better_than_the_given_model_is_not_named(monkeypatch, given, predicts, is_named):
     """Re-tuning followed what was fitted to, to 4; the law brings that back to 1.1."""
-    law = SimpleNamespace(law=SimpleNamespace(effect="coulomb_friction"), place=0)
+    law = SimpleNamespace(law=SimpleNamespace(effect="coulomb_friction"), law_index=0)
     regression = SimpleNamespace(base_terms=SimpleNamespace(driven_channel=0))
     balance = SimpleNamespace(named=(law,), search=SimpleNamespace(regression=regression))
     patched = {
@@ -222,7 +222,7 @@ def test_a_refinement_gives_way_to_its_special_case(held, named, place):
     balance = SimpleNamespace(search=SimpleNamespace(regression=SimpleNamespace(laws=laws)))
     bent = make_judged_law("position_dependent_friction", 5)
     found = find_special_case([balance], [(0, make_judged_law(name, 7)) for name in named], (0, bent))
-    assert (found and (found[1].place, found[1].law.effect)) == (
+    assert (found and (found[1].law_index, found[1].law.effect)) == (
         place if place is None else (place, "coulomb_friction")
     )
 

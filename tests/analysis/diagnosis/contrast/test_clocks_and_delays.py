@@ -19,7 +19,7 @@ from analysis.diagnosis.contrast.compared_base import (
 )
 from analysis.diagnosis.contrast.decide import choose_fault
 from analysis.diagnosis.contrast.fault import Rows
-from analysis.diagnosis.contrast.interpolation import noise_gain, resample, shift_samples
+from analysis.diagnosis.contrast.interpolation import compute_noise_gain, resample, shift_samples
 from analysis.diagnosis.contrast.likely_delays import suggest_clock_rates, suggest_delays_s
 from analysis.diagnosis.contrast.part import split_into_parts
 from analysis.diagnosis.contrast.rank_faults import rank_faults
@@ -184,7 +184,7 @@ def test_interpolation_makes_prediction_errors_of_noise_smaller_by_what_is_said(
         return left.std()
 
     smaller = one_step_error(shift_samples(noise, by)[:, 0]) / one_step_error(noise[:, 0])
-    assert smaller == pytest.approx(noise_gain(by), rel=0.03)
+    assert smaller == pytest.approx(compute_noise_gain(by), rel=0.03)
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ import pytest
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.forces.rigid_model import fit_rigid_model
-from analysis.diagnosis.localisation.clean_floor import NothingLearned
+from analysis.diagnosis.localisation.model_error_floor import IncomparableRecordingsError
 from analysis.diagnosis.reference import learn_model_error
 from analysis.diagnosis.reference.compare_with_reference import Contrast, find_contrast
 from analysis.diagnosis.result.contrast_findings import NOT_COMPARED, add_contrast
@@ -52,7 +52,7 @@ def test_clean_recordings_that_teach_a_model_nothing_leave_the_comparison_as_it_
 
     def teaches_nothing(*given):
         asked.append(given)
-        raise NothingLearned("they were measured otherwise")
+        raise IncomparableRecordingsError("they were measured otherwise")
 
     monkeypatch.setattr(learn_model_error, "learn_model_error", teaches_nothing)
     clean = rig.record_rig(1)

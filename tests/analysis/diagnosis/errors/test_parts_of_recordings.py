@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.diagnosis.data.measured_motion import as_force_driven
+from analysis.diagnosis.data.measured_motion import convert_to_force_driven
 from analysis.diagnosis.data.observed_parts import name_parts, observe_parts
 from analysis.diagnosis.errors.choose_measure import make_measure
 from equalizer.signals.joining import join
@@ -37,9 +37,9 @@ def test_a_recording_for_the_test_spares_the_others(controlled_recording: Record
 def test_an_imposed_motion_is_turned_round(controlled_recording: Recording) -> None:
     x, force = controlled_recording.response, controlled_recording.command
     speed = Signal(np.gradient(x.samples, 1 / RATE_HZ, axis=0), RATE_HZ, "velocity", "m/s", ("x",))
-    turned = as_force_driven(Recording("rack", speed, force, x, segments=controlled_recording.segments))
+    turned = convert_to_force_driven(Recording("rack", speed, force, x, segments=controlled_recording.segments))
     assert turned.command is force and turned.response is speed
-    assert as_force_driven(controlled_recording) is controlled_recording
+    assert convert_to_force_driven(controlled_recording) is controlled_recording
     chosen = make_measure([turned], make_model(quantity="velocity"))
     assert chosen.measure.name == "predicted force"
     assert "imposed" in chosen.remarks[0]

@@ -18,7 +18,7 @@ def make_balance(*courses):
         columns=[course[:, None] for course in courses],
         motions=[SimpleNamespace(step=1, rate_hz=RATE_HZ) for _ in courses],
     )  # fmt: skip
-    return SimpleNamespace(search=SimpleNamespace(regression=regression), named=[SimpleNamespace(place=0)])
+    return SimpleNamespace(search=SimpleNamespace(regression=regression), named=[SimpleNamespace(law_index=0)])
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,11 @@ import pytest
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Claim, combine_hypotheses, make_claim_hypothesis
-from analysis.diagnosis.localisation.clean_floor import CleanFloor, NothingLearned, describe_clean_floor
+from analysis.diagnosis.localisation.model_error_floor import (
+    IncomparableRecordingsError,
+    ModelErrorFloor,
+    describe_model_error_floor,
+)
 from analysis.diagnosis.reference.learn_model_error import (
     learn_model_error,
     require_same_measure,
@@ -126,14 +130,16 @@ def test_the_shares_of_a_channel_are_those_of_the_mismatch(diagnosed):
 def test_recordings_that_can_only_be_compared_otherwise_teach_nothing():
     require_same_measure("windows of 1 s", "windows of 1 s")
     said = r"can only be compared by free simulation, those to diagnose by predicted force, so their errors"
-    with pytest.raises(NothingLearned, match=said):
+    with pytest.raises(IncomparableRecordingsError, match=said):
         require_same_measure("free simulation", "predicted force")
 
 
 def test_what_was_learned_is_reported_and_where_it_is_much_that_too():
-    assert describe_clean_floor(CleanFloor(), ("ax",)) == ""
-    little = describe_clean_floor(CleanFloor(channels=(0.1, 0.004), recordings=2), ("ax", "x"))
+    assert describe_model_error_floor(ModelErrorFloor(), ("ax",)) == ""
+    little = describe_model_error_floor(ModelErrorFloor(channels=(0.1, 0.004), recordings=2), ("ax", "x"))
     assert "from 2 clean recordings: ax 10 % and x 0.4 % of the channel's signal" in little
     assert "times 1.5" in little
     assert "This is a large difference" not in little
-    assert "This is a large difference" in describe_clean_floor(CleanFloor(channels=(0.4,), recordings=1), ("ax",))
+    assert "This is a large difference" in describe_model_error_floor(
+        ModelErrorFloor(channels=(0.4,), recordings=1), ("ax",)
+    )

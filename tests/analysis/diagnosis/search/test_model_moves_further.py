@@ -7,7 +7,7 @@ import pytest
 from analysis.diagnosis.diagnose import diagnose
 from analysis.diagnosis.diagnosis_settings import DiagnosisSettings
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
-from analysis.diagnosis.search.search import move_model_further, search_effects
+from analysis.diagnosis.search.search import repeat_with_wider_bound, search_effects
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME, CountedBudget
 from analysis.diagnosis.search.verdict import MODEL_MOVED
 from analysis.diagnosis.settings import RETUNING_BOUND, WIDER_RETUNING_BOUND
@@ -80,13 +80,13 @@ def test_without_time_or_effects_to_try_the_model_does_not_move_further(make_con
     first = search_effects(context, [], ignore_progress)
     assert first.judgement.verdict == "unexplained"
     friction = [EFFECTS["coulomb_friction"]]
-    assert move_model_further(context, first, [], ignore_progress) is first
-    assert move_model_further(context, first, friction, ignore_progress, lambda: False) is first
+    assert repeat_with_wider_bound(context, first, [], ignore_progress) is first
+    assert repeat_with_wider_bound(context, first, friction, ignore_progress, lambda: False) is first
     beside = replace(first, context=replace(context, certain=(NO_EFFECTS,)))
-    assert move_model_further(beside.context, beside, friction, ignore_progress) is beside
-    assert move_model_further(context, first, friction, ignore_progress).judgement.verdict == "explained"
+    assert repeat_with_wider_bound(beside.context, beside, friction, ignore_progress) is beside
+    assert repeat_with_wider_bound(context, first, friction, ignore_progress).judgement.verdict == "explained"
     # Where time ends on the way, the page says so.
-    begun = move_model_further(context, first, friction, ignore_progress, CountedBudget(2))
+    begun = repeat_with_wider_bound(context, first, friction, ignore_progress, CountedBudget(2))
     assert begun.found is first.found
     assert begun.remarks == (*first.remarks, OUT_OF_TIME)
 

@@ -38,13 +38,13 @@ def test_it_is_found_in_a_part_of_the_test_and_confirmed_by_the_rest(case):
 
 @pytest.mark.slow
 def test_where_the_time_ends_with_the_opened_part_the_first_alone_is_named_and_that_is_said(case, monkeypatch):
-    opened, find = [], search._find_with_opened
+    opened, find = [], search._repeat_with_opened
 
     def find_late(*given):
         opened.append(given)
         return find(*given)
 
-    monkeypatch.setattr(search, "_find_with_opened", find_late)
+    monkeypatch.setattr(search, "_repeat_with_opened", find_late)
     verdict, named, remarks = diagnose_names(case, lambda: not opened)
     assert (verdict, named) == ("partly_explained", {"sensor_lag"})
     assert len(opened) == 1 and OUT_OF_TIME in remarks
@@ -55,7 +55,7 @@ def test_time_that_ends_there_hides_no_mismatch_of_the_held_out_samples(case, mo
     def ends(*given):
         raise OutOfTimeError
 
-    monkeypatch.setattr(search, "_find_in_parts", ends)
+    monkeypatch.setattr(search, "_search_with_opened", ends)
     monkeypatch.setattr(search, "_judge_with_prediction", lambda *found: Judgement("no_mismatch", False))
     measure = make_measure([case.recording], case.model).measure
     tuning = make_tuning(case.model, case.recording.command.channels)

@@ -84,7 +84,7 @@ def test_the_population_is_where_a_sampler_puts_the_maximum(fit, posterior_draws
     slope = np.zeros(K + 5)
     slope[:K], slope[K + 2] = mean[:, 1 : K + 1].sum(axis=0) / own, mean[:, K + 1].sum() / np.exp(fit.parameters[K + 3])
     slope[LOG_SDS] = square[0] - n, square[1 : K + 1].sum() - K * n, square[K + 1] - n, square[K + 2] - n
-    slope += Objective(fit.answers, Family.WEIBULL, Prior()).log_prior(fit.parameters)[1][: K + 5]
+    slope += Objective(fit.answers, Family.WEIBULL, Prior()).evaluate_log_prior(fit.parameters)[1][: K + 5]
     curvature = fit.curvature[: K + 5, : K + 5]  # the lapse rate is held
     off = np.linalg.solve(curvature, slope) / np.sqrt(np.diag(np.linalg.inv(curvature)))
     np.testing.assert_allclose(off, 0.0, atol=0.1)

@@ -24,7 +24,7 @@ from equalizer.effects.simulation.instant import (
     X,
 )
 from equalizer.effects.simulation.mechanism_kernel import compile_law
-from equalizer.effects.simulation.modal_form import step_form
+from equalizer.effects.simulation.modal_form import build_step_form
 from equalizer.effects.simulation.simulator import (
     simulate_mechanism,
     simulate_response,
@@ -221,16 +221,17 @@ def test_a_law_knows_the_acceleration_if_its_effect_asks_for_it(bench, asked):
 )
 def test_pairs_are_used_where_they_are_well_apart_and_say_the_same(model, pairs):
     advance = discretise_model(model, 1 / RATE_HZ).transition
-    form = step_form(advance)
+    form = build_step_form(advance)
     half = len(advance) // 2
-    assert (form.advance.shape == (4, half)) is pairs
-    matrix = np.block([[np.diag(form.advance[0]), np.diag(form.advance[1])],
-                       [np.diag(form.advance[2]), np.diag(form.advance[3])]]) if pairs else form.advance.T  # fmt: skip
-    np.testing.assert_allclose(form.outward @ matrix @ form.inward, advance, rtol=0, atol=1e-12)
+    assert (form.step_matrix.shape == (4, half)) is pairs
+    matrix = np.block([[np.diag(form.step_matrix[0]), np.diag(form.step_matrix[1])],
+                       [np.diag(form.step_matrix[2]), np.diag(form.step_matrix[3])]]
+                      ) if pairs else form.step_matrix.T  # fmt: skip
+    np.testing.assert_allclose(form.state_from_modal @ matrix @ form.modal_from_state, advance, rtol=0, atol=1e-12)
 
 
 def test_an_advance_that_is_not_finite_is_stepped_as_it_is():
-    assert step_form(np.full((2, 2), np.inf)).advance.shape == (2, 2)
+    assert build_step_form(np.full((2, 2), np.inf)).step_matrix.shape == (2, 2)
 
 
 @pytest.mark.parametrize("named", [(), (SMOOTH,), (("hardening_stiffness", (2,), {"k3": 1e7}), SMOOTH)])

@@ -58,7 +58,7 @@ def test_a_well_damped_device_is_fitted_as_under_the_bound_to_the_last_digit(pla
         ours = identify(response, replace(QUICK, order=order, draws=0))
         asked = identify(response, replace(QUICK, order=order, draws=0, longest_decay_s=ORDINARY_DECAY_S))
         np.testing.assert_array_equal(ours.model.parameters, asked.model.parameters)
-        assert ours.relaxed == () and not ours.bound_costs
+        assert ours.relaxed == () and not ours.is_bound_binding
         assert ours.remarks == ()
 
 
@@ -66,7 +66,7 @@ def test_a_bound_that_was_asked_for_is_kept_and_what_it_costs_is_reported(plants
     plant, _ = device_of(plants, (0.01, 0.06, 0.05), 1)
     found = identify(measuring.noisy(plant, LINES, NOISE, 1), replace(QUICK, longest_decay_s=0.5))
     assert found.model.spectral_radius <= np.exp(-1 / 500) * (1 + 1e-12)
-    assert found.bound_costs
+    assert found.is_bound_binding
     assert found.remarks[0].startswith("a pole is at the bound of the decay, 0.5 s")
     assert "friction" not in " ".join(found.remarks) and "order" not in " ".join(found.remarks)
     rms, _ = measuring.errors_of(found.model, plant, GRID)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from equalizer.signals.lockin import phasors
+from equalizer.signals.lockin import estimate_phasors
 from study.devices.accelerometer.history import ArrivedSamples
 from study.devices.accelerometer.placement import HALF_PERIODS, fit_and_resample, resample
 
@@ -35,8 +35,8 @@ def tone(frequency_hz: float, phase: float = 0.7):
 
 def found_tone(values: np.ndarray, tick_s: np.ndarray, frequency_hz: float) -> complex:
     """Amplitude and phase at START_S + 0, of cos."""
-    phasor = phasors(values, TICK_HZ, frequency_hz)[0][0]
-    reference = phasors(tone(frequency_hz, 0.0)(tick_s)[:, None], TICK_HZ, frequency_hz)[0][0]
+    phasor = estimate_phasors(values, TICK_HZ, frequency_hz)[0][0]
+    reference = estimate_phasors(tone(frequency_hz, 0.0)(tick_s)[:, None], TICK_HZ, frequency_hz)[0][0]
     return complex(phasor / reference)
 
 

@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from equalizer.signals.lockin import phasors
+from equalizer.signals.lockin import estimate_phasors
 from study.devices.accelerometer.sensor import Accelerometer
 from study.devices.accelerometer.serial_reader import open_serial
 from study.devices.rig import OwnClockSensor
@@ -28,8 +28,8 @@ def tone(host_s: np.ndarray) -> np.ndarray:
 
 def late_s(acceleration: np.ndarray, tick_s: np.ndarray) -> float:
     """Of the tone along x, beside what it was."""
-    found = phasors(acceleration[:, :1], 1000.0, TONE_HZ)[0][0]
-    true = phasors(np.sin(2 * np.pi * TONE_HZ * tick_s)[:, None], 1000.0, TONE_HZ)[0][0]
+    found = estimate_phasors(acceleration[:, :1], 1000.0, TONE_HZ)[0][0]
+    true = estimate_phasors(np.sin(2 * np.pi * TONE_HZ * tick_s)[:, None], 1000.0, TONE_HZ)[0][0]
     return -float(np.angle(found / true)) / (2 * np.pi * TONE_HZ)
 
 
@@ -62,7 +62,7 @@ def test_a_tone_comes_out_with_its_phase_on_the_ticks(rate_hz, drift_ppm):
     assert (health.ticks, health.unplaced_ticks, health.lost, health.restarts) == (1500, 0, 0, 0)
     assert health.packets == pytest.approx(1.5 * rate_hz, rel=0.4)
     assert -1e-4 < late_s(sensed.acceleration_mps2, tick_s) < WORST_S
-    amplitude = np.abs(phasors(sensed.acceleration_mps2, 1000.0, TONE_HZ)[0])
+    amplitude = np.abs(estimate_phasors(sensed.acceleration_mps2, 1000.0, TONE_HZ)[0])
     np.testing.assert_allclose(amplitude, [AMPLITUDE, AMPLITUDE / 2, 0.0], atol=0.03)
 
 

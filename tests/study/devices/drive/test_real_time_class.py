@@ -15,7 +15,7 @@ from study.devices.drive.real_time_class import (
     LINUX_ADVICE,
     PRIORITY,
     STARVING_ADVICE,
-    SWITCH_S,
+    SWITCH_INTERVAL_S,
     check_real_time_rights,
     real_time_class,
 )
@@ -82,7 +82,7 @@ def test_real_time_priority_lasts_as_long_as_the_loop(allow):
     before_s = sys.getswitchinterval()
     with real_time_class() as granted:
         assert (granted.scheduled, granted.locked, granted.advice) == (True, True, "")
-        assert library.locked and sys.getswitchinterval() == pytest.approx(SWITCH_S)
+        assert library.locked and sys.getswitchinterval() == pytest.approx(SWITCH_INTERVAL_S)
     assert asked == [(FIFO | RESET_ON_FORK, PRIORITY)]
     assert not library.locked and sys.getswitchinterval() == pytest.approx(before_s)
 
@@ -111,7 +111,7 @@ def test_overlapping_loops_keep_the_priority_until_the_later_end(allow, first_be
         each.__enter__()
     earlier, later = begun if first_begun_ends_first else reversed(begun)
     earlier.__exit__(None, None, None)
-    assert library.locked and sys.getswitchinterval() == pytest.approx(SWITCH_S)
+    assert library.locked and sys.getswitchinterval() == pytest.approx(SWITCH_INTERVAL_S)
     later.__exit__(None, None, None)
     assert not library.locked and sys.getswitchinterval() == pytest.approx(before_s)
 
@@ -122,7 +122,7 @@ def test_querying_the_priority_does_not_change_a_running_loop(allow, granted_aga
     with real_time_class():
         library.allowed = granted_again
         assert check_real_time_rights().fine == granted_again
-        assert library.locked and sys.getswitchinterval() == pytest.approx(SWITCH_S)
+        assert library.locked and sys.getswitchinterval() == pytest.approx(SWITCH_INTERVAL_S)
     assert not library.locked
 
 

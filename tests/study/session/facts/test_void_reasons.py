@@ -6,8 +6,8 @@ import pytest
 
 from study.devices.device import Fault, Health
 from study.session.facts.void_reasons import (
-    SCREEN_LATE,
-    SCREEN_SILENT,
+    SCREEN_DELAYED_BY_LOAD,
+    SCREEN_UNRESPONSIVE,
     describe_busy_voids,
     explain_many_voids,
     explain_silent_screen,
@@ -22,11 +22,11 @@ MISSED = "12.0 % of the 1 kHz ticks were missed"
 @pytest.mark.parametrize(
     ("engine_late_s", "load", "why"),
     [
-        (0.0, 0.1, SCREEN_SILENT),
-        (0.0, None, SCREEN_SILENT),
-        (0.0, 2.0, SCREEN_LATE),
-        (0.3, 0.1, SCREEN_LATE),
-        (0.3, None, SCREEN_LATE),
+        (0.0, 0.1, SCREEN_UNRESPONSIVE),
+        (0.0, None, SCREEN_UNRESPONSIVE),
+        (0.0, 2.0, SCREEN_DELAYED_BY_LOAD),
+        (0.3, 0.1, SCREEN_DELAYED_BY_LOAD),
+        (0.3, None, SCREEN_DELAYED_BY_LOAD),
     ],
 )
 def test_a_silent_screen_is_put_down_to_the_computer_only_where_something_shows_it(engine_late_s, load, why):
@@ -36,12 +36,12 @@ def test_a_silent_screen_is_put_down_to_the_computer_only_where_something_shows_
 def test_what_a_busy_computer_does_to_a_trial_is_counted_as_that(small_protocol):
     late = judge_trial(Health(Fault.NONE, 1000, 120, 0, 0, 0, 0, 1.0), small_protocol.measurement, True)
     assert late.void_reason == MISSED
-    for reason in (SCREEN_LATE, Fault.STALLED.value, late.void_reason):
+    for reason in (SCREEN_DELAYED_BY_LOAD, Fault.STALLED.value, late.void_reason):
         assert is_computer_busy(reason)
         words = describe_void_trial(reason)
         assert words.startswith("The computer was too busy for a moment")
         assert words.endswith("This was not your fault, and the trial is repeated.")
-    for reason in (SCREEN_SILENT, Fault.LOST.value, "the participant asked for it again", ""):
+    for reason in (SCREEN_UNRESPONSIVE, Fault.LOST.value, "the participant asked for it again", ""):
         assert not is_computer_busy(reason)
 
 
@@ -79,7 +79,7 @@ def test_a_protocol_that_limits_no_late_ticks_counts_such_trials(small_protocol)
 
 
 def test_a_silent_screen_is_not_the_participants_fault_either():
-    words = describe_void_trial(SCREEN_SILENT)
+    words = describe_void_trial(SCREEN_UNRESPONSIVE)
     assert "it was stopped, or the computer was too busy" in words
     assert words.endswith("This was not your fault, and the trial is repeated.")
     assert describe_void_trial("the handle was let go") == "It is void: the handle was let go."
@@ -87,11 +87,14 @@ def test_a_silent_screen_is_not_the_participants_fault_either():
 
 def test_three_void_trials_end_a_sitting_for_the_reason_that_they_had():
     busy = "the computer is too busy: 3 trials in a row were void because of it, not because of the participant"
-    assert explain_many_voids((SCREEN_LATE, SCREEN_LATE, MISSED)) == f"{busy} (the last because {MISSED})"
-    assert explain_many_voids((SCREEN_LATE, MISSED, Fault.STALLED.value)).startswith(busy)
-    mixed = explain_many_voids((SCREEN_LATE, SCREEN_LATE, SCREEN_SILENT))
+    assert (
+        explain_many_voids((SCREEN_DELAYED_BY_LOAD, SCREEN_DELAYED_BY_LOAD, MISSED))
+        == f"{busy} (the last because {MISSED})"
+    )
+    assert explain_many_voids((SCREEN_DELAYED_BY_LOAD, MISSED, Fault.STALLED.value)).startswith(busy)
+    mixed = explain_many_voids((SCREEN_DELAYED_BY_LOAD, SCREEN_DELAYED_BY_LOAD, SCREEN_UNRESPONSIVE))
     assert mixed.endswith("the last because the screen gave no sign of life: the computer may be too busy")
-    away = explain_many_voids((SCREEN_LATE, MISSED, "no answer within the time limit"))
+    away = explain_many_voids((SCREEN_DELAYED_BY_LOAD, MISSED, "no answer within the time limit"))
     assert away == "3 trials in a row were void, the last because no answer within the time limit"
 
 

@@ -10,7 +10,7 @@ from study.session.facts.events import (
     SessionInterrupted,
     SessionResumed,
 )
-from study.session.facts.void_reasons import HARDLY_ARRIVED, SCREEN_LATE
+from study.session.facts.void_reasons import SCREEN_DELAYED_BY_LOAD, TOO_LITTLE_MOTION
 from study.session.state.due_trial import PresentTrial
 from study.session.state.machine import find_next_action
 from study.session.watching.make_watch_view import LiveInfo, make_watch_view
@@ -102,7 +102,7 @@ def test_three_void_trials_of_ten_are_an_alarm(story):
 def test_a_trial_of_which_hardly_anything_arrived_is_an_alarm(story):
     story.answer(True)
     assert kinds(story.view()) == []
-    story.answer(True, flags=("slew limited", HARDLY_ARRIVED), status="flagged")
+    story.answer(True, flags=("slew limited", TOO_LITTLE_MOTION), status="flagged")
     assert kinds(story.view()) == ["still"]
     sentence = story.view().alarms[0].sentence
     assert "In 1 of the last 2 presentations less motion arrived" in sentence and "look at motors" in sentence
@@ -190,7 +190,7 @@ def test_a_clock_set_back_below_the_sittings_begin_silences_no_alarm(story):
 def test_a_busy_computer_is_an_alarm_from_the_first_void_trial_on(story):
     story.answer(True).spoil("the handle was let go")
     assert story.view().alarms == ()
-    (alarm,) = story.spoil(SCREEN_LATE).view().alarms
+    (alarm,) = story.spoil(SCREEN_DELAYED_BY_LOAD).view().alarms
     assert (alarm.kind, alarm.urgent) == ("busy", True)
     assert alarm.sentence == (
         "The computer is too busy: 1 of the last 3 presentations was void because of it. Close other programs."

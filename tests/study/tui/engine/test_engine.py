@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from study.session.facts.void_reasons import SCREEN_LATE, SCREEN_SILENT
+from study.session.facts.void_reasons import SCREEN_DELAYED_BY_LOAD, SCREEN_UNRESPONSIVE
 from study.session.views.views import Answered
 from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
 from study.store.sessions.log_writer import is_log_locked
@@ -142,7 +142,7 @@ def test_without_a_heartbeat_the_trial_is_void_and_waits_for_a_screen(begun, ses
     waiting = begun.next()
     assert isinstance(waiting, ScreenRequest)
     assert waiting.call is DisplayCall.AWAIT_RETURN
-    assert waiting.content in (SCREEN_SILENT, SCREEN_LATE)  # by how busy this computer is
+    assert waiting.content in (SCREEN_UNRESPONSIVE, SCREEN_DELAYED_BY_LOAD)  # by how busy this computer is
     assert "the screen gave no sign of life" in log_of(session).splitlines()[-1]
     begun.come_back()
     begun.reply(waiting)

@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from protocols.trial import Phase
-from study.session.facts.void_reasons import SCREEN_LATE
+from study.session.facts.void_reasons import SCREEN_DELAYED_BY_LOAD
 from study.session.views.views import (
     Answered,
     DirectionPicture,
@@ -216,7 +216,7 @@ def test_the_picture_shows_a_solid_and_a_dashed_segment_that_lean_opposite_ways(
 
 def test_a_trial_that_a_busy_computer_spoiled_is_not_the_participants_fault(typed):
     typed.type("")
-    typed.display.await_return(SCREEN_LATE)
+    typed.display.await_return(SCREEN_DELAYED_BY_LOAD)
     said = typed.out.getvalue()
     assert "The last trial does not count. The computer was too busy for a moment" in " ".join(said.split())
     assert "This was not your fault, and the trial is repeated." in " ".join(said.split())

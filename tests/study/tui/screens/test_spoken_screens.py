@@ -14,7 +14,7 @@ from protocols.document.loading import protocol_from_values
 from protocols.wording.english import ENGLISH
 from protocols.wording.in_language import translate_protocol
 from protocols.wording.words import Words
-from study.session.facts.void_reasons import SCREEN_LATE, SCREEN_SILENT
+from study.session.facts.void_reasons import SCREEN_DELAYED_BY_LOAD, SCREEN_UNRESPONSIVE
 from study.session.views.form_views import FormKind
 from study.session.views.forms import make_form
 from study.session.views.views import (
@@ -100,8 +100,8 @@ SCREENS = {
     "rest": lambda words: RestScreen(RestNotice(75.0, 3, Progress(0.4, 14)), words),
     "pause": lambda words: PauseScreen(PauseNotice("the experimenter asked for a pause", 37), words=words),
     "void": lambda words: AwaitReturnScreen("no answer within the time limit", words),
-    "void, busy": lambda words: AwaitReturnScreen(SCREEN_LATE, words),
-    "void, silent": lambda words: AwaitReturnScreen(SCREEN_SILENT, words),
+    "void, busy": lambda words: AwaitReturnScreen(SCREEN_DELAYED_BY_LOAD, words),
+    "void, silent": lambda words: AwaitReturnScreen(SCREEN_UNRESPONSIVE, words),
     "left": lambda words: GoodbyeScreen(Goodbye(False, 37, "the participant left"), words),
     "finished": lambda words: GoodbyeScreen(Goodbye(True, 1), words),
     "excluded": lambda words: GoodbyeScreen(Goodbye(False, 0, "", "excluded"), words),

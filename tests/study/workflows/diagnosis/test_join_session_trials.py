@@ -30,7 +30,7 @@ def session(tmp_path_factory, small_text):
     data = tmp_path_factory.mktemp("data")
     plan = SessionPlan(
         protocol=load_protocol(small_text, "small.toml"), protocol_text=small_text, protocol_locked=False,
-        subject="P01", observer="ideal", seed=3, data=data, participant_number=0,
+        subject="P01", observer="ideal", seed=3, data_folder=data, participant_number=0,
     )  # fmt: skip
     return conduct_new(plan, "simulated", make_simulated_participant("ideal", 3, VirtualClock())).folder.path
 

@@ -9,7 +9,7 @@ from protocols.trial import TrialStatus, VoidCause
 from study.devices.device import Fault, Health
 from study.errors import DeviceError
 from study.session.facts.sensor_facts import SensorFacts
-from study.session.facts.void_reasons import HARDLY_ARRIVED, is_computer_busy
+from study.session.facts.void_reasons import TOO_LITTLE_MOTION, is_computer_busy
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.event_log import read_log
 from study.tui.trial_words import describe_void_trial
@@ -151,6 +151,8 @@ def test_a_strong_stimulus_of_which_nothing_arrives_is_flagged_and_its_answer_co
     done = sitter.whole()
     rows = [row for row in done.state.trials if row.is_valid and row.delivered_mps2 is not None]
     measured = [event for event in read_log(done.folder.log).events if event.event == "trial_measured"]
-    said = {row.level_n: HARDLY_ARRIVED in event.flags for row, event in zip(done.state.trials, measured, strict=True)}
+    said = {
+        row.level_n: TOO_LITTLE_MOTION in event.flags for row, event in zip(done.state.trials, measured, strict=True)
+    }
     assert max(row.level_n for row in rows) >= 1.0
     assert all(said[row.level_n] is (flagged and row.level_n >= 1.0) for row in rows if not 0.6 < row.level_n < 1.0)

@@ -4,7 +4,7 @@ import pytest
 
 from study.errors import UserInterruptError
 from study.session.facts.events import NoteTaken, TrialSpoiled
-from study.session.facts.void_reasons import SCREEN_LATE
+from study.session.facts.void_reasons import SCREEN_DELAYED_BY_LOAD
 from study.session.views.views import Unanswered
 from study.store.sessions.event_log import read_log
 from study.workflows.results.fold_session import fold_session
@@ -26,7 +26,7 @@ class LateScreen:
     def ask(self, question, sign_of_life):
         self._asked += 1
         if self._asked - 1 in self._late_at:
-            return Unanswered(SCREEN_LATE, ends_sitting=False)
+            return Unanswered(SCREEN_DELAYED_BY_LOAD, ends_sitting=False)
         return self._display.ask(question, sign_of_life)
 
     def await_return(self, reason: str) -> None:
@@ -56,8 +56,8 @@ def of(end, kind):
 def test_trials_that_a_busy_computer_spoiled_are_repeated_counted_and_told_at_the_end(late_at):
     end, screen = late_at(2, 5)
     assert end.end_reason == ""
-    assert screen.voids == [SCREEN_LATE] * 2
-    assert [event.reason for event in of(end, TrialSpoiled)] == [SCREEN_LATE] * 2
+    assert screen.voids == [SCREEN_DELAYED_BY_LOAD] * 2
+    assert [event.reason for event in of(end, TrialSpoiled)] == [SCREEN_DELAYED_BY_LOAD] * 2
     (told,) = screen.told
     assert told.startswith("The computer was too busy: 2 trials were void because of it in this sitting and repeated.")
     assert [note.text for note in of(end, NoteTaken)] == [told]
@@ -69,7 +69,7 @@ def test_three_in_a_row_end_the_sitting_in_words_that_fit(late_at):
     end, screen = late_at(1, 2, 3)
     assert end.end_reason == (
         "the computer is too busy: 3 trials in a row were void because of it, not because of the participant "
-        f"(the last because {SCREEN_LATE})"
+        f"(the last because {SCREEN_DELAYED_BY_LOAD})"
     )
     with pytest.raises(UserInterruptError) as left:
         end_sitting(end, UTC)

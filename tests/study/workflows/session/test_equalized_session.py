@@ -193,7 +193,7 @@ def equalized_levels(plan, provenance) -> list[float]:
 )
 def test_a_model_of_something_else_is_refused(plan, changes, said):
     assert said in refused(plan, **changes)
-    assert not plan.data.exists()
+    assert not plan.data_folder.exists()
 
 
 def test_a_protocol_of_commanded_forces_does_not_pretend_to_use_a_model(plan, small_protocol):
@@ -219,5 +219,5 @@ def test_the_report_gives_the_error_that_was_measured(plan, tmp_path):
     quality = ModelQuality(0.13, 0.12, 0.001, 0.13, 0.004, 10.0)
     write_identified_model(tmp_path / "tested.h5", rigid(quality=quality))
     take(replace(plan, model=tmp_path / "tested.h5"))
-    page = analyze_data(plan.data, tmp_path / "out").report.read_text()
+    page = analyze_data(plan.data_folder, tmp_path / "out").report.read_text()
     assert f"S1_001: {write_quality_sentence(quality)}" in page

@@ -142,10 +142,15 @@ def test_the_free_handle_is_compared_at_the_level_of_the_probe_in_the_hand(probe
 @pytest.mark.parametrize(("paused_s", "since_s", "mass_kg"), [(200.0, None, None), (30.0, 0.0, 0.4)])
 def test_after_a_pause_no_probe_compares_with_the_grip_before_it(paused_s, since_s, mass_kg):
     before = ProbeState(
-        probe_count=3, hand_probe_count=2, since_s=50.0, referenced=True, hand_mass_kg=0.4, hand_level_n=0.2
+        probe_count=3,
+        hand_probe_count=2,
+        since_probe_s=50.0,
+        is_reference_done=True,
+        hand_mass_kg=0.4,
+        hand_level_n=0.2,
     )
     after = apply_break(before, PauseTaken("2026-01-01T00:00:00.000+00:00", "participant", paused_s), PROBES)
-    assert (after.since_s, after.hand_mass_kg, after.referenced) == (since_s, mass_kg, paused_s < 120)
+    assert (after.since_probe_s, after.hand_mass_kg, after.is_reference_done) == (since_s, mass_kg, paused_s < 120)
 
 
 def test_a_stop_while_the_hand_lets_go_plays_nothing(probed, monkeypatch):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from analysis.diagnosis.localisation.clean_floor import NothingLearned
+from analysis.diagnosis.localisation.model_error_floor import IncomparableRecordingsError
 from study.errors import StudyError
 from study.store.disk.json_document import read_json
 from study.store.formats.recording_file import write_recording
@@ -47,7 +47,7 @@ def test_clean_recordings_of_another_device_are_refused(files, findings, tmp_pat
 
 
 def test_clean_recordings_that_say_nothing_of_the_others_are_refused(files, findings, tmp_path):
-    engine = Scripted(findings, NothingLearned("the clean recordings can only be compared by windows"))
+    engine = Scripted(findings, IncomparableRecordingsError("the clean recordings can only be compared by windows"))
     with pytest.raises(StudyError, match=r"The clean recordings can only be compared by windows"):
         diagnose_recordings(plan(files, tmp_path / "out"), quiet, engine)
     assert not (tmp_path / "out").exists()

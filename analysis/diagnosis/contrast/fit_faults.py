@@ -1,4 +1,4 @@
-"""Fit the size of every fault: for each fault, the variant and the size with the smallest error after undoing it.
+"""Fit the size of every fault: for each fault, the variant and the size with the smallest error once it is undone.
 
 A fault is a change of the device or its sensors between two sets of recordings. A variant of it has fixed nonlinear
 parameters (such as a corner frequency) and an unknown size s. Undoing it changes the recording by s times a known
@@ -22,10 +22,10 @@ ALL_BLOCKS = tuple(range(CONTRAST_BLOCKS))
 """Numbers of all blocks into which the samples are divided for cross-validation."""
 RELINEARISED_VARIANTS = 3
 """Of a fault that is valid at size 1 only: number of its variants that are linearised again, besides the best of all
-sizes. Chosen by hand; each takes as long as a first try."""
+sizes. Chosen by hand; each takes as long as a first fit."""
 
 
-class TriedVariant(NamedTuple):
+class FittedVariant(NamedTuple):
     """A variant of a fault, undone at its best size."""
 
     fit: Fit
@@ -37,19 +37,19 @@ class TriedVariant(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TriedFaults:
-    """Result of trying faults: each with its best variant and size, and the products without any fault undone."""
+class FaultFits:
+    """Result of `fit_faults`: each fault with its best variant and size, and the products without any fault undone."""
 
     unchanged_pairs: list[Pair]
     """Per base, the products of both sets with nothing undone."""
-    tried: list[TriedVariant]
+    variants: list[FittedVariant]
     """The best variant of each fault that could be undone, in order of rising error."""
     complete: bool
-    """Whether all faults were tried before the time ran out."""
+    """Whether all faults were fitted before the time ran out."""
 
 
-def try_faults(compared_bases: Sequence[ComparedBase], faults: Sequence[Fault], time_left: TimeBudget) -> TriedFaults:
-    """Try the faults in order, each on all bases together, until the time runs out. Faults of which no variant is
+def fit_faults(compared_bases: Sequence[ComparedBase], faults: Sequence[Fault], time_left: TimeBudget) -> FaultFits:
+    """Fit the faults in order, each on all bases together, until the time runs out. Faults of which no variant is
     well-conditioned are left out."""
     clean_blocks_by_base = [compared.compute_grams(compared.clean, []).blocks for compared in compared_bases]
     unchanged_pairs = [
@@ -61,26 +61,24 @@ def try_faults(compared_bases: Sequence[ComparedBase], faults: Sequence[Fault], 
         )
         for compared, clean_blocks in zip(compared_bases, clean_blocks_by_base, strict=True)
     ]
-    best_variants: list[TriedVariant] = []
+    best_variants: list[FittedVariant] = []
     is_complete = False
     for fault in faults:
         if not time_left():
             break
-        trials = [
-            trial
-            for variant in fault.variants
-            if (trial := _try_variant(unchanged_pairs, compared_bases, fault, variant))
+        fits = [
+            fit for variant in fault.variants if (fit := _fit_variant(unchanged_pairs, compared_bases, fault, variant))
         ]
-        if trials:
-            best_variants.append(_choose_best_variant(trials, unchanged_pairs, compared_bases))
+        if fits:
+            best_variants.append(_choose_best_variant(fits, unchanged_pairs, compared_bases))
     else:
         is_complete = True
-    return TriedFaults(unchanged_pairs, sorted(best_variants, key=_get_error), is_complete)
+    return FaultFits(unchanged_pairs, sorted(best_variants, key=_get_error), is_complete)
 
 
-def _try_variant(
+def _fit_variant(
     unchanged_pairs: Sequence[Pair], compared_bases: Sequence[ComparedBase], fault: Fault, variant: Variant
-) -> TriedVariant | None:
+) -> FittedVariant | None:
     """Undo the fault by this variant and fit its sizes; None where undoing it is ill-conditioned. unchanged_pairs: per
     base, the products without any fault undone."""
     pairs = [
@@ -93,44 +91,43 @@ def _try_variant(
         for compared, pair in zip(compared_bases, unchanged_pairs, strict=True)
     ]
     is_well_conditioned = all(pair.undone.is_well_conditioned(variant) for pair in pairs)
-    return TriedVariant(fit_sizes(pairs, variant), fault, variant, pairs) if is_well_conditioned else None
+    return FittedVariant(fit_sizes(pairs, variant), fault, variant, pairs) if is_well_conditioned else None
 
 
-def _get_error(trial: TriedVariant) -> float:
+def _get_error(fitted_variant: FittedVariant) -> float:
     """Get the sum of squared errors with the fault undone; a sort key."""
-    return trial.fit.error
+    return fitted_variant.fit.error
 
 
 def _choose_best_variant(
-    trials: Sequence[TriedVariant], unchanged_pairs: Sequence[Pair], compared_bases: Sequence[ComparedBase]
-) -> TriedVariant:
-    """The variant with the smallest error, after linearisation about its size. Of a fault that is valid at size 1 only
-    (`Variant.exact`), several are compared at size 1: at another size, a wrong variant may have the smallest error."""
-    best_at_any_size = min(trials, key=_get_error)
+    fits: Sequence[FittedVariant], unchanged_pairs: Sequence[Pair], compared_bases: Sequence[ComparedBase]
+) -> FittedVariant:
+    """Choose the variant with the smallest error, after linearisation about its size. Of a fault that is valid at size
+    1 only (`Variant.exact`), several are compared at size 1: at another size, a wrong variant may have the smallest
+    error."""
+    best_at_any_size = min(fits, key=_get_error)
     if not best_at_any_size.variant.exact:
         return _iterate_linearisation(best_at_any_size, unchanged_pairs, compared_bases)
-    best_at_size_1 = sorted(trials, key=lambda trial: _get_error(_fit_allowed_size(trial)))[:RELINEARISED_VARIANTS]
+    best_at_size_1 = sorted(fits, key=lambda fit: _get_error(_fit_allowed_size(fit)))[:RELINEARISED_VARIANTS]
     return min(
-        (
-            _iterate_linearisation(trial, unchanged_pairs, compared_bases)
-            for trial in (best_at_any_size, *best_at_size_1)
-        ),
+        (_iterate_linearisation(fit, unchanged_pairs, compared_bases) for fit in (best_at_any_size, *best_at_size_1)),
         key=_get_error,
     )
 
 
 def _iterate_linearisation(
-    current: TriedVariant, unchanged_pairs: Sequence[Pair], compared_bases: Sequence[ComparedBase]
-) -> TriedVariant:
-    """The best fit of at most `UNDOING_ROUNDS` Gauss-Newton iterations. Each linearises the fault about the size that
-    the last iteration found. They end where that size changes by a share of less than `SIZE_IS_NEAR`, where undoing is
-    linear or ill-conditioned, and, unless only size 1 is valid, where the error no longer falls."""
+    current: FittedVariant, unchanged_pairs: Sequence[Pair], compared_bases: Sequence[ComparedBase]
+) -> FittedVariant:
+    """Return the best fit of at most `UNDOING_ROUNDS` Gauss-Newton iterations. Each linearises the fault about the size
+    that the last iteration found; in the linearised variant, that size is 1. They end where the fitted size differs
+    from 1 by less than `SIZE_IS_NEAR`, where undoing is linear or ill-conditioned, and, unless only size 1 is valid
+    (`Variant.exact`), where the error no longer falls."""
     best = _fit_allowed_size(current)
     for _ in range(UNDOING_ROUNDS):
         fit, fault, variant, _ = current
         if variant.at_size is None or abs(float(fit.sizes[0]) - 1) < SIZE_IS_NEAR:
             break
-        relinearised = _try_variant(unchanged_pairs, compared_bases, fault, variant.at_size(float(fit.sizes[0])))
+        relinearised = _fit_variant(unchanged_pairs, compared_bases, fault, variant.at_size(float(fit.sizes[0])))
         if relinearised is None:
             break
         current, previous_best = relinearised, best
@@ -140,14 +137,15 @@ def _iterate_linearisation(
     return best
 
 
-def _fit_allowed_size(trial: TriedVariant) -> TriedVariant:
-    """The variant as fitted; with its size fixed at 1 where it is valid at size 1 only."""
-    _, fault, variant, pairs = trial
+def _fit_allowed_size(fitted_variant: FittedVariant) -> FittedVariant:
+    """Return the variant as fitted, or refit it with its size fixed at 1 where it is valid at size 1 only."""
+    _, fault, variant, pairs = fitted_variant
     if not variant.exact:
-        return trial
-    return TriedVariant(fit_sizes(pairs, restrict_sizes(variant)), fault, variant, pairs)
+        return fitted_variant
+    return FittedVariant(fit_sizes(pairs, restrict_sizes(variant)), fault, variant, pairs)
 
 
 def restrict_sizes(variant: Variant) -> Variant:
-    """The variant, with its size fixed at 1 where it is valid at size 1 only (`Variant.exact`)."""
+    """Fix the size of a variant at 1 where it is valid at size 1 only (`Variant.exact`); other variants are
+    unchanged."""
     return fix_size(variant, 0.0) if variant.exact else variant

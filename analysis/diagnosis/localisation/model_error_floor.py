@@ -1,7 +1,8 @@
-"""Model error on clean recordings: the mismatch that the re-tuned model leaves on them, per cell and per channel.
+"""Model error on clean recordings: relative error of the re-tuned model, per channel and per cell of the mismatch map.
 
 Clean recordings are recordings of the same device without the fault. A mismatch of this size in the recordings to
-diagnose counts as model error, not as evidence for an effect. `reference.learn_model_error` computes it.
+diagnose counts as model error, not as evidence for an effect: it is the floor of the significance test in
+`mismatch_cells`. `reference.learn_model_error` computes it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,18 +13,19 @@ from analysis.diagnosis.settings import LEARNED_TOO_MUCH
 from analysis.wording import conjoin
 
 
-class NothingLearned(ValueError):  # noqa: N818 - an answer that a user reads
-    """The clean recordings cannot be compared with those to diagnose. Its text is a sentence without a full stop."""
+class IncomparableRecordingsError(ValueError):
+    """The clean recordings have another error measure than those to diagnose. The text is a sentence without a full
+    stop."""
 
 
 @dataclass(frozen=True, slots=True)
-class CleanFloor:
-    """Shares of rms mismatch in the rms signal of clean recordings. Empty without clean recordings."""
+class ModelErrorFloor:
+    """Relative model errors on the clean recordings: rms mismatch over rms signal. Empty without clean recordings."""
 
     shares: Mapping[tuple[str, str, str, Band], float] = field(default_factory=dict)
-    """Share of each cell: output, its quantity, input and octave."""
+    """Relative error of each cell: output channel, its quantity, input channel and octave (Hz)."""
     channels: tuple[float, ...] = ()
-    """Share of each channel over all octaves: those of the response, then those of the position."""
+    """Relative error of each channel over all octaves: channels of the response, then of the position."""
     error: str = ""
     """Name of the error measure, as in `diagnosis.json`."""
     recordings: int = 0
@@ -31,12 +33,13 @@ class CleanFloor:
 
     @property
     def margin_factor(self) -> float:
-        """Factor on the largest observed share, because the next recording may exceed it: 1 + 1 / recordings."""
+        """Factor on the largest observed share, because the next recording may exceed it: 1 + 1 / recordings. Chosen by
+        hand."""
         return 1 + 1 / max(self.recordings, 1)
 
     def get_share(self, output: str, quantity: str, input: str, band_hz: Band) -> float:
-        """Get the share of a cell. Where clean recordings never drove this input, the largest share of the same channel
-        and octave; 0 without any."""
+        """Get the relative error of a cell. Where no clean recording drives this input, the largest of the same output
+        channel and octave; 0 without any."""
         cell_share = self.shares.get((output, quantity, input, band_hz))
         if cell_share is not None:
             return cell_share
@@ -48,9 +51,9 @@ class CleanFloor:
         return max(channel_shares, default=0.0)
 
 
-def describe_clean_floor(floor: CleanFloor, channels: Sequence[str]) -> str:
-    """Sentences about the model error on the clean recordings; empty without any. channels: names, as in
-    `CleanFloor.channels`."""
+def describe_model_error_floor(floor: ModelErrorFloor, channels: Sequence[str]) -> str:
+    """Describe the model error on the clean recordings in sentences; empty without any. channels: names, in the order
+    of `ModelErrorFloor.channels`."""
     if not floor.channels:
         return ""
     shares = conjoin([f"{name} {100 * share:.2g} %" for name, share in zip(channels, floor.channels, strict=False)])
