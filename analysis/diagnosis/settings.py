@@ -10,10 +10,11 @@ Sources of the values:
 
 * principle: the value follows from the sentence next to it;
 * a name and a year: from the literature;
-* bank: the value was set from the results of a bank of simulated devices (docs/proof.md), given by its first seed;
+* bank: the value was set from the results of a bank of simulated devices (docs/proof_history.md), given by its first
+  seed;
 * hand: the value was set by hand during development, on simulated devices that are not in any reported bank
-  (docs/proof.md); for the force balance on five public recordings and simulated axes, for the comparison with clean
-  recordings on devices without a fault, by comparing two halves of a recording (docs/real.md).
+  (docs/proof_history.md); for the force balance on five public recordings and simulated axes, for the comparison with
+  clean recordings on devices without a fault, by comparing two halves of a recording (docs/real.md).
 """
 
 from math import log
@@ -183,9 +184,9 @@ IMPACTS_AS_GOOD = 1.1  # ratio to the misfit of the named effect, up to which a 
 MOST_RIVALS = 6  # rivals that are reported per effect
 # widens intervals by noise alone, which held 65 % (bank 91000); least half width, relative to the value
 INTERVAL_FACTOR, INTERVAL_SHARE = 2.5, 0.005
-# times the noise's standard error: limit of the jackknife over segments. Set on 99700 (docs/proof.md)
+# times the noise's standard error: limit of the jackknife over segments. Set on 99700 (docs/proof_history.md)
 MOST_BETWEEN_SEGMENTS = 5.0
-# gain that makes a candidate e times less likely. Bank (docs/proof.md), also the next two lines
+# gain that makes a candidate e times less likely. Bank (docs/proof_history.md), also the next two lines
 PROBABILITY_SCALE = 0.002
 # probability that no candidate is right: with noise alone left, and with much more left
 NO_CANDIDATE_LEAST, NO_CANDIDATE_MOST = 0.01, 0.8

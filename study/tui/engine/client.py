@@ -18,6 +18,7 @@ from queue import SimpleQueue
 from typing import IO
 
 from study.errors import ExitCode
+from study.session.views.resume_command import format_resume_command
 from study.tui.engine.child_process import start_child
 from study.tui.engine.from_engine import ErrorText, Failed, FromEngine, SessionReady
 from study.tui.engine.to_engine import Heartbeat, ToEngine
@@ -145,7 +146,7 @@ def _make_end_failure(exit_code: int, last_line: str, session: SessionReady | No
         explanation += f" Its last words: {last_line}"
     advice = "Take the hand off the handle until you know that no force is on."
     if session is not None:
-        advice += f" Then continue with: hapteq resume {session.path}"
+        advice += f" Then continue with: {format_resume_command(session.path, session.device)}"
     saved = "Every answer that was given is on disk." if session is not None else ""
     text = ErrorText("The device program ended", explanation, saved, advice, int(ExitCode.DEVICE))
     return Failed(text, session.path if session is not None else "")

@@ -10,6 +10,7 @@ import itertools
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 
 from protocols.wording.words import Words
@@ -116,7 +117,9 @@ class EngineCommands:
         for note in plan.notes:
             self._link.send(UserNotice(note))
         words = make_words(plan.session.protocol)
-        self._conduct_sitting(words, lambda participant: conduct_new(plan.session, order.device, participant))
+        self._conduct_sitting(
+            words, order.device, lambda participant: conduct_new(plan.session, order.device, participant)
+        )
 
     def _resume(self, command: Resume) -> None:
         """Continue a session, or write the missing results of a closed one. Raises WrongUseError for a session of a
@@ -139,13 +142,18 @@ class EngineCommands:
             self._link.send(Finished(str(folder.path), folded_session.state.answers, _make_results_message(analysis)))
             return
         words = make_words(folded_session.state.protocol)
-        self._conduct_sitting(words, lambda participant: conduct_resumed(folder, command.device, participant))
+        self._conduct_sitting(
+            words, command.device, lambda participant: conduct_resumed(folder, command.device, participant)
+        )
 
-    def _conduct_sitting(self, words: Words, conduct: Callable[[Participant], ConductedSitting]) -> None:
-        """Conduct a sitting, write its results and send them. words: texts of the protocol's language."""
+    def _conduct_sitting(
+        self, words: Words, device_name: str, conduct: Callable[[Participant], ConductedSitting]
+    ) -> None:
+        """Conduct a sitting, write its results and send them. words: texts of the protocol's language; device_name: as
+        `open_device` takes it."""
         self._link.send(ParticipantWords(words))
         self._link.send(PreparationStarted(words["preparing_device"]))
-        with self._open_participant() as participant:
+        with self._open_participant(device_name) as participant:
             conducted_sitting = conduct(participant)
         if conducted_sitting.state.closed:
             self.session_folder = None  # a closed session cannot be resumed
@@ -159,22 +167,23 @@ class EngineCommands:
         )
 
     @contextlib.contextmanager
-    def _open_participant(self) -> Iterator[Participant]:
+    def _open_participant(self, device_name: str) -> Iterator[Participant]:
         """Make the participant at the screen, without requests and replies of an earlier session."""
         self._link.requests.take()  # discard requests to an earlier session
         self._link.drop_replies()
         display = RemoteDisplay(self._link, self._clock)
         try:
-            yield Participant(display, PersonsHand(), self._clock, self._link.requests, self._connect_requests)
+            connect = partial(self._connect_requests, device_name)
+            yield Participant(display, PersonsHand(), self._clock, self._link.requests, connect)
         finally:
             self._link.stop_device = None
 
-    def _connect_requests(self, folder: SessionFolder, device: Device) -> None:
+    def _connect_requests(self, device_name: str, folder: SessionFolder, device: Device) -> None:
         """Called when session and device are open: send the session to the screen, and connect the screen's emergency
         stop to the device."""
         self.session_folder = folder
         self._link.stop_device = device.stop
-        self._link.send(SessionReady(folder.name, str(folder.path)))
+        self._link.send(SessionReady(folder.name, str(folder.path), device_name))
 
     def _withdraw(self, folder: SessionFolder) -> None:
         """Erase the participant's sessions, and name copies that may exist elsewhere."""

@@ -152,6 +152,8 @@ class SessionReady:
     """Name of the session, as in P01_001."""
     path: str
     """Path of its folder."""
+    device: str
+    """Name of the device, as `open_device` takes it."""
 
 
 @dataclass(frozen=True, slots=True)

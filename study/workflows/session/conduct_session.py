@@ -171,6 +171,7 @@ def _run(
         display=participant.display,
         hand=participant.hand,
         supervisor=supervisor,
+        device_name=equipment.device_name,
         place_m=place_m,
         pulse=equipment.pulse,
         masking_noise=equipment.sound,

@@ -7,10 +7,10 @@ Called by the command line (`study.cli.conduct`) and by the engine of the screen
 from dataclasses import replace
 
 from study.devices.device import Fault
-from study.devices.opening import SIMULATED
 from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.facts.void_reasons import TOO_BUSY
 from study.session.views.count_text import answers_are
+from study.session.views.resume_command import format_resume_command
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.session_lock import hold_session_lock
 from study.workflows.results.analysis_files import ANALYSIS_NAME, is_analysis_of
@@ -73,12 +73,11 @@ def _make_unfinished_error(sitting: ConductedSitting) -> StudyError:
     advice = device_advice if sitting.fault in FAULTS_FOR_DOCTOR else ""
     if sitting.end_reason.startswith(TOO_BUSY):
         advice = CLOSE_PROGRAMS_ADVICE
-    option = "" if sitting.device_name == SIMULATED else f" --device {sitting.device_name}"
     return error_type(
         "The session is not finished",
         f"The sitting ended: {sitting.end_reason}."
         f"{f' {sitting.fault_text[0].upper()}{sitting.fault_text[1:]}.' if sitting.fault_text else ''}",
-        f"{advice}Continue with: hapteq resume {sitting.folder.path}{option}",
+        f"{advice}Continue with: {format_resume_command(str(sitting.folder.path), sitting.device_name)}",
         saved=f"{answers_are(sitting.state.answers)} on disk.",
     )
 

@@ -19,6 +19,7 @@ from study.session.state.progress import estimate_progress
 from study.session.state.state import SessionState, is_felt_by_person
 from study.session.views.archive_views import INELIGIBILITY_REASONS
 from study.session.views.count_text import answers_are
+from study.session.views.resume_command import format_resume_command
 from study.session.views.views import Goodbye, PracticeResult, RestNotice, Welcome, make_direction_picture
 from study.store.sessions.log_seal import seal_log
 from study.workflows.results.fold_session import fold_session
@@ -115,7 +116,7 @@ def _close_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> Ses
                 monotonic_s=sitting.clock.now_s(),
             )
         )
-    resume_advice = f"Continue with: hapteq resume {sitting.folder.path}"
+    resume_advice = f"Continue with: {format_resume_command(str(sitting.folder.path), sitting.device_name)}"
     saved = f"{answers_are(state.answers)} on disk."
     if is_force_left:
         raise DeviceError(
@@ -130,7 +131,8 @@ def _add_resume_advice(error: StudyError, sitting: Sitting) -> StudyError:
         state = fold_session(sitting.folder).state
         if not state.is_finally_ineligible:
             error.saved = f"{answers_are(state.answers)} on disk."
-            error.do_now = f"{error.do_now} Then continue with: hapteq resume {sitting.folder.path}"
+            resume_command = format_resume_command(str(sitting.folder.path), sitting.device_name)
+            error.do_now = f"{error.do_now} Then continue with: {resume_command}"
     return error
 
 

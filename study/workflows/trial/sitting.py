@@ -76,6 +76,8 @@ class Sitting:
     display: Display
     hand: Hand
     supervisor: SessionSupervisor
+    device_name: str
+    """As `open_device` takes it."""
     place_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Centre of the spring, where the handle belongs."""
     pulse: Callable[[], Pulse | None] = send_no_pulse

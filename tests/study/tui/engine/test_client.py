@@ -7,7 +7,7 @@ import pytest
 
 from study.tui.engine.child_process import start_child
 from study.tui.engine.client import EngineClient
-from study.tui.engine.from_engine import Failed
+from study.tui.engine.from_engine import Failed, SessionReady
 from study.tui.engine.to_engine import ShowHome
 
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
@@ -24,6 +24,11 @@ def talks_nonsense(descriptor):
             pipe.recv()
     except EOFError:
         pass
+
+def loses_the_device(descriptor):
+    from study.tui.engine.from_engine import SessionReady
+    Connection(descriptor).send(SessionReady("P01_001", "data/P01_001", "omega3"))
+    sys.exit(3)
 
 def gives_up(descriptor):
     sys.stderr.write("first words\\nno device on the bus\\n")
@@ -70,6 +75,14 @@ def test_the_last_words_of_an_engine_are_reported(engine):
     )
     assert failure.path == ""
     client.close()
+
+
+def test_the_command_that_continues_a_session_names_its_device(engine):
+    _, heard = engine("loses_the_device")
+    assert isinstance(heard.get(timeout=20.0), SessionReady)
+    failure = heard.get(timeout=20.0)
+    assert failure.path == "data/P01_001"
+    assert failure.error.do_now.endswith("Then continue with: hapteq resume data/P01_001 --device omega3")
 
 
 def test_a_system_that_starts_nothing_is_reported(monkeypatch):
