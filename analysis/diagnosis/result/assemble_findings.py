@@ -57,6 +57,7 @@ def assemble_findings(
     examination = examine_fits(result, floors[0], maps)
     in_samples = "" if recording.is_timed or is_quasi_static(recording) else IN_SAMPLES
     proposal = context.guard.run("the next recording", "its choice", partial(_propose, context, fits, verdict), None)
+    measure_remarks = (_describe_rest(measure), describe_model_error_floor(learned, channels), in_samples)
     return Findings(
         diagnosis=_build_document(result, errors, (maps, examination.local), proposal),
         explanation=fits,
@@ -72,12 +73,7 @@ def assemble_findings(
         is_timed=recording.is_timed,
         signatures=examination.signatures,
         black_box=examination.black_box,
-        remarks=_collect_remarks(
-            (_describe_rest(measure), describe_model_error_floor(learned, channels), in_samples),
-            time_series,
-            tuning,
-            floors,
-        ),
+        remarks=_collect_remarks(measure_remarks, time_series, tuning, floors),
         maps=maps.cells,
         localisation=examination.local,
         floor=floors[0],
