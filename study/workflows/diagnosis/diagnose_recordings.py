@@ -98,8 +98,7 @@ class Answer:
 
 
 class Engine(Protocol):
-    """Signature of the function that diagnoses recordings against a model; by default
-    `analysis.diagnosis.diagnose.diagnose`."""
+    """Signature of the function that diagnoses recordings against a model; `analysis.diagnosis.diagnose.diagnose`."""
 
     def __call__(
         self,
@@ -125,16 +124,18 @@ def find_answer(plan: DiagnosePlan, on_progress: Progress, engine: Engine = diag
     on_progress("reading", 0.0)
     for_force_balance = plan.model is None and not plan.clean
     inputs, clean = _add_clean(plan, read_input(plan.sources, plan.seed, for_force_balance, plan.force_constants))
+    kept_laws = _read_effects(plan.effect_files, inputs.recordings)
     on_progress("reading", READ_SHARE)
-    has_time_left = _start_time_budget(plan)
-    guard = make_crash_guard()
+    has_time_left, guard = _start_time_budget(plan), make_crash_guard()
     first_model = _choose_model(plan, inputs, clean, (has_time_left, guard), on_progress)
     # A model that was fitted to these recordings already contains the spring.
     spring_n_per_m = inputs.spring_n_per_m if plan.model is not None or inputs.simulated else 0.0
     model = add_spring(first_model.model, spring_n_per_m)
     start_share = FITTED_SHARE if plan.model is None else READ_SHARE
     _check_compared(plan, inputs, model)
-    settings = replace(_make_settings(plan, inputs, clean, first_model.balances), time_left=has_time_left, guard=guard)
+    settings = replace(
+        _make_settings(plan, inputs, clean, first_model.balances), time_left=has_time_left, guard=guard, kept=kept_laws
+    )
     try:
         findings = engine(
             inputs.recordings, model, settings, map_forked, _scale_progress(on_progress, start_share, DIAGNOSED_SHARE)
@@ -203,7 +204,6 @@ def _make_settings(
         fitted=plan.model is None and not inputs.simulated,
         balances=balances,
         compared=plan.compare,
-        kept=_read_effects(plan.effect_files, inputs.recordings),
         discovery=plan.discovery,
     )
 

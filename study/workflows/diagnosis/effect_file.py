@@ -91,7 +91,7 @@ def read_entries(paths: Sequence[Path], recordings: Sequence[Recording]) -> tupl
             except LawError as error:
                 raise _make_effect_error(
                     f"{path} does not fit the recordings: {error}.",
-                    "Diagnose recordings that have this signal, or leave --effect-file out.",
+                    "Give it a law of signals that all recordings have, or leave --effect-file out.",
                 ) from error
     return entries
 

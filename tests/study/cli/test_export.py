@@ -76,7 +76,6 @@ def test_what_was_exported_is_analysed_with_the_same_results(data, tmp_path, cap
     assert (tmp_path / "a" / "thresholds.csv").read_bytes() == (tmp_path / "b" / "thresholds.csv").read_bytes()
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("sketched")
 @pytest.mark.parametrize("form", ["psych-ds", "csv"])
 def test_what_was_left_out_before_an_export_is_counted_after_it_without_a_name(data, tmp_path, capsys, form):

@@ -5,9 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis.diagnosis.data.observed import observe
 from analysis.diagnosis.errors.choose_measure import make_measure
+from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect
+from equalizer.effects.simulation.bodies import Restarts
 from equalizer.plant.mechanical_model import ModelEffect
 from equalizer.signals.recording import Recording
 from tests.analysis.diagnosis.errors.drifting_plant import (
@@ -153,3 +156,18 @@ def test_what_the_models_own_file_names_is_part_of_every_prediction(which: str, 
     assert (
         "are part of every simulation: dry friction." in chosen.remarks[-2 if which == "controlled_recording" else -1]
     )
+
+
+def test_a_shortened_simulation_keeps_the_restarts_of_the_records_that_it_keeps(drifting_recording: Recording) -> None:
+    record = observe(drifting_recording, 1)
+    unused = replace(record, fit=np.zeros_like(record.fit), choose=np.zeros_like(record.choose))
+    restarts = tuple(Restarts(np.array([sample]), np.zeros((1, 2))) for sample in (10, 20, 30))
+    measure = FreeSimulation((record, unused, record), np.ones(1), np.ones(1), restarts=restarts)
+    short = measure.shorten()
+    assert len(short.records) == 2
+    assert short.restarts == (restarts[0], restarts[2])
+    assert all(
+        np.isfinite(residual[kept.fit]).all()
+        for residual, kept in zip(short.residuals(make_model(), ()), short.records, strict=True)
+    )
+    assert replace(measure, restarts=()).shorten().restarts == ()

@@ -32,7 +32,6 @@ def test_after_a_refused_release_the_next_stimulus_is_released(device, rigs, rig
         device.release()
 
 
-@pytest.mark.slow
 def test_until_an_interrupted_release_is_asked_for_again_nothing_else_begins(device, rigs, rig):
     device.hold(rigs.sine(1.0, fade_s=1.0))
     device.keep_alive()

@@ -93,7 +93,6 @@ def test_a_caller_that_hangs_while_it_plays_gives_no_sign_of_life(device, rigs, 
     assert forces == [0.0]
 
 
-@pytest.mark.slow
 def test_what_the_progress_raises_ends_the_playing_with_a_fade(device, rigs, rig):
     def leave(share: float) -> None:
         if share > 0.3:
@@ -109,7 +108,6 @@ def test_what_the_progress_raises_ends_the_playing_with_a_fade(device, rigs, rig
     assert device.release().health.fault is Fault.NONE
 
 
-@pytest.mark.slow
 def test_an_interrupted_release_can_be_asked_for_again(device, rigs):
     device.hold(rigs.sine(1.0, fade_s=1.0))
     device.keep_alive()
@@ -165,7 +163,6 @@ def test_after_the_end_of_its_process_a_device_is_lost_to_every_call(device, rig
     device.close()
 
 
-@pytest.mark.slow
 def test_a_play_whose_process_ends_raises(device, rigs):
     commands = rigs.force(np.tile(rigs.sine(1.0).loop.samples, (20, 1)))
     with pytest.raises(DeviceError, match="The device was lost"):

@@ -58,7 +58,6 @@ def run(*words: object) -> str:
     return done.output
 
 
-@pytest.mark.slow
 def test_everything_that_a_study_writes_is_private(tmp_path):
     data = tmp_path / "new" / "data"
     who = ("--observer", "ideal", "--subject", "P09", "--seed", "3")
@@ -72,7 +71,6 @@ def test_everything_that_a_study_writes_is_private(tmp_path):
     assert exposed(data) == []
 
 
-@pytest.mark.slow
 def test_a_session_closes_a_data_folder_that_others_can_read(opened, tmp_path):
     outside = tmp_path / "outside.h5"
     outside.write_text("")

@@ -59,18 +59,15 @@ def test_nothing_is_analyzed_where_nothing_can_be_read(asked_by, session, gone):
     assert asked_by(standing(session, gone), "r", "a", "w") == []
 
 
-@pytest.mark.slow
 def test_withdrawal_takes_the_typed_code(asked_by, session):
     assert asked_by(session, "x", "P", "0", "1", "enter") == [("Withdraw", "/data/P01_001")]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("keys", [("P", "0", "2", "enter"), ("enter",), ("P", "0", "1", "escape")])
 def test_anything_else_erases_nothing(asked_by, session, keys):
     assert asked_by(session, "x", *keys) == []
 
 
-@pytest.mark.slow
 def test_a_wrong_code_says_that_nothing_was_erased(on_screen, session):
     async def story(sight):
         await sight.press("x", "n", "o", "enter")

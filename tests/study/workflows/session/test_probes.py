@@ -79,7 +79,6 @@ def test_levels_come_in_turn_and_never_sooner_than_the_protocol_says(probed):
     assert min(np.diff([e.monotonic_s for e in hand])) >= PROBES.interval_s
 
 
-@pytest.mark.slow
 def test_a_probes_answer_never_reaches_that_of_a_trial(sitter, sitter_of, tmp_path):
     plain = sitter.whole()
     protocol = with_probes(sitter.protocol)
@@ -87,7 +86,6 @@ def test_a_probes_answer_never_reaches_that_of_a_trial(sitter, sitter_of, tmp_pa
     assert trials_of(plain) == trials_of(other)
 
 
-@pytest.mark.slow
 def test_a_probe_is_on_the_disk_before_the_device_moves(probed, monkeypatch):
     calls, hold, append = [], SafeDevice.hold, EventLog.append
     monkeypatch.setattr(SafeDevice, "hold", lambda self, stimulus: calls.append("hold") or hold(self, stimulus))
@@ -169,7 +167,6 @@ def test_a_stop_while_the_hand_lets_go_plays_nothing(probed, monkeypatch):
     assert [e.kind for e in events_of(done.folder) if isinstance(e, ProbePlayed)] == ["hand"]
 
 
-@pytest.mark.slow
 def test_a_program_that_ends_within_a_probe_repeats_and_loses_none(probed, monkeypatch):
     show, shown = SimulatedDisplay.show_playing, []
 

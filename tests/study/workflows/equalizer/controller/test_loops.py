@@ -106,7 +106,6 @@ def test_undisturbed_it_sends_each_row_once_and_then_zero(example, rows):
     assert not sent[-1].any() and "60 ticks, 0 missed" in done.stdout and "\nreleased\n" in done.stdout
 
 
-@pytest.mark.slow
 def test_ticks_that_were_missed_are_not_sent_one_after_the_other(example, rows):
     """14.5 ms late: the forces that were due meanwhile are gone, the waveform is where the time is."""
     done = example(stall_ms=15.5)
@@ -116,7 +115,6 @@ def test_ticks_that_were_missed_are_not_sent_one_after_the_other(example, rows):
     assert not sent[-1].any() and "60 ticks, 14 missed" in done.stdout
 
 
-@pytest.mark.slow
 def test_a_loop_that_stood_still_sets_zero_and_ends(example, rows):
     done = example(stall_ms=21.5)
     assert done.returncode == 1
@@ -222,12 +220,10 @@ def test_tap_and_floor_together_are_shortened_to_the_cap_and_keep_their_directio
     np.testing.assert_allclose(deep[:-1], wanted, atol=1e-9)
 
 
-@pytest.mark.slow
 def test_a_position_beyond_all_numbers_is_no_force(chai3d):
     assert not chai3d(-1e300).any()
 
 
-@pytest.mark.slow
 def test_in_chai3d_missed_ticks_are_not_sent_and_a_stall_ends_in_zero(chai3d):
     undisturbed, missed, stalled = chai3d(-0.001), chai3d(-0.001, stall_ms=15.5), chai3d(-0.001, stall_ms=21.5)
     np.testing.assert_array_equal(missed[:AFTER], undisturbed[:AFTER])
@@ -235,7 +231,6 @@ def test_in_chai3d_missed_ticks_are_not_sent_and_a_stall_ends_in_zero(chai3d):
     assert undisturbed[AFTER:].any() and len(stalled) == AFTER + 1 and not stalled[-1].any()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("cap_n", "compiles"), [(5.0, True), (5.5, False)])
 def test_a_controller_beyond_the_cap_of_all_forces_does_not_compile_in(vendor, tmp_path, cap_n, compiles):
     model, out = write_model(tmp_path / "model.h5"), tmp_path / "out"

@@ -105,7 +105,6 @@ def attacked(sound, folder, seed, count):
     return read_whole, refused
 
 
-@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_mutated_files_are_read_or_refused_by_name(sound, tmp_path):
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
