@@ -15,6 +15,7 @@ from study.cli.main import main
 from study.session.facts.events import AnswerGiven, TrialSpoiled
 from study.store.formats.trials_file import read_trials
 from study.store.sessions.event_log import read_log
+from tests.slow_instances import slow
 
 pytestmark = pytest.mark.real_time
 
@@ -94,7 +95,7 @@ def watch_it_let_go(stub) -> None:
     assert stub.get("peak_n") <= 4.5
 
 
-@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 22))])
+@pytest.mark.parametrize("seed", [1, *slow(*range(2, 22))])
 def test_a_program_that_is_killed_leaves_no_force_and_loses_no_answer(stub, short_file, tmp_path, seed):
     random = np.random.default_rng(seed)
     data = ["--data", str(tmp_path / "data"), "--device", "omega3", "--hands-off"]

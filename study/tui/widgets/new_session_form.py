@@ -16,10 +16,9 @@ from textual.widgets import Button, Input, Label, Select, Static
 from study.session.views.archive_views import HomeView, SessionLine
 from study.session.views.participant_codes import code_problem, is_code, suggest_code
 from study.session.views.printable import replace_unprintable
+from study.session.views.resume_command import SIMULATED_DEVICE
 from study.tui.home_messages import BeginWanted
 
-SIMULATED_DEVICE = "simulated"
-"""Name of the simulated device; the list of devices adds that nothing moves."""
 PLACEHOLDER_OPTIONS = [("…", "")]
 """Entry of a list whose choices are not known yet; the list is disabled."""
 

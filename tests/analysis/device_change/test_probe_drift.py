@@ -9,6 +9,7 @@ from analysis.device_change.probe_drift import TimedProbe, find_drifts
 from analysis.device_change.probe_lines import compute_probe_lines, estimate_apparent_mass_kg
 from protocols.definition.probes import ProbeSettings
 from study.session.stimulus.probe_stimulus import make_probe_wave
+from tests.slow_instances import slow
 
 LEVELS_N = (0.2, 0.4, 0.8)
 WAVE = make_probe_wave(ProbeSettings(levels_n=LEVELS_N), 1000.0)
@@ -31,7 +32,7 @@ def session(drifting_device):
     return probes
 
 
-@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 21))])
+@pytest.mark.parametrize("seed", [1, *slow(*range(2, 21))])
 def test_where_nothing_changes_nothing_is_named(session, seed):
     assert find_drifts(session(seed), 1000) == ()
 

@@ -5,6 +5,7 @@ import pytest
 
 from analysis.diagnosis.balance.judged_law import find_family
 from tests.analysis.diagnosis.balance.invented_axis import make_recording
+from tests.slow_instances import slow
 
 RATE_HZ, STEPS = 250.0, 20
 MASS_KG, DAMPING_N_S_PER_M, GAINS = 0.4, 0.3, (400.0, 25.0)
@@ -38,7 +39,7 @@ def simulate_motor(friction_n, dead_band_n, seed):
     return make_recording(command[:, None], position[:, None], RATE_HZ)
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
+@pytest.mark.parametrize("seed", [0, *slow(1, 2)])
 def test_friction_that_holds_a_motor_between_its_moves_is_no_dead_band(find_balance, seed):
     (balance,) = find_balance(simulate_motor(LEVEL_N, 0.0, seed))
     (named,) = balance.named
@@ -46,7 +47,7 @@ def test_friction_that_holds_a_motor_between_its_moves_is_no_dead_band(find_bala
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
+@pytest.mark.parametrize("seed", [0, *slow(1, 2)])
 def test_a_dead_band_beside_which_the_motor_coasts_is_no_friction(find_balance, seed):
     (balance,) = find_balance(simulate_motor(0.0, LEVEL_N, seed))
     assert not [law for law in balance.named if law.law.effect != "force_deadband"]

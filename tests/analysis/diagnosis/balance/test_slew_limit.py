@@ -7,6 +7,7 @@ import pytest
 
 from analysis.diagnosis.balance.command_laws import make_slew_laws
 from analysis.diagnosis.settings import SLEW_REACHED
+from tests.slow_instances import slow
 
 RATE_HZ, SPEED = 50.0, 1.5
 
@@ -32,7 +33,7 @@ def record_follower(record_samples):
     return recording
 
 
-@pytest.mark.parametrize("offset_m", [-10.0, *(pytest.param(m, marks=pytest.mark.slow) for m in (0.0, 1.5))])
+@pytest.mark.parametrize("offset_m", [-10.0, *slow(0.0, 1.5)])
 def test_the_limit_is_named_with_its_speed(offset_m, record_follower, find_balance):
     """Around any place: a servo of 0 to 180 degrees is centred at 90."""
     given = record_follower(SPEED)

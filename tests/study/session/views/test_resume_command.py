@@ -1,7 +1,7 @@
 """The command that continues a session names the device, unless the command takes it anyway."""
 
 from study.devices.opening import SIMULATED
-from study.session.views.resume_command import DEFAULT_DEVICE, format_resume_command
+from study.session.views.resume_command import SIMULATED_DEVICE, format_resume_command
 
 
 def test_a_real_device_is_named():
@@ -10,4 +10,4 @@ def test_a_real_device_is_named():
 
 def test_the_default_device_is_left_out():
     assert format_resume_command("data/P01_001", SIMULATED) == "hapteq resume data/P01_001"
-    assert DEFAULT_DEVICE == SIMULATED
+    assert SIMULATED_DEVICE == SIMULATED

@@ -19,6 +19,7 @@ from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
 from study.workflows.checks.daily_check import compare_recordings
 from study.workflows.recording.record_device import RecordingPlan, make_recording_settings, record_on_device
+from tests.slow_instances import slow
 
 NEW = Omega3Parameters()
 CENTRE_M = (0.0, 0.0, 0.0)
@@ -58,9 +59,7 @@ def test_another_day_of_the_same_device_passes(recorded, seeds):
     assert [seed for seed in seeds if changed(baseline, recorded(seed))] == []
 
 
-@pytest.mark.parametrize(
-    "kind", ["friction", "noise", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("gain", "response"))]
-)
+@pytest.mark.parametrize("kind", ["friction", "noise", *slow("gain", "response")])
 def test_what_changed_at_the_device_is_named(recorded, kind):
     found = changed(recorded(1), recorded(2, WORN[kind]))
     assert kind in found

@@ -29,6 +29,7 @@ from study.workflows.equalizer.repeat_playback import repeat_playback
 from study.workflows.equalizer.repeat_results import RepeatPlan, read_earlier_forces
 from study.workflows.files.validate import validate_file
 from study.workflows.recording.record_device import RecordingPlan, record_device
+from tests.slow_instances import slow
 
 BAND_HZ = (5.0, 35.0)
 SETTINGS = DeviceSettings(
@@ -80,7 +81,7 @@ def unheard(play: int, share: float) -> None:
     """Progress that is not shown."""
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 5))])
+@pytest.mark.parametrize("seed", [0, *slow(*range(1, 5))])
 def test_ten_repeats_bring_the_error_near_the_noise(plan, seed):
     found = repeat_playback(replace(plan, seed=seed), unheard)
     assert len(found.errors) <= 11
@@ -177,7 +178,7 @@ def test_a_play_that_was_limited_is_not_learnt_from(plan):
         repeat_playback(replace(slow, settings=tight), unheard)
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 3))])
+@pytest.mark.parametrize("seed", [0, *slow(*range(1, 3))])
 def test_corrections_never_reach_the_slew_limit(plan, seed):
     first = repeat_playback(replace(plan, repeats=1), unheard).plays[0].recording.excitation.samples
     steepest = 1000 * float(np.linalg.norm(np.diff(first, axis=0), axis=1).max())

@@ -9,6 +9,7 @@ from study.errors import StudyError
 from study.importing.map_format.map_errors import MapNeededError
 from study.workflows.recording.import_recording import read_foreign
 from tests.drawn_tables import draw_table
+from tests.slow_instances import slow
 
 
 def read_or_refuse(path, drawn):
@@ -29,7 +30,7 @@ def read_or_refuse(path, drawn):
     return True
 
 
-@pytest.mark.parametrize("begin", [0, 50, *(pytest.param(at, marks=pytest.mark.slow) for at in range(100, 250, 50))])
+@pytest.mark.parametrize("begin", [0, 50, *slow(*range(100, 250, 50))])
 def test_a_table_of_any_layout_is_read_right_or_refused(tmp_path, begin):
     seen = Counter()
     for seed in range(begin, begin + 50):

@@ -17,6 +17,7 @@ from study.store.formats.recording_file import read_recording
 from study.workflows.diagnosis.write_twin import TwinPlan, write_twin
 from study.workflows.recording.play_pieces import MOST_TAKES
 from study.workflows.recording.record_device import RecordingPlan, record_device, record_on_device
+from tests.slow_instances import slow
 
 SWEEP = SweepSegment("sweep", 5.0, 30.0, 1.0, "x", duration_s=0.5)
 MULTISINE = MultisineSegment("multisine", 5.0, 30.0, 1.0, "all", 1.0, realisations=3, role="test")
@@ -231,7 +232,7 @@ def test_the_written_stiffness_is_the_springs_also_without_one(tmp_path):
 
 SHIPPED = (
     "sweep",
-    *(pytest.param(name, marks=pytest.mark.slow) for name in ("multisine", "sweep_band", "sweep_study", "sweep_hand")),
+    *slow("multisine", "sweep_band", "sweep_study", "sweep_hand"),
 )
 
 

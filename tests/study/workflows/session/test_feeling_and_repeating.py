@@ -13,6 +13,7 @@ from study.workflows.results.fold_session import fold_session
 from study.workflows.session.conduct_session import conduct_new
 from study.workflows.session.rehearse_study import Rehearsal, rehearse_study
 from study.workflows.session.simulated_participant import make_simulated_participant
+from tests.slow_instances import slow
 
 
 def conducted(sitter, observer, seed=11):
@@ -44,7 +45,7 @@ def test_the_same_seed_feels_the_same(sitter):
     assert [(t.level_n, t.answer) for t in conducted(sitter, "delivered").state.trials] == first
 
 
-@pytest.mark.parametrize("seed", [11, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (12, 13))])
+@pytest.mark.parametrize("seed", [11, *slow(12, 13)])
 def test_who_asks_again_when_unsure_is_flagged_and_within_the_limit(sitter, seed):
     state = conducted(sitter, "repeating", seed).state
     tested = [t for t in state.trials if t.phase is Phase.TEST]
@@ -58,7 +59,7 @@ def test_who_asks_again_when_unsure_is_flagged_and_within_the_limit(sitter, seed
     [
         "ideal",
         "guesser",
-        *(pytest.param(observer, marks=pytest.mark.slow) for observer in ("lapsing", "criterion_drift")),
+        *slow("lapsing", "criterion_drift"),
     ],
 )
 def test_who_asks_for_nothing_is_not_flagged(sitter, observer):
