@@ -193,8 +193,15 @@ def _search(
         from analysis.diagnosis.discovery.add_laws import LawSearch
 
         laws = LawSearch(progress, settings.time_left)
+
+        def explain_before_third_effect(pair_result: SearchResult) -> SearchResult:
+            """Try rattling play, then laws."""
+            with_play = impacts.explain_before_third_effect(pair_result)
+            is_unchanged = with_play.found is pair_result.found
+            return _skip_with_hum(laws.add_before_third)(pair_result) if is_unchanged else with_play
+
         law_searches = FurtherSearches(
-            _skip_with_hum(laws.add_short), impacts.explain_before_third_effect, _skip_with_hum(laws.add_any)
+            _skip_with_hum(laws.add_short), explain_before_third_effect, _skip_with_hum(laws.add_any)
         )
     result = search_effects(context, catalogue, progress, settings.time_left, law_searches)
     # A model that was fitted to the recordings has no calibration, hence no bound to widen.

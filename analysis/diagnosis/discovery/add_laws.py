@@ -5,6 +5,7 @@ replace the named effects if they pass the checks of `validation` on held-out da
 unconfirmed candidates, with the reasons. The search itself is `discover`; its equations are in the package's docstring.
 """
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -59,6 +60,11 @@ class LawSearch:
             if discovery is not None and is_short_description(discovery)
             else result
         )
+
+    def add_before_third(self, result: SearchResult) -> SearchResult:
+        """Add laws as `add_any`, where the two effects of `result`, which were not judged yet, leave a mismatch."""
+        is_explained = result.judgement.named or judge(result.found).verdict == "explained"
+        return result if is_explained else self.add_any(result)
 
     def add_any(self, result: SearchResult) -> SearchResult:
         """The result with discovered laws in place of its named effects. Unchanged where it needs no law or no law is
@@ -200,10 +206,16 @@ def _compute_held_out_log_error(candidate: FittedCandidate) -> float:
 
 
 def _list_rivals(context: SearchContext, catalogue_explanation: Explanation) -> list[FittedCandidate]:
-    """Rivals of the laws from the catalogue: the explanation with its named effects, and the best single effect."""
+    """Rivals of the laws from the catalogue: the explanation with its named effects, and the best single effect that
+    does not contain an excluded one (`SearchContext.excluded`), for which it would stand."""
     rivals = [catalogue_explanation.after] if catalogue_explanation.steps else []
-    if catalogue_explanation.rounds and catalogue_explanation.rounds[0]:
-        rivals.append(context.with_test_score(catalogue_explanation.rounds[0][0]))
+    single_effects = catalogue_explanation.rounds[0] if catalogue_explanation.rounds else ()
+    nameable_effects = (
+        candidate
+        for candidate in single_effects
+        if not context.excluded.intersection(candidate.fitted.hypothesis.claims[-1].effect.simpler)
+    )
+    rivals += [context.with_test_score(candidate) for candidate in itertools.islice(nameable_effects, 1)]
     return rivals
 
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from analysis.diagnosis.discovery.fit_sum import Sum
-from analysis.diagnosis.discovery.grammar import AXES
+from analysis.diagnosis.discovery.grammar import AXES, CONSTANT
 from analysis.diagnosis.errors.hypothesis import Hypothesis, combine_hypotheses
 from analysis.diagnosis.errors.law_hypothesis import hypothesis_of_law
 from equalizer.effects.discovered_law import collect_channels, derive_axis_letters, has_memory, list_response_signals
@@ -19,8 +19,9 @@ from equalizer.signals.recording import Recording
 
 _PARAMETER_PATTERN = re.compile(r"\bp(\d+)\b")
 """Pattern of a free parameter, such as p0, in the formula of a term."""
-_SIGNAL_PATTERN = re.compile(rf"\b([vfa]?)([{AXES}])\b")
-"""Pattern of a signal in the grammar's names: position x, velocity vx, command fx, reading (response) ax."""
+_SIGNAL_PATTERN = re.compile(rf"\b(v|f|a|dv|)([{AXES}])\b")
+"""Pattern of a signal in the grammar's names: position x, velocity vx, acceleration dvx, command fx, reading (response)
+ax."""
 
 
 def convert_sum_to_law(term_sum: Sum, recording: Recording) -> Law:
@@ -34,18 +35,22 @@ def convert_sum_to_law(term_sum: Sum, recording: Recording) -> Law:
     for term, factor in zip(term_sum.terms, term_sum.factors, strict=True):
         first_index = len(parameters)
         parameters += [factor, *term.numbers]
-        term_formulas.append(f"p{first_index}*{_renumber_parameters(term.shape, first_index + 1)}")
+        shape = _renumber_parameters(term.shape, first_index + 1)
+        term_formulas.append(f"p{first_index}" if shape == CONSTANT else f"p{first_index}*{shape}")
 
     def use_recording_name(match: re.Match[str]) -> str:
         axis_index = AXES.index(match[2])
-        return reading_names[axis_index] if match[1] == "a" else match[1] + axis_names_in_law[axis_index]
+        if match[1] == "a":
+            return reading_names[axis_index]
+        return match[1].replace("dv", "a") + axis_names_in_law[axis_index]
 
     formula = _SIGNAL_PATTERN.sub(use_recording_name, " + ".join(term_formulas))
     if term_sum.acts_on == "response":
         axis_name = derive_axis_letters(channels.outputs)[term_sum.axis]
         return Law(f"{reading_names[term_sum.axis]} + {formula}", tuple(parameters), (), "response", axis_name)
     law = Law(formula, tuple(parameters), (), "force", axis_names_in_law[term_sum.axis])
-    if all(name.startswith("f") for name in term_sum.variables) and not has_memory(law):
+    is_of_commands = bool(term_sum.variables) and all(name.startswith("f") for name in term_sum.variables)
+    if is_of_commands and not has_memory(law):
         return replace(law, expression=f"f{axis_names_in_law[term_sum.axis]} + {formula}", acts_on="command")
     return law
 

@@ -16,7 +16,7 @@ from analysis.diagnosis.discovery.antisymmetric_pairs import (
 from analysis.diagnosis.discovery.beam import search_best_sums
 from analysis.diagnosis.discovery.evaluate_shape import evaluate_shape
 from analysis.diagnosis.discovery.fit_laws import fit_sums, put_simplest_first, run_within_time
-from analysis.diagnosis.discovery.fit_sum import Sum
+from analysis.diagnosis.discovery.fit_sum import Sum, fit_constant
 from analysis.diagnosis.discovery.grammar import AXES
 from analysis.diagnosis.discovery.matched_filter import View, build_views
 from analysis.diagnosis.discovery.screen_terms import build_normal_equations, cross_validate_terms
@@ -37,6 +37,7 @@ from analysis.diagnosis.settings import (
     LAW_FITTED,
     LAW_FITTED_WITHIN,
     LAW_MOST_ROUNDS,
+    LAW_WORTH_SHARE,
     NOISE_ALONE,
 )
 from analysis.diagnosis.types import Progress, TimeBudget
@@ -152,6 +153,7 @@ def _find_next_law(context: SearchContext, base_fit: Fitted, time_left: TimeBudg
                 if not _cancels_command(view, candidate_sum)
             ),
             *find_antisymmetric_pairs(views),
+            *_find_constant_forces(views),
         ),
         key=lambda candidate_sum: _compute_explained_squares(views, candidate_sum),
         reverse=True,
@@ -176,6 +178,19 @@ def _find_next_law(context: SearchContext, base_fit: Fitted, time_left: TimeBudg
         placebo,
         time_left(),
     )
+
+
+def _find_constant_forces(views: Sequence[View]) -> list[Sum]:
+    """Constant forces that remove a noticeable share of the error of an axis. All axes are tested, because no view's
+    excess error shows a constant, which each regression contains."""
+    constants = [fit_constant(view) for view in views if view.acts_on == "force"]
+    return [
+        constant
+        for constant in constants
+        if constant is not None
+        and constant.base_error > LAW_ALMOST_NOISE
+        and constant.base_error - constant.cross_validated > LAW_WORTH_SHARE * (constant.base_error - 1)
+    ]
 
 
 def _may_explain_alone(best_sum: Sum) -> bool:

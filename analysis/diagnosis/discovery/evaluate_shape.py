@@ -24,13 +24,15 @@ _NUMPY_FUNCTIONS: Mapping[str, Callable[..., FloatArray]] = {
 
 
 def name_signals(evidence: Evidence) -> Columns:
-    """Name the signals (n,) as the grammar does, in SI units: position x, velocity vx and command fx of the first
-    axis, ax of the first response channel as the model predicts it (free of noise), and so on; time t in s."""
+    """Name the signals (n,) as the grammar does, in SI units: position x, velocity vx, acceleration dvx and command fx
+    of the first axis, ax of the first response channel as the model predicts it (free of noise), and so on; time t
+    in s."""
     n, m = evidence.command.shape
     columns = {"t": np.arange(n) / evidence.sample_rate_hz}
     for axis, name in zip(range(m), AXES, strict=False):
         columns[name] = evidence.axis_position[:, axis]
         columns[f"v{name}"] = evidence.axis_velocity[:, axis]
+        columns[f"dv{name}"] = np.gradient(evidence.axis_velocity[:, axis]) * evidence.sample_rate_hz
         columns[f"f{name}"] = evidence.command[:, axis]
     columns |= {f"a{name}": channel for name, channel in zip(AXES, evidence.predicted.T, strict=False)}
     return {name: np.ascontiguousarray(column) for name, column in columns.items()}

@@ -12,12 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.discovery.evaluate_shape import evaluate_shape
-from analysis.diagnosis.discovery.grammar import Term
+from analysis.diagnosis.discovery.grammar import CONSTANT, Term
 from analysis.diagnosis.discovery.matched_filter import View
 from analysis.diagnosis.discovery.screen_terms import (
     NormalEquations,
     Solution,
     add_columns,
+    build_normal_equations,
     cross_validate_terms,
     solve_all_blocks,
 )
@@ -91,6 +92,12 @@ def fit_sum(model_equations: NormalEquations, terms: Sequence[Term]) -> Sum | No
             break
     assert point.columns is not None
     return _score_sum(model_equations, point.terms, point.columns, solution)
+
+
+def fit_constant(view: View) -> Sum | None:
+    """Fit a constant force of a view, in place of that which all regressions contain. None as of `fit_sum`."""
+    columns_without = np.vstack([view.parameter_columns[:-1], np.zeros_like(view.residual)])
+    return fit_sum(build_normal_equations(replace(view, parameter_columns=columns_without)), (Term(CONSTANT),))
 
 
 def _score_sum(

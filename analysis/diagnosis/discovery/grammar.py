@@ -2,7 +2,8 @@
 
 A term is a shape times a factor; its free parameters (exponents, widths, time constants, pitches) start on a grid that
 spans the recording's travel, speed and duration. Forces linear in an axis's own motion are not terms: mass, damping and
-stiffness are parameters of the model. docs/diagnosis.md lists what the grammar contains and what it does not.
+stiffness are parameters of the model. Nor is a constant force, which each regression contains (`screen_terms`).
+docs/diagnosis.md lists what the grammar contains and what it does not.
 """
 
 import re
@@ -15,9 +16,12 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 
 Columns = Mapping[str, FloatArray]
-"""Along a recording, (n,) each, SI: x, y, z and vx, … the axes' motion, fx, … the commands, ax, … the readings, t."""
+"""Along a recording, (n,) each, SI: x, y, z, vx, … and dvx, … (accelerations) the axes' motion, fx, … the commands, ax,
+… the readings, t."""
 AXES = "xyz"
-_SIGNAL = re.compile(rf"\b(?:[vfa]?[{AXES}]|t)\b")
+_SIGNAL = re.compile(rf"\b(?:(?:v|f|a|dv)?[{AXES}]|t)\b")
+CONSTANT = "1"
+"""Shape of a constant force."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +101,7 @@ def measure_axes(columns: Columns, count: int) -> tuple[Axis, ...]:
 
 
 def list_terms(axes: Sequence[Axis], axis_index: int, duration_s: float, rate_hz: float) -> tuple[Term, ...]:
-    """All terms of a force along one axis, except the periodic ones (`find_periodic_terms`). axes: as of
+    """All terms of a force along one axis, except the periodic ones (`periodic_terms`). axes: as of
     `measure_axes`. axis_index: the force's axis. duration_s: length of the recording."""
     own_axis, other_axes = axes[axis_index], [axis for index, axis in enumerate(axes) if index != axis_index]
     terms = (
@@ -105,6 +109,7 @@ def list_terms(axes: Sequence[Axis], axis_index: int, duration_s: float, rate_hz
         *_generate_saturation_terms(own_axis), *_generate_pole_terms(own_axis),
         *_generate_memory_terms(own_axis, other_axes, duration_s, rate_hz),
         *_generate_cross_axis_terms(own_axis, other_axes), *_generate_drift_terms(own_axis, duration_s),
+        *_generate_inertia_terms(own_axis, other_axes),
     )  # fmt: skip
     return tuple(terms)
 
@@ -148,7 +153,8 @@ def _generate_hinge_terms(axis: Axis) -> Iterator[Term]:
 
 
 def _generate_saturation_terms(axis: Axis) -> Iterator[Term]:
-    """Saturating and peaked functions of velocity or position, with a free width, and soft limits of the command."""
+    """Saturating and peaked functions of velocity or position with a free width, dry friction that falls with the
+    speed, and limits of the command, soft or with an edge."""
     for (signal_name, magnitude), share in product(
         ((axis.v, axis.speed), (axis.x, axis.travel)), (0.03, 0.1, 0.3, 1.0)
     ):
@@ -158,7 +164,13 @@ def _generate_saturation_terms(axis: Axis) -> Iterator[Term]:
         yield Term(f"{signal_name}/(1 + abs({signal_name})/p0)", *width)
         yield Term(f"{signal_name}/(1 + ({signal_name}/p0)**2)", *width)
         yield Term(f"{signal_name}*exp(-({signal_name}/p0)**2)", *width)
+    for share in (0.01, 0.03, 0.1, 0.3):
+        width = (share * axis.speed,), ((1e-3 * axis.speed, 10 * axis.speed),)
+        yield Term(f"sign({axis.v})*exp(-abs({axis.v})/p0)", *width)
+        yield Term(f"sign({axis.v})*exp(-({axis.v}/p0)**2)", *width)
     yield from generate_soft_limit_terms(axis.f, axis.force)
+    for share in (0.3, 0.5, 0.7, 0.9):
+        yield Term(f"maximum(abs({axis.f}) - p0, 0)*sign({axis.f})", (share * axis.force,), ((0.0, axis.force),))
 
 
 def generate_soft_limit_terms(name: str, magnitude: float) -> Iterator[Term]:
@@ -224,75 +236,20 @@ def _generate_cross_axis_terms(own_axis: Axis, other_axes: Sequence[Axis]) -> It
         yield Term(f"sqrt({squared_speeds})*{v}")
 
 
+def _generate_inertia_terms(own_axis: Axis, other_axes: Sequence[Axis]) -> Iterator[Term]:
+    """Inertia that changes with the position q as m(q) = m0 + c q or m0 + c q², by Lagrange's equation
+    m(q) dv/dt + m'(q) v²/2 = F; that of the own axis may depend on another axis's position, whose speed then enters,
+    and that of another axis on the own position."""
+    x, v = own_axis.x, own_axis.v
+    for shape in (f"({x}*d{v} + {v}**2/2)", f"({x}**2*d{v} + {x}*{v}**2)", f"{x}*d{v}"):
+        yield Term(shape)
+    for other_axis in other_axes:
+        y, w = other_axis.x, other_axis.v
+        for shape in (f"({y}*d{v} + {w}*{v})", f"({y}**2*d{v} + 2*{y}*{w}*{v})", f"{x}*d{w}", f"{y}*d{w}"):
+            yield Term(shape)
+
+
 def _generate_drift_terms(axis: Axis, duration_s: float) -> Iterator[Term]:
     """Stiffness, damping, gain or force that changes linearly with time."""
     yield from (Term(f"{signal_name}*t") for signal_name in (axis.x, axis.v, axis.f))
     yield Term("t")
-
-
-def find_periodic_terms(
-    columns: Columns, own_axis: Axis, missing_force: FloatArray, rate_hz: float
-) -> tuple[Term, ...]:
-    """Sines of position with a free pitch, alone or times command or velocity, and sines of time with a free frequency,
-    times position, velocity or command. They start at the strongest spectral lines of `missing_force` (n,); pitches of
-    1/12 of the travel or more, which hardly make a line, also start on a grid. No pitch exceeds the travel."""
-    x = columns[own_axis.x]
-    stride = max(len(x) // 8000, 1)
-    wave_numbers = np.arange(1.0, 40.0, 0.175) / own_axis.travel
-    phasors = np.exp(-2j * np.pi * np.outer(x[::stride], wave_numbers)).astype(np.complex64)
-    terms = []
-    travel = float(np.ptp(x))
-    for weight_signal, wave_count, phase in product(
-        ("", own_axis.f, own_axis.v), np.geomspace(1.0, 12.0, 13).tolist(), (0.0, np.pi / 2)
-    ):
-        pitch = travel / wave_count
-        terms.append(
-            _build_sine_term(weight_signal, f"{own_axis.x}/p0", pitch, (0.5 * pitch, min(2 * pitch, travel)), phase)
-        )
-    for weight_signal in ("", own_axis.f, own_axis.v):
-        weight = columns[weight_signal] if weight_signal else np.ones_like(x)
-        lines = (missing_force * weight)[::stride].astype(np.complex64) @ phasors
-        for line_index in _find_peaks(np.abs(lines), 2):
-            pitch = 1 / float(wave_numbers[line_index])
-            bounds = (0.5 * pitch, min(2 * pitch, travel))
-            terms.append(
-                _build_sine_term(
-                    weight_signal, f"{own_axis.x}/p0", pitch, bounds, _compute_sine_phase(lines[line_index])
-                )
-            )
-    for weight_signal in (own_axis.x, own_axis.v, own_axis.f):
-        padded_length = 4 * len(x)  # Zero-padded: a start half a line off is out of phase by the end.
-        lines = np.fft.rfft(missing_force * columns[weight_signal], padded_length)
-        lines[: int(_SLOWEST_LINE_HZ * padded_length / rate_hz) + 1] = 0
-        line_index = int(np.argmax(np.abs(lines)))
-        line_hz = max(line_index, 1) * rate_hz / padded_length
-        terms.append(
-            _build_sine_term(
-                weight_signal, "p0*t", line_hz, (0.8 * line_hz, 1.2 * line_hz), _compute_sine_phase(lines[line_index])
-            )
-        )
-    return tuple(terms)
-
-
-_SLOWEST_LINE_HZ = 0.1
-"""Frequency (Hz) up to which lines in time are not searched: drifts are terms of their own."""
-
-
-def _build_sine_term(
-    weight: str, argument: str, start_value: float, bounds: tuple[float, float], start_phase: float
-) -> Term:
-    """A sine times a weight (empty: alone). argument: formula of the cycles, with p0 in it; start_value and bounds: of
-    p0; start_phase: of p1, rad."""
-    shape = f"sin(2*pi*{argument} + p1)"
-    return Term(f"{weight}*{shape}" if weight else shape, (start_value, start_phase), (bounds, (-20.0, 20.0)), (), (1,))
-
-
-def _compute_sine_phase(spectral_line: complex) -> float:
-    """Phase (rad) of a sine from its complex Fourier coefficient, whose angle is that of a cosine."""
-    return float(np.angle(spectral_line) + np.pi / 2)
-
-
-def _find_peaks(power: FloatArray, max_count: int) -> list[int]:
-    """Indices of the largest local maxima of a spectrum (lines,), over two neighbours on each side; largest first."""
-    peaks = [k for k in range(2, len(power) - 2) if power[k] == power[k - 2 : k + 3].max()]
-    return sorted(peaks, key=lambda k: -power[k])[:max_count]

@@ -16,7 +16,6 @@ from analysis.diagnosis.discovery.grammar import (
     POWER_BOUNDS,
     Columns,
     Term,
-    find_periodic_terms,
     format_even_power,
     format_odd_power,
     generate_soft_limit_terms,
@@ -24,6 +23,7 @@ from analysis.diagnosis.discovery.grammar import (
     measure_axes,
 )
 from analysis.diagnosis.discovery.matched_filter import View
+from analysis.diagnosis.discovery.periodic_terms import find_periodic_terms
 
 
 def list_view_terms(view: View) -> tuple[Term, ...]:

@@ -2,9 +2,8 @@
 
 Called by `search_by_simulation`; with reference recordings of the intact device by `reference.search_with_reference`.
 
-1. Forward selection (`add_effects`) uses the samples to fit and to choose by. After a second effect was found, the
-   first may be exchanged for another of its family; after the last, for any effect that fits better
-   (`revise_selection`).
+1. Forward selection (`add_effects`) uses the samples to fit and to choose by. After a second effect, the first may be
+   exchanged for another of its family; after the last, for any effect that fits better (`revise_selection`).
 2. Backward elimination (`prune`) removes effects without which the others, refitted, fit as well; effects that remove
    too little of the mismatch; and effects whose parameters the data do not determine (`identifiability`: the interval,
    or the profile likelihood, of the only amplitude contains zero).
@@ -14,9 +13,9 @@ Called by `search_by_simulation`; with reference recordings of the intact device
    of them is opened, that is, used to fit and to choose by, and the search repeated: all but the loudest segments; else
    the first half of each stretch, or every other of more parts. The part still held out must confirm what this finds.
 5. Where the catalogue leaves a mismatch, `FurtherSearches` is called (laws outside it, `discovery`): before a second
-   effect is searched for, because one law that explains everything is a shorter description than two effects, and at
-   the end. A law that was found early and leaves a part of the mismatch is kept where the rest of the search names
-   nothing. Before a third effect, rattling play is tried (`impacts`): no sum of effects predicts its waveform.
+   effect, because one law that explains everything is a shorter description than two effects; before a third, which
+   takes longer than laws; and at the end. An early law that leaves a part of the mismatch is kept where the rest of the
+   search names nothing. Rattling play (`impacts`), whose waveform no sum of effects predicts, comes before a third, too.
 6. Where a mismatch remains, or three effects are needed, and a parameter of the model is at its bound, the search is
    repeated with a wider bound (`repeat_with_wider_bound`): a model that was fitted to this device has absorbed missing
    physics as a bias. The new result is used if it explains what the first does not, or with fewer effects.
@@ -65,7 +64,7 @@ from analysis.diagnosis.search.verdict import (
     list_remarks,
     may_move_further,
 )
-from analysis.diagnosis.settings import EXPLAINED_ERROR, MOST_EFFECTS
+from analysis.diagnosis.settings import EXPLAINED_ERROR
 from analysis.diagnosis.types import Progress, TimeBudget
 from equalizer.effects.effect import Effect
 
@@ -94,7 +93,7 @@ class FurtherSearches:
     before_pairs: Callable[[SearchResult], SearchResult] = lambda result: result
     """Called before a second effect is searched for: names only what is a shorter description than two effects."""
     before_thirds: Callable[[SearchResult], SearchResult] = lambda result: result
-    """Called before a third effect is searched for: names only what explains all that two effects leave."""
+    """Called before a third effect is searched for. What explains the whole mismatch ends the search."""
     at_end: Callable[[SearchResult], SearchResult] = lambda result: result
     """Called after the last effect; also with opened held-out samples, where only these show the mismatch."""
 
@@ -107,7 +106,7 @@ def search_effects(
     further: FurtherSearches = FurtherSearches(),
 ) -> SearchResult:
     """Search for effects and judge the result (steps 1 to 5), with the model's own parameters within `Tuning.bound`."""
-    further = FurtherSearches(_guard_search(further.before_pairs), further.before_thirds, _guard_search(further.at_end))
+    further = FurtherSearches(*map(_guard_search, (further.before_pairs, further.before_thirds, further.at_end)))
     single = add_effects(context, catalogue, start_explanation(context, progress), progress, time_left, max_effects=1)
     first_result = SearchResult(context, single, Judgement("unexplained", False))
     if is_worth_searching(context, single, single.after) and judge(single).verdict != "explained":
@@ -115,14 +114,15 @@ def search_effects(
     is_explained = first_result.judgement.verdict == "explained"
     if is_explained and first_result.found.after.score.worst_channel <= EXPLAINED_ERROR:
         return first_result
-    # With excluded effects, a round that added none cannot be resumed, so that all effects are searched for at once.
-    pair = add_effects(context, catalogue, single, progress, time_left, MOST_EFFECTS if context.excluded else 2)
+    pair = add_effects(context, catalogue, single, progress, time_left, max_effects=2)
     pair = exchange_for_relatives(context, pair, catalogue, progress, time_left)
-    play_result = further.before_thirds(replace(first_result, found=pair))
-    if play_result.found is not pair:
-        return play_result
+    pair_result = further.before_thirds(replace(first_result, found=pair, unconfirmed=()))
+    if pair_result.found is not pair and pair_result.judgement.verdict == "explained":
+        return pair_result
+    candidates = pair_result.unconfirmed or first_result.unconfirmed
+    early_result = replace(first_result, unconfirmed=candidates) if pair_result.found is pair else pair_result
     result = _search_third_effect(context, pair, catalogue, progress, time_left, further.at_end)
-    return _choose_early_or_full(first_result, result)
+    return _choose_early_or_full(early_result, result)
 
 
 def repeat_with_wider_bound(
