@@ -15,7 +15,7 @@ Called by `search_by_simulation`; with reference recordings of the intact device
 5. Where the catalogue leaves a mismatch, `FurtherSearches` is called (laws outside it, `discovery`): before a second
    effect, because one law that explains everything is a shorter description than two effects; before a third, which
    takes longer than laws; and at the end. An early law that leaves a part of the mismatch is kept where the rest of the
-   search names nothing. Rattling play (`impacts`), whose waveform no sum of effects predicts, comes before a third, too.
+   search names nothing. Rattling play (`impacts`), whose waveform no sum of effects predicts, comes before it.
 6. Where a mismatch remains, or three effects are needed, and a parameter of the model is at its bound, the search is
    repeated with a wider bound (`repeat_with_wider_bound`): a model that was fitted to this device has absorbed missing
    physics as a bias. The new result is used if it explains what the first does not, or with fewer effects.
