@@ -68,6 +68,14 @@ def test_a_straight_line_stays_one():
     np.testing.assert_allclose(resample(samples, grid, "linear"), grid.compute_times_s() * 100, atol=1e-9)
 
 
+@pytest.mark.parametrize("count", [2, 3, 4, 5, 6])
+def test_few_uneven_samples_are_interpolated_by_a_lower_degree(count):
+    times_s = np.arange(count) / 100
+    samples = Samples(times_s, 3.0 + 200.0 * times_s, 0.0, 0.1)
+    grid = Grid(0.0, 200.0, 2 * count - 1)
+    np.testing.assert_allclose(resample(samples, grid, "band-limited"), 3 + 200 * grid.compute_times_s(), atol=1e-9)
+
+
 @pytest.mark.parametrize("method", ["held", "linear", "band-limited"])
 def test_a_missing_sample_stays_missing_and_its_neighbours_stay_there(method):
     values = sine(np.arange(400) / 1000, 10.0)
