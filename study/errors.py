@@ -1,4 +1,7 @@
-"""Errors that the screen and the command line show: what happened, what was saved, what to do now; and exit codes."""
+"""Exception classes whose texts are shown to the user (cause, saved data, remedy), and the exit codes of `hapteq`.
+
+Raised throughout `study`; shown by `study.cli.main` and by the screens of `study.tui`.
+"""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,7 +26,8 @@ class ExitCode(IntEnum):
 class StudyError(Exception):
     """Base class of errors that a user can act on.
 
-    `happened` and `do_now` are whole sentences; `saved` says which data are safe, where data could have been lost.
+    title: the error in a few words. happened: the cause; do_now: the remedy; saved: which data are safe, where data
+    could have been lost, else empty. All three are complete sentences.
     """
 
     exit_code = ExitCode.ERROR
@@ -36,7 +40,7 @@ class StudyError(Exception):
         self.do_now = do_now
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle by attributes: errors cross process boundaries, also those of a subclass with another constructor."""
+        """Pickle by attributes, because errors are sent between processes and subclasses have other constructors."""
         return _restore_error, (type(self), self.__dict__)
 
     def __str__(self) -> str:
@@ -44,39 +48,42 @@ class StudyError(Exception):
 
 
 class WrongUseError(StudyError):
-    """The command line requests something that is impossible."""
+    """A command line, file or setting is invalid."""
 
     exit_code = ExitCode.WRONG_USE
 
 
 class DeviceError(StudyError):
-    """The device cannot be used, or stopped working."""
+    """The device cannot be used, or failed during use."""
 
     exit_code = ExitCode.DEVICE
 
 
 class UserInterruptError(StudyError):
-    """Ctrl-C was pressed or the terminal was closed; the results so far are safe."""
+    """Ctrl-C was pressed or the terminal was closed."""
 
     exit_code = ExitCode.INTERRUPTED
 
 
 @contextmanager
-def resumable(happened: str, saved: str, further_types: tuple[type[UserInterruptError], ...] = ()) -> Iterator[None]:
-    """Context that turns Ctrl-C into a UserInterruptError which says that the same command continues the work.
-    further_types: (UserInterruptError,) where a part of the work raises its own error, which this error then
-    replaces."""
-    caught: tuple[type[BaseException], ...] = (KeyboardInterrupt, *further_types)
+def convert_interrupts(
+    happened: str, saved: str, further_types: tuple[type[UserInterruptError], ...] = ()
+) -> Iterator[None]:
+    """Context for resumable work that converts KeyboardInterrupt to a UserInterruptError whose remedy is to run the
+    same command again. happened, saved: as in `StudyError`. further_types: (UserInterruptError,) to replace the errors
+    that a part of the work raises at an interrupt, too."""
+    interruption_types: tuple[type[BaseException], ...] = (KeyboardInterrupt, *further_types)
     try:
         yield
-    except caught as interruption:
+    except interruption_types as interruption:
         raise UserInterruptError(
             "Interrupted", happened, "Run the same command again: it continues where it stopped.", saved
         ) from interruption
 
 
-def _restore_error(kind: type[StudyError], fields: dict[str, Any]) -> StudyError:
-    error = kind.__new__(kind)
+def _restore_error(error_type: type[StudyError], fields: dict[str, Any]) -> StudyError:
+    """Make an error of this class from its attributes (unpickling), without its constructor."""
+    error = error_type.__new__(error_type)
     error.__dict__.update(fields)
     error.args = (error.title,)
     return error

@@ -228,7 +228,7 @@ def sketched(monkeypatch) -> None:
         svg = f'<svg xmlns="http://www.w3.org/2000/svg" id="{picture.name}"><path d="M0 0L9 9"/></svg>'
         return svg, b"a sketch" if picture.bitmap else b""
 
-    monkeypatch.setattr("study.workflows.picture_files._draw_files", sketch)
+    monkeypatch.setattr("study.workflows.picture_files._render_files", sketch)
 
 
 @pytest.fixture

@@ -82,9 +82,9 @@ def _disturb(k, hold, garbage, state) -> None:
         if int(garbage[row, 0]) == k:
             state[int(garbage[row, 1])] = garbage[row, 2]
     if k < hold[3]:
-        state[cells.SIGN_OF_LIFE] = 1.0
+        state[cells.KEEP_ALIVE] = 1.0
     if k >= hold[4]:
-        state[cells.RELEASE_ASKED] = 1.0
+        state[cells.RELEASE_REQUEST] = 1.0
 
 
 def _play(tick, state, settings, loop, buffer, force, hold, matrix, offsets, late, garbage, world, log) -> int:

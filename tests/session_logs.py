@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from study.session.facts.log_chain import Chain, read_chained, write_chained
+from study.session.facts.log_chain import Chain, append_checksum, verify_checksum
 
 RESULTS = ("trials.csv", "thresholds.csv", "detection.csv", "session.json")
 
@@ -12,7 +12,7 @@ def events_of(log: Path) -> list[bytes]:
     """Each event's own JSON, without checksum and line end."""
     chain, events = Chain(), []
     for line in log.read_bytes().splitlines():
-        chain, event = read_chained(chain, line)
+        chain, event = verify_checksum(chain, line)
         events.append(event)
     return events
 
@@ -41,7 +41,7 @@ def forged(session: Path, change: Callable[[list[bytes]], list[bytes]]) -> None:
     """Events changed, and all checksums computed again; the seal is gone."""
     log, chain, text = session / "events.jsonl", Chain(), b""
     for event in change(events_of(log)):
-        chain, line = write_chained(chain, event)
+        chain, line = append_checksum(chain, event)
         text += line
     log.write_bytes(text)
     for path in session.glob("seal*.json"):

@@ -19,9 +19,9 @@ from study.devices.accelerometer.newest_sample import NewestSample
 from study.devices.device import DeviceInfo
 from study.devices.force_dimension.acceptance import Acceptance, write_acceptance
 from study.devices.force_dimension.connect import make_ready
+from study.devices.force_dimension.device_models import MODELS
 from study.devices.force_dimension.handle import Handle
 from study.devices.force_dimension.library import Library
-from study.devices.force_dimension.models import MODELS
 from study.devices.force_dimension.rig import ForceDimensionRig
 from study.devices.force_dimension.rigs import read_info
 

@@ -15,7 +15,7 @@ from study.session.facts.events import (
 from study.session.state.due_trial import PresentTrial
 from study.session.state.machine import Finish, TakeRest, find_next_action
 from study.session.watching.followed_session import FollowedSession, apply_followed_event, begin_watching
-from study.session.watching.live import Live
+from study.session.watching.live_state import Live
 from study.session.watching.make_watch_view import LiveInfo, make_watch_view
 from tests.session_facts import opened, presented
 

@@ -35,9 +35,9 @@ LARGEST_VALUE = 1e12  # SI; principle: far beyond any device, and its powers are
 # e-foldings of the free motion over the longest recording; principle: rounding errors stay far below it
 MOST_GROWTH = 1.0
 # standard deviations by which coherence must exceed that of noise alone for the device to respond
-ANSWER_DEVIATIONS = 5.0
+DRIVEN_DEVIATIONS = 5.0
 # coherence that must exceed noise by twice as many, else recordings are too short for a judgement
-ANSWER_COHERENCE = 0.5
+DRIVEN_COHERENCE = 0.5
 
 # How samples are split, and how well a model is trusted (`observe`). By hand.
 MODEL_FLOOR = 0.002  # share of a channel's rms that counts as noise; principle: no model is exact

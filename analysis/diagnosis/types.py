@@ -1,4 +1,4 @@
-"""Types that all folders of the diagnosis share: masks of samples, parallel maps, progress and time limits."""
+"""Type aliases that all packages of the diagnosis share: masks of samples, parallel maps, progress and time limits."""
 
 from collections.abc import Callable, Iterable
 
@@ -6,14 +6,14 @@ import numpy as np
 import numpy.typing as npt
 
 Mask = npt.NDArray[np.bool_]
-"""(n,): True at the samples, or at the lines of a spectrum, that count."""
+"""(n,): True at the samples, or at the lines of a spectrum, that are used."""
 
 Mapper = Callable[..., Iterable[object]]
-"""The built-in `map`, or a function with its arguments that works in parallel; results keep the order of the items."""
+"""The built-in `map`, or a parallel map with the same arguments; results are in the order of the items."""
 
 Progress = Callable[[str, float], None]
-"""Called with the current step in words, and the share of the whole work that is done, 0 to 1."""
+"""Progress callback: called with the current step in words and the completed share of the whole work, 0 to 1."""
 
 TimeBudget = Callable[[], bool]
-"""Time limit: called before each piece of a search. True = time is left; False ends the search, which keeps what it has
-found."""
+"""Time limit: called before each step of a search. True = time remains; False ends the search with the best result so
+far."""

@@ -115,7 +115,7 @@ def _make_confusion_picture(singles: Sequence[Outcome]) -> Picture:
     """Draw the confusion matrix of the detectable single effects: concealed effect (rows) against the first named
     (columns)."""
     detectable = [outcome for outcome in singles if outcome.detectable]
-    answers = [outcome.named_names[0] if outcome.named else NO_NAME_COLUMN for outcome in detectable]
+    answers = [outcome.named_effect_names[0] if outcome.named else NO_NAME_COLUMN for outcome in detectable]
     pairs = [(outcome.names[0], answer) for outcome, answer in zip(detectable, answers, strict=True)]
     names = sorted({true for true, _ in pairs} | {answer for _, answer in pairs if answer != NO_NAME_COLUMN})
     columns = [*names, NO_NAME_COLUMN]

@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from analysis.diagnosis.types import Mask
-from analysis.figures.picture import Picture, count_in_samples
+from analysis.figures.picture import Picture, convert_to_sample_units
 from analysis.figures.style import BLACK, BLUE, COLOURS, GREY, MARKERS, ORANGE, SKY, create_figure, style_axes
 from analysis.look.channels import Channel
 from analysis.look.kinematics import KinematicPair, differentiate
@@ -44,7 +44,7 @@ def make_look_pictures(overview: Overview, number: int) -> tuple[Picture, ...]:
         pictures.append(_make_levels_picture(overview, f"levels-{number}"))
     if overview.pairs:
         pictures.append(_make_derivatives_picture(overview, f"derivatives-{number}"))
-    return tuple(pictures if overview.recording.is_timed else map(count_in_samples, pictures))
+    return tuple(pictures if overview.recording.is_timed else map(convert_to_sample_units, pictures))
 
 
 def _make_channel_panels(overview: Overview, height_in: float) -> tuple[Figure, list[Axes]]:

@@ -1,7 +1,7 @@
 """A Matplotlib figure with its name, title, caption and alternative text, and its rendering as inline SVG.
 
-Reports embed the SVG in their HTML page, and the same SVG is written as a file. The text of the SVG is the same in
-every run: it holds no date, and its ids are derived from the picture's name.
+Reports embed the SVG in their HTML page (`analysis.reports.page`), and `study.workflows.picture_files` writes the same
+SVG as a file. The SVG is reproducible: it contains no date, and its ids are derived from the picture's name.
 """
 
 import io
@@ -17,13 +17,13 @@ from analysis.wording import replace_time_units
 
 
 def render_inline_svg(figure: Figure, name: str, title: str, description: str = "") -> str:
-    """The figure as an <svg> element, with a title and a description for screen readers. The same figure gives the same
-    text.
+    """Render a figure as an <svg> element, with a title and a description for screen readers. The layout engine of the
+    figure is removed.
 
     name: letters, digits, hyphens; the prefix of every id, so that two figures on one page have no id in common.
     """
     buffer = io.StringIO()
-    # Text is not converted to outlines, so that it can be read aloud, searched and copied.
+    # Text is not converted to outlines, so that it can be searched, copied and read by screen readers.
     with matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
         _lay_out(figure)
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
@@ -42,19 +42,19 @@ def render_inline_svg(figure: Figure, name: str, title: str, description: str = 
 
 
 def _lay_out(figure: Figure) -> None:
-    """Execute the layout engine once, with the text widths of the SVG renderer, and remove it: `savefig` draws a figure
-    that has a layout engine twice."""
+    """Execute the layout engine once, with the text widths of the SVG renderer, and remove it, because `savefig` draws
+    a figure that has a layout engine twice."""
     engine = figure.get_layout_engine()
     if engine is not None and figure.axes:
-        resolution = figure.dpi
+        dpi = figure.dpi
         FigureCanvasSVG(figure)
         engine.execute(figure)
-        figure.dpi = resolution
+        figure.dpi = dpi
     figure.set_layout_engine(None)
 
 
 def _escape_markup(text: str) -> str:
-    """The text with the characters escaped that have a meaning in XML element content."""
+    """Escape the characters &, < and > of XML element content."""
     return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
@@ -68,7 +68,7 @@ class Picture:
     caption: str
     figure: Figure
     folded: bool = False
-    """Whether a report shows only the title until the reader opens the picture."""
+    """Whether a report shows only the title, and the picture after a click."""
     bitmap: bool = True
     """Whether the picture is also written as PNG. Diagnoses omit the PNG of their many folded pictures."""
     alternative: str = ""
@@ -79,20 +79,21 @@ class Picture:
 
 
 def render_picture_svg(picture: Picture) -> str:
-    """Draw a picture once and return it as inline SVG (see `render_inline_svg`)."""
+    """Return a picture as inline SVG (`render_inline_svg`); rendered at the first call only."""
     if not picture.rendered_svg:
         picture.rendered_svg.append(render_inline_svg(picture.figure, picture.name, picture.title, picture.alternative))
     return picture.rendered_svg[0]
 
 
 def remove_figure(picture: Picture) -> Picture:
-    """A copy of the picture with an empty figure and the SVG already drawn, which can be sent to another process."""
+    """Return a copy of the picture with an empty figure, so that it can be pickled for another process; an SVG that was
+    already rendered is kept."""
     return replace(picture, figure=Figure())
 
 
-def count_in_samples(picture: Picture) -> Picture:
-    """Replace seconds and hertz by units of samples in all texts, for a recording without known time. Texts of the
-    figure are changed in place. Call this function before the picture is drawn."""
+def convert_to_sample_units(picture: Picture) -> Picture:
+    """Replace seconds and hertz by units of samples in all texts, for a recording with unknown sample rate. Texts of
+    the figure are changed in place. To be called before the picture is rendered."""
     for text in picture.figure.findobj(Text):
         if isinstance(text, Text):
             text.set_text(replace_time_units(text.get_text()))

@@ -128,7 +128,7 @@ class Overview(SummaryDisplay):
                     )
                     for row in self.summaries
                 ),
-                *((check.level, check.seen) for check in notable_checks),
+                *((check.level, check.finding) for check in notable_checks),
             ),
         )
 
@@ -186,7 +186,7 @@ def _restate_in_samples(check: Check) -> Check:
     is unchanged."""
     if check.name == CLOCK:
         return check
-    return replace(check, seen=replace_time_units(check.seen), do=replace_time_units(check.do))
+    return replace(check, finding=replace_time_units(check.finding), advice=replace_time_units(check.advice))
 
 
 def _summarise_channel(channel: Channel) -> ChannelSummary:

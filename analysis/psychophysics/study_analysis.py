@@ -30,7 +30,7 @@ from analysis.psychophysics.repeated_measures import (
     analyse_repeated_measures,
     compute_friedman_test,
 )
-from analysis.psychophysics.repeated_trials import repeat_warning
+from analysis.psychophysics.repeated_trials import format_repeat_warning
 from analysis.psychophysics.runs import Run, recompute_runs
 from analysis.psychophysics.study_warnings import list_catch_and_detection_warnings, list_study_warnings
 from analysis.psychophysics.threshold_table import ThresholdTable, tabulate_thresholds
@@ -184,7 +184,7 @@ def analyse_study(trials: Sequence[Trial], protocol: StudyProtocol, left_out: Se
         compared=describe_comparison(primary, means, comparisons, table, rule),
         warnings=(
             *list_study_warnings(tested, rows, table, protocol),
-            *filter(None, [repeat_warning(trials), make_delivery_warning(compute_deliveries(tested)),
+            *filter(None, [format_repeat_warning(trials), make_delivery_warning(compute_deliveries(tested)),
                            *make_cue_warnings(cues, gaps)]),
             *list_catch_and_detection_warnings(catches, detection, table, detection_table),
         ),

@@ -133,7 +133,8 @@ def _make_miss_table(misses: Sequence[Outcome]) -> Table:
     rows = tuple(
         (
             str(miss.number), f"{miss.kind}, {miss.bank}", describe_concealed(miss), describe_strengths(miss) or "-",
-            describe_answer(miss), f"{miss.worst_error('retuned'):.2f}", f"{miss.worst_error('after'):.2f}",
+            describe_answer(miss),
+            f"{miss.compute_worst_error('retuned'):.2f}", f"{miss.compute_worst_error('after'):.2f}",
         )
         for miss in misses
     )  # fmt: skip

@@ -21,7 +21,7 @@ from equalizer.identification.frequency_response.frequency_response import Frequ
 from equalizer.identification.frequency_response.resonances import Resonance
 from equalizer.identification.state_space.order_report import OrderReport
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 
 CURVE_POINT_COUNT = 400
 """Number of frequencies, logarithmically spaced over the model's band, at which the model's response is drawn."""
@@ -56,7 +56,7 @@ def make_identification_pictures(findings: IdentificationFindings) -> tuple[Pict
     held-out error by model order (only with a comparison of orders)."""
     low_hz, high_hz = findings.model.band_hz
     curve_hz = np.geomspace(low_hz, high_hz, CURVE_POINT_COUNT)
-    model_curve = ResponseCurve("model", curve_hz, model_response(findings.model, curve_hz))
+    model_curve = ResponseCurve("model", curve_hz, compute_model_response(findings.model, curve_hz))
     pictures = [make_transfer_functions_picture(findings.estimate, model_curve, findings.model.band_hz)]
     if findings.bands:
         pictures.append(

@@ -38,7 +38,7 @@ def render_look_report(
             summary=f"{len(overviews)} recording{'s' if len(overviews) > 1 else ''}, before any model. "
             + " ".join(summarise_overview(overview) for overview in overviews[:3]),
             banner=f"{len(wrong_checks)} thing{'s' if len(wrong_checks) > 1 else ''} would mislead an analysis: "
-            f"{wrong_checks[0][1].seen}"
+            f"{wrong_checks[0][1].finding}"
             if wrong_checks
             else "",
             sections=tuple(sections),
@@ -84,7 +84,7 @@ def _make_recording_sections(
 
 def _make_check_table(checks: Sequence[Check]) -> Table:
     """Make the table of the checks with their level, result and advice."""
-    rows = tuple((check.name, check.level, check.seen, check.do) for check in checks)
+    rows = tuple((check.name, check.level, check.finding, check.advice) for check in checks)
     return Table("What was checked", ("Check", "Result", "Seen", "What to do"), rows)
 
 

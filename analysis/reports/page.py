@@ -1,6 +1,7 @@
-"""Data structure of a report, and its rendering as a single self-contained HTML page (template `page.html.j2`).
+"""Data classes of a report, and its rendering as a single self-contained HTML page (template `page.html.j2`).
 
-Figures are inline SVG, and all text is escaped, so that a page can be archived or sent as one file.
+Figures are inline SVG, so that a page can be archived or sent as one file. All text is escaped. Every module
+`analysis.reports.*_report` makes a `Page`.
 """
 
 from collections.abc import Mapping
@@ -14,15 +15,15 @@ from analysis.figures.picture import Picture, render_picture_svg
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """A table of a report. All cells are formatted text; the first column names the row."""
+    """A table of a report. All cells are formatted text; the first column contains the labels of the rows."""
 
     caption: str
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
-    """Sentences shown with the table."""
+    """Sentences shown below the table."""
     folded: bool = False
-    """Whether only the caption is shown until the reader opens it."""
+    """Whether only the caption is shown, and the table after a click."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,17 +45,17 @@ class Page:
     title: str
     summary: str
     banner: str
-    """Important warnings, shown at the top of the page; empty = none."""
+    """Important warning, shown at the top of the page; empty = none."""
     sections: tuple[Section, ...]
     generated: str
     """Local time at which the report was made, with the UTC offset."""
     provenance: Mapping[str, str] = field(default_factory=dict)
-    """Versions, hashes and inputs by name, shown at the end of the page."""
+    """Versions, hashes and inputs of the analysis by name, shown at the end of the page."""
 
 
 def render_page(page: Page) -> str:
-    """The page as HTML without references to other files. All text is escaped. Raises jinja2.UndefinedError where the
-    template uses a name that does not exist."""
+    """Render the page as HTML without references to other files. Raises jinja2.UndefinedError where the template uses a
+    name that does not exist."""
     environment = Environment(
         loader=PackageLoader("analysis.reports", "."),
         autoescape=True,
@@ -62,10 +63,10 @@ def render_page(page: Page) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template("page.html.j2").render(page=page, svg=_svg)
+    return environment.get_template("page.html.j2").render(page=page, svg=_render_inline_svg)
 
 
-def _svg(picture: Picture) -> Markup:
+def _render_inline_svg(picture: Picture) -> Markup:
     """Inline SVG of a picture, not escaped again."""
-    # Safe as markup: drawn by this program, and `render_inline_svg` escapes its title.
+    # Safe as markup: `render_inline_svg` escapes title and description, and Matplotlib the texts of the figure.
     return Markup(render_picture_svg(picture))

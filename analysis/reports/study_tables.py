@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 from analysis.psychophysics.bias import CRITERION_DEFINITION
 from analysis.psychophysics.ellipsoid import EllipsoidResult
-from analysis.psychophysics.repeated_trials import OFTEN_WORDS
+from analysis.psychophysics.repeated_trials import FREQUENT_WORDS
 from analysis.psychophysics.study_analysis import StudyAnalysis
 from analysis.psychophysics.thresholds import RunEnd, Threshold
 from analysis.psychophysics.two_analyses import describe_measured_coverage
@@ -244,7 +244,7 @@ def make_run_table(analysis: StudyAnalysis) -> Table:
             *([REVERSALS_NOTE] if by_reversals else []),
             f"m/s² and mm: as measured in {select_threshold_words(analysis.protocol.staircase).measured_in}.",
             f"At will: presentations that the participant made void (asked for again, paused, left, answered outside "
-            f"the time), with their share; ! {OFTEN_WORDS}.",
+            f"the time), with their share; ! {FREQUENT_WORDS}.",
             f"Criterion: {CRITERION_DEFINITION}.",
         ),
         folded=True,
@@ -258,7 +258,7 @@ def _format_threshold(row: Threshold) -> str:
 
 def _format_repeats(row: Threshold) -> str:
     """Format number and share of the presentations that the participant made void; "!" marks frequent ones
-    (`OFTEN_WORDS`)."""
+    (`FREQUENT_WORDS`)."""
     if not row.repeats_at_will:
         return "0"
     return f"{row.repeats_at_will} ({100 * row.repeat_rate:.1f} %){' !' * row.asked_often}"

@@ -21,7 +21,7 @@ from equalizer.effects.simulation.command_path import ActuatorForce
 from equalizer.effects.simulation.dry_friction_kernel import compute_friction_force
 from equalizer.effects.simulation.instant import F_END, V_FREE, V_PER_N, X_FREE, X_PER_N, X
 from equalizer.effects.simulation.mechanism_kernel import compile_law
-from equalizer.effects.simulation.sensor_path import low_pass
+from equalizer.effects.simulation.sensor_path import apply_low_pass
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.starting_values import compute_quadratic_form
 from equalizer.plant.linear_simulation import compute_driven_axes
@@ -162,7 +162,7 @@ def _simulate_excerpt(evidence: Evidence, axis: int, values: Values, excerpt: sl
     # Columns: positions, velocities, accelerations of the ports (axes, then the joint), response, its positions.
     port_count = bodies.ports.shape[1]
     response = outputs[:, 3 * port_count : 3 * port_count + evidence.model.outputs]
-    return low_pass(response, rate_hz, evidence.model.sensor.bandwidth_hz), outputs[:, port_count - 1]
+    return apply_low_pass(response, rate_hz, evidence.model.sensor.bandwidth_hz), outputs[:, port_count - 1]
 
 
 EFFECT = Effect(

@@ -4,7 +4,7 @@
 
 Without a measurement, a simulation draws the lost samples at random. With a measurement, the samples are lost for which
 the measured value is likelier under repetition than under the simulated value (likelihood ratio test, equation in
-`simulation.reading_kernel`).
+`simulation.logger_kernel`).
 """
 
 import math
@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
-from equalizer.effects.simulation.reading_kernel import Flags, repeat_as_measured, repeat_where
+from equalizer.effects.simulation.logger_kernel import BoolArray, repeat_likely_losses, repeat_lost_samples
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
@@ -35,7 +35,7 @@ def _lose_at_random(
     # Seeded with the length, so that the same samples are lost in every simulation of a recording.
     lost = np.random.default_rng(len(response)).random(len(response)) < values["fraction"]
     read, repeated = response.copy(), np.empty((len(response), len(channels)))
-    repeat_where(np.ascontiguousarray(response[:, channels]), lost, repeated)
+    repeat_lost_samples(np.ascontiguousarray(response[:, channels]), lost, repeated)
     read[:, channels] = repeated
     return read
 
@@ -55,11 +55,11 @@ def _lose_as_measured(
 
 def _repeat_by_likelihood(
     samples: FloatArray, measured: FloatArray, noise: FloatArray, fraction: float
-) -> tuple[FloatArray, Flags]:
+) -> tuple[FloatArray, BoolArray]:
     """Samples (n, c) after losses, and mask (n,) of the lost ones, by likelihood ratio with the prior odds of the
     fraction."""
     read, lost = np.empty(samples.shape), np.zeros(len(samples), dtype=np.bool_)
-    repeat_as_measured(
+    repeat_likely_losses(
         np.ascontiguousarray(samples),
         np.ascontiguousarray(measured),
         np.ascontiguousarray(noise),
@@ -85,14 +85,14 @@ def _lose_positions_as_measured(
     return _repeat_rows(position, lost | _is_clearly_repeated(position, measured))
 
 
-def _repeat_rows(position: FloatArray, lost: Flags) -> FloatArray:
+def _repeat_rows(position: FloatArray, lost: BoolArray) -> FloatArray:
     """Positions (n, p) with each lost row replaced by the last row that was not lost."""
     repeated = np.empty(position.shape)
-    repeat_where(np.ascontiguousarray(position), lost, repeated)
+    repeat_lost_samples(np.ascontiguousarray(position), lost, repeated)
     return repeated
 
 
-def _is_clearly_repeated(position: FloatArray, measured: FloatArray) -> Flags:
+def _is_clearly_repeated(position: FloatArray, measured: FloatArray) -> BoolArray:
     """Mask of the samples whose measured position is far nearer to the simulated position of the sample before than to
     their own, in units of the noise (1.4826 times the median absolute deviation)."""
     error = measured - position

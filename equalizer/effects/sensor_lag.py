@@ -2,7 +2,7 @@
 
     dy/dt = 2 pi f (x - y)        f: bandwidth (-3 dB) in Hz, used instead of the model's
 
-The sensor model applies it (`simulation.sensor_path.low_pass`, discrete at the sample rate).
+The sensor model applies it (`simulation.sensor_path.apply_low_pass`, discrete at the sample rate).
 """
 
 import math
@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
-from equalizer.effects.simulation.sensor_path import low_pass, undo_low_pass
+from equalizer.effects.simulation.sensor_path import apply_low_pass, undo_low_pass
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.effects.starts.response_starts import find_response_parameter
 from equalizer.signals.signal import FloatArray
@@ -39,7 +39,7 @@ def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...
     bandwidth = find_response_parameter(
         evidence,
         channel,
-        lambda samples, bandwidth_hz: low_pass(
+        lambda samples, bandwidth_hz: apply_low_pass(
             undo_low_pass(samples, sample_rate_hz, model_bandwidth_hz), sample_rate_hz, bandwidth_hz
         ),
         list(np.geomspace(LOWEST_BANDWIDTH_SHARE * sample_rate_hz, HIGHEST_BANDWIDTH_SHARE * sample_rate_hz, 10)),

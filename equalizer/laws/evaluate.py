@@ -1,14 +1,14 @@
-"""Evaluates a law along samples, with the compiled stack machine (`kernel`) that simulations use too.
+"""Evaluation of a law (a formula with memory operators) along sampled signals, by the compiled stack machine `kernel`.
 
-`evaluate`: signals are straight lines between samples, as measured motion. `evaluate_held`: signals are held over each
-step, as commands are.
+`evaluate`: signals are interpolated linearly between samples, as measured motion is. `evaluate_held`: signals are held
+over each step, as commands are. Called by the discovery of laws, the effects made of laws, and their compensation.
 """
 
 from collections.abc import Mapping
 
 import numpy as np
 
-from equalizer.laws.kernel import FROM_ZERO, run_along, run_along_held
+from equalizer.laws.kernel import FROM_ZERO, run_held, run_interpolated
 from equalizer.laws.law import Law
 from equalizer.laws.parse import LawError
 from equalizer.laws.program import Program, compile_program
@@ -25,7 +25,7 @@ def evaluate(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float)
     """
     program, signals = _bind_signals(law, columns, sample_rate_hz)
     value, memory = np.empty(len(signals)), np.zeros(program.memory)
-    run_along(program.with_numbers(law.numbers), signals, memory, 1 / sample_rate_hz, value)
+    run_interpolated(program.with_numbers(law.numbers), signals, memory, 1 / sample_rate_hz, value)
     return value
 
 
@@ -35,12 +35,13 @@ def evaluate_held(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: f
     program, signals = _bind_signals(law, columns, sample_rate_hz)
     values, memory = np.empty((2, len(signals))), np.zeros(program.memory)
     memory[0] = FROM_ZERO
-    run_along_held(program.with_numbers(law.numbers), signals, memory, 1 / sample_rate_hz, values)
+    run_held(program.with_numbers(law.numbers), signals, memory, 1 / sample_rate_hz, values)
     return values
 
 
 def _bind_signals(law: Law, columns: Mapping[str, FloatArray], sample_rate_hz: float) -> tuple[Program, FloatArray]:
-    """The law's program, and its signals as an array (n, k), column by column in the program's order."""
+    """Compile the law's program, and arrange its signals as an array (n, k), in the program's order of columns. Raises
+    LawError as `evaluate` does."""
     if not columns:
         raise LawError("a law is evaluated along signals, and there are none")
     lengths = {len(column) for column in columns.values()}

@@ -1,8 +1,8 @@
 """Compiled stack machine that runs a law's program (postfix code, see `program`) at an instant or along samples.
 
-A step has a start and an end. Between them the signals of operators with memory (lag, play, delay, integral) are
-straight lines; at a start they may jump, as commands do. `run` may be called several times for a step; `commit_step`
-then stores its end as the start of the next step. Times are in seconds.
+A time step has a start and an end. Between them the signals of operators with memory (lag, play, delay, integral) are
+linear in time; at a start they may jump, as commands do. `run_program` may be called several times for a step;
+`commit_step` then stores its end as the start of the next step. Times are in seconds.
 """
 
 from typing import Any
@@ -14,13 +14,13 @@ from equalizer.laws.program import CELLS, CODE, MEMORY_SIZE, STACK_SIZE
 from equalizer.signals.signal import FloatArray
 
 START, END = 0, 1
-"""Phase of a step at which a value is computed."""
+"""Instant of a step at which a value is computed (`phase`)."""
 SETTLED, STARTED, FROM_ZERO = 0.0, 1.0, 2.0
-"""State of the memory, its first number. SETTLED: not started, begins in the steady state of the signals' first values;
-STARTED: started; FROM_ZERO: not started, begins with all signals zero."""
+"""First number of the memory: initialization state. SETTLED: to be initialized to the steady state of the signals'
+first values; FROM_ZERO: to be initialized with all signals zero; STARTED: initialized."""
 NO_REFERENCE_COUNTS: Any = {"_nrt": False}
-"""Option of Numba to compile without reference counts of arrays, permitted because all arrays belong to the caller and
-the function allocates none. Their atomic operations took two thirds of the time of a short law, and three quarters of a
+"""Numba option to compile without reference counts of arrays, safe because the caller owns all arrays and the function
+allocates none. Measured: their atomic operations took two thirds of the time of a short law, and three quarters of a
 step of a mechanism."""
 _VECTOR = types.float64[::1]
 _MATRIX = types.float64[:, ::1]
@@ -33,7 +33,7 @@ _LAG, _PLAY, _DELAY, _INTEGRAL = (CODE[name] for name in ("lag", "play", "delay"
 _TIME_TOLERANCE = 1e-9
 """Tolerance for equal instants, relative to the delay (rounding)."""
 _RING_SIZE = (MEMORY_SIZE["delay"] - 4) // 2
-"""Number of instants in the ring buffer of a delay."""
+"""Number of instants that the ring buffer of a delay can store."""
 
 
 @njit(inline="always")
@@ -56,6 +56,7 @@ def _apply_binary(code: int, left: float, right: float) -> float:
 
 @njit(inline="always")
 def _apply_unary(code: int, operand: float) -> float:  # noqa: C901 - a table, in the only form that compiles to a jump
+    """Apply a function of one argument; NaN or inf outside its domain."""
     if code == _NEGATE:
         return -operand
     if code == _ABS:
@@ -81,24 +82,26 @@ def _apply_unary(code: int, operand: float) -> float:  # noqa: C901 - a table, i
 
 @njit(inline="always")
 def _apply_lag(signal: float, tau_s: float, memory: FloatArray, offset: int, phase: int, step_s: float) -> float:
-    """First-order lag, y' = (s - y) / tau, exact for signals s that are straight lines over a step. memory: y and s at
-    the start, then y and s at the end."""
+    """First-order lag, y' = (s - y) / tau, exact for signals s that are linear over a step; s itself where tau is not
+    above 0. memory: y and s at the start, then y and s at the end."""
     if not tau_s > 0:
         return signal
     if phase == START:
         memory[offset + 1] = signal
         return float(memory[offset])
-    steps = step_s / tau_s
-    decay = -np.expm1(-steps)
-    mean = decay / steps
-    memory[offset + 2] = (1 - decay) * memory[offset] + (mean - 1 + decay) * memory[offset + 1] + (1 - mean) * signal
+    step_ratio = step_s / tau_s
+    rise = -np.expm1(-step_ratio)
+    mean_decay = rise / step_ratio
+    memory[offset + 2] = (
+        (1 - rise) * memory[offset] + (mean_decay - 1 + rise) * memory[offset + 1] + (1 - mean_decay) * signal
+    )
     memory[offset + 3] = signal
     return float(memory[offset + 2])
 
 
 @njit(inline="always")
 def _apply_integral(signal: float, memory: FloatArray, offset: int, phase: int, step_s: float) -> float:
-    """Integral over time by the trapezoidal rule, exact for straight lines. memory: value and signal at the start, then
+    """Integral over time by the trapezoidal rule, exact for linear signals. memory: value and signal at the start, then
     at the end."""
     if phase == START:
         memory[offset + 1] = signal
@@ -110,8 +113,8 @@ def _apply_integral(signal: float, memory: FloatArray, offset: int, phase: int, 
 
 @njit(inline="always")
 def _apply_play(signal: float, half_width: float, memory: FloatArray, offset: int, phase: int) -> float:
-    """Play (backlash) operator: the output moves only as far as it takes to stay within half_width of the signal.
-    memory: output at the start, at the end."""
+    """Play (backlash) operator: the output moves only as far as needed to stay within half_width of the signal. memory:
+    output at the start, at the end."""
     width = max(half_width, 0.0)
     output = min(max(memory[offset], signal - width), signal + width)
     memory[offset + 1] = output
@@ -131,14 +134,14 @@ def _interpolate_delayed(
     index of the oldest in use, their times and values; then the latest signal and delay, which are not yet in the
     buffer. At a jump of the signal, the start of a step reads the value after it, the end the value before it."""
     times, values, delayed_s = offset + 2, offset + 2 + _RING_SIZE, time_s - delay_s
-    first, last = int(memory[offset + 1]), int(memory[offset]) - 1
+    oldest, newest = int(memory[offset + 1]), int(memory[offset]) - 1
     limit_s = delayed_s + (_TIME_TOLERANCE if phase == START else -_TIME_TOLERANCE) * delay_s
-    while first < last and memory[times + (first + 1) % _RING_SIZE] <= limit_s:
-        first += 1
-    time_before, value_before = memory[times + first % _RING_SIZE], memory[values + first % _RING_SIZE]
+    while oldest < newest and memory[times + (oldest + 1) % _RING_SIZE] <= limit_s:
+        oldest += 1
+    time_before, value_before = memory[times + oldest % _RING_SIZE], memory[values + oldest % _RING_SIZE]
     time_after, value_after = time_s, signal
-    if first < last:
-        time_after, value_after = memory[times + (first + 1) % _RING_SIZE], memory[values + (first + 1) % _RING_SIZE]
+    if oldest < newest:
+        time_after, value_after = memory[times + (oldest + 1) % _RING_SIZE], memory[values + (oldest + 1) % _RING_SIZE]
     if time_after <= time_before:
         return float(value_before)
     return float(
@@ -163,15 +166,16 @@ def _store_instant(signal: float, delay_s: float, memory: FloatArray, offset: in
         time_s,
         signal,
     )
-    first = int(memory[offset + 1])
-    while first < count - 1 and memory[times + (first + 1) % _RING_SIZE] <= time_s - (1 + _TIME_TOLERANCE) * delay_s:
-        first += 1
-    memory[offset + 1] = max(first, count - _RING_SIZE)
+    oldest = int(memory[offset + 1])
+    while oldest < count - 1 and memory[times + (oldest + 1) % _RING_SIZE] <= time_s - (1 + _TIME_TOLERANCE) * delay_s:
+        oldest += 1
+    memory[offset + 1] = max(oldest, count - _RING_SIZE)
 
 
 @njit(inline="always")
 def _apply_delay(signal: float, delay_s: float, memory: FloatArray, offset: int, phase: int, time_s: float) -> float:
-    """Delay by delay_s seconds; a jump at the start of a step is stored as a second instant of the same time."""
+    """Delay by delay_s seconds, none where it is not above 0; a jump at the start of a step is stored as a second
+    instant of the same time."""
     if not delay_s > 0:
         return signal
     newest = offset + 2 + _RING_SIZE + (int(memory[offset]) - 1) % _RING_SIZE
@@ -183,7 +187,7 @@ def _apply_delay(signal: float, delay_s: float, memory: FloatArray, offset: int,
 
 @njit(inline="always")
 def _initialise_memory(code: int, signal: float, memory: FloatArray, offset: int, time_s: float) -> None:
-    """Fill an operator's memory as if its signal had always had this value."""
+    """Initialize an operator's memory to the steady state of a constant signal; an integral stays at its value."""
     if code == _DELAY:
         memory[offset], memory[offset + 1], memory[offset + 2], memory[offset + 2 + _RING_SIZE] = (
             1.0,
@@ -197,18 +201,25 @@ def _initialise_memory(code: int, signal: float, memory: FloatArray, offset: int
 
 @njit(inline="always")
 def _run_with_memory(  # noqa: PLR0913 - a kernel takes flat arrays
-    code: int, signal: float, operand: float, memory: FloatArray, offset: int, phase: int, time_s: float, step_s: float
+    code: int,
+    signal: float,
+    parameter: float,
+    memory: FloatArray,
+    offset: int,
+    phase: int,
+    time_s: float,
+    step_s: float,
 ) -> float:
-    """Value of an operator with memory. operand: its second argument (constant); offset: index of its
-    memory."""
+    """Value of an operator with memory. parameter: its second, constant argument (unused by the integral); offset:
+    index of its first cell in `memory`."""
     if memory[0] != STARTED:
         _initialise_memory(code, 0.0 if memory[0] == FROM_ZERO else signal, memory, offset, time_s)
     if code == _LAG:
-        return float(_apply_lag(signal, operand, memory, offset, phase, step_s))
+        return float(_apply_lag(signal, parameter, memory, offset, phase, step_s))
     if code == _PLAY:
-        return float(_apply_play(signal, operand, memory, offset, phase))
+        return float(_apply_play(signal, parameter, memory, offset, phase))
     if code == _DELAY:
-        return float(_apply_delay(signal, operand, memory, offset, phase, time_s))
+        return float(_apply_delay(signal, parameter, memory, offset, phase, time_s))
     return float(_apply_integral(signal, memory, offset, phase, step_s))
 
 
@@ -216,7 +227,7 @@ def _run_with_memory(  # noqa: PLR0913 - a kernel takes flat arrays
     types.float64(_VECTOR, _VECTOR, _VECTOR, _VECTOR, types.int64, types.float64, types.float64),
     cache=True, nogil=True, error_model="numpy", **NO_REFERENCE_COUNTS,
 )  # fmt: skip
-def run(  # noqa: PLR0913 - a kernel takes flat arrays
+def run_program(  # noqa: PLR0913 - a kernel takes flat arrays
     program: FloatArray, signals: FloatArray, memory: FloatArray, stack: FloatArray, phase: int, time_s: float,
     step_s: float,
 ) -> float:  # fmt: skip
@@ -246,7 +257,7 @@ def run(  # noqa: PLR0913 - a kernel takes flat arrays
 
 @njit(types.void(_VECTOR, _VECTOR, types.float64), cache=True, nogil=True, **NO_REFERENCE_COUNTS)
 def commit_step(program: FloatArray, memory: FloatArray, time_s: float) -> None:
-    """Store the end of the step that was run last as the start of the next step. time_s: time of that end."""
+    """Store the end of the last step as the start of the next step. time_s: time of that end."""
     for row in range(0, program.shape[0], 2):
         code, offset = int(program[row]), int(program[row + 1])
         if code in (_LAG, _INTEGRAL):
@@ -260,26 +271,26 @@ def commit_step(program: FloatArray, memory: FloatArray, time_s: float) -> None:
 
 
 @njit(types.void(_VECTOR, _MATRIX, _VECTOR, types.float64, _VECTOR), cache=True, nogil=True, error_model="numpy")
-def run_along(program: FloatArray, signals: FloatArray, memory: FloatArray, step_s: float, values: FloatArray) -> None:
-    """Write the law's values to `values` (n,). signals: (n, k), straight lines from sample to sample, step_s seconds
-    apart."""
+def run_interpolated(
+    program: FloatArray, signals: FloatArray, memory: FloatArray, step_s: float, values: FloatArray
+) -> None:
+    """Write the law's values at n samples, step_s seconds apart, to `values` (n,). signals: (n, k), interpolated
+    linearly between samples."""
     stack = np.empty(STACK_SIZE)
     for k in range(signals.shape[0]):
-        values[k] = run(program, signals[k], memory, stack, END if k > 0 else START, k * step_s, step_s)
+        values[k] = run_program(program, signals[k], memory, stack, END if k > 0 else START, k * step_s, step_s)
         if k > 0:
             commit_step(program, memory, k * step_s)
         memory[0] = STARTED
 
 
 @njit(types.void(_VECTOR, _MATRIX, _VECTOR, types.float64, _MATRIX), cache=True, nogil=True, error_model="numpy")
-def run_along_held(
-    program: FloatArray, signals: FloatArray, memory: FloatArray, step_s: float, values: FloatArray
-) -> None:
+def run_held(program: FloatArray, signals: FloatArray, memory: FloatArray, step_s: float, values: FloatArray) -> None:
     """Write the law's values at the start and at the end of each step to `values` (2, n); signals (n, k) are held over
     a step of step_s seconds."""
     stack = np.empty(STACK_SIZE)
     for k in range(signals.shape[0]):
-        values[0, k] = run(program, signals[k], memory, stack, START, k * step_s, step_s)
+        values[0, k] = run_program(program, signals[k], memory, stack, START, k * step_s, step_s)
         memory[0] = STARTED
-        values[1, k] = run(program, signals[k], memory, stack, END, (k + 1) * step_s, step_s)
+        values[1, k] = run_program(program, signals[k], memory, stack, END, (k + 1) * step_s, step_s)
         commit_step(program, memory, (k + 1) * step_s)

@@ -4,8 +4,9 @@ For signals a and b without their means, on one grid, at lag l:
 
     r(l) = sum a(k + l) b(k) / sqrt(sum a(k + l)² sum b(k)²),    sums over the samples where both overlap.
 
-The offset is that of the largest |r|, interpolated by a spline. It is refused where |r| is small, where the maximum
-lies at the end of the searched range, and where another peak is about as high, as with periodic signals.
+The offset is the lag of the largest |r|, interpolated by a spline. It is rejected where |r| is small, where the maximum
+lies at the end of the searched range, and where another peak is about as high, as with periodic signals. Called by
+`study.importing.alignment`.
 """
 
 from dataclasses import dataclass
@@ -20,20 +21,20 @@ IntArray = npt.NDArray[np.signedinteger]
 BoolArray = npt.NDArray[np.bool_]
 
 LEAST_CORRELATION = 0.5
-"""Least |r| for an offset to be trusted. By hand."""
-AMBIGUOUS = 0.98
-"""Height of a second peak, relative to the highest, above which the offset is ambiguous. By hand."""
+"""Least |r| at which an offset is accepted. Chosen, like all constants here without another reason."""
+AMBIGUOUS_RATIO = 0.98
+"""Height of a second peak, relative to the highest, above which the offset is ambiguous."""
 LEAST_OVERLAP = 0.25
-"""Least overlap of the two signals, as a share of the shorter one. By hand."""
+"""Least overlap of the two signals, as a share of the shorter one."""
 LEAST_LAGS = 8
-"""Least number of lags to search: the spline of fifth order needs six."""
+"""Least number of lags in the searched range: a spline of degree 5 needs six."""
 ENERGY_FLOOR = 1e-9
-"""Least product of the overlapping energies, relative to that of the whole signals: silent stretches must not give a
-large r. By hand."""
+"""Lower limit of the product of the overlapping energies in the denominator of r, relative to that of the whole
+signals, so that silent stretches do not give a large r."""
 
 
 class NoOffsetError(ValueError):
-    """The cross-correlation of two signals has no single clear peak, so their clock offset is not known."""
+    """The clock offset of two signals cannot be determined: their cross-correlation has no single clear peak."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,43 +42,44 @@ class ClockOffset:
     """Offset between the clocks of two recordings of the same motion."""
 
     offset_s: float
-    """Added to the other clock's time to give the reference's."""
+    """Offset (s) that is added to the times of the second clock to give times of the reference clock."""
     correlation: float
     """Normalised cross-correlation at this offset; negative where one signal is inverted."""
 
 
-def offset_by_correlation(reference: Samples, other: Samples, about_s: float, within_s: float) -> ClockOffset:
-    """The offset between about_s - within_s and about_s + within_s of the largest magnitude of the normalised
-    cross-correlation.
+def find_clock_offset(reference: Samples, shifted: Samples, centre_s: float, half_range_s: float) -> ClockOffset:
+    """Find the clock offset with the largest |r| between centre_s - half_range_s and centre_s + half_range_s. shifted:
+    the same motion, recorded with the second clock.
 
-    Both are put onto one band-limited grid at twice the faster rate; the peak of the normalised cross-correlation is
-    taken between its samples, along a spline. Raises NoOffsetError where nothing agrees, the best agreement is at the
-    end of the range, or another offset agrees as well.
+    Both are resampled (band-limited) to twice the higher of their rates. Raises NoOffsetError where the overlap within
+    the range is too short, |r| is too small, its maximum is at the end of the range, or another peak is about as high;
+    ValueError as `resample` does.
     """
-    rate_hz = 2 * max(1 / float(np.median(np.diff(part.times_s))) for part in (reference, other))
-    first, second = (_resample_centred(part, rate_hz) for part in (reference, other))
+    rate_hz = 2 * max(1 / float(np.median(np.diff(part.times_s))) for part in (reference, shifted))
+    first, second = (_resample_centred(part, rate_hz) for part in (reference, shifted))
     correlation = _correlate_normalised(first, second)
     lags = np.arange(-(len(second) - 1), len(first))
-    offsets_s = reference.times_s[0] - other.times_s[0] + lags / rate_hz
-    allowed = (np.abs(offsets_s - about_s) <= within_s) & _has_enough_overlap(lags, len(first), len(second))
-    if allowed.sum() < LEAST_LAGS:
+    offsets_s = reference.times_s[0] - shifted.times_s[0] + lags / rate_hz
+    is_searched = (np.abs(offsets_s - centre_s) <= half_range_s) & _has_enough_overlap(lags, len(first), len(second))
+    if is_searched.sum() < LEAST_LAGS:
         raise NoOffsetError("the two signals do not overlap within the range of offsets that is searched; widen it")
-    offsets_s, correlation = offsets_s[allowed], correlation[allowed]
+    offsets_s, correlation = offsets_s[is_searched], correlation[is_searched]
     peak = int(np.argmax(np.abs(correlation)))
-    best = abs(correlation[peak])
-    if best < LEAST_CORRELATION:
+    highest = abs(correlation[peak])
+    if highest < LEAST_CORRELATION:
         raise NoOffsetError(
-            f"the two signals agree nowhere (highest correlation {best:.2f}); give two signals of the same quantity"
+            f"the two signals agree nowhere (highest correlation {highest:.2f}); give two signals of the same quantity"
         )
     if not 0 < peak < len(correlation) - 1:
         raise NoOffsetError(
             f"the two signals agree best at the end of the range that is searched ({offsets_s[peak]:g} s); widen it"
         )
-    _refuse_rivals(offsets_s, np.abs(correlation), peak)
+    _refuse_rival_peaks(offsets_s, np.abs(correlation), peak)
     return _interpolate_peak(offsets_s, correlation, peak)
 
 
 def _resample_centred(samples: Samples, rate_hz: float) -> FloatArray:
+    """Samples (n,) on a uniform grid from the first time on, without their mean; missing values are zero."""
     count = int(np.floor((samples.times_s[-1] - samples.times_s[0]) * rate_hz)) + 1
     values = resample(samples, Grid(float(samples.times_s[0]), rate_hz, count), "band-limited")
     centred = values - np.nanmean(values)
@@ -85,33 +87,38 @@ def _resample_centred(samples: Samples, rate_hz: float) -> FloatArray:
 
 
 def _correlate_normalised(first: FloatArray, second: FloatArray) -> FloatArray:
-    """r of the module for signals (n,) and (m,), at each of the n + m - 1 lags -(m - 1) to n - 1."""
-    # Here and below: SciPy's signal and interpolation modules take longer to import than a diagnosis that does not need
-    # them.
+    """Normalised cross-correlation r (module docstring) of signals (n,) and (m,) at the n + m - 1 lags -(m - 1) to
+    n - 1."""
+    # Imported here and below, because SciPy's signal and interpolation modules take long to import.
     from scipy import signal as sg
 
-    raw = sg.correlate(first, second, mode="full", method="fft")
+    cross_correlation = sg.correlate(first, second, mode="full", method="fft")
     first_energy = sg.correlate(first**2, np.ones(len(second)), mode="full", method="fft")
     second_energy = sg.correlate(np.ones(len(first)), second**2, mode="full", method="fft")
-    floor = ENERGY_FLOOR * float(np.sum(first**2) * np.sum(second**2))
-    normalised: FloatArray = raw / np.sqrt(np.maximum(first_energy * second_energy, max(floor, np.finfo(float).tiny)))
+    energy_floor = ENERGY_FLOOR * float(np.sum(first**2) * np.sum(second**2))
+    normalised: FloatArray = cross_correlation / np.sqrt(
+        np.maximum(first_energy * second_energy, max(energy_floor, np.finfo(float).tiny))
+    )
     return normalised
 
 
-def _has_enough_overlap(lags: IntArray, first: int, second: int) -> BoolArray:
-    """Mask of the lags at which signals of these lengths overlap by at least `LEAST_OVERLAP`."""
-    overlap = np.minimum(first, lags + second) - np.maximum(0, lags)
-    has_overlap: BoolArray = overlap >= LEAST_OVERLAP * min(first, second)
+def _has_enough_overlap(lags: IntArray, first_length: int, second_length: int) -> BoolArray:
+    """Mask (lags,) of the lags at which signals of these lengths overlap by at least `LEAST_OVERLAP`."""
+    overlap = np.minimum(first_length, lags + second_length) - np.maximum(0, lags)
+    has_overlap: BoolArray = overlap >= LEAST_OVERLAP * min(first_length, second_length)
     return has_overlap
 
 
-def _refuse_rivals(offsets_s: FloatArray, height: FloatArray, peak: int) -> None:
-    """Raises NoOffsetError where another peak than that at the index `peak` is about as high. height: |r|."""
+def _refuse_rival_peaks(offsets_s: FloatArray, magnitude: FloatArray, peak: int) -> None:
+    """Raise NoOffsetError where a peak more than two lags from the index `peak` is about as high. magnitude: |r|,
+    (lags,)."""
     from scipy import signal as sg
 
-    peaks, _ = sg.find_peaks(height)
+    peaks, _ = sg.find_peaks(magnitude)
     rivals = [
-        candidate for candidate in peaks if abs(candidate - peak) > 2 and height[candidate] > AMBIGUOUS * height[peak]
+        candidate
+        for candidate in peaks
+        if abs(candidate - peak) > 2 and magnitude[candidate] > AMBIGUOUS_RATIO * magnitude[peak]
     ]
     if rivals:
         raise NoOffsetError(
@@ -121,15 +128,16 @@ def _refuse_rivals(offsets_s: FloatArray, height: FloatArray, peak: int) -> None
 
 
 def _interpolate_peak(offsets_s: FloatArray, correlation: FloatArray, peak: int) -> ClockOffset:
-    """The maximum of |r| within a lag of the index `peak`, on a spline of fifth order."""
+    """Maximum of |r| within one lag of the index `peak`, on a spline of degree 5 through the eight neighbours on either
+    side, in steps of 1/2000 of a lag."""
     from scipy.interpolate import make_interp_spline
 
     neighbours = slice(max(0, peak - 8), peak + 9)
     spline = make_interp_spline(
         offsets_s[neighbours] - offsets_s[peak], correlation[neighbours], k=min(5, len(correlation) - 1)
     )
-    step = offsets_s[1] - offsets_s[0]
-    fine = np.linspace(-step, step, 4001)
-    values = spline(fine)
-    best = int(np.argmax(np.abs(values)))
-    return ClockOffset(float(offsets_s[peak] + fine[best]), float(values[best]))
+    lag_s = offsets_s[1] - offsets_s[0]
+    fine_offsets_s = np.linspace(-lag_s, lag_s, 4001)
+    fine_correlation = spline(fine_offsets_s)
+    fine_peak = int(np.argmax(np.abs(fine_correlation)))
+    return ClockOffset(float(offsets_s[peak] + fine_offsets_s[fine_peak]), float(fine_correlation[fine_peak]))

@@ -1,7 +1,7 @@
-"""Deterministic excitations as columns of samples: sinusoids, logarithmic sweeps, and fades at their ends.
+"""Deterministic excitation signals for system identification: sinusoids, logarithmic swept sines, and fades.
 
-Recordings for identification use sweeps, which excite a band, and sinusoids; stimuli use the fades. A signal has the
-unit of its amplitude.
+Called by `study.session.stimulus` for recordings and stimuli, and by the design of experiments. A signal has the unit
+of its amplitude.
 """
 
 import numpy as np
@@ -9,27 +9,29 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 
 
-def sine(frequency_hz: float, amplitude: float, n: int, sample_rate_hz: float) -> FloatArray:
-    """Sinusoid of n samples that starts at phase zero, (n,)."""
-    wave: FloatArray = amplitude * np.sin(2 * np.pi * frequency_hz / sample_rate_hz * np.arange(n))
+def make_sine(frequency_hz: float, amplitude: float, sample_count: int, sample_rate_hz: float) -> FloatArray:
+    """Make a sinusoid that starts at phase zero, (sample_count,)."""
+    wave: FloatArray = amplitude * np.sin(2 * np.pi * frequency_hz / sample_rate_hz * np.arange(sample_count))
     return wave
 
 
-def log_sweep(from_hz: float, to_hz: float, amplitude: float, n: int, sample_rate_hz: float) -> FloatArray:
-    """A period of a logarithmic swept sine, (n,), which may be repeated without a jump. Every octave takes equal time.
+def make_log_sweep(
+    from_hz: float, to_hz: float, amplitude: float, sample_count: int, sample_rate_hz: float
+) -> FloatArray:
+    """Make one period of a logarithmic swept sine, (sample_count,), which can be repeated without a jump of phase.
 
-    Frequency f(t) = from_hz (to_hz / from_hz)^(t / T), T = n / sample_rate_hz; all frequencies are lowered by a common
-    factor, so that the period contains the next lower whole number of cycles. Raises ValueError where the sweep would
-    not rise, would exceed half the sample rate, or would contain less than a cycle.
+    Frequency f(t) = from_hz (to_hz / from_hz)^(t / T), T = sample_count / sample_rate_hz; all frequencies are lowered
+    by a common factor, so that the period contains the next lower whole number of cycles. Raises ValueError unless 0 <
+    from_hz < to_hz <= half the sample rate, and where the period would contain less than a cycle.
     """
     if not 0 < from_hz < to_hz <= sample_rate_hz / 2:
         raise ValueError(
             f"a sweep needs 0 < from_hz < to_hz <= {sample_rate_hz / 2:g} Hz (half the rate), "
             f"not {from_hz:g} to {to_hz:g}"
         )
-    duration_s = n / sample_rate_hz
+    duration_s = sample_count / sample_rate_hz
     log_ratio = np.log(to_hz / from_hz)
-    cycles = from_hz * duration_s / log_ratio * (np.exp(log_ratio * np.arange(n) / n) - 1.0)
+    cycles = from_hz * duration_s / log_ratio * (np.exp(log_ratio * np.arange(sample_count) / sample_count) - 1.0)
     total_cycles = from_hz * duration_s / log_ratio * (np.exp(log_ratio) - 1.0)
     if total_cycles < 1.0:
         raise ValueError(f"a sweep of {duration_s:g} s from {from_hz:g} to {to_hz:g} Hz holds less than a cycle")
@@ -38,12 +40,12 @@ def log_sweep(from_hz: float, to_hz: float, amplitude: float, n: int, sample_rat
 
 
 def apply_fades(samples: FloatArray, fade_in: int, fade_out: int) -> FloatArray:
-    """Samples (n, ...) with a raised-cosine rise over the first `fade_in` and fall over the last `fade_out` of them.
-    Raises ValueError where both fades together are longer than the samples."""
-    n = samples.shape[0]
-    if fade_in + fade_out > n:
-        raise ValueError(f"fades of {fade_in} and {fade_out} samples do not fit into {n}; shorten them")
-    envelope = np.ones(n)
+    """Apply a raised-cosine rise to the first `fade_in` and a fall to the last `fade_out` of the samples (n, ...), from
+    and to zero. Raises ValueError where both fades together are longer than the samples."""
+    sample_count = samples.shape[0]
+    if fade_in + fade_out > sample_count:
+        raise ValueError(f"fades of {fade_in} and {fade_out} samples do not fit into {sample_count}; shorten them")
+    envelope = np.ones(sample_count)
     envelope[:fade_in] = 0.5 - 0.5 * np.cos(np.pi * np.arange(fade_in) / max(fade_in, 1))
-    envelope[n - fade_out :] = 0.5 + 0.5 * np.cos(np.pi * np.arange(1, fade_out + 1) / max(fade_out, 1))
-    return samples * envelope.reshape((n,) + (1,) * (samples.ndim - 1))
+    envelope[sample_count - fade_out :] = 0.5 + 0.5 * np.cos(np.pi * np.arange(1, fade_out + 1) / max(fade_out, 1))
+    return samples * envelope.reshape((sample_count,) + (1,) * (samples.ndim - 1))

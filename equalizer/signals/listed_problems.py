@@ -1,8 +1,8 @@
-"""Base class of errors that list all problems of a document, a model or a table at once, not only the first."""
+"""Base class of the validation errors of documents, models and tables: they list all problems, not only the first."""
 
 
 class ListedProblemsError(ValueError):
-    """Base class. `problems`: one sentence for each problem; the message joins them by semicolons."""
+    """An input has one or more problems. `problems`: a sentence for each; the message joins them by semicolons."""
 
     def __init__(self, problems: tuple[str, ...]) -> None:
         super().__init__("; ".join(problems))

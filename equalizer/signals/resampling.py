@@ -1,9 +1,10 @@
 """Resampling to a uniform time grid: zero-order hold, linear or band-limited interpolation.
 
-The method must fit the signal. Zero-order hold is exact for a command that is held until the next command, which
-interpolation would smear. Band-limited interpolation (a Kaiser-windowed low-pass) is exact up to `PASSBAND` for a
-signal that was sampled behind an anti-aliasing filter, to which a hold would add spectral images. Missing samples (NaN,
-gaps in the time stamps) remain missing."""
+The method must suit the signal. Zero-order hold is exact for a command that is held until the next command.
+Band-limited interpolation (a Kaiser-windowed low pass) is accurate up to `PASSBAND` for a signal that was sampled
+behind an anti-aliasing filter; a hold would add spectral images. Missing samples (NaN, gaps in the time stamps) remain
+missing. Called by `clock_offset` and `study.importing`.
+"""
 
 from dataclasses import dataclass
 from fractions import Fraction
@@ -22,31 +23,32 @@ PASSBAND = 0.88
 """Edge of the flat passband of band-limited resampling, relative to the lower of both Nyquist frequencies, at which the
 stopband begins."""
 TIME_TOLERANCE = 1e-3
-"""Largest difference of times that count as equal, in sample periods of the grid."""
+"""Largest difference of times that count as equal, in sample periods of the grid. Chosen."""
 SAMPLE_TOLERANCE = 1e-5
 """Largest offset, in sample periods, of grid instants from samples that is ignored in band-limited resampling. At four
 fifths of the Nyquist frequency it causes an error of about the stopband level of the filter."""
-_HALF_LENGTH = 48
-"""Half the length of the low-pass, in sample periods of the lower rate."""
-_BETA = 8.6
-"""Shape parameter of the Kaiser window, beta = 0.1102 (A - 8.7) by Kaiser's formula: A = 87 dB of attenuation."""
+_HALF_LENGTH_PERIODS = 48
+"""Half the length of the low pass, in sample periods of the lower rate. Chosen for the transition band 1 -
+`PASSBAND`."""
+_KAISER_BETA = 8.6
+"""Shape parameter of the Kaiser window: by Kaiser's formula, 0.1102 (A - 8.7), for an attenuation A of 87 dB."""
 _OVERSAMPLING = 8
-"""Oversampling factor of the samples through which a spline is laid, where the rates have no simple ratio or the grid
-begins between samples."""
+"""Oversampling factor before spline interpolation, where the rates have no simple ratio or the grid begins between
+samples."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Samples:
-    """One channel: values at increasing times. NaN is a missing value."""
+    """One channel: values at increasing times; NaN is a missing value."""
 
     times_s: FloatArray
-    """(n,), s."""
+    """(n,): times of the samples (s)."""
     values: FloatArray
     """(n,), in any unit."""
     rate_hz: float
-    """Sample rate; 0 where the time stamps are not uniform."""
+    """Sample rate (Hz); 0 where the time stamps are not uniform."""
     gap_s: float
-    """Neighbouring times further apart than this have missing samples between them."""
+    """Longest distance (s) of neighbouring times without missing samples between them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,16 +59,16 @@ class Grid:
     rate_hz: float
     count: int
 
-    def times_s(self) -> FloatArray:
+    def compute_times_s(self) -> FloatArray:
         """(count,): the instants (s)."""
         return self.start_s + np.arange(self.count) / self.rate_hz
 
 
 def resample(samples: Samples, grid: Grid, method: Method) -> FloatArray:
-    """Values at the grid's times, (count,), in the unit of the samples; NaN where samples are missing. Raises
-    ValueError where fewer than two samples are known, or the grid begins before the first or ends after the last
+    """Resample to the times of the grid: (count,), in the unit of the samples; NaN where samples are missing. Raises
+    ValueError where fewer than two samples are finite, or the grid begins before the first or ends after the last
     sample."""
-    times_s = grid.times_s()
+    times_s = grid.compute_times_s()
     tolerance_s = TIME_TOLERANCE / grid.rate_hz
     if times_s[0] < samples.times_s[0] - tolerance_s or times_s[-1] > samples.times_s[-1] + tolerance_s:
         raise ValueError(
@@ -94,34 +96,39 @@ def resample(samples: Samples, grid: Grid, method: Method) -> FloatArray:
 def _is_missing(
     samples: Samples, is_finite: BoolArray, times_s: FloatArray, tolerance_s: float, is_held: bool
 ) -> BoolArray:
-    """(count,): times before the first or after the last known sample, or between two known samples with missing
-    samples between them. is_held: a value remains known for one median sample period. tolerance_s: tolerance, s."""
-    stamps, indices = samples.times_s[is_finite], np.flatnonzero(is_finite)
-    step = float(np.median(np.diff(samples.times_s)))
-    is_gap = (np.diff(stamps) > samples.gap_s) | (np.diff(indices) > 1)
-    previous_index = np.clip(np.searchsorted(stamps, times_s + tolerance_s, side="right") - 1, 0, len(stamps) - 2)
-    elapsed_s = times_s - stamps[previous_index]
+    """Mask (count,) of the grid's times before the first or after the last finite sample, or between two of them with
+    missing samples between. is_held: a value remains known for one median sample period. tolerance_s: see
+    `TIME_TOLERANCE`."""
+    known_times_s, known_indices = samples.times_s[is_finite], np.flatnonzero(is_finite)
+    period_s = float(np.median(np.diff(samples.times_s)))
+    is_gap = (np.diff(known_times_s) > samples.gap_s) | (np.diff(known_indices) > 1)
+    previous_index = np.clip(
+        np.searchsorted(known_times_s, times_s + tolerance_s, side="right") - 1, 0, len(known_times_s) - 2
+    )
+    elapsed_s = times_s - known_times_s[previous_index]
     in_gap = (
         is_gap[previous_index]
-        & (elapsed_s > (step - tolerance_s if is_held else tolerance_s))
-        & (times_s < stamps[previous_index + 1] - tolerance_s)
+        & (elapsed_s > (period_s - tolerance_s if is_held else tolerance_s))
+        & (times_s < known_times_s[previous_index + 1] - tolerance_s)
     )
     missing: BoolArray = (
-        in_gap | (times_s < stamps[0] - tolerance_s) | (times_s > stamps[-1] + (step if is_held else tolerance_s))
+        in_gap
+        | (times_s < known_times_s[0] - tolerance_s)
+        | (times_s > known_times_s[-1] + (period_s if is_held else tolerance_s))
     )
     return missing
 
 
 def _resample_band_limited(samples: Samples, grid: Grid) -> FloatArray:
-    """Polyphase filter where the rates have a simple ratio and the grid begins at a sample; else a spline on samples
-    that are oversampled first."""
+    """Resample by a polyphase filter where the rates have a simple ratio (denominator up to 1000) and the grid begins
+    at a sample; else oversample, and interpolate by a spline."""
     if not samples.rate_hz:
         return _resample_uneven(samples, grid)
-    first = (grid.start_s - samples.times_s[0]) * samples.rate_hz
+    first_sample = (grid.start_s - samples.times_s[0]) * samples.rate_hz
     ratio = Fraction(grid.rate_hz / samples.rate_hz).limit_denominator(1000)
-    exact = abs(float(ratio) * samples.rate_hz / grid.rate_hz - 1) * grid.count < SAMPLE_TOLERANCE
-    if exact and abs(first - round(first)) < SAMPLE_TOLERANCE:
-        return _resample_by_ratio(samples.values, ratio, round(first), grid.count)
+    is_exact_ratio = abs(float(ratio) * samples.rate_hz / grid.rate_hz - 1) * grid.count < SAMPLE_TOLERANCE
+    if is_exact_ratio and abs(first_sample - round(first_sample)) < SAMPLE_TOLERANCE:
+        return _resample_by_ratio(samples.values, ratio, round(first_sample), grid.count)
     dense = _resample_by_ratio(
         samples.values, Fraction(_OVERSAMPLING), 0, _OVERSAMPLING * (len(samples.values) - 1) + 1
     )
@@ -131,49 +138,58 @@ def _resample_band_limited(samples: Samples, grid: Grid) -> FloatArray:
 
 
 def _resample_uneven(samples: Samples, grid: Grid) -> FloatArray:
-    """Quintic spline through samples at uneven times. Gaps are bridged by straight lines first, because the spline
-    would oscillate in them."""
+    """Interpolate samples at uneven times by a quintic spline. Gaps are first filled by linear interpolation, because
+    the spline would oscillate in them."""
     times_s, values = samples.times_s, samples.values
-    steps = np.diff(times_s)
-    median_s = float(np.median(steps))
-    wide = np.flatnonzero(steps > samples.gap_s)
-    if len(wide):
-        gap_times = [np.arange(times_s[i] + median_s, times_s[i + 1] - median_s / 2, median_s) for i in wide]
+    steps_s = np.diff(times_s)
+    period_s = float(np.median(steps_s))
+    gap_indices = np.flatnonzero(steps_s > samples.gap_s)
+    if len(gap_indices):
+        gap_times = [np.arange(times_s[i] + period_s, times_s[i + 1] - period_s / 2, period_s) for i in gap_indices]
         all_times = np.sort(np.concatenate([times_s, *gap_times]))
         times_s, values = all_times, np.interp(all_times, times_s, values)
-    return _resample_spline(times_s, values, grid, 1 / median_s)
+    return _resample_spline(times_s, values, grid, 1 / period_s)
 
 
 def _resample_spline(times_s: FloatArray, values: FloatArray, grid: Grid, source_rate_hz: float) -> FloatArray:
-    """Quintic spline through the samples, at the times of the grid. Where the grid is slower than the source, the
-    spline is evaluated on a finer grid and low-pass filtered, against aliasing."""
+    """Interpolate by a spline of degree 5 (3 for four or five samples, 1 for two or three) at the times of the grid.
+    Where the grid is more than 1 % slower than the source, the spline is evaluated on a finer grid and low-pass
+    filtered, against aliasing."""
     # Imported here, as below: SciPy's signal and interpolation modules take long to import, and most runs need neither.
     from scipy.interpolate import make_interp_spline
 
-    order = min(5, (len(values) - 1) // 2 * 2 + 1)
+    order = min(5, (len(values) - 2) // 2 * 2 + 1)
     origin_s = times_s[0]
     spline = make_interp_spline(times_s - origin_s, values, k=order)
     oversampling = int(np.ceil(2 * source_rate_hz / grid.rate_hz)) if grid.rate_hz < 0.99 * source_rate_hz else 1
     dense_times_s = (
         grid.start_s - origin_s + np.arange((grid.count - 1) * oversampling + 1) / (grid.rate_hz * oversampling)
     )
-    dense: FloatArray = spline(np.clip(dense_times_s, 0.0, times_s[-1] - origin_s))
-    return dense if oversampling == 1 else _resample_by_ratio(dense, Fraction(1, oversampling), 0, grid.count)
+    dense_values: FloatArray = spline(np.clip(dense_times_s, 0.0, times_s[-1] - origin_s))
+    return (
+        dense_values
+        if oversampling == 1
+        else _resample_by_ratio(dense_values, Fraction(1, oversampling), 0, grid.count)
+    )
 
 
-def _resample_by_ratio(values: FloatArray, ratio: Fraction, first: int, count: int) -> FloatArray:
-    """Polyphase FIR resampling to `ratio` times the rate, `count` values from the sample `first` on. Ends are continued
-    by point reflection."""
+def _resample_by_ratio(values: FloatArray, ratio: Fraction, first_sample: int, count: int) -> FloatArray:
+    """Resample to `ratio` times the rate by a polyphase FIR filter: `count` values from the index `first_sample` of
+    `values` on. Beyond the ends, values are extrapolated by point reflection."""
     from scipy import signal as sg
 
     up, down = ratio.numerator, ratio.denominator
     if ratio == 1:
-        return values[first : first + count].copy()
-    margin = _HALF_LENGTH * (max(up, down) // up + 1)
-    pad = margin + (-(margin + first)) % down
-    longer_factor = max(up, down)
-    taps = sg.firwin(2 * _HALF_LENGTH * longer_factor + 1, (1 + PASSBAND) / 2 / longer_factor, window=("kaiser", _BETA))
+        return values[first_sample : first_sample + count].copy()
+    margin = _HALF_LENGTH_PERIODS * (max(up, down) // up + 1)
+    pad = margin + (-(margin + first_sample)) % down
+    larger_factor = max(up, down)
+    low_pass = sg.firwin(
+        2 * _HALF_LENGTH_PERIODS * larger_factor + 1,
+        (1 + PASSBAND) / 2 / larger_factor,
+        window=("kaiser", _KAISER_BETA),
+    )
     padded = np.pad(values, pad, mode="reflect", reflect_type="odd")
-    resampled: FloatArray = sg.resample_poly(padded, up, down, window=taps)
-    start = (pad + first) * up // down
+    resampled: FloatArray = sg.resample_poly(padded, up, down, window=low_pass)
+    start = (pad + first_sample) * up // down
     return resampled[start : start + count].copy()

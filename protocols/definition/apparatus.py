@@ -1,5 +1,6 @@
-"""Settings of the apparatus that every protocol shares: directions, spring, limits.
+"""Settings of the apparatus in every protocol: test directions, virtual spring, safety limits.
 
+Each class is a table of the TOML file; Pydantic checks its values. Part of `study_protocol` and `recording_protocol`.
 Axes are those of the device: x toward the operator, y to the right, z up, origin at the centre of the workspace.
 """
 
@@ -23,7 +24,7 @@ class TestDirections:
     easiest pair to distinguish, and therefore give the most conservative limit.
     """
 
-    __test__ = False  # a test direction is not a test
+    __test__ = False  # pytest collects classes whose names begin with Test
 
     plane: Annotated[
         Plane,
@@ -45,7 +46,7 @@ class TestDirections:
 
 @dataclass(frozen=True, config=STRICT)
 class SpringSettings:
-    """A weak virtual spring towards the centre, which keeps the handle where the linkage is symmetric."""
+    """Weak virtual spring and damper towards the centre, which keep the handle where the linkage is symmetric."""
 
     natural_frequency_hz: Annotated[
         float,
@@ -70,7 +71,7 @@ class SpringSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class SafetySettings:
-    """Limits that the safety layer enforces at every tick, independent of the rest of the program."""
+    """Limits of force and time that the safety layer enforces at every tick, independent of the rest of the program."""
 
     stimulus_cap_n: Annotated[
         float,
@@ -127,7 +128,8 @@ class SafetySettings:
     plausibility: PlausibilitySettings = Field(default_factory=PlausibilitySettings)
 
     @model_validator(mode="after")
-    def _consistent(self) -> Self:
+    def _require_consistent_caps(self) -> Self:
+        """Raise InconsistentError where total_cap_n is below stimulus_cap_n."""
         if self.total_cap_n < self.stimulus_cap_n:
             allowed = f"at least {self.stimulus_cap_n} N, the stimulus_cap_n, with room for the spring"
             refuse([Problem("total_cap_n", f"is {self.total_cap_n} N, below stimulus_cap_n", allowed)])

@@ -1,4 +1,7 @@
-"""Declared analysis: the part of a preregistration that a program can check, fixed before data are collected."""
+"""Preregistered analysis of a study protocol, as far as a program can check it. Part of `study_protocol`.
+
+`study_contradictions` checks it against the other tables; `analysis.psychophysics.declared_result` evaluates it.
+"""
 
 from typing import Annotated, Literal
 
@@ -10,7 +13,7 @@ from protocols.definition.staircase_rule import STRICT
 
 @dataclass(frozen=True, config=STRICT)
 class AnalysisSettings:
-    """Analysis declared before the data are collected. `hapteq protocol lock` fixes it with the rest of the
+    """Analysis that is declared before the data are collected; `hapteq protocol lock` fixes it with the rest of the
     protocol."""
 
     primary: Annotated[
@@ -47,5 +50,5 @@ class AnalysisSettings:
     ] = "undeclared"
 
 
-INTERVALS = {"hierarchical": "paired_t", "published": "tukey"}
-"""The interval that each primary analysis computes."""
+INTERVAL_BY_ANALYSIS = {"hierarchical": "paired_t", "published": "tukey"}
+"""Method of the 95 % interval that each primary analysis computes; another one must not be declared with it."""

@@ -1,4 +1,8 @@
-"""The language of the screens that a participant reads, and the questions that a laboratory asks besides."""
+"""Texts of the participant's screens, and questionnaire items of a study protocol.
+
+Each class is a table of the TOML file; Pydantic checks its values. Part of `study_protocol`; the answers are written by
+`study.store.formats.answer_table`.
+"""
 
 from dataclasses import field
 from typing import Annotated, Self
@@ -11,13 +15,13 @@ from protocols.definition.staircase_rule import STRICT
 
 Sentence = Annotated[str, Field(min_length=1, max_length=500)]
 Key = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
-LONGEST_SCALE = 11
-"""Most steps of a rating scale."""
+MAX_SCALE_STEPS = 11
+"""Largest number of steps of a rating scale. Chosen: 0 to 10."""
 
 
 @dataclass(frozen=True, config=STRICT)
 class TextSettings:
-    """Texts of the participant's screens. They are part of the hash: a protocol with other texts has another hash."""
+    """Texts of the participant's screens. They are part of the protocol's hash."""
 
     language: Annotated[
         str,
@@ -37,7 +41,8 @@ class TextSettings:
     ] = field(default_factory=dict, hash=False)
 
     @model_validator(mode="after")
-    def _resolve_answers(self) -> Self:
+    def _require_texts(self) -> Self:
+        """Raise InconsistentError for a language other than English without its texts."""
         if self.language != "en" and not self.words:
             allowed = "the texts themselves in text.words, which `hapteq` fills in where it reads the file"
             refuse([Problem("language", f'is "{self.language}", and its texts are missing', allowed)])
@@ -46,8 +51,8 @@ class TextSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class Question:
-    """A question before the trials or after the last run. An answer is optional. Without choices, number and scale the
-    answer is free text."""
+    """A question before the trials or after the last run, answered by a choice, a number, a step of a scale, or,
+    without these, by free text. An answer is optional."""
 
     key: Annotated[Key, Field(description="Name of the answer in the log.")]
     question: Annotated[Sentence, Field(description="Text of the question.")]
@@ -78,35 +83,38 @@ class Question:
 
     @property
     def steps(self) -> tuple[str, ...]:
-        """Texts of the scale's steps; empty where there is no scale."""
+        """Texts of the steps of the scale, first to last; empty without a scale."""
         return tuple(str(step) for step in range(self.scale[0], self.scale[1] + 1)) if self.scale else ()
 
     @property
     def is_free_text(self) -> bool:
+        """Whether the answer is free text: neither choices, number nor scale are given."""
         return not (self.choices or self.number or self.scale)
 
     @model_validator(mode="after")
-    def _of_one_kind(self) -> Self:
+    def _require_consistent_answer(self) -> Self:
+        """Raise InconsistentError where the fields contradict each other."""
         refuse(list(_find_problems(self)))
         return self
 
 
 def _find_problems(question: Question) -> tuple[Problem, ...]:
+    """Contradictions between the fields of a question; empty where there are none."""
     problems = []
     if sum(map(bool, (question.choices, question.number, question.scale))) > 1:
         problems.append(
             Problem("choices", "is given together with number or scale", "only one of choices, number and scale")
         )
     if question.codes and len(question.codes) != len(question.choices):
-        wrong = f"has {len(question.codes)} entries for {len(question.choices)} choices"
-        problems.append(Problem("codes", wrong, "one for each of the choices, or none"))
+        problem_text = f"has {len(question.codes)} entries for {len(question.choices)} choices"
+        problems.append(Problem("codes", problem_text, "one for each of the choices, or none"))
     if any(len(set(entries)) < len(entries) for entries in (question.codes, question.choices)):
         problems.append(Problem("choices", "or its codes have an entry twice", "different entries"))
     if question.number and not (len(question.number) == 2 and question.number[0] < question.number[1]):
         problems.append(Problem("number", f"is {list(question.number)}", "the lowest and then the highest number"))
     scale = question.scale
-    if scale and not (len(scale) == 2 and 0 <= scale[0] < scale[1] < scale[0] + LONGEST_SCALE):
-        allowed = f"the first and the last of 2 to {LONGEST_SCALE} steps, none below 0"
+    if scale and not (len(scale) == 2 and 0 <= scale[0] < scale[1] < scale[0] + MAX_SCALE_STEPS):
+        allowed = f"the first and the last of 2 to {MAX_SCALE_STEPS} steps, none below 0"
         problems.append(Problem("scale", f"is {list(scale)}", allowed))
     if question.ends and not (scale and len(question.ends) == 2):
         problems.append(Problem("ends", "does not match the scale", "two texts, together with a scale"))

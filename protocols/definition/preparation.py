@@ -1,4 +1,7 @@
-"""Parts of a sitting around its trials: consent, set-up, demonstration, practice, debrief."""
+"""Settings of the preparation of a sitting: consent, set-up, masking noise, demonstration, practice.
+
+Each class is a table of the TOML file; Pydantic checks its values. Part of `study_protocol`.
+"""
 
 from typing import Annotated, Literal, Self
 
@@ -25,7 +28,7 @@ RoveDb = Annotated[
 
 @dataclass(frozen=True, config=STRICT)
 class ConsentSettings:
-    """Consent of the participant, and criteria that exclude a person from taking part."""
+    """Consent of the participant, and exclusion criteria."""
 
     version: Annotated[
         str,
@@ -56,7 +59,8 @@ class ConsentSettings:
     ] = ()
 
     @model_validator(mode="after")
-    def _has_version(self) -> Self:
+    def _require_version(self) -> Self:
+        """Raise InconsistentError for statements or exclusions without a version."""
         if (self.statements or self.exclusions) and not self.version:
             refuse([Problem("version", "is empty, although something is asked", "the version of the wording")])
         return self
@@ -64,8 +68,8 @@ class ConsentSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class SetupSettings:
-    """Posture of the participant at the device, asked for and logged at the start of every sitting, and the required
-    values."""
+    """Set-up and posture of the participant, which are asked for and logged at the start of every sitting, with the
+    required values."""
 
     ask: Annotated[bool, Field(description="Whether the questions on the set-up are asked. Default: no.")] = False
     hearing_masked: Annotated[
@@ -93,8 +97,7 @@ class SetupSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class MaskingSettings:
-    """Masking noise that the program plays from its own sound output, so that the device is not heard. It is pink, like
-    that of `hapteq noise`."""
+    """Pink masking noise (as of `hapteq noise`) that the program plays, so that the device is not heard."""
 
     play: Annotated[
         bool,
@@ -124,10 +127,11 @@ class MaskingSettings:
     ] = 1
 
     @model_validator(mode="after")
-    def _has_band(self) -> Self:
+    def _require_rising_band(self) -> Self:
+        """Raise InconsistentError unless high_hz is at least 1 Hz above low_hz."""
         if self.high_hz < self.low_hz + 1:
-            wrong = f"is {self.high_hz:g}, not above low_hz by 1 Hz"
-            refuse([Problem("high_hz", wrong, f"at least {self.low_hz + 1:g}")])
+            problem_text = f"is {self.high_hz:g}, not above low_hz by 1 Hz"
+            refuse([Problem("high_hz", problem_text, f"at least {self.low_hz + 1:g}")])
         return self
 
 
@@ -146,8 +150,8 @@ class DemoSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class PracticeSettings:
-    """A short run around one level for each frequency, passed by right answers. Its trials are not part of any
-    result."""
+    """Practice runs, one for each frequency, near a fixed level, with a criterion of right answers. Their trials are
+    not part of any result."""
 
     frequencies_hz: Annotated[
         tuple[StimulusFrequency, ...],
@@ -200,11 +204,12 @@ class PracticeSettings:
     ] = "after_answer"
 
     @model_validator(mode="after")
-    def _reachable(self) -> Self:
+    def _require_reachable_criterion(self) -> Self:
+        """Raise InconsistentError for more right answers than of_last, and for fewer trials than of_last."""
         problems = []
         if self.right_needed > self.of_last:
-            wrong = f"is {self.right_needed}, more than of_last"
-            problems.append(Problem("right_needed", wrong, f"at most {self.of_last}"))
+            problem_text = f"is {self.right_needed}, more than of_last"
+            problems.append(Problem("right_needed", problem_text, f"at most {self.of_last}"))
         if self.trial_limit < self.of_last:
             problems.append(Problem("trial_limit", f"is {self.trial_limit}, below of_last", f"at least {self.of_last}"))
         refuse(problems)

@@ -1,28 +1,32 @@
-"""A problem with one key of a protocol file."""
+"""Validation problem of one key of a protocol file, and the error that reports such problems.
+
+Raised by the validators of `protocols.definition`; `protocols.document.validation_messages` completes the keys.
+"""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """Reads as a sentence: the key, what is wrong with it, what is allowed."""
+    """A problem with one key. As text it is a sentence: the key, the problem, the allowed values."""
 
     key: str
     """Dotted path such as `staircase.start_n` or `staircase.steps[2].step_db`; list entries count from 1."""
     problem: str
-    """A predicate: "is 5, which is too large"."""
+    """Predicate of the sentence: "is 5, which is too large"."""
     allowed: str
+    """Allowed values, as a phrase."""
 
     def __str__(self) -> str:
         return f"{self.key} {self.problem}. Allowed: {self.allowed}."
 
-    def below(self, parent: str) -> "Problem":
-        """The same problem with its key below the table `parent`."""
+    def prefix_key(self, parent: str) -> "Problem":
+        """Return the same problem with its key prefixed by the table `parent`, unless that is empty."""
         return Problem(".".join(part for part in (parent, self.key) if part), self.problem, self.allowed)
 
 
 class InconsistentError(ValueError):
-    """Values that are valid individually but not together. Keys are relative to the table that raises it."""
+    """Values of a table are invalid together. `problems`: their keys are relative to the table."""
 
     def __init__(self, problems: tuple[Problem, ...]) -> None:
         super().__init__(" ".join(str(problem) for problem in problems))
@@ -30,6 +34,6 @@ class InconsistentError(ValueError):
 
 
 def refuse(problems: list[Problem]) -> None:
-    """Raise InconsistentError when there are any."""
+    """Raise InconsistentError with the problems; do nothing for an empty list."""
     if problems:
         raise InconsistentError(tuple(problems))

@@ -1,4 +1,8 @@
-"""The excitations of a recording protocol: sinusoids, swept sines, multisines."""
+"""Excitation segments of a recording protocol: sinusoids, swept sines, multisines.
+
+Each class is a table of the TOML file; Pydantic checks its values. Part of `recording_protocol`; the signals are made
+by `study.session.stimulus.recording_pieces`.
+"""
 
 import math
 from typing import Annotated, Literal, Self
@@ -36,7 +40,7 @@ Role = Annotated[
 
 @dataclass(frozen=True, config=STRICT)
 class SineSegment:
-    """Sinusoids in sequence, each played long enough to be steady before its evaluated part."""
+    """Sinusoids in sequence, each with a time to settle before its evaluated part."""
 
     kind: Annotated[Literal["sine"], Field(description="Sinusoids, one after another.")]
     frequencies_hz: Annotated[
@@ -59,7 +63,7 @@ class SineSegment:
 
 @dataclass(frozen=True, config=STRICT)
 class SweepSegment:
-    """A periodic logarithmic swept sine. During the first period the transient decays."""
+    """A periodic logarithmic swept sine; the transient decays during the first period."""
 
     kind: Annotated[Literal["sweep"], Field(description="A logarithmic swept sine.")]
     from_hz: Annotated[Frequency, Field(description="Lowest frequency, where every period begins.")]
@@ -72,20 +76,21 @@ class SweepSegment:
 
     @model_validator(mode="after")
     def _require_rising_cycle(self) -> Self:
-        _refuse_downwards(self.from_hz, self.to_hz)
-        least_s = math.log(self.to_hz / self.from_hz) / (self.to_hz - self.from_hz)
+        """Raise InconsistentError unless the sweep rises, and for a period of less than a cycle."""
+        _require_rising_band(self.from_hz, self.to_hz)
+        shortest_period_s = math.log(self.to_hz / self.from_hz) / (self.to_hz - self.from_hz)
         problem_text = f"is {self.duration_s} s, less than a cycle of the sweep"
-        allowed = f"{math.ceil(1e6 * least_s) / 1e6:g} s or more"
-        refuse([] if self.duration_s >= least_s else [Problem("duration_s", problem_text, allowed)])
+        allowed = f"{math.ceil(1e6 * shortest_period_s) / 1e6:g} s or more"
+        refuse([] if self.duration_s >= shortest_period_s else [Problem("duration_s", problem_text, allowed)])
         return self
 
 
 @dataclass(frozen=True, config=STRICT)
 class MultisineSegment:
-    """A periodic sum of sinusoids of equal size and random phases: all frequencies at once, on whole lines.
+    """A periodic sum of sinusoids of equal amplitude and random phases, at multiples of 1 / duration_s.
 
-    With odd lines only, the even lines of the response contain noise and even distortion, not the signal. Periods
-    differ in noise only. Realisations differ in their phases, and therefore in odd distortion.
+    With odd lines only, the even lines of the response contain noise and even distortion alone. Periods differ in noise
+    only; realisations differ in their phases, and therefore in odd distortion.
     """
 
     kind: Annotated[Literal["multisine"], Field(description="A sum of sinusoids with random phases.")]
@@ -131,12 +136,13 @@ class MultisineSegment:
     role: Role = ""
 
     @model_validator(mode="after")
-    def _has_lines(self) -> Self:
-        _refuse_downwards(self.from_hz, self.to_hz)
+    def _require_lines(self) -> Self:
+        """Raise InconsistentError for a band that does not rise or contains no line."""
+        _require_rising_band(self.from_hz, self.to_hz)
         first, last = math.ceil(self.from_hz * self.duration_s - 1e-9), math.floor(self.to_hz * self.duration_s + 1e-9)
         lines = [line for line in range(first, min(last, first + 1) + 1) if line % 2 or not self.odd_only]
-        apart_hz = (2 if self.odd_only else 1) / self.duration_s
-        allowed = f"a period with lines between from_hz and to_hz, which lie {apart_hz:g} Hz apart here"
+        line_spacing_hz = (2 if self.odd_only else 1) / self.duration_s
+        allowed = f"a period with lines between from_hz and to_hz, which lie {line_spacing_hz:g} Hz apart here"
         refuse([] if lines else [Problem("duration_s", f"is {self.duration_s} s, too short for the band", allowed)])
         return self
 
@@ -144,11 +150,12 @@ class MultisineSegment:
 Segment = Annotated[SineSegment | SweepSegment | MultisineSegment, Field(discriminator="kind")]
 
 
-def highest_hz(segment: SineSegment | SweepSegment | MultisineSegment) -> float:
-    """Highest frequency of the excitation (Hz)."""
+def find_highest_hz(segment: SineSegment | SweepSegment | MultisineSegment) -> float:
+    """Find the highest frequency of the excitation (Hz)."""
     return max(segment.frequencies_hz) if isinstance(segment, SineSegment) else segment.to_hz
 
 
-def _refuse_downwards(from_hz: float, to_hz: float) -> None:
+def _require_rising_band(from_hz: float, to_hz: float) -> None:
+    """Raise InconsistentError unless from_hz is below to_hz."""
     if to_hz <= from_hz:
         refuse([Problem("to_hz", f"is {to_hz} Hz, not above from_hz", f"above {from_hz} Hz, the from_hz")])

@@ -1,9 +1,10 @@
-"""The [staircase] table of a protocol: numbers and choices of a transformed up-down rule, or of the Psi method.
+"""Schema of the [staircase] table of a protocol: settings of a transformed up-down rule, or of the Psi method.
 
 A transformed up-down rule (Levitt, Journal of the Acoustical Society of America 49 (1971), 467) raises the level after
 a number of wrong answers in a row and lowers it after a number of right ones; its levels settle where both are equally
-likely (1 up, 3 down: 79.4 % right). The rule itself is `protocols.procedure.staircase`. Each description below is the
-text of docs/formats.md and of the schema.
+likely (1 up, 3 down: 79.4 % right). The rule is computed by `protocols.procedure.staircase`. Field of
+`study_protocol.StudyProtocol`; the descriptions are printed in docs/formats.md and in the JSON schema. 3 N is the
+safety limit of a stimulus with a hand (docs/safety.md); the other bounds are chosen, wide enough for any study.
 """
 
 from enum import Enum
@@ -15,13 +16,14 @@ from pydantic.dataclasses import dataclass
 from protocols.definition.problem import Problem, refuse
 
 STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
-"""Unknown keys, infinities and NaN are refused."""
+"""pydantic configuration of all settings classes of a protocol: unknown keys, infinities and NaN are refused."""
 
 
 class StepChange(Enum):
     """Trial at which the next step size takes effect.
 
-    Published staircases of "4 dB, then 1 dB" differ in this, and their thresholds differ by 0.7 to 1.1 dB as a result.
+    Published staircases of "4 dB, then 1 dB" differ in this: AT_REVERSAL gives thresholds 0.7 to 1.1 dB lower than
+    AFTER_REVERSAL.
     """
 
     AFTER_REVERSAL = "after_reversal"
@@ -67,7 +69,8 @@ class BayesianPlacement:
 
 @dataclass(frozen=True, config=STRICT)
 class StaircaseRule:
-    """A transformed up-down rule. Numbers without a default must be stated by the experimenter."""
+    """Rule that chooses the levels of a run: a transformed up-down rule, or the Psi method (`bayesian`). Numbers
+    without a default must be stated by the experimenter."""
 
     start_n: Annotated[float, Field(ge=0.001, le=3.0, description="Level of the first trial of every run, in newtons.")]
     cap_n: Annotated[
@@ -150,7 +153,8 @@ class StaircaseRule:
         return self.bayesian.trials > 0
 
     @model_validator(mode="after")
-    def _consistent(self) -> Self:
+    def _check_consistency(self) -> Self:
+        """Raise InconsistentError where values of the table contradict each other."""
         problems = []
         if self.start_n > self.cap_n:
             problems.append(Problem("start_n", f"is {self.start_n} N, above cap_n", f"at most {self.cap_n} N, the cap"))
@@ -162,12 +166,12 @@ class StaircaseRule:
                     f"at most {self.reversals}, the number in reversals",
                 )
             )
-        planned = sum(phase.reversals for phase in self.steps)
-        if planned != self.reversals:
+        planned_reversals = sum(phase.reversals for phase in self.steps)
+        if planned_reversals != self.reversals:
             problems.append(
                 Problem(
                     "steps",
-                    f"plan {planned} reversals in all, but the run ends after {self.reversals}",
+                    f"plan {planned_reversals} reversals in all, but the run ends after {self.reversals}",
                     "phases whose reversals add up to the number in reversals",
                 )
             )
@@ -176,12 +180,12 @@ class StaircaseRule:
 
 
 def _find_placement_problems(rule: StaircaseRule) -> list[Problem]:
-    """Contradictions between the keys of the up-down rule and those of the Psi method."""
+    """Find contradictions between the keys of the up-down rule and those of the Psi method."""
     bayesian, problems = rule.bayesian, []
     if bayesian.spread_db and not rule.is_bayesian:
-        wrong = f"is {bayesian.spread_db} dB, but bayesian.trials is 0"
-        problems.append(Problem("bayesian.spread_db", wrong, "0, or a number of trials in bayesian.trials"))
+        problem_text = f"is {bayesian.spread_db} dB, but bayesian.trials is 0"
+        problems.append(Problem("bayesian.spread_db", problem_text, "0, or a number of trials in bayesian.trials"))
     if rule.is_bayesian and rule.initial_one_up_one_down:
-        wrong = "is true, but Psi chooses the levels (bayesian.trials), and there is no reversal to wait for"
-        problems.append(Problem("initial_one_up_one_down", wrong, "false, or 0 in bayesian.trials"))
+        problem_text = "is true, but Psi chooses the levels (bayesian.trials), and there is no reversal to wait for"
+        problems.append(Problem("initial_one_up_one_down", problem_text, "false, or 0 in bayesian.trials"))
     return problems

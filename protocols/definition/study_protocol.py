@@ -1,6 +1,9 @@
 """Schema of a study protocol (pydantic): all settings of a session, each with unit, bounds, default and its reason.
 
-Read from TOML by `study.store.formats.protocol_files`; contradictions between settings are refused."""
+Built from TOML by `protocols.document.loading`; a protocol whose settings contradict each other is refused with
+`problem.InconsistentError`. Classes and descriptions are the source of docs/formats.md and of the JSON schema. The
+bounds of the fields are chosen, wide enough for any study.
+"""
 
 from typing import Annotated, Literal, Self
 
@@ -9,7 +12,6 @@ from pydantic.dataclasses import dataclass
 
 from protocols.definition.apparatus import SafetySettings, SpringSettings, TestDirections
 from protocols.definition.declared_analysis import AnalysisSettings
-from protocols.definition.exposure import CatchSettings, DetectionSettings, GateSettings, SittingLimits
 from protocols.definition.field_types import Name, Source, StimulusFrequency, Title
 from protocols.definition.measurement import MeasurementSettings
 from protocols.definition.participant_text import Question, TextSettings
@@ -22,6 +24,7 @@ from protocols.definition.preparation import (
 )
 from protocols.definition.probes import ProbeSettings
 from protocols.definition.problem import Problem, refuse
+from protocols.definition.session_settings import CatchSettings, DetectionSettings, GateSettings, SittingLimits
 from protocols.definition.staircase_rule import STRICT, StaircaseRule
 from protocols.definition.study_contradictions import find_contradictions
 
@@ -91,6 +94,7 @@ class StimulusSettings:
 
     @model_validator(mode="after")
     def _check_distinct(self) -> Self:
+        """Raise InconsistentError where a frequency is listed twice."""
         if len(set(self.frequencies_hz)) != len(self.frequencies_hz):
             refuse([Problem("frequencies_hz", "names a frequency twice", "every frequency once")])
         return self
@@ -98,7 +102,7 @@ class StimulusSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class ScheduleSettings:
-    """Order of presentation, and randomisation."""
+    """Order of the frequencies, and randomisation of directions and labels."""
 
     order: Annotated[
         Literal["random", "williams", "as_listed"],
@@ -125,7 +129,7 @@ class ScheduleSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class TrialSettings:
-    """One presentation and its answer."""
+    """Answer of a trial: buttons, feedback, repeats and time limit; and the pause after it."""
 
     device_buttons: Annotated[
         tuple[int, ...],
@@ -168,7 +172,7 @@ class TrialSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class TrainingSettings:
-    """Runs before the study proper. They follow the same rule, and their trials are not part of any result."""
+    """Training runs before the test runs. They follow the same rule, and their trials are not part of any result."""
 
     frequencies_hz: Annotated[
         tuple[StimulusFrequency, ...],
@@ -254,11 +258,12 @@ class StudyProtocol:
 
     @property
     def all_frequencies_hz(self) -> tuple[float, ...]:
-        """All frequencies (Hz) that may be played, each once, ascending."""
-        parts = (self.stimulus, self.training, self.practice, self.detection)
-        return tuple(sorted({frequency_hz for part in parts for frequency_hz in part.frequencies_hz}))
+        """All frequencies (Hz) of test, training, practice and detection, each once, ascending."""
+        tables = (self.stimulus, self.training, self.practice, self.detection)
+        return tuple(sorted({frequency_hz for table in tables for frequency_hz in table.frequencies_hz}))
 
     @model_validator(mode="after")
     def _check_consistency(self) -> Self:
+        """Raise InconsistentError where tables contradict each other."""
         refuse(find_contradictions(self))
         return self

@@ -1,6 +1,7 @@
-"""Serialisation of a protocol to plain values and to TOML text, the inverse of `loading`.
+"""Serialisation of a protocol to plain values and to TOML text; the inverse is `loading`.
 
-Every default is written out, so that the text states all settings by itself.
+Every default is written out, so that the text states all settings. Called by `hashing` and `explain` (values), and by
+`study.store.formats.participant_texts` and `study.workflows.results.export_study` (text).
 """
 
 import json
@@ -11,21 +12,22 @@ from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.schema import ADAPTERS
 
 
-def protocol_values(protocol: StudyProtocol | RecordingProtocol) -> dict[str, Any]:
-    """Plain values (JSON types) with all defaults filled in; `loading.protocol_from_values` is the inverse."""
+def protocol_to_values(protocol: StudyProtocol | RecordingProtocol) -> dict[str, Any]:
+    """Convert a protocol to plain values (JSON types), all defaults included; inverse:
+    `loading.protocol_from_values`."""
     values: dict[str, Any] = ADAPTERS[protocol.kind].dump_python(protocol, mode="json")
     return values
 
 
 def dump_protocol(protocol: StudyProtocol | RecordingProtocol) -> str:
-    """TOML text with all defaults; `loading.load_protocol` reads an equal protocol from it."""
-    return _format_table("", protocol_values(protocol)).lstrip("\n")
+    """Convert a protocol to TOML text with all defaults; `loading.load_protocol` reads an equal protocol from it."""
+    return _format_table("", protocol_to_values(protocol)).lstrip("\n")
 
 
 def _format_table(path: str, values: dict[str, Any], header: str = "") -> str:
-    """TOML text of a table: its header, its plain keys, then its sub-tables, because TOML assigns each key to the
-    header above it. path: dotted name of the table, empty for the document."""
-    scalar_values = {key: value for key, value in values.items() if not _holds_tables(value)}
+    """Format a table as TOML: its header, its plain keys, then its sub-tables, because TOML assigns each key to the
+    header above it. path: dotted name of the table, empty for the document; header: empty for the document."""
+    scalar_values = {key: value for key, value in values.items() if not _has_table_header(value)}
     text = (f"\n{header}\n" if header else "") + "".join(
         f"{key} = {_format_value(value)}\n" for key, value in scalar_values.items()
     )
@@ -33,18 +35,18 @@ def _format_table(path: str, values: dict[str, Any], header: str = "") -> str:
         table_path = f"{path}.{key}" if path else key
         if isinstance(value, dict):
             text += _format_table(table_path, value, f"[{table_path}]")
-        elif _holds_tables(value):
+        elif _has_table_header(value):
             text += "".join(_format_table(table_path, entry, f"[[{table_path}]]") for entry in value)
     return text
 
 
-def _holds_tables(value: Any) -> bool:
-    """Whether a value is written under headers of its own: a table, or a list of tables."""
+def _has_table_header(value: Any) -> bool:
+    """Whether a value is written under separate TOML headers: a table, or a list that contains a table."""
     return isinstance(value, dict) or (isinstance(value, list) and any(isinstance(entry, dict) for entry in value))
 
 
 def _format_value(value: Any) -> str:
-    """A value other than a table as TOML text."""
+    """Format a truth value, text, number, or list of these as TOML."""
     match value:
         case bool():
             return str(value).lower()

@@ -11,7 +11,7 @@ from typing import Any
 
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.study_protocol import StudyProtocol
-from protocols.document.dumping import protocol_values
+from protocols.document.dumping import protocol_to_values
 from protocols.document.schema import (
     Node,
     ValuePath,
@@ -44,7 +44,7 @@ class ExplainedField:
 def explain_protocol(protocol: StudyProtocol | RecordingProtocol) -> tuple[ExplainedField, ...]:
     """Explain all fields of a protocol, in the order of its values, with nested tables flattened to dotted keys."""
     schema = make_protocol_schema(protocol.kind)
-    return tuple(_explain_fields(schema, protocol_values(protocol), ()))
+    return tuple(_explain_fields(schema, protocol_to_values(protocol), ()))
 
 
 def _explain_fields(schema: Node, value: Any, path: ValuePath) -> Iterator[ExplainedField]:

@@ -9,7 +9,6 @@ import json
 from typing import Any
 
 from protocols.definition.declared_analysis import AnalysisSettings
-from protocols.definition.exposure import CatchSettings, DetectionSettings, GateSettings, SittingLimits
 from protocols.definition.participant_text import TextSettings
 from protocols.definition.plausibility import DEFAULT_VALUES
 from protocols.definition.preparation import (
@@ -21,8 +20,9 @@ from protocols.definition.preparation import (
 )
 from protocols.definition.probes import ProbeSettings
 from protocols.definition.recording_protocol import RecordingProtocol
+from protocols.definition.session_settings import CatchSettings, DetectionSettings, GateSettings, SittingLimits
 from protocols.definition.study_protocol import StudyProtocol
-from protocols.document.dumping import protocol_values
+from protocols.document.dumping import protocol_to_values
 
 DefaultValue = str | float | bool | list[Any] | dict[str, Any]
 """Default value of a field, as in JSON."""
@@ -104,7 +104,7 @@ def protocol_hash(protocol: StudyProtocol | RecordingProtocol) -> str:
     do, because they are fixed before the data as well. Defaults are included, except those of later settings
     (`*_SINCE`).
     """
-    values = protocol_values(protocol)
+    values = protocol_to_values(protocol)
     if isinstance(protocol, StudyProtocol):
         for name, default in TABLES_SINCE.items():
             if getattr(protocol, name) == default:

@@ -1,6 +1,7 @@
-"""Lock of a protocol: its hash, stored before data are collected, and the check that the protocol is still the same.
+"""Lock of a protocol: its hash, stored before data are collected, and the check that the protocol is unchanged.
 
-With a lock, a change of the settings after the start of data collection is detected. A lock is a JSON document.
+With a lock, a change of the settings after the start of data collection is detected. A lock is a JSON document. Called
+by `study.store.formats.protocol_files`, which reads and writes the file.
 """
 
 import json
@@ -11,10 +12,10 @@ from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.hashing import protocol_hash
 
-FORMAT = "hapteq-protocol-lock"
-"""Value of the key `format`, by which a lock is recognised."""
-VERSION = 1
-"""Version of the lock's format."""
+LOCK_FORMAT = "hapteq-protocol-lock"
+"""Value of the key `format`, which identifies a JSON document as a lock."""
+LOCK_VERSION = 1
+"""Version of the lock's JSON format; a lock of another version is refused."""
 
 
 class LockError(ValueError):
@@ -31,18 +32,18 @@ class ProtocolLock:
     locked_utc: str
     """Time of the lock, UTC, ISO 8601."""
     hapteq: str
-    """Version of hapteq that locked it."""
+    """Version of the program hapteq that made the lock."""
 
 
-def make_lock(protocol: StudyProtocol | RecordingProtocol, locked_utc: str, hapteq: str) -> ProtocolLock:
-    """The lock of a protocol. locked_utc: ISO 8601; hapteq: version of the program."""
-    return ProtocolLock(protocol.name, protocol_hash(protocol), locked_utc, hapteq)
+def make_lock(protocol: StudyProtocol | RecordingProtocol, locked_utc: str, hapteq_version: str) -> ProtocolLock:
+    """Make the lock of a protocol. locked_utc: time, ISO 8601; hapteq_version: version of the program that makes it."""
+    return ProtocolLock(protocol.name, protocol_hash(protocol), locked_utc, hapteq_version)
 
 
-def check_lock(lock: ProtocolLock, protocol: StudyProtocol | RecordingProtocol, locked: str) -> None:
-    """Raise LockError unless `protocol` equals, value by value, the one that was locked.
+def check_lock(lock: ProtocolLock, protocol: StudyProtocol | RecordingProtocol, locked_time: str) -> None:
+    """Raise LockError unless `protocol` has the name and the hash that were locked.
 
-    locked: time of the lock in words, for the message.
+    locked_time: time of the lock as readable text, for the message.
     """
     if protocol.name != lock.name:
         raise LockError(
@@ -51,16 +52,16 @@ def check_lock(lock: ProtocolLock, protocol: StudyProtocol | RecordingProtocol, 
     current_hash = protocol_hash(protocol)
     if current_hash != lock.hash:
         raise LockError(
-            f"protocol {lock.name} was locked on {locked} and has changed since: "
+            f"protocol {lock.name} was locked on {locked_time} and has changed since: "
             f"its fingerprint is {current_hash[:12]}…, the locked one {lock.hash[:12]}…"
         )
 
 
 def lock_to_json(lock: ProtocolLock) -> str:
-    """JSON text of a lock."""
+    """Convert a lock to JSON text; inverse: `lock_from_json`."""
     document = {
-        "format": FORMAT,
-        "version": VERSION,
+        "format": LOCK_FORMAT,
+        "version": LOCK_VERSION,
         "name": lock.name,
         "hash": lock.hash,
         "locked_utc": lock.locked_utc,
@@ -70,16 +71,18 @@ def lock_to_json(lock: ProtocolLock) -> str:
 
 
 def lock_from_json(text: str) -> ProtocolLock:
-    """Parse a lock from JSON. Raises LockError for a document that is no lock of this version; its message says why."""
+    """Parse a lock from JSON text. Raises LockError, with the cause, for text that is no lock of this version."""
     try:
         document: Any = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise LockError(f"a lock is a JSON document, but this is none: {error}") from error
-    if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise LockError(f'a lock contains "format": "{FORMAT}", and this document does not')
-    if document.get("version") != VERSION:
-        raise LockError(f"the lock is of version {document.get('version')}, and this hapteq reads version {VERSION}")
-    wrong = [key for key in ("name", "hash", "locked_utc", "hapteq") if not isinstance(document.get(key), str)]
-    if wrong:
-        raise LockError(f"the lock lacks the text {', '.join(wrong)}")
+    if not isinstance(document, dict) or document.get("format") != LOCK_FORMAT:
+        raise LockError(f'a lock contains "format": "{LOCK_FORMAT}", and this document does not')
+    if document.get("version") != LOCK_VERSION:
+        raise LockError(
+            f"the lock is of version {document.get('version')}, and this hapteq reads version {LOCK_VERSION}"
+        )
+    missing_keys = [key for key in ("name", "hash", "locked_utc", "hapteq") if not isinstance(document.get(key), str)]
+    if missing_keys:
+        raise LockError(f"the lock lacks the text {', '.join(missing_keys)}")
     return ProtocolLock(document["name"], document["hash"], document["locked_utc"], document["hapteq"])

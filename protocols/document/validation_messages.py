@@ -88,7 +88,7 @@ def _translate_error(root: Node, error: Any) -> tuple[Problem, ...]:
     if error["type"] == "unexpected_keyword_argument":
         return (_report_unknown_key(root, place),)
     if error["type"] == "value_error" and isinstance(error["ctx"]["error"], InconsistentError):
-        return tuple(problem.below(key) for problem in error["ctx"]["error"].problems)
+        return tuple(problem.prefix_key(key) for problem in error["ctx"]["error"].problems)
     if error["type"] in ("union_tag_not_found", "union_tag_invalid"):
         return (_report_wrong_entry_kind(root, place, error),)
     node = find_node(root, place)

@@ -1,7 +1,8 @@
-"""Short practice run around a fixed level, before the test: when it ends, and whether it was passed.
+"""Criterion of a practice run (short, around a fixed level, before the test): when it ends, and whether it is passed.
 
-Criterion: `right_needed` correct answers among the last `of_last`, within `trial_limit` trials (`PracticeSettings`).
-The state is a value: `add_answer` returns the next one.
+Passed with `right_needed` correct answers among the last `of_last`, within `trial_limit` trials (`PracticeSettings`).
+The state is immutable: `add_answer` returns the next one. Called by `study.session` (state, progress of a followed
+session), `study.workflows.session.run_session` and `analysis.psychophysics.study_analysis`.
 """
 
 from dataclasses import dataclass
@@ -18,17 +19,17 @@ class PracticeState:
 
 
 def add_answer(state: PracticeState, correct: bool) -> PracticeState:
-    """The state after one more answer."""
+    """Return the state after one more answer."""
     return PracticeState((*state.correct, correct))
 
 
 def count_right_of_last(settings: PracticeSettings, state: PracticeState) -> int:
-    """Number of correct answers among the last `of_last`."""
+    """Count the correct answers among the last `of_last`, or among all while fewer were given."""
     return sum(state.correct[-settings.of_last :])
 
 
 def is_practice_passed(settings: PracticeSettings, state: PracticeState) -> bool:
-    """Whether at least `right_needed` of the last `of_last` answers are correct."""
+    """Whether at least `right_needed` of the last `of_last` answers are correct; also before `of_last` were given."""
     return count_right_of_last(settings, state) >= settings.right_needed
 
 

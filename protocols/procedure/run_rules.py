@@ -1,4 +1,7 @@
-"""Staircase rule of a run: training and detection differ from the test runs."""
+"""Staircase rule of a run by its phase: training and detection change start level or trial limit of the test's rule.
+
+Called by `study.session.state.state` when a run begins, and by `analysis.psychophysics.detection`.
+"""
 
 from dataclasses import replace
 
@@ -8,18 +11,19 @@ from protocols.trial import Phase
 
 
 def make_staircase_rule(protocol: StudyProtocol, phase: Phase) -> StaircaseRule:
-    """The rule of a staircase run. Practice runs, at a fixed level, have none: see `protocols.procedure.practice`.
+    """Make the rule of a staircase run. A limit of 0 in training or detection means that of the protocol's staircase.
 
+    Not for practice runs, whose phase is TRAINING too: they have a fixed level (`protocols.procedure.practice`).
     Raises ValueError for CATCH: catch trials lie within test runs and follow no staircase.
     """
     match phase:
         case Phase.TEST:
             return protocol.staircase
         case Phase.TRAINING:
-            limit = protocol.training.trial_limit
-            return replace(protocol.staircase, trial_limit=limit) if limit else protocol.staircase
+            trial_limit = protocol.training.trial_limit
+            return replace(protocol.staircase, trial_limit=trial_limit) if trial_limit else protocol.staircase
         case Phase.DETECTION:
-            limit = protocol.detection.trial_limit or protocol.staircase.trial_limit
-            return replace(protocol.staircase, start_n=protocol.detection.start_n, trial_limit=limit)
+            trial_limit = protocol.detection.trial_limit or protocol.staircase.trial_limit
+            return replace(protocol.staircase, start_n=protocol.detection.start_n, trial_limit=trial_limit)
         case Phase.CATCH:
             raise ValueError("catch trials follow no staircase")

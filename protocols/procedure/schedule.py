@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from protocols.definition.exposure import CatchSettings
 from protocols.definition.preparation import DemoSettings, PracticeSettings
+from protocols.definition.session_settings import CatchSettings
 from protocols.definition.study_protocol import ScheduleSettings, StudyProtocol
 from protocols.procedure.staircase import to_db, to_newton
 from protocols.trial import Phase

@@ -2,8 +2,9 @@
 
 The order of the frequencies is counterbalanced by a Williams design (`schedule.make_williams_rows`). A participant's
 number determines the row of the design and whether the labels 1 and 2 of the directions are swapped. Both repeat after
-a cycle of participants; each place of the cycle is a cell of the design. A sample of n participants fills the cells in
-turn. A cell whose participant withdrew or did not finish lacks a participant, because a number is never assigned again.
+a cycle of participants; each position in the cycle is a cell of the design. A sample of n participants fills the cells
+in turn. A cell whose participant withdrew or did not finish lacks a participant, because a number is never assigned
+again. Called by `study.workflows.views.plan_study`.
 """
 
 from collections.abc import Sequence
@@ -23,7 +24,7 @@ class Participant:
 
     code: str
     number: int | None
-    """Place in the balanced order, from 0; None where none was assigned."""
+    """Position in the balanced order, from 0; None where none was assigned."""
     progress: Progress
     reason: str = ""
     """Reason why a participant is left out, such as refused, excluded, withdrawn or unreadable; else empty."""
@@ -65,10 +66,10 @@ class StudyPlan:
     """Cells of one cycle in the order in which they are assigned; empty where a cycle is one participant, so that
     nothing is balanced."""
     next_number: int
-    """Number of the next participant."""
+    """Position of the next participant in the balanced order, from 0."""
 
     def count(self, progress: Progress) -> int:
-        """Number of participants with this progress, including those without a place in the balanced order."""
+        """Count the participants with this progress, including those without a position in the balanced order."""
         return sum(participant.progress == progress for participant in self.participants)
 
     @property
@@ -86,39 +87,44 @@ class StudyPlan:
 
 def plan_study(protocol: StudyProtocol, participants: Sequence[Participant], next_number: int) -> StudyPlan:
     """Make the plan of a study: its cells with the numbers of participants that they have and need. participants: those
-    of this protocol; next_number: number of the next participant. Where the protocol declares no sample size, the plan
-    completes the present cycle."""
+    of this protocol; next_number: number of the next participant, from 0. Where the protocol declares no sample size,
+    the cells require complete cycles for `next_number` participants, at least one cycle."""
     planned = protocol.analysis.participants
-    cycle = _find_cycle_length(protocol)
-    sample = planned or -(-max(next_number, 1) // cycle) * cycle
+    cycle_length = _find_cycle_length(protocol)
+    sample_size = planned or -(-max(next_number, 1) // cycle_length) * cycle_length
     cells = (
-        tuple(_make_cell(protocol, place, cycle, sample, participants) for place in range(cycle)) if cycle > 1 else ()
+        tuple(
+            _make_cell(protocol, cycle_index, cycle_length, sample_size, participants)
+            for cycle_index in range(cycle_length)
+        )
+        if cycle_length > 1
+        else ()
     )
     return StudyPlan(protocol.name, planned, tuple(participants), cells, next_number)
 
 
 def _find_cycle_length(protocol: StudyProtocol) -> int:
-    """Number of participants after which order and labelling repeat."""
+    """Compute the number of participants after which order of frequencies and labelling repeat."""
     frequencies, settings = protocol.stimulus.frequencies_hz, protocol.schedule
-    orders = len(make_williams_rows(len(frequencies))) if settings.order == "williams" and frequencies else 1
-    return orders * (1 if settings.labels == "fixed" else 2)
+    order_count = len(make_williams_rows(len(frequencies))) if settings.order == "williams" and frequencies else 1
+    return order_count * (1 if settings.labels == "fixed" else 2)
 
 
 def _make_cell(
-    protocol: StudyProtocol, cycle_index: int, cycle: int, sample: int, participants: Sequence[Participant]
+    protocol: StudyProtocol, cycle_index: int, cycle_length: int, sample_size: int, participants: Sequence[Participant]
 ) -> Cell:
-    """Make the cell of this index in the cycle, with the participants of a sample of this size."""
+    """Make the cell of this index in the cycle; all participants of the cell count, also those beyond the sample."""
     frequencies_hz = protocol.stimulus.frequencies_hz
     is_random = protocol.schedule.order == "random"
     cell_participants = [
         participant
         for participant in participants
-        if participant.number is not None and participant.number % cycle == cycle_index
+        if participant.number is not None and participant.number % cycle_length == cycle_index
     ]
     return Cell(
         () if is_random else order_frequencies(protocol.schedule, frequencies_hz, 0, cycle_index),
         are_labels_swapped(protocol.schedule, len(frequencies_hz), cycle_index),
-        len(range(cycle_index, sample, cycle)),
+        len(range(cycle_index, sample_size, cycle_length)),
         sum(participant.progress == "done" for participant in cell_participants),
         sum(participant.progress == "begun" for participant in cell_participants),
     )

@@ -1,26 +1,30 @@
-"""All English texts by key, and the placeholders that a translation of each must contain."""
+"""All English texts for participants by key, and the placeholders that a translation of each must contain.
+
+Merges the tables `english_*`. Used by `words` (texts to show), `translation` (checks of a table) and
+`study.store.formats.participant_texts` (reading a table).
+"""
 
 from string import Formatter
 
 from protocols.wording.english_facts import FACTS
-from protocols.wording.english_forms import FORMS, PROTOCOLS
-from protocols.wording.english_help import HELP
-from protocols.wording.english_screens import SCREENS
+from protocols.wording.english_forms import FORM_TEXTS, PROTOCOL_TEXTS
+from protocols.wording.english_help import HELP_PAGES
+from protocols.wording.english_screens import SCREEN_TEXTS
 
-ENGLISH: dict[str, str] = {**SCREENS, **FORMS, **FACTS, **HELP, **PROTOCOLS}
+ENGLISH: dict[str, str] = {**SCREEN_TEXTS, **FORM_TEXTS, **FACTS, **HELP_PAGES, **PROTOCOL_TEXTS}
 """English text of every key; a complete translation has exactly these keys."""
 
 LANGUAGES = {"en": "English", "de": "German", "es": "Spanish"}
 """Names of the languages supplied with hapteq, by code (ISO 639-1)."""
 
 
-def placeholders(text: str) -> frozenset[str] | None:
-    """Names of the placeholders `{name}` in a text; None where braces are unpaired or contain more than a name, such as
-    a format or a conversion."""
+def list_placeholders(text: str) -> frozenset[str] | None:
+    """List the names of the placeholders `{name}` in a text; None where braces are unpaired, or contain no name or
+    more than a name, such as a format or a conversion."""
     try:
-        parts = [(name, spec, conversion) for _, name, spec, conversion in Formatter().parse(text) if name is not None]
+        fields = [(name, spec, conversion) for _, name, spec, conversion in Formatter().parse(text) if name is not None]
     except ValueError:
         return None
-    if any(spec or conversion or not name.isidentifier() for name, spec, conversion in parts):
+    if any(spec or conversion or not name.isidentifier() for name, spec, conversion in fields):
         return None
-    return frozenset(name for name, _, _ in parts)
+    return frozenset(name for name, _, _ in fields)

@@ -1,10 +1,10 @@
 """English texts of the forms (consent, exclusion, set-up, questions), and of the shipped protocols, by key.
 
-A key that ends in `_1` is the singular, in `_n` the form for any other count. Names in braces are placeholders that the
-program fills in; every translation has the same keys and placeholders (`in_language`).
+Merged into `english.ENGLISH`. A key that ends in `_1` is the singular, in `_n` the form for any other count. Names in
+braces are placeholders that the program fills in; every translation has the same keys and placeholders (`translation`).
 """
 
-FORMS: dict[str, str] = {
+FORM_TEXTS: dict[str, str] = {
     "yes": "yes",
     "no": "no",
     "quoted": "“{text}”",
@@ -67,7 +67,7 @@ FORMS: dict[str, str] = {
     "take_title": "Take the handle again",
     "take_intro": "The measurement without a hand is over.",
     "take_held": "Do you hold the handle as before?",
-    # Line mode.
+    # Forms in line mode: questions and answers as plain text in a terminal.
     "line_form_1": "1 question. Type the answer and Enter; b goes one question back, q leaves.",
     "line_form_n": "{count} questions. Type the answer and Enter; b goes one question back, q leaves.",
     "line_form_place": "{number} of {all}: {question}",
@@ -84,9 +84,9 @@ FORMS: dict[str, str] = {
     "line_form_confirm": "y if that is right, b to answer again: ",
     "line_form_confirm_letter": "y",
 }
-"""Texts of the forms by key, on the screen and in line mode (plain text in a terminal)."""
+"""Texts of the forms by key, on the screen and in line mode."""
 
-PROTOCOLS: dict[str, str] = {
+PROTOCOL_TEXTS: dict[str, str] = {
     "protocol_title_threshold": "Force thresholds for telling two directions apart, 5 to 45 Hz",
     "protocol_title_equalized": "Thresholds for telling two equal accelerations apart by direction, 5 to 45 Hz",
     "protocol_title_training": "Practice run at 5 Hz",
@@ -120,5 +120,5 @@ PROTOCOLS: dict[str, str] = {
     "protocol_not_at_all": "not at all",
     "protocol_very": "very",
 }
-"""Sentences of the shipped protocols by key. A protocol that contains one of them word by word gets the translation of
-that key (`in_language`)."""
+"""Sentences of the shipped protocols by key. `translation` replaces a sentence of a protocol that equals one of these
+by the text of that key in the protocol's language."""

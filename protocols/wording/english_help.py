@@ -1,10 +1,10 @@
 """English help pages of the participant's screens (F1), in Markdown, by key.
 
-A key is `help_` and the name of the screen; `help_everywhere` follows every page. Translations replace them key by key
-(`protocols.wording.english`; German and Spanish: de.toml, es.toml).
+A key is `help_` and the name of the screen; `help_everywhere` is appended to every page. Merged into `english.ENGLISH`;
+a translation has the same keys (`translation`; German and Spanish: de.toml, es.toml).
 """
 
-HELP: dict[str, str] = {
+HELP_PAGES: dict[str, str] = {
     "help_title": "Help",
     "help_instructions": """\
 # Instructions

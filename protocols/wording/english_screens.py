@@ -1,13 +1,14 @@
 """English texts of the participants' screens and of line mode (plain text in a terminal), by key.
 
-A key that ends in `_1` is the singular, in `_n` the form for any other count. Names in braces are placeholders that the
-program fills in; every translation has the same keys and placeholders (`in_language`).
+Merged into `english.ENGLISH`, looked up by `words`. A key that ends in `_1` is the singular, in `_n` the form for any
+other count. Names in braces are placeholders that the program fills in; every translation has the same keys and
+placeholders (`translation`).
 """
 
-# A protocol in German or Spanish contains its texts, and its hash covers them: a change of a shipped translation would
-# change these hashes.
-SCREENS: dict[str, str] = {
-    # Footer: what a key does. Short, because a single line of 80 columns shows all keys of a screen.
+# A protocol in German or Spanish contains its texts, and its hash covers them: a new key, or a change of a shipped
+# translation, changes the hashes of these protocols.
+SCREEN_TEXTS: dict[str, str] = {
+    # Footer: action of each key. Short, because a single line of 80 columns shows all keys of a screen.
     "key_help": "Help",
     "key_begin": "Begin",
     "key_answer_1": "Answer 1",

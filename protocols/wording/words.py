@@ -8,11 +8,11 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from protocols.wording.english import ENGLISH, placeholders
+from protocols.wording.english import ENGLISH, list_placeholders
 from protocols.wording.english_facts import FACTS
-from protocols.wording.english_screens import SCREENS
+from protocols.wording.english_screens import SCREEN_TEXTS
 
-FOOTER_KEYS = {text: key for key, text in SCREENS.items() if key.startswith("key_")}
+FOOTER_KEYS = {text: key for key, text in SCREEN_TEXTS.items() if key.startswith("key_")}
 """Key of each word in the footer (what a keyboard key does), by its English text."""
 
 
@@ -44,7 +44,7 @@ class Words:
     def fill(self, key: str, values: Mapping[str, object]) -> str:
         """Fill in the placeholders of a text. The English text is shown where the placeholders of the protocol's own
         text differ (from another version of hapteq), so that no sentence is missing on the screen."""
-        has_same_placeholders = placeholders(self[key]) == placeholders(ENGLISH[key])
+        has_same_placeholders = list_placeholders(self[key]) == list_placeholders(ENGLISH[key])
         return (self[key] if has_same_placeholders else ENGLISH[key]).format_map(values)
 
     def fill_count(self, key: str, count: int) -> str:

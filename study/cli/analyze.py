@@ -1,4 +1,7 @@
-"""`hapteq analyze`: thresholds, ANOVA, figures and the report of all sessions in a folder."""
+"""Command `hapteq analyze`: computes thresholds, ANOVA, figures and the report of all sessions in a folder.
+
+Parses the options and calls `study.workflows.results.analyze_data`. Loaded by `command_table`.
+"""
 
 from pathlib import Path
 from typing import Annotated

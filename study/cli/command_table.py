@@ -1,6 +1,7 @@
-"""The commands of `hapteq` in their groups, each loaded when it is called.
+"""Table of the commands of `hapteq` in groups, each imported only when it is looked up (lazy loading).
 
-A command's file is named as the command, and so is its function in it; a command with subcommands is an `app`.
+A command's module and the function in it have the name of the command, with "_" for "-"; a command with subcommands is
+a typer application `app`. `main` uses `CommandTable`, the commands with subcommands (`kit`, `protocol`) `Subcommands`.
 """
 
 from collections.abc import Iterator, Mapping
@@ -11,8 +12,8 @@ import typer
 from typer.core import TyperGroup
 from typer.main import get_command
 
-FILES = {"import": "import_recording"}
-"""Modules of commands whose names are keywords of Python."""
+KEYWORD_MODULES = {"import": "import_recording"}
+"""Module and function names of commands whose names are keywords of Python."""
 
 COMMANDS: dict[str, dict[str, str]] = {
     "Study": {
@@ -60,44 +61,45 @@ COMMANDS: dict[str, dict[str, str]] = {
         "kit": "Take a blind test on your own device",
     },
 }
-"""What each command does, by group."""
+"""Short help of each command, by the title of its group."""
 
 
-class LoadedWhenCalled(Mapping[str, Any]):
-    """Commands by name, without importing any of them before it is asked for: `--help` and `--version` need none."""
+class LazyCommands(Mapping[str, Any]):
+    """Mapping from a command's name to the command, which is imported only when it is looked up: `--help` and
+    `--version` import none. Raises KeyError for an unknown name."""
 
     def __init__(self) -> None:
-        self.words = {name: words for group in COMMANDS.values() for name, words in group.items()}
+        self.short_helps = {name: short_help for group in COMMANDS.values() for name, short_help in group.items()}
 
     def __getitem__(self, name: str) -> Any:
-        words = self.words[name]
-        file = FILES.get(name, name.replace("-", "_"))
-        module = import_module(f"study.cli.{file}")
+        short_help = self.short_helps[name]
+        module_name = KEYWORD_MODULES.get(name, name.replace("-", "_"))
+        module = import_module(f"study.cli.{module_name}")
         app = getattr(module, "app", None)
         if app is None:
             app = typer.Typer(add_completion=False, rich_markup_mode=None)
             settings = getattr(module, "CONTEXT_SETTINGS", None)
-            app.command(name, short_help=words, context_settings=settings)(getattr(module, file))
+            app.command(name, short_help=short_help, context_settings=settings)(getattr(module, module_name))
         return get_command(app)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.words)
+        return iter(self.short_helps)
 
     def __len__(self) -> int:
-        return len(self.words)
+        return len(self.short_helps)
 
 
 class CommandTable(TyperGroup):
-    """All commands as one command line, with groups in `--help` and unwrapped lines."""
+    """The command `hapteq`: all commands of `COMMANDS`, listed by group in `--help` with their complete short help."""
 
     @property
     def commands(self) -> Any:
         """Commands by name, each imported when it is looked up."""
-        return LoadedWhenCalled()
+        return LazyCommands()
 
     @commands.setter
     def commands(self, registered: Any) -> None:
-        """Required by Typer's interface; there are no further commands."""
+        """Do nothing: typer assigns the commands registered with it, and there are none."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Names in the order of `COMMANDS`."""
@@ -105,16 +107,17 @@ class CommandTable(TyperGroup):
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write the commands under the titles of their groups, without importing any."""
-        for title, rows in COMMANDS.items():
+        for title, short_helps in COMMANDS.items():
             with formatter.section(title):
-                formatter.write_dl(list(rows.items()))
+                formatter.write_dl(list(short_helps.items()))
 
 
 class Subcommands(TyperGroup):
-    """The list of subcommands in `--help`, with each line whole."""
+    """A command with subcommands, which lists them in `--help` with their complete short help."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write the subcommands under one title, each with its whole short help."""
+        """Write the subcommands under one title, each with its short help; no help is longer than the limit of 200
+        characters, so that none is cut."""
         with formatter.section("Commands"):
             formatter.write_dl(
                 [(name, command.get_short_help_str(limit=200)) for name, command in self.commands.items()]

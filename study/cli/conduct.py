@@ -13,8 +13,8 @@ from pathlib import Path
 import typer
 
 from protocols.wording.words import Words
-from study.cli.motion_notice import announce
-from study.cli.progress import show_answer_count
+from study.cli.motion_notice import announce_motion
+from study.cli.progress import show_run_and_trial
 from study.cli.results import print_results
 from study.devices.clock import Clock, RealClock, VirtualClock
 from study.devices.opening import REAL, needs_real_time
@@ -77,7 +77,7 @@ def _confirm_free_handle(observer: str | None, device: str, hands_off: bool) -> 
     """Announce that a real device moves by itself, and have it confirmed, where a simulated participant uses one; do
     nothing otherwise. Raises WrongUseError where that is not confirmed."""
     if observer is not None and device in REAL:
-        announce(
+        announce_motion(
             f"A simulated participant ('{observer}') takes this session: the {device} moves by itself, for as long as "
             "a session lasts. No person may hold the handle, and its workspace must be free.",
             hands_off,
@@ -113,7 +113,7 @@ def _provide_participant(
     it, and told after it that the results are for the experimenter. Raises WrongUseError where standard input is
     closed."""
     if observer is not None:
-        with show_answer_count(f"simulated participant '{observer}'") as show_question:
+        with show_run_and_trial(f"simulated participant '{observer}'") as show_question:
             yield make_simulated_participant(observer, seed, clock, on_question=show_question)
         return
     typer.echo(words["preparing_device"], err=True)

@@ -1,4 +1,8 @@
-"""`hapteq contact`: a recorded transient, turned to the normal of a contact, played on the device."""
+"""Command `hapteq contact`: plays a recorded acceleration transient along the normal of a contact, on the device.
+
+Parses the options, prints the notice before the device moves, and calls `study.workflows.equalizer.play_contact`.
+Loaded by `command_table`.
+"""
 
 import json
 from pathlib import Path
@@ -6,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from study.cli.motion_notice import announce
+from study.cli.motion_notice import announce_motion
 from study.cli.results import JsonOption
 from study.cli.seed import check_seed
 from study.cli.session_options import DeviceOption, HandsOffOption
@@ -28,7 +32,7 @@ def contact(
     hands_off: HandsOffOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Play a transient that begins when a contact is felt: nothing may act before it. No person may hold the
+    """Play an acceleration transient that begins at a contact; no force acts before the contact. No person may hold the
     handle; from a script, a real device moves with --hands-off only.
 
     Writes forces.csv, wanted.csv, measured.csv, contact.json and a picture that compares it with a force of one gain.
@@ -40,7 +44,9 @@ def contact(
 
     plan = ContactPlan(model, transient, normal, out, device, scale, weight, cap, seed)
     with show_late_bar("Plays (%)", total=100) as show:
-        playback = play_contact(plan, lambda share: show(round(100 * share)), partial(announce, hands_off=hands_off))
+        playback = play_contact(
+            plan, lambda share: show(round(100 * share)), partial(announce_motion, hands_off=hands_off)
+        )
     typer.echo(
         json.dumps(summarise_contact(playback), indent=2)
         if as_json

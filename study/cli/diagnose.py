@@ -1,4 +1,8 @@
-"""`hapteq diagnose`: where model and recording differ, and what physics the model lacks."""
+"""Command `hapteq diagnose`: locates the mismatch of model and recording, and names the physics that the model lacks.
+
+Parses the options, calls `study.workflows.diagnosis.diagnose_recordings` and prints its answer. Loaded by
+`command_table`; `model` uses `ForceConstantOption`, too.
+"""
 
 import json
 from dataclasses import replace
@@ -90,7 +94,7 @@ def diagnose(
     with show_steps("Diagnosing") as show:
         answer = find_answer(plan, show)
     findings = answer.findings
-    # Printed before drawing, because the page takes a while.
+    # Printed before the report and its figures are made, because they take much longer.
     typer.echo(json.dumps(make_json(findings), indent=2) if as_json else "\n".join(format_answer(findings)))
     with show_steps("Diagnosing") as show:
         complete = write_answer(answer, show)

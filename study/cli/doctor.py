@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from study.cli.motion_notice import announce, require_confirmation
+from study.cli.motion_notice import announce_motion, require_confirmation
 from study.cli.results import JsonOption
 from study.cli.session_options import DataOption, DeviceOption, HandsOffOption
 
 if TYPE_CHECKING:
-    from study.session.views.views import DeviceFinding
+    from study.session.views.participant_views import DeviceFinding
     from study.workflows.checks.daily_check import MotionCallbacks
     from study.workflows.checks.examine_setup import Examination
 
@@ -142,7 +142,7 @@ def _show_motion(hands_off: bool) -> "Iterator[MotionCallbacks]":
     from study.workflows.checks.daily_check import MotionCallbacks, compute_play_duration_s
 
     with show_late_bar("The device moves (s)", total=round(compute_play_duration_s())) as show:
-        yield MotionCallbacks(partial(announce, hands_off=hands_off), show)
+        yield MotionCallbacks(partial(announce_motion, hands_off=hands_off), show)
 
 
 def _calibrate(device: str) -> None:

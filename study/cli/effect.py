@@ -1,4 +1,7 @@
-"""`hapteq effect`: a law that was discovered, as a file that later diagnoses look for."""
+"""Command `hapteq effect`: saves a discovered law (a formula of a missing force) as an effect for later diagnoses.
+
+Parses the options and calls `study.workflows.diagnosis.effect_file`. Loaded by `command_table`.
+"""
 
 from pathlib import Path
 from typing import Annotated

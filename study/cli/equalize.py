@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from study.cli.motion_notice import announce
+from study.cli.motion_notice import announce_motion
 from study.cli.results import JsonOption
 from study.cli.seed import check_seed
 from study.cli.session_options import HandsOffOption
@@ -112,7 +112,7 @@ def _repeat_on_device(
         summarise_repeats,
     )
 
-    ask = partial(announce, hands_off=hands_off)
+    ask = partial(announce_motion, hands_off=hands_off)
     with show_late_bar("Plays", total=order.repeats + 1) as show:
         repeated = repeat_trajectory(plan, order, lambda number, share: show(number + share), ask)
     return summarise_repeats(repeated), format_repeat_lines(repeated)

@@ -1,4 +1,7 @@
-"""`hapteq export`: a study's trials in the forms that other tools read."""
+"""Command `hapteq export`: writes the trials of a study as Psych-DS, BIDS, MATLAB or CSV files.
+
+Parses the options and calls `study.workflows.results.export_study`. Loaded by `command_table`.
+"""
 
 import json
 from pathlib import Path

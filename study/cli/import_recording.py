@@ -1,4 +1,9 @@
-"""`hapteq import`: a laboratory's files as a hapteq recording."""
+"""Command `hapteq import`: converts files of other programs to one hapteq recording in SI units.
+
+Parses the options and calls `study.workflows.recording.import_recording`; prints a map to be completed where the
+channels of the files are unknown. Loaded by `command_table`, under the name of this module because `import` is a
+keyword.
+"""
 
 import json
 from pathlib import Path
@@ -23,18 +28,18 @@ def import_recording(
 ) -> None:
     """Write one recording: units in SI, all channels on one rate, clocks aligned. All changes are reported.
 
-    Without a map, tables and arrays whose names say units are understood (time [s], fx [N], x_mm, ...), so are files
-    that a shipped map fits, and hapteq recordings; for other files a map to be completed is printed.
+    Without a map, three kinds of files are read: tables and arrays whose names contain units (time [s], fx [N], x_mm,
+    ...), files that a shipped map fits, and hapteq recordings. For other files a map to be completed is printed.
     """
     from study.cli.progress import show_late_bar
     from study.importing.map_format.map_errors import MapNeededError
     from study.workflows.recording.import_recording import ImportPlan, check_free
-    from study.workflows.recording.import_recording import import_recording as run
+    from study.workflows.recording.import_recording import import_recording as convert_files
 
     check_free(out)
     try:
         with show_late_bar("Importing (%)", total=100) as show:
-            imported = run(ImportPlan(tuple(files), by_map, out), lambda share: show(round(100 * share)))
+            imported = convert_files(ImportPlan(tuple(files), by_map, out), lambda share: show(round(100 * share)))
     except MapNeededError as error:
         typer.echo(error.skeleton, nl=False)
         raise

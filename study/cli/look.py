@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from study.cli.results import JsonOption
-from study.cli.screen import columns
+from study.cli.screen import read_terminal_width
 
 if TYPE_CHECKING:
     from analysis.look.overview import Overview
@@ -46,7 +46,9 @@ def look_lines(overview: "Overview", everything: bool) -> Iterable[str]:
     yield ""
     for check in overview.checks:
         if everything or check.level != "fine":
-            yield from wrap_hanging(f"{check.level:6s}  {check.name}: {check.seen} {check.do}".rstrip(), 8, columns())
+            yield from wrap_hanging(
+                f"{check.level:6s}  {check.name}: {check.finding} {check.advice}".rstrip(), 8, read_terminal_width()
+            )
     fine = sum(check.level == "fine" for check in overview.checks)
     if not everything and fine:
         yield f"fine    {fine} further checks (--all shows them)"
@@ -74,7 +76,7 @@ def _tables(overview: "Overview") -> Iterable[str]:
     for summary in overview.summaries:
         sizes = [typeset(f"{value:.4g}") for value in (summary.lowest, summary.highest, summary.mean, summary.rms)]
         rows.append((f"{summary.role} {summary.name}", summary.quantity, summary.unit, *sizes, str(summary.missing)))
-    yield from align_rows(tuple(rows), columns())
+    yield from align_rows(tuple(rows), read_terminal_width())
     segments = overview.recording.segments
     if segments:
         yield ""
@@ -84,7 +86,7 @@ def _tables(overview: "Overview") -> Iterable[str]:
             sizes = [f"{value:.4g}" for value in level.rms]
             times = (f"{level.start_s:.4g}", f"{level.duration_s:.4g}", str(level.period) if level.period else "")
             table.append((f"{level.number} {level.kind}", level.role, *times, *sizes))
-        yield from align_rows(tuple(table), columns())
+        yield from align_rows(tuple(table), read_terminal_width())
         if len(segments) > MOST_SEGMENTS:
             yield f"and {len(segments) - MOST_SEGMENTS} segments more"
 

@@ -1,4 +1,7 @@
-"""Notice that a real device is going to move, and its confirmation by the person beside it."""
+"""Notice that a real device is going to move, and its confirmation by Enter at the terminal.
+
+Called by the commands that move a device (`record`, `contact`, `equalize`, `twin`, `doctor`, `conduct`).
+"""
 
 import sys
 
@@ -7,28 +10,29 @@ import typer
 from study.errors import WrongUseError
 
 
-def announce(notice: str, hands_off: bool, hand_on_handle: bool = False) -> None:
-    """Print the notice, and wait for Enter.
+def announce_motion(notice: str, hands_off: bool, hand_on_handle: bool = False) -> None:
+    """Print the notice to stderr, and wait for Enter where standard input is a keyboard.
 
-    Without a keyboard no person can confirm it: then hands_off, the caller's own word, is needed for a free handle,
-    and a held one is not moved at all. Raises WrongUseError, or KeyboardInterrupt for a terminal that is closed.
+    hands_off: whether the user states that no hand is on the handle (--hands-off); then no confirmation is required
+    without a keyboard. hand_on_handle: whether the motion is meant for a held handle, which always requires it. Raises
+    WrongUseError as `require_confirmation`, and KeyboardInterrupt at the end of the input.
     """
-    from study.cli.screen import has_keys
+    from study.cli.screen import has_keyboard
 
     typer.echo(notice, err=True)
     require_confirmation(hands_off, hand_on_handle)
-    if has_keys():
+    if has_keyboard():
         typer.echo("Press Enter to begin. ", err=True, nl=False)
-        if not sys.stdin.readline():  # closed, as by Ctrl-D, is not a confirmation
+        if not sys.stdin.readline():  # the end of the input (Ctrl-D, a closed terminal) is no confirmation
             raise KeyboardInterrupt
 
 
 def require_confirmation(hands_off: bool, hand_on_handle: bool = False) -> None:
-    """Require that a person can confirm what a real device will do. Raises WrongUseError where no person can confirm
-    what a real device will do. Arguments as of `announce`."""
-    from study.cli.screen import has_keys
+    """Raise WrongUseError unless a person can confirm the motion at a keyboard, or `hands_off` is stated for a motion
+    without a hand. Arguments as of `announce_motion`."""
+    from study.cli.screen import has_keyboard
 
-    if has_keys() or (hands_off and not hand_on_handle):
+    if has_keyboard() or (hands_off and not hand_on_handle):
         return
     raise WrongUseError(
         "The device was not moved: its notice was not confirmed",

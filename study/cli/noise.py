@@ -1,4 +1,7 @@
-"""`hapteq noise`: a file of masking noise, so that a participant does not hear the device."""
+"""Command `hapteq noise`: writes a sound file of pink masking noise, so that a participant does not hear the device.
+
+Parses the options and calls `study.workflows.session.write_masking_noise`. Loaded by `command_table`.
+"""
 
 from pathlib import Path
 from typing import Annotated
@@ -18,9 +21,9 @@ def noise(
     high_hz: Annotated[float, typer.Option(min=1, max=20_000, help="Upper corner.")] = 8000.0,
 ) -> None:
     """Write pink noise that hides the sound of the device, and say how to use it."""
-    from study.workflows.session.write_masking_noise import HOW_TO_USE, NoisePlan, write_masking_noise
+    from study.workflows.session.write_masking_noise import PLAYBACK_INSTRUCTIONS, NoisePlan, write_masking_noise
 
     write_masking_noise(out, NoisePlan(minutes=minutes, low_hz=low_hz, high_hz=high_hz, seed=seed))
     typer.echo(str(out))
-    for sentence in HOW_TO_USE:
+    for sentence in PLAYBACK_INSTRUCTIONS:
         typer.echo(sentence, err=True)

@@ -83,7 +83,7 @@ def power(
     from study.store.formats.protocol_files import read_study_protocol
     from study.workflows.cluster import open_cluster_workers
     from study.workflows.planning.simulate_power import PowerPlan, simulate_power
-    from study.workflows.worker_processes import worker_processes
+    from study.workflows.worker_processes import open_worker_processes
 
     loaded = read_study_protocol(protocol, Path()).protocol
     crowd = _make_crowd(loaded, threshold_n, effect_db)
@@ -95,7 +95,7 @@ def power(
     sizes = parse_sample_sizes(subjects)
     plan = PowerPlan(crowd, loaded.staircase, sizes, studies, seed, loaded.analysis.contrast_hz)
     title = f"{studies} studies of each of {len(sizes)} sizes"
-    executor = worker_processes(workers) if scheduler is None else open_cluster_workers(scheduler)
+    executor = open_worker_processes(workers) if scheduler is None else open_cluster_workers(scheduler)
     with executor as pool, show_bar(title, total=studies * len(sizes)) as advance:
         points = simulate_power(plan, out, pool, advance)
     if as_json:

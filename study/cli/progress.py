@@ -1,4 +1,8 @@
-"""Progress on stderr: bars on a terminal, nothing in a log."""
+"""Progress bars of the commands on stderr, as context managers that yield a callback; used by all long commands.
+
+Without a terminal, as in a log, a bar is written once, when it ends; `show_steps` and `show_run_and_trial` write
+nothing.
+"""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -16,36 +20,37 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
-from study.session.views.views import Question
+from study.session.views.participant_views import Question
 
 
 @contextmanager
-def show_answer_count(title: str) -> Iterator[Callable[[Question], None]]:
-    """Callback with the current run and trial of a simulated participant; the length of a staircase is unknown
-    beforehand."""
+def show_run_and_trial(title: str) -> Iterator[Callable[[Question], None]]:
+    """Show the run and trial of a simulated participant, without a bar, because the length of a staircase is unknown.
+    The yielded function takes the current question."""
     columns = (TextColumn("{task.description}"), TextColumn("{task.fields[where]}"), TimeElapsedColumn())
     with Progress(*columns, console=Console(file=sys.stderr), transient=True) as progress:
-        task = progress.add_task(title, where="")
+        task_id = progress.add_task(title, where="")
 
         def show(question: Question) -> None:
-            run = f"{question.phase.value} run {question.run_number} of {question.runs_in_phase}"
-            progress.update(task, where=f"{run}, trial {question.trial_number}")
+            run_text = f"{question.phase.value} run {question.run_number} of {question.runs_in_phase}"
+            progress.update(task_id, where=f"{run_text}, trial {question.trial_number}")
 
         yield show
 
 
 @contextmanager
 def show_bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
-    """Progress bar; the yielded function takes how much is done."""
+    """Show a progress bar at once. The yielded function takes the completed amount, in the unit of `total`."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=Console(file=sys.stderr)) as progress:
-        task = progress.add_task(title, total=total)
-        yield lambda completed: progress.update(task, completed=completed)
+        task_id = progress.add_task(title, total=total)
+        yield lambda completed: progress.update(task_id, completed=completed)
 
 
 @contextmanager
 def show_late_bar(title: str, total: float) -> Iterator[Callable[[float], None]]:
-    """Progress bar that is drawn only at the first progress, because something may have to be read or asked first."""
+    """Show a progress bar from the first call of the yielded function on, because files may have to be read or a
+    question asked before. Arguments as of `show_bar`."""
     with ExitStack() as stack:
 
         @cache
@@ -57,7 +62,8 @@ def show_late_bar(title: str, total: float) -> Iterator[Callable[[float], None]]
 
 @contextmanager
 def show_steps(title: str) -> Iterator[Callable[[str, float], None]]:
-    """The yielded function takes the current step and the share that is done. Silent without a terminal."""
+    """Show a progress bar with the name of the current step. The yielded function takes this name and the share done, 0
+    to 1. Writes nothing without a terminal."""
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
     is_silent = not sys.stderr.isatty()
     with ExitStack() as stack:
@@ -68,7 +74,7 @@ def show_steps(title: str) -> Iterator[Callable[[str, float], None]]:
             return progress, progress.add_task(title, total=1.0)
 
         def show(step_name: str, share: float) -> None:
-            progress, task = start_bar()
-            progress.update(task, description=f"{title}: {step_name}", completed=share)
+            progress, task_id = start_bar()
+            progress.update(task_id, description=f"{title}: {step_name}", completed=share)
 
         yield show

@@ -1,4 +1,7 @@
-"""`hapteq real`: recordings of real devices against simple models, on one page."""
+"""Command `hapteq real`: diagnoses a folder of recordings of real devices, and writes one page of results.
+
+Parses the options and calls `study.evaluation.real.real_recordings`. Loaded by `command_table`.
+"""
 
 from pathlib import Path
 from typing import Annotated
@@ -35,10 +38,10 @@ def real(
     scheduler: SchedulerOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Diagnose a folder of real recordings: what was named, what remains unexplained, what an expert would object.
+    """Diagnose a folder of real recordings: what was named, what remains unexplained, and possible objections.
 
     Maps in the folder of the recordings are used, else those that come with hapteq. After an interruption, the same
-    command goes on.
+    command continues.
     """
     import json
 

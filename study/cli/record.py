@@ -1,16 +1,21 @@
-"""`hapteq record`: play a recording protocol on the device and keep what came back."""
+"""Command `hapteq record`: plays a recording protocol on the device and records the response.
+
+Parses the options, prints the notice before the device moves, and calls `study.workflows.recording.record_device`.
+Loaded by `command_table`.
+"""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from study.cli.motion_notice import announce
+from study.cli.motion_notice import announce_motion
 from study.cli.seed import check_seed
 from study.cli.session_options import DeviceOption, HandsOffOption
 from study.errors import WrongUseError
 
 ORIGIN_M = (0.0, 0.0, 0.0)
+"""Centre of the workspace, x y z (m): the default place of a recording."""
 
 
 def record(
@@ -29,10 +34,11 @@ def record(
     seed: Annotated[int, typer.Option(min=0, callback=check_seed, help="Seed of the simulated device's noise.")] = 1,
     hands_off: HandsOffOption = False,
 ) -> None:
-    """Record the device's answer to an excitation. Interrupted, the pieces that are complete are written.
+    """Record the device's response to an excitation. If it is interrupted, the complete pieces are written.
 
-    Where the accelerometer clips, a piece is played again with less force. A real device says first whether a hand
-    may be on the handle, and waits for Enter in a terminal; from a script it moves a free handle with --hands-off only.
+    Where the accelerometer clips, a piece is played again with less force. Before a real device moves, a notice says
+    whether a hand may be on the handle, and Enter is awaited; from a script only a free handle is moved, with
+    --hands-off.
     """
     from functools import partial
 
@@ -41,8 +47,8 @@ def record(
     from study.workflows.recording.record_device import RecordingPlan, record_device, require_free_output
 
     source = read_recording_protocol(protocol)
-    hand_on_handle = source.protocol.hand == "held"
-    if hand_on_handle and hands_off:
+    is_held = source.protocol.hand == "held"
+    if is_held and hands_off:
         raise WrongUseError(
             "Is a hand on the handle?",
             f"{protocol!r} is played into a hand, and --hands-off says that there is none.",
@@ -53,7 +59,7 @@ def record(
     require_free_output(out)
     with show_late_bar(f"{source.protocol.title} (s)", total=round(plan.total_s)) as show:
         recording = record_device(
-            plan, on_progress=show, before_moving=partial(announce, hands_off=hands_off, hand_on_handle=hand_on_handle)
+            plan, on_progress=show, before_moving=partial(announce_motion, hands_off=hands_off, hand_on_handle=is_held)
         )
     typer.echo(str(recording.path))
     for warning in recording.warnings:

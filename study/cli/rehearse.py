@@ -8,7 +8,7 @@ import typer
 from study.cli.results import JsonOption, print_results
 from study.cli.scheduler import SchedulerOption, connect_cluster
 from study.cli.seed import check_seed
-from study.cli.session_options import ModelOption, ProtocolOption, protocol_or_default
+from study.cli.session_options import ModelOption, ProtocolOption, choose_protocol
 
 
 def rehearse(
@@ -37,7 +37,7 @@ def rehearse(
     from study.workflows.session.equalize_stimuli import check_model_for_protocol
     from study.workflows.session.rehearse_study import Rehearsal, make_rehearsed_observer, rehearse_study
 
-    source = read_study_protocol(protocol_or_default(protocol, model), out)
+    source = read_study_protocol(choose_protocol(protocol, model), out)
     check_model_for_protocol(source.protocol, model)
     rehearsal = Rehearsal(
         source.protocol, source.text, subjects, seed, data=out, model=model, observer=observer, locked=source.locked

@@ -1,4 +1,7 @@
-"""`hapteq reproduce`: the published figures 1 to 5 on the simulated omega.3."""
+"""Command `hapteq reproduce`: computes the published figures 1 to 5 again on the simulated omega.3.
+
+Parses the options and calls `study.evaluation.reproduction.reproduce_paper`. Loaded by `command_table`.
+"""
 
 from pathlib import Path
 from typing import Annotated

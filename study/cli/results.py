@@ -1,4 +1,7 @@
-"""Output of results: lines for a person or one JSON document on stdout; messages on stderr."""
+"""Output of the commands' results: the option `--json`, and printing of a session's or a study's analysis.
+
+`JsonOption` is used by most commands, `print_results` by `analyze` and by the commands that run a session.
+"""
 
 import json
 from dataclasses import asdict
@@ -12,7 +15,7 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Results as one JSON do
 
 
 def print_results(analysis: WrittenAnalysis, as_json: bool) -> None:
-    """Print the results of a session or analysis."""
+    """Print an analysis: as one JSON document on stdout, or its table on stdout, warnings and report path on stderr."""
     if as_json:
         document = {
             "thresholds": [asdict(threshold) for threshold in analysis.thresholds],

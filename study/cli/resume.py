@@ -29,10 +29,10 @@ def resume(
 
     answer_keys = parse_keys(keys)
     if not plain and has_screen() and not _has_simulated_participant(session, data):
-        from study.tui.app.app_start import AppStart
+        from study.tui.app.start_options import StartOptions
         from study.tui.engine.to_engine import Resume
 
-        open_screen(AppStart(str(data), device, answer_keys, Resume(session, device, str(data))), as_json)
+        open_screen(StartOptions(str(data), device, answer_keys, Resume(session, device, str(data))), as_json)
         return
     from study.cli.conduct import run_resumed_session
 
@@ -42,12 +42,12 @@ def resume(
 def _has_simulated_participant(session: str, data: Path) -> bool:
     """Whether the first event of the session's log states a simulated participant, for whom no screen is opened. False
     if no log can be read."""
-    from study.regular_file import DOCUMENT_BYTES, open_regular
+    from study.regular_file import MAX_DOCUMENT_BYTES, open_regular
 
     for folder in (Path(session), data / session):
         try:
             with open_regular(folder / LOG_NAME) as log:
-                return json.loads(log.readline(DOCUMENT_BYTES)).get("observer") is not None
+                return json.loads(log.readline(MAX_DOCUMENT_BYTES)).get("observer") is not None
         except (OSError, ValueError, AttributeError, RecursionError):
             continue
     return False

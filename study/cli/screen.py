@@ -1,4 +1,7 @@
-"""Start the screen of `study` and `resume`, and print the results when it ends."""
+"""Starts the full-screen interface of `hapteq study` and `hapteq resume`, and prints the results when it ends.
+
+Also tells the commands what the terminal can do: `has_screen`, `has_keyboard` and `read_terminal_width`.
+"""
 
 import os
 import shutil
@@ -10,39 +13,41 @@ import typer
 from study.errors import DeviceError, ExitCode, StudyError, UserInterruptError, WrongUseError
 
 if TYPE_CHECKING:
-    from study.tui.app.app_start import AppStart
+    from study.tui.app.start_options import StartOptions
     from study.tui.engine.from_engine import Failed, Finished
 
-KINDS: dict[int, type[StudyError]] = {
+ERROR_TYPES: dict[int, type[StudyError]] = {
     ExitCode.WRONG_USE: WrongUseError,
     ExitCode.DEVICE: DeviceError,
     ExitCode.INTERRUPTED: UserInterruptError,
 }
-"""Error for an exit code that the screen's process ended with; `StudyError` for any other."""
+"""Error class by exit code of a failed sitting; `StudyError` for any other code."""
 
 
 def has_screen() -> bool:
-    """Whether there is a terminal, or a browser of `hapteq serve`, to draw on. Results may go to a file."""
+    """Whether the interface can be drawn: in a browser (`hapteq serve` sets TEXTUAL_DRIVER), or in a terminal that is
+    connected to standard input and stderr and not dumb. Standard output may be a file."""
     if "TEXTUAL_DRIVER" in os.environ:
         return True
-    return has_keys() and sys.stderr is not None and sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
+    return has_keyboard() and sys.stderr is not None and sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
 
 
-def has_keys() -> bool:
-    """Whether standard input may be a keyboard."""
+def has_keyboard() -> bool:
+    """Whether standard input is a terminal, so that a person may press keys."""
     return sys.stdin is not None and sys.stdin.isatty()
 
 
-def columns() -> int | None:
-    """Width of the terminal for results; None for a file or pipe, whose lines are not wrapped."""
+def read_terminal_width() -> int | None:
+    """Read the width of the terminal on stdout, in columns; None for a file or pipe, whose lines are not wrapped."""
     return shutil.get_terminal_size().columns if sys.stdout is not None and sys.stdout.isatty() else None
 
 
-def open_screen(start: "AppStart", as_json: bool) -> None:
-    """Run the screen. Raises StudyError for an unfinished sitting."""
+def open_screen(options: "StartOptions", as_json: bool) -> None:
+    """Run the interface until it is closed, then print the results. Raises the StudyError of a failed sitting (class by
+    `ERROR_TYPES`), and typer.Exit for any other exit code than 0."""
     from study.tui.app.app import HapteqApp
 
-    app = HapteqApp(start)
+    app = HapteqApp(options)
     try:
         app.run()
     finally:
@@ -53,14 +58,15 @@ def open_screen(start: "AppStart", as_json: bool) -> None:
 
 
 def _print_outcome(outcome: "Finished | Failed | None", as_json: bool) -> None:
+    """Print the results of a finished sitting; nothing without an outcome. Raises the StudyError of a failed one."""
     from study.tui.engine.from_engine import Failed
 
     if outcome is None:
         return
     if isinstance(outcome, Failed):
         error = outcome.error
-        kind = KINDS.get(error.exit_code, StudyError)
-        raise kind(error.title, error.happened, error.do_now, error.saved)
+        error_type = ERROR_TYPES.get(error.exit_code, StudyError)
+        raise error_type(error.title, error.happened, error.do_now, error.saved)
     results = outcome.results
     for line in (results.document,) if as_json else results.table:
         typer.echo(line)

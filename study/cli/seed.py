@@ -1,17 +1,17 @@
-"""The `--seed` option: limited to what all our files can hold."""
+"""Check of the option `--seed` of the commands: the seed must fit into the integers that hapteq's files can hold."""
 
 from study.errors import WrongUseError
 
-LARGEST_BITS = 128
-"""`study.store.disk.strict_json` reads integers of up to 40 digits."""
+MAX_SEED_BITS = 128
+"""Largest seed in bits: 128 bits are up to 39 digits, and `study.store.disk.strict_json` reads up to 40."""
 
 
 def check_seed(seed: int | None) -> int | None:
-    """Option callback: the seed, unchanged. Raises WrongUseError if it is too large."""
-    if seed is not None and seed.bit_length() > LARGEST_BITS:
+    """Return the seed unchanged (typer callback). Raises WrongUseError if it has more than `MAX_SEED_BITS` bits."""
+    if seed is not None and seed.bit_length() > MAX_SEED_BITS:
         raise WrongUseError(
             "This seed is too large",
-            f"It has {seed.bit_length()} bits; files hold seeds of up to {LARGEST_BITS}.",
+            f"It has {seed.bit_length()} bits; files hold seeds of up to {MAX_SEED_BITS}.",
             "Give a smaller one to --seed, or none.",
         )
     return seed

@@ -1,4 +1,7 @@
-"""Options that several commands on sessions and devices share, each with one name and one help text."""
+"""Command-line options that several commands on sessions and devices share, so that name and help text are the same.
+
+Used as types of the parameters of typer commands, such as `study`, `resume`, `record` and `doctor`.
+"""
 
 from pathlib import Path
 from typing import Annotated
@@ -45,6 +48,6 @@ ObserverOption = Annotated[
 PlainOption = Annotated[bool, typer.Option("--plain", help="Line mode; answers may also come from a pipe.")]
 
 
-def protocol_or_default(protocol: str | None, model: Path | None) -> str:
-    """The protocol's name; the default depends on whether stimuli are equalized."""
+def choose_protocol(protocol: str | None, model: Path | None) -> str:
+    """Return the protocol's name; without one, the default for stimuli with a model (equalized) or without."""
     return protocol or ("direction_threshold" if model is None else "equalized_threshold")

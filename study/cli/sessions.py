@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from study.cli.results import JsonOption
-from study.cli.screen import columns
+from study.cli.screen import read_terminal_width
 from study.cli.session_options import DataOption
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def sessions(
     if not lines:
         typer.echo(f"No sessions in {data}. hapteq study begins one, hapteq rehearse makes simulated ones.", err=True)
         return
-    for text in _format_table(lines, remarks, columns()):
+    for text in _format_table(lines, remarks, read_terminal_width()):
         typer.echo(text)
 
 

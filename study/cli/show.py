@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from study.cli.results import JsonOption
-from study.cli.screen import columns
+from study.cli.screen import read_terminal_width
 from study.cli.session_options import DataOption
 
 if TYPE_CHECKING:
@@ -33,12 +33,14 @@ def show(
 ) -> None:
     """Facts, thresholds, warnings and staircases of a session; verdict, effects and fit of a diagnosis; or channels,
     segments and facts of a recording."""
-    from study.importing.arrays.arrays import FOREIGN
     from study.importing.arrays.json_arrays import is_own_document
+    from study.importing.arrays.read_arrays import FOREIGN_ENDINGS
     from study.store.disk.hdf5_file import is_hdf5
 
     target_path = Path(target)
-    is_foreign = target_path.is_file() and target_path.suffix.lower() in FOREIGN and not is_own_document(target_path)
+    is_foreign = (
+        target_path.is_file() and target_path.suffix.lower() in FOREIGN_ENDINGS and not is_own_document(target_path)
+    )
     if is_foreign or (target_path.is_file() and is_hdf5(target_path)):
         _show_recording(Path(target), as_json)
         return
@@ -98,9 +100,9 @@ def _format_session(view: "SessionView", log: bool) -> Iterable[str]:
 
     yield describe_session(view.line)
     yield ""
-    yield from align_rows(view.facts, columns())
+    yield from align_rows(view.facts, read_terminal_width())
     if view.thresholds:
-        yield from ("", *align_rows(view.thresholds, columns()))
+        yield from ("", *align_rows(view.thresholds, read_terminal_width()))
     for warning in view.warnings:
         yield f"\nNote: {warning}"
     if view.staircases:
@@ -126,7 +128,7 @@ def _format_diagnosis(view: "DiagnosisView") -> Iterable[str]:
     """Lines of a diagnosis: verdict, effects, rejected candidates, fit, mismatch, notes and the next experiment."""
     from study.tui.text_rows import align_rows
 
-    width = columns()
+    width = read_terminal_width()
     inner_width = None if width is None else width - 2
     yield view.verdict
     sections = (

@@ -38,4 +38,4 @@ def stream(
     marker_count = stream_session(
         folder.log, outlet, on_marker=typer.echo, side_tasks=SideTasks(log_clock_offset, signals.push)
     )
-    typer.echo(f"{marker_count} markers and {signals.sent} ticks; the session is finished.", err=True)
+    typer.echo(f"{marker_count} markers and {signals.sent_ticks} ticks; the session is finished.", err=True)

@@ -20,7 +20,7 @@ from study.cli.session_options import (
     ObserverOption,
     PlainOption,
     ProtocolOption,
-    protocol_or_default,
+    choose_protocol,
 )
 from study.tui.keys.answer_keys import parse_keys
 
@@ -41,21 +41,21 @@ def study(
     as_json: JsonOption = False,
 ) -> None:
     """Take the study: instructions, training, one staircase per frequency, thresholds and a report."""
-    from study.cli.screen import has_keys, has_screen, open_screen
+    from study.cli.screen import has_keyboard, has_screen, open_screen
 
-    answer_keys, protocol = parse_keys(keys), protocol_or_default(protocol, model)
+    answer_keys, protocol = parse_keys(keys), choose_protocol(protocol, model)
     if observer is None and not plain and has_screen():
-        from study.tui.app.app_start import AppStart
+        from study.tui.app.start_options import StartOptions
         from study.tui.engine.to_engine import BeginSession, SessionOrder
 
         equalizer = "" if model is None else str(model)
         session_order = None if subject is None else SessionOrder(protocol, device, subject, str(data), seed, equalizer)
         begin_message = None if session_order is None else BeginSession(session_order)
-        open_screen(AppStart(str(data), device, answer_keys, begin_message, protocol, seed, equalizer), as_json)
+        open_screen(StartOptions(str(data), device, answer_keys, begin_message, protocol, seed, equalizer), as_json)
         return
     from study.cli.conduct import SittingOptions, run_new_session
 
-    if observer is None and not plain and not has_keys():
+    if observer is None and not plain and not has_keyboard():
         typer.echo("No terminal here: a simulated participant ('ideal') takes the session.", err=True)
         observer = "ideal"
     sitting_options = SittingOptions(observer=observer, subject=subject, keys=answer_keys, hands_off=hands_off)

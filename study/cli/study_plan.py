@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from study.cli.results import JsonOption
-from study.cli.screen import columns
+from study.cli.screen import read_terminal_width
 
 if TYPE_CHECKING:
     from study.workflows.views.plan_study import PlannedStudy
@@ -35,7 +35,7 @@ def study_plan(
         typer.echo(json.dumps(summarise_plans(studies), indent=2))
         return
     for number, study in enumerate(studies):
-        for line in (*[""] * (number > 0), *_plan_lines(study, columns())):
+        for line in (*[""] * (number > 0), *_plan_lines(study, read_terminal_width())):
             typer.echo(line)
 
 

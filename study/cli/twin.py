@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from study.cli.motion_notice import announce
+from study.cli.motion_notice import announce_motion
 from study.cli.results import JsonOption
 from study.cli.seed import check_seed
 from study.cli.session_options import DeviceOption, HandsOffOption
@@ -43,7 +43,9 @@ def twin(
     plan = TwinPlan(out, device, seed, protocol, band, calibration)
     check_output_and_band(plan)
     with show_late_bar("Twin (%)", total=100) as show:
-        fitted_twin = write_twin(plan, lambda share: show(round(100 * share)), partial(announce, hands_off=hands_off))
+        fitted_twin = write_twin(
+            plan, lambda share: show(round(100 * share)), partial(announce_motion, hands_off=hands_off)
+        )
     typer.echo(
         json.dumps(summarise_twin(fitted_twin), indent=2)
         if as_json

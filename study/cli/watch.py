@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from study.cli.screen import columns
+from study.cli.screen import read_terminal_width
 from study.cli.session_options import DataOption
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def _print_once(folder: Path, as_json: bool) -> None:
         typer.echo(json.dumps(asdict(view), indent=2))
         return
     for line in format_changes(None, view):
-        for terminal_line in wrap_hanging(line, LABEL_CELLS, columns()):
+        for terminal_line in wrap_hanging(line, LABEL_CELLS, read_terminal_width()):
             typer.echo(terminal_line)
 
 

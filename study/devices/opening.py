@@ -18,9 +18,9 @@ from study.devices.admission import HAND_STIMULUS_CAP_N as HAND_STIMULUS_CAP_N
 from study.devices.clock import Clock
 from study.devices.device import CALIBRATED as CALIBRATED
 from study.devices.device import REPLAY, Device, DeviceInfo, DeviceSettings
-from study.devices.force_dimension.models import MODELS
+from study.devices.force_dimension.device_models import MODELS
 from study.errors import DeviceError
-from study.session.views.views import DeviceFinding
+from study.session.views.participant_views import DeviceFinding
 
 if TYPE_CHECKING:
     from equalizer.linkage.calibration import LinkageReading

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from study.devices.device import CALIBRATED, REPLAY, DeviceSettings
-from study.devices.force_dimension.models import MODELS
+from study.devices.force_dimension.device_models import MODELS
 from study.devices.force_dimension.rigs import open_force_dimension_rig
 from study.devices.rig import CompiledRig, Rig
 from study.devices.simulated.omega3 import build_omega3

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from analysis.wording import format_number, typeset
-from equalizer.signals.clock_offset import NoOffsetError, offset_by_correlation
+from equalizer.signals.clock_offset import NoOffsetError, find_clock_offset
 from study.importing.expressions.functions import Value
 from study.importing.expressions.namespace import Namespace
 from study.importing.map_format.import_map import ClockMap
@@ -68,7 +68,7 @@ def _align_by_correlation(first: Logger, logger: Logger) -> tuple[float, str]:
     reference = first.base.make_samples(first.compute_values(clock.align_to))
     aligned = logger.base.make_samples(logger.compute_values(clock.align))
     try:
-        best_match = offset_by_correlation(reference, aligned, clock.offset_s, clock.align_within_s)
+        best_match = find_clock_offset(reference, aligned, clock.offset_s, clock.align_within_s)
     except ValueError as error:
         reason_prefix = "" if isinstance(error, NoOffsetError) else "correlation is not possible: "
         raise ImportProblemError(f"clock '{clock.name}' cannot be aligned: {reason_prefix}{error}") from error

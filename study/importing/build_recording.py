@@ -19,7 +19,7 @@ from equalizer.signals.recording_checks import check_recording
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.signals.units import UNSTATED, UnknownUnitError, check_quantity, find_quantity, parse_unit
 from study.importing.alignment import Logger, align_signals
-from study.importing.arrays.arrays import Arrays, read_arrays
+from study.importing.arrays.read_arrays import Arrays, read_arrays
 from study.importing.expressions.budget import Budget
 from study.importing.expressions.namespace import make_namespace
 from study.importing.map_format.import_map import ChannelMap, ComputedMap, ImportMap

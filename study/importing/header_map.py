@@ -10,10 +10,17 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from study.importing.arrays.array_groups import groups_in
-from study.importing.arrays.arrays import MEND, WORKBOOKS, Array, Arrays, read_arrays, unread_reason
+from study.importing.arrays.array_groups import find_runs
 from study.importing.arrays.csv_arrays import FaultyColumn
 from study.importing.arrays.mat_arrays import suggest_conversion
+from study.importing.arrays.read_arrays import (
+    IMPORT_AGAIN,
+    WORKBOOK_ENDINGS,
+    Array,
+    Arrays,
+    find_unread_reason,
+    read_arrays,
+)
 from study.importing.imposed_roles import IMPOSED_REMARK, NOT_IMPOSED_REMARK, swap_imposed_roles
 from study.importing.map_format.import_map import ChannelMap, ClockMap, CsvMap, ImportMap, PartMap
 from study.importing.map_format.map_errors import ImportRefusedError
@@ -52,13 +59,13 @@ def read_without_map(path: Path) -> Arrays:
     for column, role in zip(columns, propose_roles(columns), strict=True):
         is_used = role or column.quantity or _is_time(column) or len(faulty) == len(columns)
         if is_used and column.header in faulty:
-            raise ImportRefusedError(path.name, _find_fault(arrays.by_name[column.header]), MEND)
+            raise ImportRefusedError(path.name, _find_fault(arrays.by_name[column.header]), IMPORT_AGAIN)
     return arrays
 
 
 def _find_fault(array: Array) -> str:
     """Problem of a column with an invalid field; empty for all other arrays."""
-    reason = unread_reason(array)
+    reason = find_unread_reason(array)
     return reason if isinstance(reason, FaultyColumn) else ""
 
 
@@ -131,7 +138,7 @@ def _select_table(arrays: Arrays) -> tuple[Arrays, tuple[str, ...]]:
     """The columns, without single values. Of several tables of the same form, such as sheets of a workbook: the columns
     of the first, and the prefixes of all."""
     columns = {name: array for name, array in arrays.by_name.items() if array.ndim}
-    groups = groups_in(columns, LEAST_SAMPLES)
+    groups = find_runs(columns, LEAST_SAMPLES)
     member_count = len(groups.prefixes) * len(groups.names)
     if member_count != len(columns) or not all(prefix.endswith(("/", "__")) for prefix in groups.prefixes):
         return Arrays(arrays.path, columns, arrays.clocks), ()
@@ -143,14 +150,16 @@ def _select_table(arrays: Arrays) -> tuple[Arrays, tuple[str, ...]]:
 def find_header_problems(arrays: Arrays) -> tuple[str, ...]:
     """What the names leave open, as clauses that name the column; empty if `make_header_map` makes a map."""
     if not any(array.dtype.kind in "fiub" and array.ndim for array in arrays.by_name.values()):
-        reasons = {name: kind for name, array in arrays.by_name.items() if (kind := unread_reason(array))}
+        reasons = {name: kind for name, array in arrays.by_name.items() if (kind := find_unread_reason(array))}
         kinds = ", ".join(f"'{name}' is {kind}" for name, kind in reasons.items())
         advice = [text for name, kind in reasons.items() if (text := suggest_conversion(name, kind))][:1]
         return ("; ".join((f"it holds no arrays of numbers{f' ({kinds})' if kinds else ''}", *advice)),)
     table, prefixes = _select_table(arrays)
     if len({_NUMBER_PATTERN.sub("", prefix) for prefix in prefixes}) > 1:
         names = " and ".join(f"'{prefix.rstrip('/_')}'" for prefix in prefixes[:_MAX_LISTED_NAMES])
-        sheet_advice = ", or name its sheet, as in sheet = ... under [csv]" if arrays.path.suffix in WORKBOOKS else ""
+        sheet_advice = (
+            ", or name its sheet, as in sheet = ... under [csv]" if arrays.path.suffix in WORKBOOK_ENDINGS else ""
+        )
         return (
             f"its {len(prefixes)} parts are alike ({names}), but not numbered as repeats are: keep the [[part]] of one "
             f"in the map{sheet_advice}",

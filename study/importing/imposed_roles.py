@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Literal
 
 from analysis.look.imposed_motion import is_imposed
-from study.importing.arrays.arrays import Array
+from study.importing.arrays.read_arrays import Array
 from study.importing.map_format.import_map import SignalRole
 from study.importing.map_format.signal_words import ParsedName, may_be_imposed_motion
 

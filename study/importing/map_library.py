@@ -12,7 +12,7 @@ from importlib.resources import files as resources
 from pathlib import Path
 
 from study.errors import StudyError, WrongUseError
-from study.importing.arrays.arrays import read_arrays
+from study.importing.arrays.read_arrays import read_arrays
 from study.importing.expressions.budget import Budget
 from study.importing.expressions.expression import find_names
 from study.importing.expressions.namespace import make_namespace

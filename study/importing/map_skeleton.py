@@ -11,10 +11,10 @@ from dataclasses import replace
 from itertools import takewhile
 from textwrap import wrap
 
-from study.importing.arrays.array_groups import Groups, groups_in
-from study.importing.arrays.arrays import Array, Arrays, unread_reason
+from study.importing.arrays.array_groups import RunGroups, find_runs
 from study.importing.arrays.csv_arrays import FaultyColumn
 from study.importing.arrays.mat_arrays import CELL_ENTRY_PREFIX, suggest_conversion
+from study.importing.arrays.read_arrays import Array, Arrays, find_unread_reason
 from study.importing.imposed_roles import IMPOSED_REMARK, NOT_IMPOSED_REMARK, swap_imposed_roles
 from study.importing.map_format.signal_words import (
     may_be_imposed_motion,
@@ -49,7 +49,7 @@ def make_map_skeleton(arrays: Arrays) -> str:
 
 def _write_lines(all_arrays: Arrays) -> Iterator[str]:
     """Lines of the map: head, clocks, channels, parts, segment."""
-    groups = groups_in(all_arrays.by_name, LEAST_SAMPLES)
+    groups = find_runs(all_arrays.by_name, LEAST_SAMPLES)
     ungrouped_names = _find_ungrouped_runs(all_arrays, groups)
     arrays = _select_first_run(all_arrays, groups, ungrouped_names)
     surplus = find_surplus_arrays(arrays)
@@ -89,7 +89,7 @@ def _write_lines(all_arrays: Arrays) -> Iterator[str]:
     yield "split = { fit = 0.5, test = 0.5 }"
 
 
-def _find_ungrouped_runs(all_arrays: Arrays, groups: Groups) -> list[str]:
+def _find_ungrouped_runs(all_arrays: Arrays, groups: RunGroups) -> list[str]:
     """Arrays of runs in cells that belong to no group. Cells of single numbers hold constants and do not count."""
     long_names = [
         name
@@ -99,7 +99,7 @@ def _find_ungrouped_runs(all_arrays: Arrays, groups: Groups) -> list[str]:
     return [name for name in long_names if not name.startswith(groups.prefixes)] if groups.prefixes else []
 
 
-def _select_first_run(all_arrays: Arrays, groups: Groups, ungrouped_names: Sequence[str]) -> Arrays:
+def _select_first_run(all_arrays: Arrays, groups: RunGroups, ungrouped_names: Sequence[str]) -> Arrays:
     """Arrays of the first of several runs and those that belong to no run, except `ungrouped`; the times of tables
     [time, value ...] as separate arrays."""
     run_names = [name for name in all_arrays.by_name if name.startswith(groups.prefixes)] if groups.prefixes else []
@@ -154,7 +154,7 @@ def _write_direction(roles: Mapping[str, str]) -> Iterator[str]:
 def _describe_excluded_array(name: str, array: Array) -> Iterator[str]:
     """A comment on an array that is not a channel: invalid, without numbers, constant, or of more than two
     dimensions."""
-    reason = unread_reason(array)
+    reason = find_unread_reason(array)
     if isinstance(reason, FaultyColumn):
         yield f"\n# Left out: {reason}"
     elif array.dtype.kind not in "fiub":
@@ -200,7 +200,7 @@ def _write_parts(prefixes: tuple[str, ...]) -> Iterator[str]:
         yield f"prefix = {json.dumps(prefix)}"
 
 
-def _write_ungrouped_runs(ungrouped_names: Sequence[str], groups: Groups) -> Iterator[str]:
+def _write_ungrouped_runs(ungrouped_names: Sequence[str], groups: RunGroups) -> Iterator[str]:
     """Comments on runs in cells of another length, and on how to add them where their names identify the arrays."""
     if ungrouped_names:
         names_text = ", ".join(ungrouped_names[:_MAX_LISTED_RUNS]) + (

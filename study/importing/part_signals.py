@@ -47,7 +47,7 @@ class _GridClock:
         """(count,) times (s). Raises ValueError unless count is that of the grid."""
         if count != self.grid.count:
             raise ValueError(f"{count} samples are not the recording's {self.grid.count}")
-        return self.grid.times_s()
+        return self.grid.compute_times_s()
 
 
 def resample_part(
@@ -201,7 +201,7 @@ def _compute_channel(
 ) -> FloatArray:
     """Evaluate the expression of a computed channel on the grid (grid.count,). columns: the channels by name. Raises
     ImportProblemError for another shape or infinite values."""
-    arrays = {**file_namespace.arrays, "clock_s": grid.times_s(), "rate_hz": np.array(grid.rate_hz), **columns}
+    arrays = {**file_namespace.arrays, "clock_s": grid.compute_times_s(), "rate_hz": np.array(grid.rate_hz), **columns}
     try:
         value = Namespace(
             arrays, file_namespace.definitions, file_namespace.file_name, file_namespace.budget

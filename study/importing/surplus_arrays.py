@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from equalizer.signals.units import UnknownUnitError, parse_unit
-from study.importing.arrays.arrays import Array, Arrays
+from study.importing.arrays.read_arrays import Array, Arrays
 from study.importing.map_format.signal_words import FOREIGN_WORDS, split_bracketed_unit
 
 LEAST_SAMPLES = 16

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from equalizer.signals.resampling import Samples
 from equalizer.signals.units import UnknownUnitError, parse_unit
-from study.importing.arrays.arrays import Array
+from study.importing.arrays.read_arrays import Array
 from study.importing.expressions.functions import Value
 from study.importing.expressions.namespace import Namespace, NoTime
 from study.importing.map_format.import_map import ClockMap

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 from statistics import NormalDist
 
 from protocols.trial import Phase
-from study.participants.chance import draw_response_time_s, draw_uniform
-from study.participants.detection import DETECTION_SLOPE
+from study.participants.detection_thresholds import DETECTION_SLOPE
 from study.participants.observer import PerceivedStimulus, Reply
 from study.participants.psychometric_curve import WeibullCurve
+from study.participants.random_draws import draw_response_time_s, draw_uniform
 
 
 @dataclass(frozen=True, slots=True)

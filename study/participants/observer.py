@@ -1,4 +1,8 @@
-"""Interface of simulated participants: the stimulus that is perceived, and the reply to it."""
+"""Interface of simulated participants: the perceived stimulus, the reply to it, and the protocol `Observer`.
+
+All other modules of this package implement or build an `Observer`; `study.workflows.session.simulated_participant`
+asks it.
+"""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -9,8 +13,8 @@ from study.session.stimulus.delivered import Delivered
 
 @dataclass(frozen=True, slots=True)
 class PerceivedStimulus:
-    """One stimulus as far as a participant can perceive it, and its place in the session. Runs, trials and attempts
-    count from 0."""
+    """One stimulus as a participant can perceive it, and its position in the session. Run, trial and attempt are
+    indices from 0."""
 
     run: int
     trial: int
@@ -23,7 +27,7 @@ class PerceivedStimulus:
     """Number of the direction on the screen, 1 or 2; in a detection trial, number of the interval with the
     vibration."""
     trials_before: int
-    """Trials answered so far in this session, training included."""
+    """Number of trials answered so far in this session, training included."""
     nominal_n: float | None = None
     """Level of the staircase (N), where `level_n` was roved around it."""
     delivered: Delivered | None = None
@@ -35,7 +39,7 @@ class Reply:
     """Reply of a simulated participant to a presentation."""
 
     answer: int
-    """1 or 2."""
+    """Number of the direction or interval, 1 or 2."""
     response_time_s: float
     """Time from the onset to the answer (s)."""
     ask_again: bool = False

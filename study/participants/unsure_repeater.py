@@ -10,9 +10,9 @@ import math
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 
-from study.participants.chance import draw_response_time_s, draw_uniform
 from study.participants.direction_feeler import DirectionFeeler
 from study.participants.observer import PerceivedStimulus, Reply
+from study.participants.random_draws import draw_response_time_s, draw_uniform
 
 _NORMAL = NormalDist()
 """Standard normal distribution."""

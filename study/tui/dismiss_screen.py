@@ -1,4 +1,5 @@
-"""Dismiss a screen with its reply exactly once, even if two keys that dismiss it arrive together."""
+"""Dismiss a screen with its reply exactly once, even if two keys that dismiss it arrive together. Every screen uses
+this function instead of `Screen.dismiss`."""
 
 from __future__ import annotations
 
@@ -11,8 +12,8 @@ Reply = TypeVar("Reply")
 
 
 def dismiss_screen(screen: Screen[Reply], reply: Reply) -> None:
-    """Dismiss the screen if it is on top; otherwise do nothing. Two keys that arrive together are both handled by the
-    same screen. If that screen were dismissed again for the second key, Textual would remove the screen below it, or
-    end the program."""
+    """Dismiss the screen if it is on top of the screen stack; otherwise do nothing. Of two keys that arrive together,
+    both are handled by the same screen: a second `Screen.dismiss` would remove the screen below it, or end the
+    program."""
     if screen.is_active:
         screen.dismiss(reply)

@@ -1,7 +1,7 @@
 """Textual messages that screens outside a sitting post: requests of the user to the application.
 
-The application receives them and sends commands to the engine. They are not changed after they are posted, but
-cannot be frozen, because Textual stores fields of its own in a message.
+`study.tui.app.app.HapteqApp` handles them (`on_begin_requested`, ...) and sends commands to the engine. They are not
+changed after they are posted, but cannot be frozen dataclasses, because Textual sets attributes of a message.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from study.tui.engine.to_engine import Diagnose, ToEngine
 
 
 @dataclass(eq=False)
-class BeginWanted(Message):
+class BeginRequested(Message):
     """Begin a new session."""
 
     subject: str
@@ -26,7 +26,7 @@ class BeginWanted(Message):
 
 
 @dataclass(eq=False)
-class ResumeWanted(Message):
+class ResumeRequested(Message):
     """Resume a session."""
 
     path: str
@@ -34,7 +34,7 @@ class ResumeWanted(Message):
 
 
 @dataclass(eq=False)
-class WatchWanted(Message):
+class WatchRequested(Message):
     """Show the experimenter's view of a running session."""
 
     path: str
@@ -42,19 +42,21 @@ class WatchWanted(Message):
 
 
 @dataclass(eq=False)
-class DiagnoseWanted(Message):
+class DiagnoseRequested(Message):
     """Diagnose recordings against a model, and show the progress."""
 
     command: Diagnose
+    """Message to the engine: recordings, model and folder of the results."""
 
 
 @dataclass(eq=False)
-class CommandWanted(Message):
-    """Any other request: a message that is passed to the engine unchanged."""
+class CommandRequested(Message):
+    """Send a command to the engine: any request without a message class above."""
 
     command: ToEngine
+    """Message that is sent unchanged."""
 
 
 @dataclass(eq=False)
-class HomeWanted(Message):
-    """Return to the start screen, and read the list of sessions again."""
+class HomeRequested(Message):
+    """Return to the start screen, whose list of sessions is read again."""

@@ -10,7 +10,7 @@ from protocols.trial import Phase
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.facts.void_reasons import ACCELERATION_MISSING, SCREEN_UNRESPONSIVE, is_computer_busy
 from study.session.views.form_views import Form, Limits
-from study.session.views.views import DemoMenu, Progress, Question, Task, Welcome
+from study.session.views.participant_views import DemoMenu, Progress, Question, Task, Welcome
 
 
 def format_heading(question: Question, words: Words = ENGLISH_WORDS) -> str:

@@ -1,13 +1,16 @@
-"""Device settings that follow from a study protocol: force limits, centring spring, recorded part of each trial."""
+"""Device settings that follow from a study protocol: force limits, centring spring, recorded part of each trial.
+
+Called by `conduct_session` and `examine_setup` before they open the device.
+"""
 
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.device import DeviceSettings
 from study.session.stimulus.limits import make_study_limits
 
 
-def device_settings(protocol: StudyProtocol, hand_on_handle: bool = True) -> DeviceSettings:
-    """Settings with which a device is opened for a study. hand_on_handle: whether a person holds the handle; a
-    simulated device then carries a simulated hand."""
+def make_device_settings(protocol: StudyProtocol, hand_on_handle: bool = True) -> DeviceSettings:
+    """Make the settings with which a device is opened for a study. hand_on_handle: whether a person holds the handle; a
+    simulated device then has a simulated hand."""
     return DeviceSettings(
         limits=make_study_limits(protocol),
         spring_frequency_hz=protocol.spring.natural_frequency_hz,

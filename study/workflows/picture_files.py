@@ -1,7 +1,7 @@
-"""Figures of a report as files: SVG for editing, PNG for slides.
+"""Write the figures of a report as files: SVG for editing, PNG for slides.
 
 Figures are drawn in parallel processes (`forked_map`). The same data give the same files: neither format contains a
-date or the version of Matplotlib.
+date or the version of Matplotlib. Called by the workflows and evaluations that write a report.
 """
 
 import io
@@ -17,16 +17,17 @@ from study.store.disk.text_file import write_text
 from study.workflows.forked_map import map_forked
 
 FIGURE_DPI = 150
-"""Resolution of PNG files (dots per inch)."""
+"""Resolution of PNG files (dots per inch). Chosen for slides."""
 
 
 def write_pictures(folder: Path, pictures: Sequence[Picture]) -> None:
     """Draw the pictures and write them into `folder`, which is created if necessary: an SVG file each, and a PNG file
-    where `Picture.bitmap` is set. Existing files are replaced. Raises CannotWriteError."""
+    where `Picture.bitmap` is set. Existing files are replaced. The SVG texts are kept in `pictures`, for the report.
+    Raises CannotWriteError where a file cannot be written."""
     drawn_pictures = map_forked(draw_picture, pictures)
     for picture, drawn_picture in zip(pictures, drawn_pictures, strict=True):
         picture.rendered_svg[:] = drawn_picture.picture.rendered_svg
-    write_drawn(folder, drawn_pictures)
+    write_drawn_pictures(folder, drawn_pictures)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,19 +42,21 @@ class DrawnPicture:
 
 
 def draw_picture(picture: Picture) -> DrawnPicture:
-    """Draw a picture as SVG and, where `Picture.bitmap` is set, as PNG. Runs in a worker process."""
-    svg, png = _draw_files(picture)
+    """Draw a picture as SVG and, where `Picture.bitmap` is set, as PNG. Meant for a worker process."""
+    svg, png = _render_files(picture)
     picture.rendered_svg[:] = [svg]
     return DrawnPicture(remove_figure(picture), png)
 
 
-def _draw_files(picture: Picture) -> tuple[str, bytes]:
-    """Text of the SVG file and content of the PNG file; the latter is empty unless `Picture.bitmap` is set."""
-    return render_picture_svg(picture), _png(picture) if picture.bitmap else b""
+def _render_files(picture: Picture) -> tuple[str, bytes]:
+    """Render the text of the SVG file and the content of the PNG file, which is empty unless `Picture.bitmap` is
+    set."""
+    return render_picture_svg(picture), _render_png(picture) if picture.bitmap else b""
 
 
-def write_drawn(folder: Path, drawn_pictures: Iterable[DrawnPicture]) -> None:
-    """Write pictures that are already drawn into `folder`, as `write_pictures` does. Raises CannotWriteError."""
+def write_drawn_pictures(folder: Path, drawn_pictures: Iterable[DrawnPicture]) -> None:
+    """Write pictures that were drawn before into `folder`, as `write_pictures` does. Raises CannotWriteError where a
+    file cannot be written."""
     try:
         make_folder(folder)
     except OSError as problem:
@@ -66,8 +69,8 @@ def write_drawn(folder: Path, drawn_pictures: Iterable[DrawnPicture]) -> None:
             write_atomically(folder / f"{drawn_picture.picture.name}.png", drawn_picture.png, overwrite=True)
 
 
-def _png(picture: Picture) -> bytes:
-    """Content of the PNG file at `FIGURE_DPI`."""
+def _render_png(picture: Picture) -> bytes:
+    """Render a figure as PNG at `FIGURE_DPI`."""
     buffer = io.BytesIO()
     # Without the version of matplotlib in the file, the same data give the same file.
     picture.figure.savefig(buffer, format="png", dpi=FIGURE_DPI, metadata={"Software": None})

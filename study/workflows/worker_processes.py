@@ -1,4 +1,5 @@
-"""Worker processes for CPU-bound work, started clean (spawned); running work is finished on leaving."""
+"""Pool of worker processes for CPU-bound work, started by spawning. Called by `rehearse_study`, `seal_cases` and
+`hapteq power`; `cluster` is the alternative with the nodes of a cluster."""
 
 import signal
 from collections.abc import Iterator
@@ -11,23 +12,25 @@ from study.errors import StudyError
 
 
 @contextmanager
-def worker_processes(workers: int) -> Iterator[ProcessPoolExecutor]:
-    """A process pool that ignores Ctrl-C in its workers. Raises StudyError where one of them is killed."""
-    # Forking a process with numba's threads in it is not safe; a spawned one starts clean.
-    pool = ProcessPoolExecutor(workers, get_context("spawn"), _leave_ctrl_c_to_the_parent)
+def open_worker_processes(workers: int) -> Iterator[ProcessPoolExecutor]:
+    """Yield a pool of `workers` processes, which ignore Ctrl-C. At the end of the context, also after an exception,
+    running tasks are completed and waiting ones cancelled. Raises StudyError where a worker was killed."""
+    # A fork would inherit the locks of threads (numba, OpenBLAS); a spawned process has none.
+    pool = ProcessPoolExecutor(workers, get_context("spawn"), _ignore_interrupts)
     try:
         yield pool
-    except BrokenProcessPool as died:
+    except BrokenProcessPool as broken_pool:
         raise StudyError(
             "A worker process was killed",
             "It ended without an error of its own: it was killed, or the system lacked memory.",
             "Run the same command again: it continues where it stopped. Where memory is short, use fewer --workers.",
             saved="What was finished is kept.",
-        ) from died
+        ) from broken_pool
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _leave_ctrl_c_to_the_parent() -> None:
-    """Ignore Ctrl-C in a worker: a terminal sends it to all processes."""
+def _ignore_interrupts() -> None:
+    """Ignore SIGINT in a worker: for Ctrl-C the terminal sends it to all processes, and the calling process handles
+    it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

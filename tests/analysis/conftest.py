@@ -9,8 +9,8 @@ import pytest
 
 from analysis.figures.diagnosis.diagnosis_pictures import diagnosis_pictures
 from protocols.definition.apparatus import SafetySettings, TestDirections
-from protocols.definition.exposure import CatchSettings, DetectionSettings
 from protocols.definition.preparation import PracticeSettings
+from protocols.definition.session_settings import CatchSettings, DetectionSettings
 from protocols.definition.staircase_rule import StaircaseRule, StepPhase
 from protocols.definition.study_protocol import StimulusSettings, StudyProtocol, TrainingSettings
 from protocols.procedure.run_rules import make_staircase_rule

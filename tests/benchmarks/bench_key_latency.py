@@ -137,7 +137,7 @@ def terminal(command: list[str], pass_fds: tuple[int, ...] = ()) -> Iterator[Pty
 def watched_screen(protocol: str, data: str, news: int) -> None:
     """The application itself, with a task in its event loop that measures how late it comes."""
     from study.tui.app.app import HapteqApp
-    from study.tui.app.app_start import AppStart
+    from study.tui.app.start_options import StartOptions
     from study.tui.engine.to_engine import BeginSession, SessionOrder
 
     class FollowedSession(HapteqApp):
@@ -157,7 +157,7 @@ def watched_screen(protocol: str, data: str, news: int) -> None:
                     os.write(news, f"{state} {late_ms:.1f}\n".encode())
 
     app = FollowedSession(
-        AppStart(data, "simulated", first=BeginSession(SessionOrder(protocol, "simulated", "B01", data, 4)))
+        StartOptions(data, "simulated", first_sitting=BeginSession(SessionOrder(protocol, "simulated", "B01", data, 4)))
     )
     try:
         app.run()

@@ -68,8 +68,8 @@ def us_of_ticks(rig) -> float:
     runner = SteppedRunner(rig, governor, False, time.monotonic, monotonic=True)
     governor.begin_hold(rigs.sine(1.0))
     # Ticks follow each other at once, so the handle hardly moves.
-    governor.settings[[cells.WATCHDOG_TICKS, cells.STALE_TICKS, cells.EASE_TICKS]] = np.inf
-    governor.state[cells.LONGEST] = np.inf
+    governor.settings[[cells.WATCHDOG_TICKS, cells.STALE_TICKS, cells.REDUCTION_TICKS]] = np.inf
+    governor.state[cells.LONGEST_HOLD] = np.inf
     us = us_each(lambda: runner.run(TICKS))
     assert governor.moving, (governor.fault, runner.failure)
     return us

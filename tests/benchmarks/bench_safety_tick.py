@@ -47,7 +47,7 @@ def ns_per_tick(rig: CompiledRig, tick) -> float:
     arrays = (governor.state, governor.settings, governor.loop, governor.buffer, governor.force, governor.ring)
 
     def run() -> None:
-        governor.state[govern.TICK] = governor.state[govern.LAST_SIGN] = 0.0
+        governor.state[govern.TICK] = governor.state[govern.LAST_KEEP_ALIVE_TICK] = 0.0
         governor.settings[govern.WATCHDOG_TICKS] = np.inf
         run_block(
             rig.sense,

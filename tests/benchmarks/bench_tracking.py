@@ -112,7 +112,7 @@ def time_ticks(step, K, g, directions, live, taken, before, after) -> None:
     """Each tick by itself; the transient starts anew at its end. taken: ns."""
     for row in range(taken.size):
         _clock(MONOTONIC, before.ctypes)
-        lqr_kernel.tick(step, K, g, directions[row % directions.shape[0]], row % K.shape[0], live)
+        lqr_kernel.simulate_tick(step, K, g, directions[row % directions.shape[0]], row % K.shape[0], live)
         _clock(MONOTONIC, after.ctypes)
         taken[row] = (after[0] - before[0]) * 1_000_000_000 + after[1] - before[1]
 

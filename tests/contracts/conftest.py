@@ -14,7 +14,7 @@ import pytest
 
 from protocols.trial import Phase
 from study.devices.clock import Clock, RealClock, VirtualClock
-from study.participants.observers import find_observer
+from study.participants.observer_catalogue import find_observer
 from study.session.state.due_trial import PresentTrial
 from study.session.views.form_views import Form
 from study.tui.line_mode.line_input import LineInput

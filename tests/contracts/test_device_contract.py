@@ -11,7 +11,7 @@ import pytest
 from equalizer.signals.joining import join
 from study.devices.clock import VirtualClock
 from study.devices.device import Fault
-from study.devices.force_dimension.models import MODELS
+from study.devices.force_dimension.device_models import MODELS
 from study.devices.opening import DEVICES, FRICTIONLESS, open_device
 from study.devices.rigs_by_name import RIGS_BY_NAME
 from study.devices.safe import SafeDevice

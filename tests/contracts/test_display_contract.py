@@ -7,7 +7,7 @@ import pytest
 
 from protocols.trial import Phase
 from study.session.views.form_views import Form, FormField, FormKind, find_missing_fields
-from study.session.views.views import (
+from study.session.views.participant_views import (
     AfterPause,
     Answered,
     DemoDone,

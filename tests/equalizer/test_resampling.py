@@ -21,7 +21,7 @@ def test_a_sinusoid_is_recovered_to_a_ten_thousandth_up_to_four_fifths_of_nyquis
     samples = even(sine(np.arange(4000) / 1000, frequency_hz))
     grid = Grid(0.1, rate_hz, int(3.7 * rate_hz))
     found = resample(samples, grid, "band-limited")
-    np.testing.assert_allclose(found, sine(grid.times_s(), frequency_hz), atol=1e-4)
+    np.testing.assert_allclose(found, sine(grid.compute_times_s(), frequency_hz), atol=1e-4)
 
 
 @settings(max_examples=20, deadline=None)
@@ -32,7 +32,7 @@ def test_a_shift_by_a_part_of_a_sample_is_exact_to_a_ten_thousandth(shift_s, fre
     samples = even(sine(np.arange(2000) / 1000, frequency_hz))
     grid = Grid(shift_s, 1000.0, 1700)
     found = resample(samples, grid, "band-limited")[50:-50]
-    np.testing.assert_allclose(found, sine(grid.times_s(), frequency_hz)[50:-50], atol=1e-4)
+    np.testing.assert_allclose(found, sine(grid.compute_times_s(), frequency_hz)[50:-50], atol=1e-4)
 
 
 def test_what_a_slower_rate_cannot_carry_is_taken_out():
@@ -49,7 +49,9 @@ def test_uneven_stamps_are_recovered_as_well_as_the_page_says(frequency_hz, with
     times_s = np.cumsum(steps_s)
     grid = Grid(0.1, rate_hz, int(3.0 * rate_hz))
     found = resample(Samples(times_s, sine(times_s, frequency_hz), 0.0, 3e-3), grid, "band-limited")
-    np.testing.assert_allclose(found[50:-50], sine(grid.times_s(), frequency_hz)[50:-50], atol=max(within, 5e-6))
+    np.testing.assert_allclose(
+        found[50:-50], sine(grid.compute_times_s(), frequency_hz)[50:-50], atol=max(within, 5e-6)
+    )
 
 
 def test_a_held_staircase_is_recovered_exactly_and_an_interpolated_one_is_not():
@@ -63,7 +65,15 @@ def test_a_held_staircase_is_recovered_exactly_and_an_interpolated_one_is_not():
 
 def test_a_straight_line_stays_one():
     samples, grid = even(np.arange(50.0), 100.0), Grid(0.0, 333.0, 160)
-    np.testing.assert_allclose(resample(samples, grid, "linear"), grid.times_s() * 100, atol=1e-9)
+    np.testing.assert_allclose(resample(samples, grid, "linear"), grid.compute_times_s() * 100, atol=1e-9)
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 5, 6])
+def test_few_uneven_samples_are_interpolated_by_a_lower_degree(count):
+    times_s = np.arange(count) / 100
+    samples = Samples(times_s, 3.0 + 200.0 * times_s, 0.0, 0.1)
+    grid = Grid(0.0, 200.0, 2 * count - 1)
+    np.testing.assert_allclose(resample(samples, grid, "band-limited"), 3 + 200 * grid.compute_times_s(), atol=1e-9)
 
 
 @pytest.mark.parametrize("method", ["held", "linear", "band-limited"])
@@ -85,7 +95,7 @@ def test_a_gap_in_the_stamps_becomes_missing_samples(method):
     assert set(np.flatnonzero(np.isnan(found))) == set(range(100, 150))
     if method == "band-limited":
         here = np.isfinite(found)
-        np.testing.assert_allclose(found[here], sine(grid.times_s(), 20.0)[here], atol=1e-9)
+        np.testing.assert_allclose(found[here], sine(grid.compute_times_s(), 20.0)[here], atol=1e-9)
 
 
 def test_a_grid_that_leaves_the_samples_is_refused():

@@ -9,9 +9,9 @@ from equalizer.tracking.feedforward.trajectory import (
     TRAJECTORY,
     TableError,
     Trajectory,
+    format_trajectory_csv,
     parse_trajectory,
     require_rate,
-    trajectory_csv,
 )
 
 GOOD = "time_s,ax,ay,az\n0.0,1,2,3\n0.001,4,5,6\n0.002,7,8,9\n"
@@ -43,7 +43,7 @@ def test_a_table_of_accelerations_is_read():
 @settings(max_examples=50, deadline=None)
 def test_forces_are_read_back_to_the_last_digit(rows, rate_hz, start_s):
     written = Trajectory(forces(np.array(rows), rate_hz), start_s)
-    read = parse_trajectory(trajectory_csv(written))
+    read = parse_trajectory(format_trajectory_csv(written))
     assert read.kind is FORCES
     assert np.array_equal(read.signal.samples, written.signal.samples)
     assert (read.signal.sample_rate_hz, read.start_s) == (rate_hz, start_s)
@@ -54,7 +54,7 @@ def test_windows_line_ends_blanks_in_the_header_and_empty_lines_at_the_end_do_no
 
 
 def test_a_rate_that_is_no_whole_number_is_kept():
-    text = trajectory_csv(Trajectory(forces(np.zeros((100, 3)), 610.35)))
+    text = format_trajectory_csv(Trajectory(forces(np.zeros((100, 3)), 610.35)))
     assert parse_trajectory(text).signal.sample_rate_hz == pytest.approx(610.35, rel=1e-9)
 
 
@@ -92,7 +92,7 @@ def test_of_many_faults_the_first_are_named_and_the_rest_counted():
 
 def test_missing_samples_are_not_written():
     with pytest.raises(TableError, match="a table of forces cannot hold missing or infinite values"):
-        trajectory_csv(Trajectory(forces(np.full((3, 3), np.nan))))
+        format_trajectory_csv(Trajectory(forces(np.full((3, 3), np.nan))))
 
 
 def test_other_signals_make_no_table():

@@ -25,11 +25,11 @@ def loaded_by(statement: str) -> set[str]:
 def test_help_loads_nothing_heavy():
     loaded = loaded_by(
         "from study.cli.main import main\n"
-        "from study.cli.command_table import LoadedWhenCalled\n"
+        "from study.cli.command_table import LazyCommands\n"
         "import io, contextlib\n"
         "with contextlib.redirect_stdout(io.StringIO()): main(['--help'])\n"
         "assert 'study.cli.diagnose' not in sys.modules\n"
-        "for command in LoadedWhenCalled().values(): str(command.help)"
+        "for command in LazyCommands().values(): str(command.help)"
     )
     assert loaded.isdisjoint(HEAVY), sorted(loaded & set(HEAVY))
 

@@ -20,7 +20,7 @@ from analysis.psychophysics.catch_trials import compute_wilson_interval
 from analysis.psychophysics.criterion_drift import estimate_criterion_drifts
 from analysis.psychophysics.study_warnings import DRIFT_LEVEL, LEFT_OUT_LEVEL, STRONG_BIAS
 from protocols.trial import Trial
-from study.participants.observers import find_observer
+from study.participants.observer_catalogue import find_observer
 from study.participants.population import make_member
 from tests.study.participants.test_flagged_people import session
 

@@ -14,7 +14,7 @@ from protocols.definition.staircase_rule import StaircaseRule, StepPhase
 from protocols.procedure.staircase import begin_staircase, is_finished, level_n, step
 from protocols.trial import Phase
 from study.participants.observer import PerceivedStimulus
-from study.participants.observers import find_observer
+from study.participants.observer_catalogue import find_observer
 
 RULE = StaircaseRule(1.0, 3.0, 1, 3, (StepPhase(4.0, 3), StepPhase(1.0, 10)), 13, 10)
 HZ, RUNS = 15.0, 150

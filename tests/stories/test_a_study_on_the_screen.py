@@ -9,8 +9,8 @@ import pytest
 
 from protocols.document.loading import load_protocol
 from study.devices.clock import VirtualClock
-from study.participants.observers import find_observer
-from study.session.views.views import Answered
+from study.participants.observer_catalogue import find_observer
+from study.session.views.participant_views import Answered
 from study.store.sessions.archive import SessionFolder
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.conduct_session import Participant, conduct_new

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from study.cli.main import app
 from study.errors import StudyError
-from study.importing.arrays.arrays import read_arrays
+from study.importing.arrays.read_arrays import read_arrays
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_library import find_map, read_map
 from study.regular_file import RefusedFileError, open_regular, read_regular
@@ -30,7 +30,7 @@ from study.store.formats.trials_file import read_trials
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog, read_log, read_valid_events
 from study.store.sessions.live_file import read_live
-from study.store.sessions.log_writer import is_log_locked
+from study.store.sessions.log_lock import is_log_locked
 from study.workflows.files.validate import validate_file
 from study.workflows.results.fold_session import fold_session
 from study.workflows.views.view_home import make_home_view

@@ -20,7 +20,7 @@ from analysis.diagnosis.confirm.confirm_laws import search_by_balance
 from analysis.diagnosis.confirm.fitting_measures import FittingMeasure
 from analysis.diagnosis.confirm.held_out_gain import HeldOutGain, estimate_held_out_gain
 from analysis.diagnosis.errors.hypothesis import Claim
-from analysis.diagnosis.search.parsimony import only_refines
+from analysis.diagnosis.search.parsimony import is_refined_candidate
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.verdict import Judgement, SearchResult, Unconfirmed
 from analysis.diagnosis.settings import (
@@ -117,7 +117,7 @@ def _find_best_rival(context: SearchContext, result: SearchResult) -> FittedCand
     rivals = [
         rival
         for rival in result.found.rounds[len(steps) - 1]
-        if rival.newest != best.newest and not only_refines(rival, best)
+        if rival.newest != best.newest and not is_refined_candidate(rival, best)
     ]
     return context.with_test_score(rivals[0]) if rivals else None
 

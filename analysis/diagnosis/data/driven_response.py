@@ -1,94 +1,100 @@
-"""Test by coherence whether the responses of a recording depend on its commands at all.
+"""Significance test of the multiple coherence between commands and responses: are the responses driven at all?
 
-The statistic is the multiple coherence at the lines that the commands drive (Bendat and Piersol, Random Data, 4th ed.,
-7.3), averaged over K stretches (the segments of Welch's method). For responses of noise and r independent commands it
-follows a beta distribution with the parameters r and K - r. Stretches of a short recording may be shorter than the
-device's memory, so that a response also counts as driven if the past commands predict it on held-out samples, or if it
-predicts its command: with dry friction or under control, a slow force that follows the motion may be hidden below the
-command's own noise.
+The coherence at the lines that the commands drive (Bendat and Piersol, Random Data, 4th ed., 7.3) is estimated from K
+stretches (the segments of Welch's method) and averaged over the lines. For responses of pure noise and r independent
+commands, each line's value follows a beta distribution with the parameters r and K - r. In a short recording the
+stretches may be shorter than the device's impulse response, and a slow force that only follows the motion (dry
+friction, closed loop) may lie below the noise of the command. A response therefore also counts as driven where past
+commands predict it on held-out samples, or where it predicts its command. Called by `input_checks`.
 """
 
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from analysis.diagnosis.settings import ANSWER_COHERENCE, ANSWER_DEVIATIONS
+from analysis.diagnosis.settings import DRIVEN_COHERENCE, DRIVEN_DEVIATIONS
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.signals.spectral_density import hann
 
-STRETCHES = 12
-"""Number of stretches per command. Chosen heuristically, like all constants here."""
+STRETCHES_PER_COMMAND = 12
+"""Number of stretches per command channel; K is this times the number of commands. Chosen heuristically, like all
+constants here."""
 LEAST_LINE_POWER = 0.01
-"""Least power of a driven line, relative to the strongest line."""
-SHARED_BY_WINDOW = 2.0
-"""Number of neighbouring lines that count as one independent line, because the Hann window correlates them."""
+"""Least power of a driven line, relative to the line with the largest power."""
+CORRELATED_LINES = 2.0
+"""Number of neighbouring lines that carry the information of one, because the Hann window correlates them."""
 RANK_TOLERANCE = 1e-6
-"""Least singular value of the commands at a line, relative to the largest, that adds to their rank."""
-MEMORY, MOST_TAPS, RIDGE = 0.1, 100, 1e-3
-"""Share of a recording that the predicting filter spans, most coefficients per command, and ridge parameter."""
+"""Least singular value of the commands at a line, relative to the largest, that counts towards their rank."""
+FILTER_SPAN_SHARE, MAX_TAPS, RIDGE_SHARE = 0.1, 100, 1e-3
+"""Span of the predicting filter as a share of the recording, largest number of its coefficients per signal, and ridge
+parameter relative to the mean diagonal element of the normal matrix."""
 
 
 def compute_response_significance(recordings: Sequence[Recording]) -> float | None:
-    """Excess coherence of the best response channel over that of noise, in standard deviations. None where the
-    recordings are too short for a verdict, or where the coherence is not significant but a filter predicts the response
-    or its command. recordings: with the same channels and rate; commands without gaps."""
+    """Excess coherence of the response channel with the largest mean coherence over that of noise, in standard
+    deviations. None where the recordings are too short for a verdict, or where the coherence is not significant but a
+    filter predicts a response or a command. recordings: with the same channels and rate; commands without gaps."""
     inputs, outputs = _compute_spectra(recordings)
     if not len(inputs):
         return None
     power = (np.abs(inputs) ** 2).sum(axis=(0, 2))
     lines = np.flatnonzero(power > LEAST_LINE_POWER * power.max(initial=0.0))
     lines = lines[lines > 0]
-    coherences = [
-        value for line in lines if (value := _compute_coherence(inputs[:, line], outputs[:, line])) is not None
+    line_results = [
+        line_result
+        for line in lines
+        if (line_result := _compute_coherence(inputs[:, line], outputs[:, line])) is not None
     ]
-    if not coherences:
+    if not line_results:
         return None
-    coherence, noise_mean, noise_variance = (np.array(column) for column in zip(*coherences, strict=True))
-    mean_sd = np.sqrt(SHARED_BY_WINDOW * noise_variance.sum()) / len(coherences)
+    coherence, noise_mean, noise_variance = (np.array(column) for column in zip(*line_results, strict=True))
+    mean_sd = np.sqrt(CORRELATED_LINES * noise_variance.sum()) / len(line_results)
     # Too short: even the coherence of a device that clearly responds would hardly be significant.
-    if (ANSWER_COHERENCE - noise_mean.mean()) / mean_sd < 2 * ANSWER_DEVIATIONS:
+    if (DRIVEN_COHERENCE - noise_mean.mean()) / mean_sd < 2 * DRIVEN_DEVIATIONS:
         return None
     deviations = float(((coherence.mean(axis=0) - noise_mean.mean()) / mean_sd).max())
-    significant = deviations >= ANSWER_DEVIATIONS or not any(_is_predictable(recording) for recording in recordings)
+    significant = deviations >= DRIVEN_DEVIATIONS or not any(_is_predictable(recording) for recording in recordings)
     return deviations if significant else None
 
 
 def _is_predictable(recording: Recording) -> bool:
-    """Whether past commands predict a response, or the responses around a sample predict a command."""
+    """Whether past commands predict a response, or responses before and after a sample predict its command."""
     command, response = recording.command.samples, recording.response.samples
     return _can_predict(response, command, uses_future=False) or _can_predict(command, response, uses_future=True)
 
 
-def _can_predict(y: FloatArray, signals: FloatArray, uses_future: bool) -> bool:
-    """Whether a linear filter of signals (n, k), fitted to the first half, predicts a channel of y (n, c) in the
-    second. uses_future: half of the filter lies in the signals' future, as that of a derivative does."""
-    n = len(y)
-    tap_step = max(int(MEMORY * n) // MOST_TAPS, 1)
-    taps = min(int(MEMORY * n), MOST_TAPS)
+def _can_predict(targets: FloatArray, signals: FloatArray, uses_future: bool) -> bool:
+    """Whether an FIR filter of signals (n, k), fitted to the first half by ridge regression, explains at least the
+    share `DRIVEN_COHERENCE` of the power of a channel of targets (n, c) in the second half. uses_future: half of the
+    taps are non-causal, as a derivative needs."""
+    sample_count = len(targets)
+    tap_step = max(int(FILTER_SPAN_SHARE * sample_count) // MAX_TAPS, 1)
+    taps = min(int(FILTER_SPAN_SHARE * sample_count), MAX_TAPS)
     samples_before, samples_after = (
         ((taps - taps // 2) * tap_step, taps // 2 * tap_step) if uses_future else (taps * tap_step, 0)
     )
     padded = np.pad(signals, ((samples_before, samples_after), (0, 0)), mode="edge" if uses_future else "constant")
-    shifted = [padded[taps * tap_step - k * tap_step :][:n] for k in range(taps)]
-    rows = np.hstack([*shifted, np.ones((n, 1))])
-    finite = np.isfinite(y).all(axis=1) & np.isfinite(rows).all(axis=1)
-    first_half = finite & (np.arange(n) < n // 2)
-    gram = rows[first_half].T @ rows[first_half]
+    shifted_signals = [padded[taps * tap_step - k * tap_step :][:sample_count] for k in range(taps)]
+    regressors = np.hstack([*shifted_signals, np.ones((sample_count, 1))])
+    finite = np.isfinite(targets).all(axis=1) & np.isfinite(regressors).all(axis=1)
+    first_half = finite & (np.arange(sample_count) < sample_count // 2)
+    gram = regressors[first_half].T @ regressors[first_half]
     weights = np.linalg.solve(
-        gram + RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram)), rows[first_half].T @ y[first_half]
+        gram + RIDGE_SHARE * np.trace(gram) / len(gram) * np.eye(len(gram)),
+        regressors[first_half].T @ targets[first_half],
     )
     second_half = finite & ~first_half
-    residual_squares = np.sum((y[second_half] - rows[second_half] @ weights) ** 2, axis=0)
-    power = np.maximum(np.sum((y[second_half] - y[first_half].mean(axis=0)) ** 2, axis=0), 1e-300)
-    return bool(np.any(residual_squares < (1 - ANSWER_COHERENCE) * power))
+    residual_squares = np.sum((targets[second_half] - regressors[second_half] @ weights) ** 2, axis=0)
+    power = np.maximum(np.sum((targets[second_half] - targets[first_half].mean(axis=0)) ** 2, axis=0), 1e-300)
+    return bool(np.any(residual_squares < (1 - DRIVEN_COHERENCE) * power))
 
 
 def _compute_spectra(recordings: Sequence[Recording]) -> tuple[ComplexArray, ComplexArray]:
-    """Spectra (stretches, lines, inputs) of the commands and (stretches, lines, outputs) of the responses; empty where
-    stretches would have less than 16 samples."""
+    """Spectra (stretches, lines, inputs) of the commands and (stretches, lines, outputs) of the responses; no stretches
+    where each would have less than 16 samples."""
     inputs, outputs = len(recordings[0].command.channels), len(recordings[0].response.channels)
-    length = sum(len(recording) for recording in recordings) // (STRETCHES * inputs)
+    length = sum(len(recording) for recording in recordings) // (STRETCHES_PER_COMMAND * inputs)
     pairs = (
         [pair for recording in recordings for pair in _transform_stretches(recording, length)] if length >= 16 else []
     )
@@ -98,12 +104,13 @@ def _compute_spectra(recordings: Sequence[Recording]) -> tuple[ComplexArray, Com
 
 
 def _transform_stretches(recording: Recording, length: int) -> Iterator[tuple[ComplexArray, ComplexArray]]:
-    """Spectra of commands and responses per stretch, without stretches at rest or with gaps."""
+    """Spectra (lines, channels) of commands and responses per stretch of `length` samples; stretches with constant
+    commands or missing responses are left out."""
     window = hann(length)[:, None]
     for start in range(0, len(recording) - length + 1, length):
-        u, y = (part.samples[start : start + length] for part in (recording.command, recording.response))
-        if np.ptp(u, axis=0).any() and np.isfinite(y).all():
-            yield _transform_windowed(u, window), _transform_windowed(y, window)
+        commands, responses = (part.samples[start : start + length] for part in (recording.command, recording.response))
+        if np.ptp(commands, axis=0).any() and np.isfinite(responses).all():
+            yield _transform_windowed(commands, window), _transform_windowed(responses, window)
 
 
 def _transform_windowed(samples: FloatArray, window: FloatArray) -> ComplexArray:
@@ -111,15 +118,16 @@ def _transform_windowed(samples: FloatArray, window: FloatArray) -> ComplexArray
     return np.asarray(np.fft.rfft(window * (samples - samples.mean(axis=0)), axis=0))
 
 
-def _compute_coherence(u: ComplexArray, y: ComplexArray) -> tuple[FloatArray, float, float] | None:
-    """(p,): coherence, the share of each response's power that the commands explain; with its mean and variance for
-    noise. u: (stretches, inputs), y: (stretches, outputs). None where too few stretches drive the line."""
-    basis, singular_values, _ = np.linalg.svd(u, full_matrices=False)
+def _compute_coherence(commands: ComplexArray, responses: ComplexArray) -> tuple[FloatArray, float, float] | None:
+    """Multiple coherence at a line, (p,): share of each response's power that the commands explain; with its mean and
+    variance for noise. commands: (stretches, inputs), responses: (stretches, outputs). None where the stretches are
+    fewer than twice the rank of the commands plus one, or where a response has no power."""
+    basis, singular_values, _ = np.linalg.svd(commands, full_matrices=False)
     basis = basis[:, singular_values > RANK_TOLERANCE * singular_values.max()]
     stretches, rank = basis.shape
-    power = (np.abs(y) ** 2).sum(axis=0)
+    power = (np.abs(responses) ** 2).sum(axis=0)
     if stretches < 2 * rank + 1 or not power.all():
         return None
-    share = (np.abs(basis.conj().T @ y) ** 2).sum(axis=0) / power
-    mean = rank / stretches
-    return share, mean, mean * (1 - mean) / (stretches + 1)
+    coherence = (np.abs(basis.conj().T @ responses) ** 2).sum(axis=0) / power
+    noise_mean = rank / stretches
+    return coherence, noise_mean, noise_mean * (1 - noise_mean) / (stretches + 1)

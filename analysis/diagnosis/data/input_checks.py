@@ -10,8 +10,8 @@ from analysis.diagnosis.data.driven_response import compute_response_significanc
 from analysis.diagnosis.data.observed_parts import count_fit_samples
 from analysis.diagnosis.data.recorded_conditions import find_weight_problems
 from analysis.diagnosis.settings import (
-    ANSWER_DEVIATIONS,
     CYCLES_SHARE,
+    DRIVEN_DEVIATIONS,
     LARGEST_VALUE,
     LEAST_CYCLES,
     LEAST_SAMPLES,
@@ -84,7 +84,7 @@ def require_usable_data(
         elif (
             not shortness
             and (significance := compute_response_significance(recordings)) is not None
-            and significance < ANSWER_DEVIATIONS
+            and significance < DRIVEN_DEVIATIONS
         ):
             problems.append(
                 "the responses are not related to the commands: their coherence is no larger than that of noise, so "

@@ -24,7 +24,7 @@ from analysis.diagnosis.discovery.validation import (
 from analysis.diagnosis.errors.output_error import gather_evidence
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import keep_identifiable
-from analysis.diagnosis.search.parsimony import leaves_far_less
+from analysis.diagnosis.search.parsimony import has_far_smaller_error
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.starting_hypotheses import is_within_data
 from analysis.diagnosis.search.verdict import SearchResult, Unconfirmed, judge
@@ -141,7 +141,7 @@ def _find_rival_objections(
     if catalogue_explanation.steps and may_approximate_law(context, catalogue_explanation):
         rivals = [rival for rival in rivals if not is_shorter_and_as_good(context, discovery, rival)]
     yield from find_failed_checks(context, discovery, rivals)
-    if not all(leaves_far_less(discovery.explanation.after, rival) for rival in rivals):
+    if not all(has_far_smaller_error(discovery.explanation.after, rival) for rival in rivals):
         yield "the effects of the catalogue reach almost as small an error"
 
 

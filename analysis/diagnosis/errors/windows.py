@@ -20,7 +20,7 @@ from analysis.diagnosis.errors.free_simulation import stack_simulated_channels
 from equalizer.effects.effect import Effect, PlacedEffect, Structure
 from equalizer.effects.simulation.bodies import Restarts, build_bodies
 from equalizer.effects.simulation.forces_along_motion import compute_actuator_force
-from equalizer.effects.simulation.sensor_path import low_pass
+from equalizer.effects.simulation.sensor_path import apply_low_pass
 from equalizer.effects.simulation.simulator import Measurement, SimulationResult, simulate_windows
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.plant.linear_simulation import discretise_model
@@ -216,7 +216,7 @@ def _compute_free_motion(
     states[0] = np.eye(len(discrete_model.transition))
     for k in range(1, window_samples):
         states[k] = discrete_model.transition @ states[k - 1]
-    response = low_pass(
+    response = apply_low_pass(
         states.transpose(0, 2, 1) @ discrete_model.response.T, sample_rate_hz, structure.sensor.bandwidth_hz
     )
     outputs = np.concatenate([response, states.transpose(0, 2, 1) @ discrete_model.position.T], axis=2)

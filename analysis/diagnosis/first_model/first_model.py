@@ -1,4 +1,4 @@
-"""Data class of the first model: what a diagnosis starts from where the user gave no model (`fit_without_model`)."""
+"""Result of fitting a starting model for a diagnosis, where the user gave none. Made by `fit_without_model`."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FirstModel:
-    """The first model, with the force balances that were computed for it."""
+    """A mechanical model fitted to the recordings themselves, with the force balances that were computed for it."""
 
     model: MechanicalModel
-    """Fitted to the recordings; its tolerance says how far a diagnosis may re-tune it."""
+    """Fitted to the recordings; its tolerances limit how far a diagnosis re-tunes it."""
     remarks: tuple[str, ...]
-    """Sentences for the user on how the model was fitted, and what it does not show."""
+    """Sentences for the user: how the model was fitted, and its limits."""
     balances: "tuple[Balance, ...] | None" = None
-    """Force balance of each command; None = not computed."""
+    """Force balances from which the model was fitted; None = not computed."""

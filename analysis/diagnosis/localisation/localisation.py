@@ -112,7 +112,13 @@ def _list_possible_entries(
     entries += [Entry("errors of several response channels", "sensor", None, identity[:, :, :p])] if p > 1 else []
     if with_position and recording.position is not None:
         entries += [
-            Entry(f"an error of the position channel {name}", "sensor", name, identity[:, :, [p + k]], of_position=True)
+            Entry(
+                f"an error of the position channel {name}",
+                "sensor",
+                name,
+                identity[:, :, [p + k]],
+                is_position_error=True,
+            )
             for k, name in enumerate(recording.position.channels)
         ]
     return tuple(entries)

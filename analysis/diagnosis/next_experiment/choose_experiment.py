@@ -1,9 +1,10 @@
-"""Optimal experiments to discriminate rivals: the largest difference of their predictions after the rival's re-tuning.
+"""Optimal design of experiments for model discrimination: which recordings separate the named effect from its rivals?
 
-Method of Hunter and Reiner (Technometrics 7:307, 1965), with the information of the existing recordings as the prior of
-the rival's parameters. Called by `propose_experiment`.
+Method of Hunter and Reiner (Technometrics 7:307, 1965): the experiment with the largest difference between the
+predictions of both models after the rival's parameters are re-tuned. The information of the existing recordings is the
+prior of these parameters. Called by `propose_experiment`.
 
-Several recordings: with residuals r_i of n recordings, sensitivities X_i and prior information K,
+Several recordings: with differences r_i of the predictions for n recordings, sensitivities X_i and prior information K,
 
     min over d of sum_i |r_i - X_i d|^2 + d' K d  >=  sum_i (min over d of |r_i - X_i d|^2 + d' (K / n) d),
 
@@ -28,14 +29,14 @@ from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
 
 MOST_RECORDINGS = 3
-"""Recordings that are proposed at once."""
+"""Largest number of recordings that are proposed together. Chosen heuristically."""
 RETUNING_STEPS = 3
-"""Gauss-Newton steps of the rival's re-tuning."""
+"""Largest number of Gauss-Newton steps of the rival's re-tuning. Chosen heuristically."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bench:
-    """The device on which experiments are simulated."""
+    """Simulated test bench: the re-tuned model, sampling and noise with which experiments are simulated."""
 
     tuning: Tuning
     sample_rate_hz: float
@@ -46,20 +47,21 @@ class Bench:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PredictedGain:
-    """Expected discrimination between the named effect and a rival by an experiment."""
+    """Expected evidence of one experiment for the named effect against a rival."""
 
     experiment: Experiment
     gain: float
-    """Expected log likelihood ratio in favour of the true effect; 0 where a simulation diverged."""
+    """Expected log-likelihood ratio in favour of the true effect; 0 where a simulation diverged."""
     shared: float = 0.0
-    """The same with a part of the prior information, as one of `MOST_RECORDINGS` recordings."""
+    """The same with the `MOST_RECORDINGS`-th part of the prior information; such gains add up to a lower bound of the
+    joint gain of several recordings (module docstring)."""
 
 
 def predict_gains(
     bench: Bench, named_fit: Fitted, rival: Fitted, information: FloatArray, menu: Sequence[Experiment]
 ) -> tuple[PredictedGain, ...]:
-    """The experiments with their gains, in the menu's order. information: (t + parameters, t + parameters), information
-    matrix of the rival's parameters from what has been recorded, calibration included."""
+    """Predict the gain of each experiment, in the menu's order. information: (d, d), information matrix of the rival's
+    d parameters, the re-tuned ones first, from the existing recordings and the calibration."""
     return tuple(
         PredictedGain(experiment, *_compute_gains(bench, named_fit, rival, information, experiment))
         for experiment in menu
@@ -68,19 +70,19 @@ def predict_gains(
 
 @dataclass(frozen=True, slots=True)
 class ExperimentSet:
-    """The experiments to make next and the rivals that they discriminate; empty where none would."""
+    """Experiments proposed together, and the rivals that they discriminate; empty where no experiment would."""
 
     experiments: tuple[Experiment, ...]
     discriminated: tuple[int, ...]
     """Indices of the rivals that they discriminate from the named effect."""
     gain: float
-    """Smallest expected log likelihood ratio, over these rivals."""
+    """Smallest expected log-likelihood ratio over these rivals; 0 for an empty set."""
 
 
 def choose_experiments(predicted: Sequence[Sequence[PredictedGain]]) -> ExperimentSet:
-    """Choose recordings that discriminate the rivals of one effect; empty where none would. If a single recording
-    discriminates all rivals, that with the largest gain per minute; else a greedy set cover: each next recording
-    reduces the missing gain most per minute. predicted: per rival, the gains of one menu, in its order."""
+    """Choose recordings that discriminate the rivals of one effect (gain of at least `TELLING_GAIN`). If single
+    recordings discriminate all rivals, that with the largest gain per minute; else a greedy set cover: each next
+    recording reduces the missing gain most per minute. predicted: per rival, the gains of one menu, in its order."""
     single_gains, shared_gains = (
         np.array(
             [[float(getattr(prediction, name)) for prediction in rival_gains] for rival_gains in predicted]
@@ -88,14 +90,18 @@ def choose_experiments(predicted: Sequence[Sequence[PredictedGain]]) -> Experime
         for name in ("gain", "shared")
     )
     menu = [prediction.experiment for prediction in predicted[0]] if len(predicted) else []
-    cost = np.array([experiment.minutes for experiment in menu])
-    largest_gains = np.maximum(
+    duration_min = np.array([experiment.minutes for experiment in menu])
+    largest_gain_by_rival = np.maximum(
         single_gains.max(axis=1, initial=0.0), np.sort(shared_gains, axis=1)[:, -MOST_RECORDINGS:].sum(axis=1)
     )
-    rivals = [int(index) for index in np.argsort(-largest_gains, kind="stable") if largest_gains[index] >= TELLING_GAIN]
+    rivals = [
+        int(index)
+        for index in np.argsort(-largest_gain_by_rival, kind="stable")
+        if largest_gain_by_rival[index] >= TELLING_GAIN
+    ]
     # Where no set discriminates all rivals, the rival with the smallest gain is left out.
     while rivals:
-        chosen = _choose_single(single_gains[rivals], cost) or _choose_cover(shared_gains[rivals], cost)
+        chosen = _choose_single(single_gains[rivals], duration_min) or _choose_cover(shared_gains[rivals], duration_min)
         if chosen:
             discriminated = tuple(sorted(rivals))
             gain = (
@@ -108,31 +114,33 @@ def choose_experiments(predicted: Sequence[Sequence[PredictedGain]]) -> Experime
     return ExperimentSet((), (), 0.0)
 
 
-def _choose_single(gains: FloatArray, cost: FloatArray) -> list[int]:
-    """The recording that discriminates every rival by itself, with the largest gain per cost; empty where none does."""
-    weakest = gains.min(axis=0)
-    if not (weakest >= TELLING_GAIN).any():
+def _choose_single(gains: FloatArray, duration_min: FloatArray) -> list[int]:
+    """Index of the recording that alone discriminates all rivals, with the largest gain per minute; empty where none
+    does. gains: (rivals, menu); duration_min: (menu,)."""
+    smallest_gain = gains.min(axis=0)
+    if not (smallest_gain >= TELLING_GAIN).any():
         return []
-    return [int(np.argmax(np.where(weakest >= TELLING_GAIN, weakest / cost, -np.inf)))]
+    return [int(np.argmax(np.where(smallest_gain >= TELLING_GAIN, smallest_gain / duration_min, -np.inf)))]
 
 
-def _choose_cover(gains: FloatArray, cost: FloatArray) -> list[int]:
-    """A few recordings that discriminate every rival together; empty where as many as `MOST_RECORDINGS` do not."""
+def _choose_cover(gains: FloatArray, duration_min: FloatArray) -> list[int]:
+    """Indices of at most `MOST_RECORDINGS` recordings that together discriminate all rivals, without a redundant one;
+    empty where the greedy search finds none. gains: (rivals, menu); duration_min: (menu,)."""
     chosen: list[int] = []
     while (deficit := np.maximum(TELLING_GAIN - gains[:, chosen].sum(axis=1), 0.0)).any():
-        if len(chosen) == min(MOST_RECORDINGS, len(cost)):
+        if len(chosen) == min(MOST_RECORDINGS, len(duration_min)):
             return []
-        added_gain = np.minimum(gains, deficit[:, None]).sum(axis=0) / cost
+        added_gain = np.minimum(gains, deficit[:, None]).sum(axis=0) / duration_min
         added_gain[chosen] = -np.inf
         chosen.append(int(np.argmax(added_gain)))
     redundant = (k for k in chosen if (gains[:, [j for j in chosen if j != k]].sum(axis=1) >= TELLING_GAIN).all())
-    dropped = next(redundant, None)
-    return [number for number in chosen if number != dropped]
+    redundant_index = next(redundant, None)
+    return [index for index in chosen if index != redundant_index]
 
 
-def make_document_entry(best: ExperimentSet, names: Sequence[str]) -> NextExperiment | None:
-    """The proposed recordings as an entry of the document; None where `best` is empty. names: of the named effect, then
-    of each rival."""
+def make_document_entry(best: ExperimentSet, effect_names: Sequence[str]) -> NextExperiment | None:
+    """Proposed recordings as an entry of the diagnosis document; None for an empty set. effect_names: name of the named
+    effect, then of each rival."""
     if not best.experiments:
         return None
     has_added_mass = any(experiment.added for experiment in best.experiments)
@@ -143,7 +151,7 @@ def make_document_entry(best: ExperimentSet, names: Sequence[str]) -> NextExperi
     place = "in these recordings together" if later_commands else "there"
     return NextExperiment(
         command="; then ".join([f"record {first_command}", *later_commands]),
-        splits=(names[0], *dict.fromkeys(names[1 + number] for number in best.discriminated)),
+        splits=(effect_names[0], *dict.fromkeys(effect_names[1 + rival_index] for rival_index in best.discriminated)),
         why=f"{place} their predictions differ by more than noise and tolerances can explain: the log likelihood of "
         f"the true effect would exceed that of the others by at least {best.gain:.3g}{weight_remark}",
     )
@@ -152,20 +160,20 @@ def make_document_entry(best: ExperimentSet, names: Sequence[str]) -> NextExperi
 def _compute_gains(
     bench: Bench, named_fit: Fitted, rival: Fitted, information: FloatArray, experiment: Experiment
 ) -> tuple[float, float]:
-    """Gain of the experiment alone, and with the n-th part of the prior, as one of `MOST_RECORDINGS` recordings."""
+    """`gain` and `shared` of `PredictedGain` for one experiment."""
     base = _simulate(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment)
     difference = (
         _simulate(bench, named_fit.deviations, named_fit.hypothesis, named_fit.hypothesis.point, experiment) - base
     )
     columns = []
-    for number in range(len(rival.deviations)):
+    for index in range(len(rival.deviations)):
         displaced = rival.deviations.copy()
-        displaced[number] += DIFFERENCE_STEP
+        displaced[index] += DIFFERENCE_STEP
         displaced_signals = _simulate(bench, displaced, rival.hypothesis, rival.hypothesis.point, experiment)
         columns.append((displaced_signals - base) / DIFFERENCE_STEP)
-    for number, free_parameter in enumerate(rival.hypothesis.parameters):
+    for index, free_parameter in enumerate(rival.hypothesis.parameters):
         point = rival.hypothesis.point.copy()
-        point[number] += free_parameter.difference_step
+        point[index] += free_parameter.difference_step
         columns.append(
             (_simulate(bench, rival.deviations, rival.hypothesis, point, experiment) - base)
             / free_parameter.difference_step
@@ -174,8 +182,8 @@ def _compute_gains(
     if not (np.isfinite(difference).all() and np.isfinite(sensitivities).all()):
         return 0.0, 0.0
     single_gain, shared_gain = (
-        _retune_rival(bench, rival, free_parameter, (experiment, difference, sensitivities)) / 2
-        for free_parameter in (information, information / MOST_RECORDINGS)
+        _retune_rival(bench, rival, prior_information, (experiment, difference, sensitivities)) / 2
+        for prior_information in (information, information / MOST_RECORDINGS)
     )
     return single_gain, min(shared_gain, single_gain)
 
@@ -183,40 +191,49 @@ def _compute_gains(
 def _retune_rival(
     bench: Bench, rival: Fitted, information: FloatArray, prediction: tuple[Experiment, FloatArray, FloatArray]
 ) -> float:
-    """Sum of squares that remains after the rival is re-tuned by Gauss-Newton steps. prediction: the experiment, the
-    difference of the predictions, and the sensitivities to the rival's parameters."""
+    """Sum of squared differences plus prior penalty that remains after the rival is re-tuned by Gauss-Newton steps.
+    prediction: the experiment, the difference of the predictions (samples,) in units of the noise, and the
+    sensitivities (d, samples) to the rival's parameters."""
     experiment, difference, sensitivities = prediction
-    tuned, t = np.zeros(len(information)), len(rival.deviations)
+    parameter_change, deviation_count = np.zeros(len(information)), len(rival.deviations)
     target = _simulate(bench, rival.deviations, rival.hypothesis, rival.hypothesis.point, experiment) + difference
-    initial_squares, smallest, remainder = float(difference @ difference), np.inf, difference
-    rhs = sensitivities @ difference
-    linear_prediction = initial_squares - float(
-        rhs @ np.linalg.lstsq(sensitivities @ sensitivities.T + information, rhs, rcond=None)[0]
+    initial_squares, smallest_squares, residual = float(difference @ difference), np.inf, difference
+    projected_difference = sensitivities @ difference
+    linearised_squares = initial_squares - float(
+        projected_difference
+        @ np.linalg.lstsq(sensitivities @ sensitivities.T + information, projected_difference, rcond=None)[0]
     )
     for _ in range(RETUNING_STEPS):
         step = np.linalg.lstsq(
-            sensitivities @ sensitivities.T + information, sensitivities @ remainder - information @ tuned, rcond=None
+            sensitivities @ sensitivities.T + information,
+            sensitivities @ residual - information @ parameter_change,
+            rcond=None,
         )[0]
-        tuned = tuned + step
+        parameter_change = parameter_change + step
         try:
             retuned_signals = _simulate(
-                bench, rival.deviations + tuned[:t], rival.hypothesis, rival.hypothesis.point + tuned[t:], experiment
+                bench,
+                rival.deviations + parameter_change[:deviation_count],
+                rival.hypothesis,
+                rival.hypothesis.point + parameter_change[deviation_count:],
+                experiment,
             )
         except (MechanicalModelError, np.linalg.LinAlgError):
             break
-        remainder = target - retuned_signals
+        residual = target - retuned_signals
         with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged
-            squares = float(remainder @ remainder + tuned @ information @ tuned)
-        if not squares < smallest:
+            penalised_squares = float(residual @ residual + parameter_change @ information @ parameter_change)
+        if not penalised_squares < smallest_squares:
             break
-        smallest = squares
-    # Where the steps diverge, the prediction of the linearised model is used, which is rather too small.
-    return smallest if smallest < initial_squares else max(linear_prediction, 0.0)
+        smallest_squares = penalised_squares
+    # Where the steps diverge: the value of the linearised model, which tends to be too small (conservative).
+    return smallest_squares if smallest_squares < initial_squares else max(linearised_squares, 0.0)
 
 
 def _simulate(
     bench: Bench, deviations: FloatArray, hypothesis: Hypothesis, point: FloatArray, experiment: Experiment
 ) -> FloatArray:
+    """Simulated response and position of an experiment, flattened to (samples,), in units of the noise."""
     model: MechanicalModel = bench.tuning.tune(deviations)
     model = add_mass(model, experiment.added) if experiment.added else model
     with np.errstate(over="ignore", invalid="ignore"):  # of a simulation that diverged

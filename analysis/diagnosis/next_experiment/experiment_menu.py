@@ -12,7 +12,7 @@ import numpy as np
 
 from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel
-from equalizer.signals.excitation import apply_fades, log_sweep, sine
+from equalizer.signals.excitation import apply_fades, make_log_sweep, make_sine
 from equalizer.signals.signal import FloatArray
 
 SLOWEST_HZ, SLOWEST_SHARE = 1.0, 0.1
@@ -62,10 +62,10 @@ def list_experiments(model: MechanicalModel, sample_rate_hz: float, axis: int, l
 
     def make_sweep(peak: float, to_hz: float = usual_hz, length_factor: float = 1.0) -> FloatArray:
         samples = int(length_factor * length_s * sample_rate_hz)
-        return drive_axis(log_sweep(slowest_hz, to_hz, peak, samples, sample_rate_hz))
+        return drive_axis(make_log_sweep(slowest_hz, to_hz, peak, samples, sample_rate_hz))
 
     def make_sinusoid(peak: float) -> FloatArray:
-        return drive_axis(sine(slow_hz, peak, int(length_s * sample_rate_hz), sample_rate_hz))
+        return drive_axis(make_sine(slow_hz, peak, int(length_s * sample_rate_hz), sample_rate_hz))
 
     sweep, wide_sweep = (f"a sweep from {slowest_hz:.3g} to {upper_hz:.3g} Hz" for upper_hz in (usual_hz, fastest_hz))
     levels = {1: "the highest level so far", 4: "a quarter of the highest level", 20: "a twentieth of it"}

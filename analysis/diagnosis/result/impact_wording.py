@@ -1,7 +1,7 @@
-"""Sentences for a diagnosis of rattling play, which compares band powers of the response instead of samples.
+"""Sentences of the report for a diagnosis of backlash with impacts, which compares band powers instead of samples.
 
-Errors are rms logarithms of the ratio of amplitudes (`errors.band_power`), so that exp(error) is the factor by which
-amplitudes are off.
+Errors are rms natural logarithms of the ratio of predicted to measured amplitude (`errors.band_power`), so that
+exp(error) is the typical factor between them. Called by `wording`; the remark by `search_by_simulation`.
 """
 
 import math
@@ -18,9 +18,10 @@ IMPACTS_COMPARED = (
 """Remark on every such diagnosis: how impacts were compared, and what the errors mean."""
 
 
-def impact_sentence(diagnosis: Diagnosis, named: str) -> str:
-    """The answer, with which the report begins: the named effects, and the factors by which amplitudes are off without
-    them, with them, and by chance alone (held-out errors, else those of the fit). named: the effects, in words."""
+def format_impact_answer(diagnosis: Diagnosis, effect_words: str) -> str:
+    """First sentences of the report: the named effects, and the factors between predicted and measured amplitudes
+    without them, with them, and by chance alone, from held-out errors where there are any, else from those of the fit.
+    effect_words: the named effects, in words."""
     errors = diagnosis.fit.test if diagnosis.fit.test.after is not None else diagnosis.fit.fit
     remainder = "" if diagnosis.verdict == "explained" else ", but that is not all"
     log_ratios = [errors.retuned, errors.after, errors.noise]
@@ -32,4 +33,4 @@ def impact_sentence(diagnosis: Diagnosis, named: str) -> str:
             f"their strength can: in half octaves, the predicted amplitudes are wrong by a factor of {factor_without} "
             f"without this effect and of {factor_with} with it; chance alone gives a factor of {factor_by_chance}"
         )
-    return f"Missing in the model: {named}{remainder}. Its impacts cannot be predicted one by one; {text}."
+    return f"Missing in the model: {effect_words}{remainder}. Its impacts cannot be predicted one by one; {text}."

@@ -12,7 +12,7 @@ import numpy as np
 from analysis.diagnosis.document import Estimate, FoundLaw, NamedEffect, Rival, make_found_law
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.parsimony import is_equal_rival, only_refines
+from analysis.diagnosis.search.parsimony import is_equal_rival, is_refined_candidate
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.search.verdict import compute_step_shares
 from analysis.diagnosis.settings import (
@@ -149,7 +149,7 @@ def _explain_rejection(best: FittedCandidate, rival: FittedCandidate, is_equal: 
     claim = rival.fitted.hypothesis.claims[-1]
     axis = find_axis_letter(claim, labels)
     site = f" ({axis})" if axis else ""
-    if only_refines(rival, best):
+    if is_refined_candidate(rival, best):
         gain = "too little" if rival_error < (1 - _SAME_ERROR) * best_error else "nothing"
         return (
             f"it contains the named law as a special case{site}, and its further parameters gain {gain}: its error "
@@ -251,7 +251,7 @@ def compute_probabilities(fitted_candidates: Sequence[FittedCandidate], error: f
         [max(candidate.score.mean_log_error - best.score.mean_log_error, 0.0) for candidate in fitted_candidates]
     )
     is_refinement = np.array(
-        [candidate is not best and only_refines(candidate, best) for candidate in fitted_candidates]
+        [candidate is not best and is_refined_candidate(candidate, best) for candidate in fitted_candidates]
     )
     weights = np.where(is_refinement, 0.0, np.exp(-excess / PROBABILITY_SCALE))
     return tuple((1 - compute_none_probability(error)) * float(weight) for weight in weights / weights.sum())

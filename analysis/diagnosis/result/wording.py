@@ -24,7 +24,7 @@ from analysis.diagnosis.result.ceiling_wording import (
     describe_error_change,
 )
 from analysis.diagnosis.result.findings import Findings
-from analysis.diagnosis.result.impact_wording import impact_sentence
+from analysis.diagnosis.result.impact_wording import format_impact_answer
 from analysis.diagnosis.result.plausibility import describe_doubts
 from analysis.diagnosis.result.retuned_parameters import (
     MovedParameter,
@@ -102,7 +102,7 @@ def write_answer(findings: Findings) -> str:
     """The sentence of the verdict, by band powers where impacts were compared."""
     diagnosis, device = findings.diagnosis, extract_device(findings)
     if findings.explanation.statistic is not None:
-        return impact_sentence(
+        return format_impact_answer(
             diagnosis, conjoin([format_effect_title(effect, device.single) for effect in diagnosis.effects])
         )
     return describe_verdict(diagnosis, find_final_moves(findings) if diagnosis.verdict == "parameters" else (), device)

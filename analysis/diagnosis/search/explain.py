@@ -31,7 +31,7 @@ from analysis.diagnosis.errors.hypothesis import NO_EFFECTS, Hypothesis, combine
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.next_effect import Step, find_next_effect
-from analysis.diagnosis.search.parsimony import are_inseparable, compute_excess, is_worthwhile, leaves_little
+from analysis.diagnosis.search.parsimony import are_inseparable, compute_excess, has_small_error, is_worthwhile
 from analysis.diagnosis.search.search_context import (
     FittedCandidate,
     SearchContext,
@@ -195,7 +195,7 @@ def is_worth_searching(context: SearchContext, explanation: Explanation, base: F
     errors; except with opened held-out samples, which are few and may show an effect that the others do not."""
     if base.fitted.hypothesis.claims:
         has_noise_limit = context.references is None and not context.has_opened_samples
-        if has_noise_limit and len(base.fitted.hypothesis.claims) > 1 and leaves_little(explanation.retuned, base):
+        if has_noise_limit and len(base.fitted.hypothesis.claims) > 1 and has_small_error(explanation.retuned, base):
             return False
         return base.score.worst_channel > context.least_remaining_error
     has_held_out_mismatch = bool(np.nanmax(explanation.retuned.score.test, initial=0.0) > HELD_OUT_SURPRISE)

@@ -12,7 +12,7 @@ from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.errors.output_error import Fitted, gather_evidence
 from analysis.diagnosis.search.compare_candidates import compare_candidates
 from analysis.diagnosis.search.no_prediction import is_newest_without_prediction
-from analysis.diagnosis.search.parsimony import excludes, move_plainest_first
+from analysis.diagnosis.search.parsimony import are_exclusive, move_preferred_first
 from analysis.diagnosis.search.screening import screen
 from analysis.diagnosis.search.search_context import (
     SCREENING,
@@ -96,7 +96,7 @@ def compare_plausible_fits(
 ) -> tuple[FittedCandidate, ...]:
     """The candidates of these first fits, the preferred one first, without those that predict nothing beyond `base` and
     those with a parameter outside the range of the data (such as a limit above the largest command)."""
-    return move_plainest_first(
+    return move_preferred_first(
         [
             candidate
             for candidate in compare_candidates(context, base, fits)
@@ -114,7 +114,7 @@ def _suggest_hypotheses(
     suggested = [
         hypothesis
         for hypothesis in list_candidates(catalogue, evidence, context.guard.wrap(context.map_, STARTING))
-        if not any(excludes(base_claim, hypothesis.claims[0]) for base_claim in base_hypothesis.claims)
+        if not any(are_exclusive(base_claim, hypothesis.claims[0]) for base_claim in base_hypothesis.claims)
     ]
     if context.references is not None and not any(
         base_claim.effect.name == CLOCK_DRIFT for base_claim in base_hypothesis.claims

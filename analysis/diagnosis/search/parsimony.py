@@ -1,10 +1,10 @@
-"""Parsimony: whether an effect is worth adding, whether errors distinguish two explanations, and which one is preferred
-where they do not.
+"""Model selection: whether an effect is worth adding, and which of two candidates is preferred (parsimony).
 
-Errors are compared by the mean log error power over channels (`FitScore.mean_log_error`, 0 = only noise). Its excess
-above the accuracy of the noise estimate, `NOISE_KNOWN_TO`, is what is left to explain. Where the errors of two
-candidates do not differ by more than chance, the one with the lower information criterion is preferred, and a special
-case before the law that contains it, unless the latter gains clearly.
+Candidates are compared by the mean log error power over channels (`FitScore.mean_log_error`, 0 = noise alone). Its
+excess above the accuracy of the noise estimate, `NOISE_KNOWN_TO`, is the part that remains unexplained. Where the
+errors of two candidates do not differ by more than chance, the one with the lower information criterion is preferred,
+and a special case before the more general law, unless the latter has a clearly smaller error. Called by modules of
+`search`, `discovery`, `confirm`, `result` and `next_experiment`.
 """
 
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ DRY_FRICTION = frozenset(
         "position_dependent_friction",
     }
 )
-"""Effects whose force opposes the motion and hardly depends on its speed."""
+"""Names of the effects whose force opposes the motion and hardly depends on its speed."""
 
 FAMILIES: tuple[frozenset[str], ...] = (
     DRY_FRICTION,
@@ -51,11 +51,12 @@ FAMILIES: tuple[frozenset[str], ...] = (
     frozenset({"added_mass", "hand_impedance", "body_on_actuator"}),
     frozenset({"backlash", "loose_joint"}),
 )
-"""Effects of similar action: at one place, at most one of a family is named, and they are exchanged for one another."""
+"""Names of effects with similar forces or errors. At one place at most one of a family is named; a search exchanges
+them for one another."""
 
 
-def excludes(existing: Claim, added: Claim) -> bool:
-    """Whether `added` cannot be added beside `present`: the same effect, or one of its family, at a common place."""
+def are_exclusive(existing: Claim, added: Claim) -> bool:
+    """Whether two claims exclude each other: the same effect, or two of one family, at a common site."""
     if not set(existing.sites) & set(added.sites):
         return False
     names = {existing.effect.name, added.effect.name}
@@ -63,62 +64,67 @@ def excludes(existing: Claim, added: Claim) -> bool:
 
 
 def list_relatives(name: str, catalogue: Sequence[Effect]) -> tuple[Effect, ...]:
-    """The effects that may replace the named one, itself included: its family, and the laws of which it is a special
-    case."""
+    """List the effects that may replace the named one, itself included: its family, and the laws of which it is a
+    special case."""
     families = {name}.union(*(family for family in FAMILIES if name in family))
     return tuple(effect for effect in catalogue if effect.name in families or name in effect.simpler)
 
 
-def move_plainest_first(fitted_candidates: Sequence[FittedCandidate]) -> tuple[FittedCandidate, ...]:
-    """The candidates with the preferred one moved to the front. fitted_candidates: by error, the best first."""
+def move_preferred_first(fitted_candidates: Sequence[FittedCandidate]) -> tuple[FittedCandidate, ...]:
+    """Move the preferred candidate to the front; the order of the others stays. fitted_candidates: by error, the best
+    first."""
     if not fitted_candidates:
         return ()
     preferred = fitted_candidates[0]
     for rival in fitted_candidates[1:]:
-        if _is_plainer(rival, preferred) and _is_preferable(rival, preferred):
+        if _is_simpler(rival, preferred) and _is_preferable(rival, preferred):
             preferred = rival
     return (preferred, *(candidate for candidate in fitted_candidates if candidate is not preferred))
 
 
-def _is_plainer(simpler: FittedCandidate, reference: FittedCandidate) -> bool:
-    return only_refines(reference, simpler) or (
+def _is_simpler(simpler: FittedCandidate, reference: FittedCandidate) -> bool:
+    """Whether a candidate is a special case of the reference, or no refinement of it with a lower information
+    criterion."""
+    return is_refined_candidate(reference, simpler) or (
         _compute_information_criterion(simpler) < _compute_information_criterion(reference)
-        and not only_refines(simpler, reference)
+        and not is_refined_candidate(simpler, reference)
     )
 
 
 def _compute_information_criterion(candidate: FittedCandidate) -> float:
-    """2 k + |d|²: Akaike's penalty (1974) for k parameters, and the squared deviations d of the re-tuned parameters
-    from the calibration, in prior standard deviations. Without the likelihood: it is only used where errors do not
-    differ."""
+    """2 k + |d|²: Akaike's penalty (1974) for the k parameters of the effects, and the squared deviations d of the
+    re-tuned parameters from the calibration, in prior standard deviations. Without the likelihood term, because only
+    candidates with equal errors are compared by it."""
     deviations = candidate.fitted.deviations
     return 2.0 * len(candidate.fitted.hypothesis.point) + float(deviations @ deviations)
 
 
-def only_refines(general: FittedCandidate, special: FittedCandidate) -> bool:
-    """Whether the general candidate's last effect contains the special one's as a special case, at the same place."""
+def is_refined_candidate(general: FittedCandidate, special: FittedCandidate) -> bool:
+    """Whether the last effect of the general candidate contains that of the special one as a special case, at the same
+    sites or more."""
     return _is_special_case(special, general)
 
 
 def is_equal_rival(named_candidate: FittedCandidate, rival: FittedCandidate) -> bool:
-    """Whether the candidate is a rival: inseparable from the named candidate, and no refinement of it."""
-    return are_inseparable(named_candidate, rival) and not only_refines(rival, named_candidate)
+    """Whether a candidate is a rival of the named one: errors inseparable, and no refinement of it."""
+    return are_inseparable(named_candidate, rival) and not is_refined_candidate(rival, named_candidate)
 
 
 def compute_excess(candidate: FittedCandidate) -> float:
-    """Mean log error power above the noise."""
+    """Mean log error power above the noise and its uncertainty, at least 0."""
     return max(candidate.score.mean_log_error - NOISE_KNOWN_TO, 0.0)
 
 
 def compute_mismatch_share(base: FittedCandidate, completed: FittedCandidate) -> float:
-    """Relative decrease of the excess log error power over the noise, between 0 and 1."""
+    """Share of the base's excess (`compute_excess`) that the completed candidate removes, 0 to 1; 0 without excess."""
     base_excess = compute_excess(base)
     return min(max(1 - compute_excess(completed) / base_excess, 0.0), 1.0) if base_excess > 0 else 0.0
 
 
-def leaves_little(retuned: FittedCandidate, candidate: FittedCandidate) -> bool:
-    """Whether a candidate leaves little more than noise: as much as the right laws leave of a real device, which none
-    fits exactly. retuned: the model without effects."""
+def has_small_error(retuned: FittedCandidate, candidate: FittedCandidate) -> bool:
+    """Whether a candidate's largest error over channels is close to the noise: at most `EXPLAINED_ERROR`, or at most
+    `CONVINCING_ERROR` if it also removes the share `CONVINCING_SHARE` of the excess of the model without effects,
+    `retuned`."""
     worst_error = candidate.score.worst_channel
     if worst_error <= EXPLAINED_ERROR:
         return True
@@ -126,15 +132,16 @@ def leaves_little(retuned: FittedCandidate, candidate: FittedCandidate) -> bool:
 
 
 def are_inseparable(best: FittedCandidate, rival: FittedCandidate) -> bool:
-    """Whether two candidates' errors do not differ enough; also where the difference is smaller than what both gain on
-    clean recordings, where neither effect is present."""
+    """Whether the rival's error exceeds that of the best candidate by no more than chance, or by no more than both gain
+    on clean recordings, where neither effect is present."""
     difference = rival.score.mean_log_error - best.score.mean_log_error
     return difference <= max(AS_GOOD_GAIN, AS_GOOD_SHARE * compute_excess(best), min(rival.clean_gain, best.clean_gain))
 
 
 def is_worthwhile(base: FittedCandidate, extended: FittedCandidate) -> bool:
-    """Whether an effect lowers the error enough to be added. Where only the worst channel is above the noise, and not
-    the mean over channels, or no more is left than a right law leaves, its logarithm must fall by half."""
+    """Whether an effect lowers the mean log error enough to be added. Where the base has no excess or its largest error
+    over channels is at most `EXPLAINED_ERROR`, but above `NOISE_ALONE`, the logarithm of that error must also fall by
+    half."""
     gain, log_error = base.score.mean_log_error - extended.score.mean_log_error, np.log(base.score.worst_channel)
     is_small = compute_excess(base) == 0 or base.score.worst_channel <= EXPLAINED_ERROR
     if is_small and log_error > np.log(NOISE_ALONE) and np.log(extended.score.worst_channel) > log_error / 2:
@@ -143,13 +150,15 @@ def is_worthwhile(base: FittedCandidate, extended: FittedCandidate) -> bool:
 
 
 def _is_special_case(special_candidate: FittedCandidate, general_candidate: FittedCandidate) -> bool:
+    """Whether the last effect of one candidate is a special case of the other's last effect, at a subset of its
+    sites."""
     special, general = special_candidate.fitted.hypothesis.claims[-1], general_candidate.fitted.hypothesis.claims[-1]
     return special.effect.name in general.effect.simpler and set(special.sites) <= set(general.sites)
 
 
 def _is_preferable(simpler: FittedCandidate, refined: FittedCandidate) -> bool:
-    """Whether the simpler candidate is preferred: inseparable from the other, or its special case from which the other
-    gains too little."""
+    """Whether the simpler candidate is preferred: its special case, over which the refined one gains too little, or
+    else inseparable from it."""
     if not _is_special_case(simpler, refined):
         return are_inseparable(refined, simpler)
     gain = simpler.score.mean_log_error - refined.score.mean_log_error
@@ -157,11 +166,13 @@ def _is_preferable(simpler: FittedCandidate, refined: FittedCandidate) -> bool:
     return gain <= max(REFINED_GAIN, min(share * compute_excess(simpler), REFINED_MOST_GAIN))
 
 
-def leaves_far_less(candidate: FittedCandidate, rival: FittedCandidate) -> bool:
+def has_far_smaller_error(law_candidate: FittedCandidate, effect_candidate: FittedCandidate) -> bool:
     """Whether a law outside the catalogue replaces a named effect: its excess error is at most the share `LAW_BEATS` of
-    the effect's, and its mean log rms error on the same held-out samples is lower by more than `NOISE_KNOWN_TO`. The
-    second condition refuses a law that is the effect's own formula in another form."""
-    candidate_error, rival_error = (float(np.mean(np.log(fitted.score.test))) for fitted in (candidate, rival))
+    the effect's, and its mean log rms error on the held-out samples, if there are any, is lower by more than
+    `NOISE_KNOWN_TO`. The second condition rejects a law that is the effect's formula in another form."""
+    candidate_error, rival_error = (
+        float(np.mean(np.log(fitted.score.test))) for fitted in (law_candidate, effect_candidate)
+    )
     if np.isfinite(candidate_error) and candidate_error >= rival_error - NOISE_KNOWN_TO:
         return False
-    return compute_excess(candidate) <= LAW_BEATS * compute_excess(rival)
+    return compute_excess(law_candidate) <= LAW_BEATS * compute_excess(effect_candidate)

@@ -22,7 +22,7 @@ from analysis.diagnosis.search.next_effect import (
     find_first_fits,
     find_next_effect,
 )
-from analysis.diagnosis.search.parsimony import is_worthwhile, leaves_little, list_relatives, move_plainest_first
+from analysis.diagnosis.search.parsimony import has_small_error, is_worthwhile, list_relatives, move_preferred_first
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.time_budget import OutOfTimeError, limit_map
 from analysis.diagnosis.search.verdict import as_good_as_noise, compute_step_shares, is_worth_naming
@@ -142,7 +142,9 @@ def exchange_effects(
     crashes."""
     limited = replace(context, map_=limit_map(context.map_, time_left))
     for _ in explanation.steps:
-        if not _may_exchange(context, explanation, time_left) or leaves_little(explanation.retuned, explanation.after):
+        if not _may_exchange(context, explanation, time_left) or has_small_error(
+            explanation.retuned, explanation.after
+        ):
             break
         exchanged = _exchange_first(
             limited, explanation, partial(_search_first_effect, limited, explanation, catalogue, progress)
@@ -187,7 +189,7 @@ def exchange_for_relatives(
         fits = find_first_fits(limited, family, base, evidence, _make_exchange_step(progress), sites)
         improved = [law for law in fits if law.cost < last_step.fitted.cost]
         current_fit = _move_first_to_end(limited, last_step)
-        compared = move_plainest_first([*compare_plausible_fits(limited, base, improved, evidence), current_fit])
+        compared = move_preferred_first([*compare_plausible_fits(limited, base, improved, evidence), current_fit])
         # The other effects are refitted only where the first effect is replaced.
         return explanation if compared[0] is current_fit else remove_effect(limited, explanation, 0), compared
 

@@ -33,7 +33,7 @@ from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, add_effects, explain, is_worth_searching, start_explanation
 from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.no_prediction import is_without_prediction
-from analysis.diagnosis.search.parsimony import leaves_far_less
+from analysis.diagnosis.search.parsimony import has_far_smaller_error
 from analysis.diagnosis.search.revise_selection import (
     drop_needless,
     drop_negligible,
@@ -153,7 +153,7 @@ def _choose_early_or_full(early: SearchResult, full: SearchResult) -> SearchResu
     is_timed_out = full.found.ended_early
     if not early.judgement.named:
         return replace(full, unconfirmed=(*early.unconfirmed, *full.unconfirmed)) if is_timed_out else full
-    if full.judgement.named and not (is_timed_out and leaves_far_less(early.found.after, full.found.after)):
+    if full.judgement.named and not (is_timed_out and has_far_smaller_error(early.found.after, full.found.after)):
         return full
     return replace(early, remarks=(OUT_OF_TIME, *early.remarks)) if is_timed_out else early
 

@@ -13,7 +13,7 @@ from analysis.diagnosis.document import Verdict
 from analysis.diagnosis.effect_words import get_noun
 from analysis.diagnosis.errors.hypothesis import Hypothesis
 from analysis.diagnosis.search.explain import Explanation
-from analysis.diagnosis.search.parsimony import compute_mismatch_share, leaves_little
+from analysis.diagnosis.search.parsimony import compute_mismatch_share, has_small_error
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME
 from analysis.diagnosis.settings import (
@@ -125,8 +125,8 @@ def list_remarks(explanation: Explanation) -> tuple[str, ...]:
 
 
 def as_good_as_noise(explanation: Explanation) -> bool:
-    """Whether the error on the samples to fit and to choose by is little more than noise (`leaves_little`)."""
-    return leaves_little(explanation.retuned, explanation.after)
+    """Whether the error on the samples to fit and to choose by is little more than noise (`has_small_error`)."""
+    return has_small_error(explanation.retuned, explanation.after)
 
 
 def is_worth_naming(explanation: Explanation) -> bool:

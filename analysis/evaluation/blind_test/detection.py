@@ -66,7 +66,7 @@ def compute_ideal_threshold(draws: Sequence[Outcome]) -> float | None:
 def classify_outcome(outcome: Outcome) -> str:
     """Class of an outcome with a concealed effect: "right", "in the set" (returned, but not right), "missed", or
     "invisible" (missed where it was not detectable)."""
-    if outcome.right:
+    if outcome.is_correct:
         return "right"
     if outcome.names[0] in outcome.returned:
         return "in the set"
@@ -79,7 +79,7 @@ def compute_rates_by_size(singles: Sequence[Outcome]) -> tuple[SizeGroup, ...]:
     groups = []
     for indices in np.array_split(np.arange(len(ordered)), min(SIZE_GROUPS, len(ordered))):
         group = [ordered[k] for k in indices]
-        hits = sum(case.right for case in group)
+        hits = sum(case.is_correct for case in group)
         median_change = float(np.median([max(case.adds, 1e-3) for case in group]))
         groups.append(
             SizeGroup(median_change, hits / len(group), *compute_wilson_interval(hits, len(group)), len(group))

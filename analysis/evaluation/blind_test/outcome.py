@@ -1,4 +1,8 @@
-"""Outcome of a single case of a bank once its label is revealed: the concealed effects, and the diagnosis."""
+"""Outcome of one blind-test case after its label is revealed: the concealed effects, the diagnosis and its errors.
+
+A bank is a set of simulated recordings with concealed effects. Outcomes are made by `study.evaluation.bank.prove` and
+scored by `score`, `detection` and `calibration`.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,12 +12,12 @@ from analysis.diagnosis.document import Diagnosis, NamedEffect
 
 DETECTABLE = 1.25
 """Ratio of the re-tuned model's rms error to the noise's rms, in the worst channel, on held-out samples, above which an
-effect counts as detectable: the model then leaves an error of sqrt(1.25² - 1) = 0.75 of the noise. By hand."""
+effect counts as detectable: the model then leaves an error of sqrt(1.25² - 1) = 0.75 of the noise. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
-class Concealed:
-    """An effect that was concealed in a case, with its place and true parameters."""
+class ConcealedEffect:
+    """An effect that was concealed in a case, with its place and true parameters (in the effect's units)."""
 
     effect: str
     place: str
@@ -23,14 +27,14 @@ class Concealed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnsweredCase:
-    """A case of a sealed bank with its diagnosis and its errors."""
+    """A case of a bank with its diagnosis and the errors of the models."""
 
     number: int
     seed: int
     kind: str
     axes: tuple[str, ...]
     adds: float
-    """Change of the readings by what is concealed, simulated: its rms over the noise's rms, in the worst channel."""
+    """Simulated change of the readings by the concealed effects: its rms over the noise's rms, in the worst channel."""
     diagnosis: Diagnosis | None
     """The diagnosis; None where it failed."""
     channel_errors: Mapping[str, Mapping[str, float]]
@@ -46,30 +50,30 @@ class AnsweredCase:
     @property
     def detectable(self) -> bool:
         """Whether the re-tuned model leaves a detectable error; a failed diagnosis counts as if it did."""
-        return self.diagnosis is None or self.worst_error("retuned") > DETECTABLE
+        return self.diagnosis is None or self.compute_worst_error("retuned") > DETECTABLE
 
-    def worst_error(self, stage: str) -> float:
-        """Rms error on held-out samples over the noise's rms, in the worst channel; NaN where it is not known. stage:
-        "before", "retuned" or "after"."""
+    def compute_worst_error(self, stage: str) -> float:
+        """Rms error on held-out samples over the noise's rms, in the channel where it is largest; NaN where no errors
+        are known. stage: "before", "retuned" or "after"."""
         return max(self.channel_errors.get(stage, {}).values(), default=float("nan"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome(AnsweredCase):
     """A case of a bank of effects. kind: nothing, single, pair, outside (the catalogue) or without (the true effect was
-    not to be considered)."""
+    excluded from the diagnosis)."""
 
     bank: str
-    """main, dirty (more hidden extras) or engine (a second physics engine)."""
+    """main, dirty (with additional disturbances) or engine (a second physics engine)."""
     model: str
     """Origin of the model: calibrated, or re-tuned to the device."""
-    concealed: tuple[Concealed, ...]
+    concealed: tuple[ConcealedEffect, ...]
     strengths: tuple[float, ...]
-    """Of each concealed effect: 0 = the weakest that is drawn, 1 = the strongest."""
+    """Strength of each concealed effect within the range of the draws: 0 = the weakest, 1 = the strongest."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The concealed effects, in the order of `concealed`."""
+        """Names of the concealed effects, in the order of `concealed`."""
         return tuple(concealed.effect for concealed in self.concealed)
 
     @property
@@ -78,23 +82,23 @@ class Outcome(AnsweredCase):
         return () if self.diagnosis is None else self.diagnosis.effects
 
     @property
-    def named_names(self) -> tuple[str, ...]:
-        """The effects of `named`, without their parameters."""
+    def named_effect_names(self) -> tuple[str, ...]:
+        """Names of the effects in `named`."""
         return tuple(effect.effect for effect in self.named)
 
     @property
-    def seen_by_ideal_observer(self) -> bool:
-        """Whether the effects show in a simulation of the same device with and without them, before a re-tuned model
-        hides part of them: their change and the independent noise add up in power."""
+    def is_seen_by_ideal_observer(self) -> bool:
+        """Whether the effects would be detectable without re-tuning, which hides part of them: from the difference of
+        two simulations with and without them, `adds`, and independent noise, added in power."""
         return hypot(1.0, self.adds) > DETECTABLE
 
     @property
-    def right(self) -> bool:
-        """Whether exactly the concealed effects are named; their places and parameters are scored elsewhere. A failed
-        diagnosis names none: see `score.is_wrong_answer`, which counts it."""
-        return sorted(self.named_names) == sorted(self.names)
+    def is_correct(self) -> bool:
+        """Whether exactly the concealed effects are named; places and parameters are scored in `score`. A failed
+        diagnosis names none, so that it is correct only where nothing is concealed."""
+        return sorted(self.named_effect_names) == sorted(self.names)
 
     @property
     def returned(self) -> tuple[str, ...]:
-        """The returned set: the named effects and their inseparable rivals; empty where the diagnosis failed."""
+        """Names of the named effects and their inseparable rivals; empty where the diagnosis failed."""
         return () if self.diagnosis is None else self.diagnosis.returned_set

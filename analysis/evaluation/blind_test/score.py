@@ -21,7 +21,7 @@ from analysis.evaluation.blind_test.confidence_intervals import (
     pool_share,
 )
 from analysis.evaluation.blind_test.follow_up import FollowUp, compute_follow_up_figures
-from analysis.evaluation.blind_test.outcome import Concealed, Outcome
+from analysis.evaluation.blind_test.outcome import ConcealedEffect, Outcome
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
 FULL_TURN = 2 * math.pi
@@ -55,14 +55,14 @@ def is_wrong_answer(outcome: Outcome) -> bool:
         return False
     if outcome.kind == "outside":
         return outcome.verdict not in ADMITS_MISMATCH
-    return not outcome.right or is_on_other_axis(outcome)
+    return not outcome.is_correct or is_on_other_axis(outcome)
 
 
 def has_wrong_name(outcome: Outcome) -> bool:
     """Whether an effect is named that is not concealed in the case, or any effect where the true effect was excluded
     from the catalogue."""
     allowed_names = () if outcome.kind in ("nothing", "without") else outcome.names
-    return not set(outcome.named_names) <= set(allowed_names)
+    return not set(outcome.named_effect_names) <= set(allowed_names)
 
 
 def is_on_other_axis(outcome: Outcome) -> bool:
@@ -115,25 +115,27 @@ def _compute_single_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEst
     bank_words = {"main": "", "dirty": ", dirty bank", "engine": ", second engine"}
     for bank in BANKS:
         detectable = _select_detectable(_select_kind(outcomes, "single", bank))
-        yield compute_share(f"named right{bank_words[bank]}", detectable, lambda case: case.right)
+        yield compute_share(f"named right{bank_words[bank]}", detectable, lambda case: case.is_correct)
     singles_detected = _select_detectable(_select_kind(outcomes, "single"))
-    yield compute_share("named first, all banks", singles_detected, lambda case: case.named_names[:1] == case.names)
+    yield compute_share(
+        "named first, all banks", singles_detected, lambda case: case.named_effect_names[:1] == case.names
+    )
     yield compute_share("in the returned set", singles_detected, lambda case: case.names[0] in case.returned)
     named_cases = [case for case in singles_detected if case.named]
     yield compute_statistic(
         "names in the returned set, mean", [float(len(case.returned)) for case in named_cases], np.mean
     )
     unambiguous = [case for case in singles_detected if len(case.returned) == 1]
-    yield compute_share("right where one name is returned", unambiguous, lambda case: case.right)
+    yield compute_share("right where one name is returned", unambiguous, lambda case: case.is_correct)
     yield compute_share("place", named_cases, lambda case: case.named[0].place == case.concealed[0].place)
     on_one_axis = [
-        case for case in named_cases if case.right and case.concealed[0].axis is not None and len(case.axes) > 1
+        case for case in named_cases if case.is_correct and case.concealed[0].axis is not None and len(case.axes) > 1
     ]
     yield compute_share("axis, of two or three", on_one_axis, lambda case: not is_on_other_axis(case))
     singles = _select_kind(outcomes, "single")
-    detectable = [single for single in singles if single.seen_by_ideal_observer]
+    detectable = [single for single in singles if single.is_seen_by_ideal_observer]
     yield compute_share("single effects that count as detectable", singles, lambda case: case.detectable)
-    yield compute_share("named right, of those that an oracle sees", detectable, lambda case: case.right)
+    yield compute_share("named right, of those that an oracle sees", detectable, lambda case: case.is_correct)
     undetectable = [outcome for outcome in outcomes if outcome.kind != "nothing" and not outcome.detectable]
     yield compute_share("not detectable, yet a wrong name", undetectable, has_wrong_name)
 
@@ -160,13 +162,13 @@ def _compute_open_set_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalE
 def _compute_pair_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEstimate]:
     """Figures on cases with two concealed effects."""
     pairs = _select_detectable(_select_kind(outcomes, "pair"))
-    yield compute_share("pairs, both and no other", pairs, lambda case: case.right)
-    yield compute_share("pairs, at least one", pairs, lambda case: bool(set(case.names) & set(case.named_names)))
+    yield compute_share("pairs, both and no other", pairs, lambda case: case.is_correct)
+    yield compute_share("pairs, at least one", pairs, lambda case: bool(set(case.names) & set(case.named_effect_names)))
 
 
 def _compute_number_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEstimate]:
     """Parameter errors and interval coverage of single effects named right, the remaining error, and run times."""
-    right_cases = [case for case in _select_detectable(_select_kind(outcomes, "single")) if case.right]
+    right_cases = [case for case in _select_detectable(_select_kind(outcomes, "single")) if case.is_correct]
     errors = [compute_main_error(case.concealed[0], case.named[0]) for case in right_cases]
     yield compute_statistic(
         "main parameter's error, median", [error for error in errors if error is not None], np.median
@@ -181,12 +183,12 @@ def _compute_number_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEst
     yield compute_share(
         "the same, main parameters", mains, lambda case: is_main_covered(case.concealed[0], case.named[0])
     )
-    final_errors = [case.worst_error("after") for case in right_cases]
+    final_errors = [case.compute_worst_error("after") for case in right_cases]
     yield compute_statistic("held-out error over noise, worst channel, median", final_errors, np.median)
     yield compute_statistic("seconds per diagnosis, median", [outcome.seconds for outcome in outcomes], np.median)
 
 
-def compute_main_error(concealed: Concealed, named_effect: NamedEffect) -> float | None:
+def compute_main_error(concealed: ConcealedEffect, named_effect: NamedEffect) -> float | None:
     """Relative error of the estimate of an effect's main parameter; None where its true value is unknown or 0."""
     name = EFFECTS_BY_NAME[concealed.effect].main.name
     if not concealed.values.get(name):
@@ -196,7 +198,7 @@ def compute_main_error(concealed: Concealed, named_effect: NamedEffect) -> float
     return abs(estimate - true_value) / abs(true_value)
 
 
-def compute_interval_coverage(concealed: Concealed, named_effect: NamedEffect) -> dict[str, bool]:
+def compute_interval_coverage(concealed: ConcealedEffect, named_effect: NamedEffect) -> dict[str, bool]:
     """By parameter, whether its 95 % interval contains the true value; only parameters that have both."""
     coverage = {}
     for name, estimate in named_effect.parameters.items():
@@ -206,7 +208,7 @@ def compute_interval_coverage(concealed: Concealed, named_effect: NamedEffect) -
     return coverage
 
 
-def is_main_covered(concealed: Concealed, named_effect: NamedEffect) -> bool:
+def is_main_covered(concealed: ConcealedEffect, named_effect: NamedEffect) -> bool:
     """Whether the 95 % interval of the effect's main parameter contains the true value. Raises KeyError where the
     interval or the true value is missing."""
     return compute_interval_coverage(concealed, named_effect)[EFFECTS_BY_NAME[concealed.effect].main.name]

@@ -1,6 +1,8 @@
-"""Findings on the published figure 3: off-axis motion by frequency, from acceleration ellipses of the simulated device.
+"""Comparison with figure 3 of Wilson, Chan, Salisbury and Niemeyer, Multi-DOF Equalization of Haptic Devices.
 
-Coupling is the ratio of off-axis to along-axis amplitude at the driven frequency (`PhasorEllipse.off_axis_ratio`).
+The figure shows acceleration ellipses under a sinusoidal force along one test direction. Coupling is the ratio of
+off-axis to along-axis amplitude at the driven frequency (`PhasorEllipse.off_axis_ratio`), here of the simulated device.
+Called by `study.evaluation.reproduction.write_reproduction`.
 """
 
 from collections.abc import Sequence
@@ -10,7 +12,8 @@ from analysis.psychophysics.ellipsoid import EllipsoidResult
 from analysis.wording import format_number
 
 MAX_COUPLING_RATIO = 1.25
-"""Largest ratio of the largest to the smallest coupling that counts as "nearly the same"."""
+"""Largest ratio of the largest to the smallest coupling that counts as "nearly the same". Chosen: the paper prints no
+number."""
 
 _DIFFERS = (
     "The simulated device's mount was given its modes so that the coupling follows the published one over frequency: "
@@ -21,11 +24,12 @@ _DIFFERS = (
     "The published definition, mean squares, counts noise and harmonics as motion. The same picture from the driven "
     "frequency alone is drawn below it, and the coupling in the table is of that kind.",
 )
+"""Differences from the publication, for the report."""
 
 
-def ellipsoid_findings(results: Sequence[EllipsoidResult]) -> FigureFindings:
-    """Findings on the published figure 3. results: an ellipse per frequency; a finding that needs frequencies which are
-    absent is left out."""
+def make_ellipsoid_findings(results: Sequence[EllipsoidResult]) -> FigureFindings:
+    """Compare the measured ellipses with the published figure 3. results: an ellipse per frequency; a finding whose
+    frequencies are absent is left out."""
     coupling = {
         result.frequency_hz: result.phasor.off_axis_ratio
         for result in results
@@ -49,7 +53,7 @@ def ellipsoid_findings(results: Sequence[EllipsoidResult]) -> FigureFindings:
 
 
 def _find_coupling(result: EllipsoidResult) -> Finding:
-    """Coupling and shape of the ellipse at one frequency, without a judgement: the paper prints no number."""
+    """Coupling and shape of the ellipse at one frequency, not compared, because the paper prints no number."""
     ratio, axes = result.phasor.off_axis_ratio, result.moments.normalised_axes
     ratio_text = "" if ratio is None else f"off the direction over along it {100 * ratio:.0f} %; "
     return Finding(
@@ -63,11 +67,12 @@ def _find_coupling(result: EllipsoidResult) -> Finding:
 
 
 def _find_low_frequency_coupling(coupling: dict[float, float]) -> Finding | None:
-    """Whether coupling is nearly the same at 5, 10 and 15 Hz. coupling: by frequency in Hz."""
-    low = [coupling[f] for f in (5.0, 10.0, 15.0) if f in coupling]
-    if len(low) < 2:
+    """Whether coupling is nearly the same at 5, 10 and 15 Hz; None for fewer than two of these frequencies. coupling:
+    by frequency in Hz."""
+    low_frequency_coupling = [coupling[f] for f in (5.0, 10.0, 15.0) if f in coupling]
+    if len(low_frequency_coupling) < 2:
         return None
-    spread = max(low) / min(low)
+    spread = max(low_frequency_coupling) / min(low_frequency_coupling)
     return Finding(
         what="Coupling at 5, 10 and 15 Hz",
         published="nearly identical",
@@ -80,7 +85,7 @@ def _find_low_frequency_coupling(coupling: dict[float, float]) -> Finding | None
 
 
 def _find_high_frequency_coupling(coupling: dict[float, float]) -> Finding | None:
-    """Whether coupling at 35 Hz is less than at 25 Hz. coupling: by frequency in Hz."""
+    """Whether coupling at 35 Hz is less than at 25 Hz; None where either is missing. coupling: by frequency in Hz."""
     if not {25.0, 35.0} <= coupling.keys():
         return None
     ratio = coupling[35.0] / coupling[25.0]

@@ -1,6 +1,7 @@
-"""Results of sweeps over the whole frequency range of a device: transfer functions, resonances and coupling onset.
+"""Data class of a device's frequency response over its whole range, with its resonances and coupling onset.
 
-They are the input of the findings on the published figures 4 and 1 (`response_findings`).
+Made by `study.evaluation.reproduction.reproduce_paper` from swept-sine recordings, for the comparison with figures 4
+and 1 of Wilson, Chan, Salisbury and Niemeyer, Multi-DOF Equalization of Haptic Devices (`response_findings`).
 """
 
 from dataclasses import dataclass
@@ -12,10 +13,10 @@ from equalizer.identification.frequency_response.resonances import Resonance
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredDevice:
-    """Measured frequency response of a device, with the resonances and the coupling onset found in it."""
+    """Measured frequency response of a device, with the resonances and the coupling onset computed from it."""
 
     response: FrequencyResponse
-    """Transfer functions from each force to each acceleration."""
+    """Transfer functions from each force (N) to each acceleration (m/s²)."""
     resonances: tuple[Resonance, ...]
     onset: CouplingOnset
-    """Frequency from which on the axes couple."""
+    """Onset of coupling: the frequency (Hz) above which a force along one axis also moves others."""

@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from analysis.evaluation.reproduction.document import PlayedRow
-from equalizer.signals.excitation import log_sweep
+from equalizer.signals.excitation import make_log_sweep
 from equalizer.signals.multisine import list_lines_between, make_multisines
 from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.quality import measure_quality
@@ -53,7 +53,7 @@ def make_target_wave(
         lines = list_lines_between(low, high, period, sample_rate_hz, odd_only=False)
         return make_multisines(lines, period, 1.0, 1, 1, seed)[0][:, 0]
     # Slightly wider than the band, so that the ends of the band lie inside the sweep, not at its jump back.
-    spectrum = np.fft.rfft(log_sweep(0.9 * low, 1.06 * high, 1.0, period, sample_rate_hz))
+    spectrum = np.fft.rfft(make_log_sweep(0.9 * low, 1.06 * high, 1.0, period, sample_rate_hz))
     spectrum[~mask_lines_in_band(band_hz, period, sample_rate_hz)] = 0
     wave = np.fft.irfft(spectrum, period)
     normalised: FloatArray = wave / np.abs(wave).max()

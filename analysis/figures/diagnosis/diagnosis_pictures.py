@@ -15,7 +15,7 @@ from analysis.figures.diagnosis.remainder import make_remainder_picture
 from analysis.figures.diagnosis.rivals import make_rivals_pictures
 from analysis.figures.diagnosis.signature import make_signature_pictures
 from analysis.figures.diagnosis.state_maps import make_state_map_pictures
-from analysis.figures.picture import Picture, count_in_samples
+from analysis.figures.picture import Picture, convert_to_sample_units
 
 
 def diagnosis_pictures(findings: Findings, guard: Guard | None = None) -> tuple[Picture, ...]:
@@ -54,7 +54,7 @@ def list_drawings(findings: Findings) -> list[WorkPart]:
 
 def _draw_with_time_labels(draw: Callable[[], Sequence[Picture]], is_timed: bool) -> Sequence[Picture]:
     """Draw the pictures; with labels in samples instead of seconds where the time axis is unknown."""
-    return draw() if is_timed else [count_in_samples(picture) for picture in draw()]
+    return draw() if is_timed else [convert_to_sample_units(picture) for picture in draw()]
 
 
 def _make_remainder_pictures(findings: Findings) -> list[Picture]:

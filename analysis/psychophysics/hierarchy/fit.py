@@ -14,7 +14,7 @@ from scipy.special import expit
 
 from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import Family
-from analysis.psychophysics.hierarchy.marginal import Layout
+from analysis.psychophysics.hierarchy.marginal import ParameterLayout
 from analysis.psychophysics.hierarchy.objective import Objective, Prior, maximise
 from analysis.psychophysics.hierarchy.refine import QuadratureSearch
 from equalizer.signals.signal import FloatArray
@@ -28,7 +28,7 @@ class HierarchicalFit:
     answers: Answers
     family: Family
     parameters: FloatArray
-    """(k + 6,): see `marginal.Layout`."""
+    """(k + 6,): see `marginal.ParameterLayout`."""
     latent: FloatArray
     """(n, k + 2): posterior modes of each person's thresholds (dB), log-slope and criterion, at the population's
     parameters."""
@@ -48,9 +48,9 @@ class HierarchicalFit:
     """Whether the last Newton search converged within its maximum number of steps (`refine.MOST_NEWTON_STEPS`)."""
 
     @property
-    def layout(self) -> Layout:
+    def layout(self) -> ParameterLayout:
         """Indices of the parameters."""
-        return Layout(len(self.answers.frequencies_hz))
+        return ParameterLayout(len(self.answers.frequencies_hz))
 
     @property
     def means_db(self) -> FloatArray:

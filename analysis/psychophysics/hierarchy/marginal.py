@@ -1,18 +1,21 @@
 """Marginal likelihood of each person in the hierarchical psychometric model, by Laplace's method, and its gradient.
 
-Population: theta = mean_j + person + person x frequency, both normal; log-slope normal; criterion normal around 0; one
-lapse rate. Its parameters, in this order (`Layout`): the k means in dB, log SD of persons, log SD of person x
-frequency, mean log-slope, log SD of log-slopes, log SD of criteria, logit of the lapse rate.
+Population: the threshold of a person at frequency j is mean_j + person + person x frequency (dB), both random effects
+normal; the log-slope is normal, the criterion normal around 0; all persons share one lapse rate. Parameters of the
+population, in this order (`ParameterLayout`): the k means in dB, log SD of persons, log SD of person x frequency, mean
+log-slope, log SD of log-slopes, log SD of criteria, logit of the lapse rate. Latent parameters of a person: k
+thresholds, log-slope, criterion.
 
-With the mode z of a person's latent parameters, d = z - centre, prior precision P, expected information J:
+With the mode z of a person's latent parameters, d = z - prior mean, prior precision P, expected information J:
     log marginal = log-likelihood(z) - d' P d / 2 + (ln det P - ln det(P + J)) / 2.
-J replaces the observed curvature, which can vanish at the mode of a run with a lapse: the volume would be infinite.
+J replaces the observed curvature, which can vanish at the mode of a run with a lapse, so that the approximation would
+diverge.
 
 Adaptive levels need no correction: each level follows from the answers before it by a fixed rule, so that the design is
 ignorable (D. B. Rubin, Biometrika 63 (1976), 581-592). Answers at the cap count as answers at that level, uncensored.
 
 Source: L. Tierney, J. B. Kadane, J. Am. Stat. Assoc. 81 (1986), 82-86; the gradient by implicit differentiation of the
-mode: H. J. Skaug, D. A. Fournier, Comput. Stat. Data Anal. 51 (2006), 699-709.
+mode: H. J. Skaug, D. A. Fournier, Comput. Stat. Data Anal. 51 (2006), 699-709. Called by `objective`.
 """
 
 import math
@@ -29,17 +32,17 @@ NEWTON_STEPS = 60
 DECREMENT_TOLERANCE = 1e-11
 """Newton decrement (gradient times step) of the log posterior at which a mode is found; the gradient of the marginal
 likelihood then has some six correct digits."""
-LOWEST_CURVATURE = 1e-5
+LEAST_CURVATURE = 1e-5
 """Least eigenvalue of the observed curvature (per dB²) that is used for a Newton step. A prior SD of 30 dB, with no
 answers, has a curvature of 1e-3, well above it."""
-LONGEST_STEP_DB, LONGEST_STEP_SLOPE, LONGEST_STEP_D = 6.0, 0.7, 1.0
+LONGEST_STEP_DB, LONGEST_STEP_SLOPE, LONGEST_STEP_CRITERION = 6.0, 0.7, 1.0
 """Largest Newton step in a threshold (dB), a log-slope and a criterion (units of d'): over larger steps the log
 posterior is not quadratic."""
 
 
 @dataclass(frozen=True, slots=True)
-class Layout:
-    """Indices of the population's parameters in their vector (k + 6,), for k frequencies."""
+class ParameterLayout:
+    """Indices of the population's parameters in their vector, (k + 6,), for k frequencies."""
 
     k: int
     """Number of frequencies; the means are parameters 0 to k - 1."""
@@ -65,17 +68,20 @@ class Layout:
         return self.k + 5
 
 
-class Marginal:
-    """Marginal likelihood of n persons. The last modes, `latent` (n, k + 2), are kept as the start of the next
-    search."""
+class MarginalLikelihood:
+    """Marginal likelihood of n persons by Laplace's method. The modes, `latent` (n, k + 2), are kept as the starting
+    values of the next search."""
 
     def __init__(self, likelihood: TrialLikelihood, latent: FloatArray) -> None:
         self.likelihood, self.latent = likelihood, latent
-        self.layout = Layout(likelihood.frequencies)
-        self._max_steps = np.array([LONGEST_STEP_DB] * likelihood.frequencies + [LONGEST_STEP_SLOPE, LONGEST_STEP_D])
+        self.layout = ParameterLayout(likelihood.frequencies)
+        self._max_steps = np.array(
+            [LONGEST_STEP_DB] * likelihood.frequencies + [LONGEST_STEP_SLOPE, LONGEST_STEP_CRITERION]
+        )
 
     def evaluate(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Log marginal likelihood of each person (n,), and its gradient (n, size). parameters: (size,)."""
+        """Log marginal likelihood of each person (n,), and its gradient (n, k + 6). parameters: (k + 6,), see
+        `ParameterLayout`."""
         layout, k = self.layout, self.layout.k
         precision, prior_mean = compute_prior_precision(parameters, k), _compute_prior_mean(parameters, k)
         lapse = float(expit(parameters[layout.lapse]))
@@ -83,7 +89,7 @@ class Marginal:
         deviation = self.latent - prior_mean
         inverse = np.linalg.inv(precision + derivatives.information).astype(np.float64)
         trace_by_latent, trace_by_lapse = self.likelihood.trace_derivatives(self.latent, lapse, inverse)
-        # The sensitivity of the mode depends on the observed curvature; the volume uses the expected one.
+        # Implicit differentiation of the mode needs the observed curvature, although det(P + J) uses the expected one.
         adjoint = np.linalg.solve(precision - derivatives.second, trace_by_latent[..., None])[..., 0]
         weighted_deviation = deviation @ precision
         value = (
@@ -92,23 +98,23 @@ class Marginal:
             + 0.5 * np.linalg.slogdet(precision)[1]
             + 0.5 * np.linalg.slogdet(inverse)[1]
         )
-        scores = np.empty((len(value), layout.size))
-        by_centre = weighted_deviation - 0.5 * adjoint @ precision
-        scores[:, :k], scores[:, layout.slope] = by_centre[:, :k], by_centre[:, k]
+        gradient = np.empty((len(value), layout.size))
+        gradient_by_centre = weighted_deviation - 0.5 * adjoint @ precision
+        gradient[:, :k], gradient[:, layout.slope] = gradient_by_centre[:, :k], gradient_by_centre[:, k]
         for index, precision_change, log_det in _differentiate_precision(parameters, k):
             changed_deviation = deviation @ precision_change
-            scores[:, index] = (
+            gradient[:, index] = (
                 -0.5 * np.einsum("na,na->n", deviation, changed_deviation)
                 + 0.5 * log_det
                 - 0.5 * np.einsum("nab,ab->n", inverse, precision_change)
                 + 0.5 * np.einsum("na,na->n", adjoint, changed_deviation)
             )
-        scores[:, layout.lapse] = (lapse * (1.0 - lapse)) * (
+        gradient[:, layout.lapse] = (lapse * (1.0 - lapse)) * (
             derivatives.lapse_derivative
             - 0.5 * trace_by_lapse
             - 0.5 * np.einsum("na,na->n", adjoint, derivatives.gradient_lapse_derivative)
         )
-        return value, scores
+        return value, gradient
 
     def find_modes(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mode of each person's latent parameters (n, k + 2), and the answers' expected information there (n, k + 2,
@@ -120,7 +126,9 @@ class Marginal:
         return self.latent, derivatives.information
 
     def _maximise_posterior(self, precision: FloatArray, prior_mean: FloatArray, lapse: float) -> Derivatives:
-        """Newton's method for all persons at once; a step that lowers a person's log posterior is divided by 3."""
+        """Find the modes by Newton's method for all persons at once, from `latent`, which they replace. A step that
+        lowers a person's log posterior (by more than rounding, 1e-10) is divided by 3, at most 11 times. Returns the
+        derivatives at the modes. parameters: precision (k + 2, k + 2), prior_mean (k + 2,), lapse rate."""
         latent = self.latent.copy()
         current = self.likelihood.evaluate(latent, lapse)
         log_posterior = _compute_log_posterior(current, latent - prior_mean, precision)
@@ -129,11 +137,11 @@ class Marginal:
             step = np.linalg.solve(
                 _choose_curvature(precision - current.second, precision + current.information), gradient[..., None]
             )[..., 0]
-            gain = np.einsum("na,na->n", gradient, step)
-            if gain.max() < DECREMENT_TOLERANCE:
+            newton_decrement = np.einsum("na,na->n", gradient, step)
+            if newton_decrement.max() < DECREMENT_TOLERANCE:
                 break
             step_ratio = np.abs(step / self._max_steps).max(axis=1)
-            step_fraction = np.where(gain < DECREMENT_TOLERANCE, 0.0, 1.0 / np.maximum(1.0, step_ratio))
+            step_fraction = np.where(newton_decrement < DECREMENT_TOLERANCE, 0.0, 1.0 / np.maximum(1.0, step_ratio))
             for _ in range(12):
                 trial_latent = latent + step_fraction[:, None] * step
                 trial = self.likelihood.evaluate(trial_latent, lapse)
@@ -148,18 +156,18 @@ class Marginal:
 
 
 def _compute_log_posterior(derivatives: Derivatives, deviation: FloatArray, precision: FloatArray) -> FloatArray:
-    """(n,): log-likelihood plus log prior, without the prior's constant."""
+    """(n,): log-likelihood plus log prior, without the prior's constant. deviation: (n, k + 2), from the prior mean."""
     log_posterior: FloatArray = derivatives.value - 0.5 * np.einsum("na,ab,nb->n", deviation, precision, deviation)
     return log_posterior
 
 
 def _choose_curvature(observed: FloatArray, expected: FloatArray) -> FloatArray:
-    """(n, d, d): the observed curvature, or the expected curvature for persons whose observed curvature is not
-    positive definite, as may be far from a mode: the Newton step is then still an ascent direction."""
+    """(n, k + 2, k + 2): the observed curvature, or the expected one for persons whose observed curvature is not
+    positive definite (least eigenvalue up to `LEAST_CURVATURE`), so that every Newton step is an ascent direction."""
     lowest = np.linalg.eigvalsh(observed)[:, 0]
-    if lowest.min() > LOWEST_CURVATURE:
+    if lowest.min() > LEAST_CURVATURE:
         return observed
-    return np.where((lowest > LOWEST_CURVATURE)[:, None, None], observed, expected)
+    return np.where((lowest > LEAST_CURVATURE)[:, None, None], observed, expected)
 
 
 def _compute_prior_mean(parameters: FloatArray, k: int) -> FloatArray:
@@ -168,25 +176,28 @@ def _compute_prior_mean(parameters: FloatArray, k: int) -> FloatArray:
 
 
 def compute_prior_precision(parameters: FloatArray, k: int) -> FloatArray:
-    """Inverse covariance of the latent parameters, (k + 2, k + 2): a person has a deviation shared by all frequencies,
-    and another at each frequency."""
+    """Prior precision (inverse covariance) of the latent parameters, (k + 2, k + 2). Covariance of the thresholds:
+    variance of persons for all pairs, plus variance of person x frequency on the diagonal."""
     shared_variance, interaction_variance = math.exp(2.0 * parameters[k]), math.exp(2.0 * parameters[k + 1])
     precision = np.zeros((k + 2, k + 2))
-    mean = np.full((k, k), 1.0 / k)
-    precision[:k, :k] = (np.eye(k) - mean) / interaction_variance + mean / (interaction_variance + k * shared_variance)
+    averaging = np.full((k, k), 1.0 / k)
+    precision[:k, :k] = (np.eye(k) - averaging) / interaction_variance + averaging / (
+        interaction_variance + k * shared_variance
+    )
     precision[k, k], precision[k + 1, k + 1] = math.exp(-2.0 * parameters[k + 3]), math.exp(-2.0 * parameters[k + 4])
     return precision
 
 
 def _differentiate_precision(parameters: FloatArray, k: int) -> list[tuple[int, FloatArray, float]]:
-    """For each log SD: its index, the derivative of the precision, and that of the precision's log determinant."""
+    """For each log SD: its index, the derivative of the precision, and that of the log determinant of the precision."""
     shared_variance, interaction_variance = math.exp(2.0 * parameters[k]), math.exp(2.0 * parameters[k + 1])
     total_variance = interaction_variance + k * shared_variance
-    mean = np.full((k, k), 1.0 / k)
+    averaging = np.full((k, k), 1.0 / k)
     by_shared, by_interaction, by_slope, by_criterion = (np.zeros((k + 2, k + 2)) for _ in range(4))
-    by_shared[:k, :k] = -2.0 * k * shared_variance / total_variance**2 * mean
+    by_shared[:k, :k] = -2.0 * k * shared_variance / total_variance**2 * averaging
     by_interaction[:k, :k] = (
-        -2.0 / interaction_variance * (np.eye(k) - mean) - 2.0 * interaction_variance / total_variance**2 * mean
+        -2.0 / interaction_variance * (np.eye(k) - averaging)
+        - 2.0 * interaction_variance / total_variance**2 * averaging
     )
     by_slope[k, k] = -2.0 * math.exp(-2.0 * parameters[k + 3])
     by_criterion[k + 1, k + 1] = -2.0 * math.exp(-2.0 * parameters[k + 4])

@@ -79,7 +79,7 @@ class Nodes:
 
 @dataclass(frozen=True, slots=True)
 class Population:
-    """The population's parameters (those of a `Layout`), by name and in their own units."""
+    """The population's parameters (those of a `ParameterLayout`), by name and in their own units."""
 
     means: FloatArray
     """(k,): mean threshold at each frequency, dB."""
@@ -99,7 +99,7 @@ class Population:
     @staticmethod
     def from_parameters(parameters: FloatArray, k: int) -> "Population":
         """The population of transformed parameters (k + 6,), in which standard deviations are logarithms and the lapse
-        rate is a logit (`marginal.Layout`)."""
+        rate is a logit (`marginal.ParameterLayout`)."""
         shared_sd, interaction_sd, slope_sd, criterion_sd = (
             math.exp(parameters[k + offset]) for offset in (0, 1, 3, 4)
         )

@@ -14,7 +14,7 @@ from scipy.special import expit, logit
 from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import STARTING_SLOPE, Family
 from analysis.psychophysics.hierarchy.likelihood import TrialLikelihood
-from analysis.psychophysics.hierarchy.marginal import Layout, Marginal
+from analysis.psychophysics.hierarchy.marginal import MarginalLikelihood, ParameterLayout
 from equalizer.signals.signal import FloatArray
 
 
@@ -37,29 +37,30 @@ class Prior:
 
 
 LOG_SD_BOUNDS = ((-5.0, 3.5), (-5.0, 3.5), (-5.0, 0.7), (-5.0, 1.1))
-"""Bounds of the log standard deviations, in the order of `Layout.log_sds`: 0.007 to 33 dB, up to 2 in log-slopes, up to
-3 in d'. At the lower bound persons are alike; at the upper bound they have practically nothing in common."""
+"""Bounds of the log standard deviations, in the order of `ParameterLayout.log_sds`: 0.007 to 33 dB, up to 2 in
+log-slopes, up to 3 in d'. At the lower bound persons are alike; at the upper bound they have practically nothing in
+common."""
 LAPSE_BOUNDS = (float(logit(1e-4)), float(logit(0.3)))
 """Bounds of the lapse rate (logit): 0.01 % to 30 %."""
 
 
 class Objective:
     """Minus the penalized log marginal likelihood with its gradient, as a function to minimise. `start`: starting
-    values (size,) of the parameters in the order of `Layout`."""
+    values (size,) of the parameters in the order of `ParameterLayout`."""
 
     def __init__(self, answers: Answers, family: Family, prior: Prior) -> None:
         self.answers, self.family = answers, family
-        self.prior, self.layout = prior, Layout(len(answers.frequencies_hz))
+        self.prior, self.layout = prior, ParameterLayout(len(answers.frequencies_hz))
         start = choose_starting_parameters(answers, family)
         k = self.layout.k
         latent_start = np.tile(np.concatenate([start[:k], [start[self.layout.slope], 0.0]]), (answers.persons, 1))
         # (persons, k + 2): each person's thresholds (dB), log-slope and criterion, from the population's values.
-        self.marginal = Marginal(TrialLikelihood(answers, family), latent_start)
+        self.marginal = MarginalLikelihood(TrialLikelihood(answers, family), latent_start)
         self.start = start
         self._mean_level_db = float(np.average(answers.level_db, weights=answers.right + answers.wrong))
 
     def __call__(self, parameters: FloatArray) -> tuple[float, FloatArray]:
-        """Value and gradient (size,) at the parameters (size,) of `Layout`."""
+        """Value and gradient (size,) at the parameters (size,) of `ParameterLayout`."""
         value, scores = self.marginal.evaluate(parameters)
         log_prior, prior_gradient = self.evaluate_log_prior(parameters)
         return -float(value.sum()) - log_prior, -scores.sum(axis=0) - prior_gradient
@@ -97,8 +98,8 @@ class Objective:
 
 
 def choose_starting_parameters(answers: Answers, family: Family) -> FloatArray:
-    """Choose starting values (k + 6,) of the population parameters, in the order of `Layout`: for the means the average
-    level played (dB) at each frequency, for the others typical values, as logarithms or logits."""
+    """Choose starting values (k + 6,) of the population parameters, in the order of `ParameterLayout`: for the means
+    the average level played (dB) at each frequency, for the others typical values, as logarithms or logits."""
     k = len(answers.frequencies_hz)
     trials = answers.right + answers.wrong
     frequency_index = answers.run % k

@@ -18,7 +18,7 @@ from scipy.special import ndtr
 
 from analysis.psychophysics.hierarchy.answers import Answers
 from analysis.psychophysics.hierarchy.curve import NEPER_PER_DB, T_AT_THRESHOLD, Family, compute_mean_evidence
-from analysis.psychophysics.hierarchy.marginal import Layout
+from analysis.psychophysics.hierarchy.marginal import ParameterLayout
 from analysis.psychophysics.hierarchy.nodes import (
     Moments,
     NodeCounts,
@@ -99,8 +99,8 @@ class Quadrature:
 
 
 def integrate(quadrature: Quadrature, parameters: FloatArray, moments: Moments, counts: NodeCounts) -> Integrals:
-    """Log marginal likelihoods and derivatives at the parameters (size,) of `Layout`. moments: posterior moments at
-    these parameters, or at parameters close to them. counts: number of nodes."""
+    """Log marginal likelihoods and derivatives at the parameters (size,) of `ParameterLayout`. moments: posterior
+    moments at these parameters, or at parameters close to them. counts: number of nodes."""
     k = quadrature.k
     population = Population.from_parameters(parameters, k)
     nodes = place_nodes(moments, counts)
@@ -141,7 +141,7 @@ def _normalise(log_terms: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _assemble_gradient(mean: FloatArray, deviations: FloatArray, population: Population) -> FloatArray:
     """(n, q, size): gradient of L at the outer nodes, averaged over the inner nodes. mean: (n, q, k, 3), averages by
     mean, log SD and lapse rate; deviations: (n, q, 3), of u, b and c in standard deviations."""
-    layout = Layout(mean.shape[2])
+    layout = ParameterLayout(mean.shape[2])
     gradient = np.empty((*mean.shape[:2], layout.size))
     gradient[..., : layout.k] = mean[..., 0]
     gradient[..., layout.k + 1], gradient[..., layout.lapse] = mean[..., 1].sum(axis=2), mean[..., 2].sum(axis=2)
@@ -153,7 +153,7 @@ def _assemble_gradient(mean: FloatArray, deviations: FloatArray, population: Pop
 def _assemble_within_node_covariance(covariance: FloatArray) -> FloatArray:
     """Covariance of the gradient within outer nodes (size, size), from the covariances (k, 3, 3) by mean, log SD and
     lapse rate at each frequency: thresholds at different frequencies are independent there."""
-    layout = Layout(len(covariance))
+    layout = ParameterLayout(len(covariance))
     index, total = np.arange(layout.k), covariance.sum(axis=0)
     hessian = np.zeros((layout.size, layout.size))
     hessian[index, index] = covariance[:, 0, 0]
@@ -169,7 +169,7 @@ def _compute_mean_hessian(
 ) -> FloatArray:
     """(size, size): posterior mean of the Hessian of L, summed over persons. It follows from the gradient, because the
     population densities are normal. lapse_curvature: second derivative by the logit of the lapse rate."""
-    layout, total = Layout(len(population.means)), scores.sum(axis=0)
+    layout, total = ParameterLayout(len(population.means)), scores.sum(axis=0)
     hessian = np.zeros((layout.size, layout.size))
     index = np.arange(layout.k)
     hessian[index, index] = -persons / population.interaction_sd**2

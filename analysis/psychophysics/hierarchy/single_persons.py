@@ -62,7 +62,7 @@ def fit_single_persons(
     objective = Objective(answers, family, prior)
     parameters, layout = objective.start.copy(), objective.layout
     parameters[: layout.k] = np.average(answers.level_db, weights=answers.right + answers.wrong)
-    # In the order of `Layout.log_sds`. The part common to all frequencies (SD 1 dB) is negligible.
+    # In the order of `ParameterLayout.log_sds`. The part common to all frequencies (SD 1 dB) is negligible.
     parameters[layout.log_sds] = [0.0, math.log(THRESHOLD_SD_DB), math.log(SLOPE_LOG_SD), math.log(CRITERION_SD)]
 
     def cost(logit_lapse: float) -> float:

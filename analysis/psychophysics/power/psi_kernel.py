@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, SimulatedRun, Track, give_answer
+from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, SimulatedRun, Track, simulate_answer
 from equalizer.signals.signal import FloatArray
 from protocols.definition.staircase_rule import StaircaseRule
 from protocols.procedure.psi import (
@@ -112,8 +112,8 @@ def play_psi(psi: PackedPsi, person: Participant, seed: int, track: Track) -> Si
     level_index, trials, repeats, sd_db, mean_db = 0, 0, person.repeats, math.inf, 0.0
     while trials < min(psi.trial_limit, MOST_TRIALS) and not sd_db <= psi.stop_sd_db:
         level = psi.levels_db[level_index]
-        side, is_correct, repeats = give_answer(person, level, trials, repeats)
-        track.level_db[trials], track.side[trials], track.right[trials] = level, side, is_correct
+        side, is_correct, repeats = simulate_answer(person, level, trials, repeats)
+        track.level_db[trials], track.side[trials], track.correct[trials] = level, side, is_correct
         trials += 1
         log_p += psi.log_p_answer[1 if is_correct else 0, level_index]
         probability = normalise_posterior(log_p)

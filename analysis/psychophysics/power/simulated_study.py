@@ -18,13 +18,13 @@ from analysis.psychophysics.hierarchy.curve import NEPER_PER_DB, STARTING_SLOPE,
 from analysis.psychophysics.power.felt_delivery import FeltDelivery
 from analysis.psychophysics.power.psi_kernel import pack_psi, play_psi
 from analysis.psychophysics.power.staircase_kernel import (
+    LEVEL_TOLERANCE_DB,
     MOST_TRIALS,
-    SAME_DB,
     Participant,
     SimulatedRun,
     Track,
     pack_rule,
-    play_run,
+    simulate_staircase,
 )
 from analysis.psychophysics.thresholds import CUT_PROBABILITY
 from equalizer.signals.signal import FloatArray
@@ -120,7 +120,7 @@ def simulate_study(crowd: Crowd, rule: StaircaseRule, people: int, seed: tuple[i
         np.repeat(np.arange(people * k), counts),
         tracks.level_db[within_run],
         tracks.side[within_run],
-        tracks.right[within_run].astype(np.bool_),
+        tracks.correct[within_run].astype(np.bool_),
     )
     runs = (_compute_posterior_means if rule.is_bayesian else _compute_reversal_means)(rule, tracks, run_results)
     return SimulatedStudy(
@@ -157,7 +157,7 @@ def _compute_reversal_means(rule: StaircaseRule, tracks: Track, run_results: Seq
     averaged = tracks.reversal_db[:, -rule.averaged_reversals :]
     nan_unless_complete = np.where(np.array([run.reversals for run in run_results]) == rule.reversals, 1.0, math.nan)
     newtons = np.minimum(10.0 ** (averaged / 20.0), rule.cap_n)
-    at_cap = averaged >= to_db(rule.cap_n) - SAME_DB
+    at_cap = averaged >= to_db(rule.cap_n) - LEVEL_TOLERANCE_DB
     return _RunThresholds(
         newtons.mean(axis=1) * nan_unless_complete,
         averaged.mean(axis=1) * nan_unless_complete,
@@ -204,7 +204,9 @@ def _simulate_sessions(
     in the order of the tracks. seeds: (runs,); habit_seed: seed of the habits."""
     habit_rng, k = np.random.default_rng(habit_seed), len(crowd.frequencies_hz)
     simulate_run = (
-        partial(play_psi, pack_psi(rule)) if rule.is_bayesian else partial(play_run, pack_rule(rule, crowd.rove_db))
+        partial(play_psi, pack_psi(rule))
+        if rule.is_bayesian
+        else partial(simulate_staircase, pack_rule(rule, crowd.rove_db))
     )
     run_results = [SimulatedRun(0, 0)] * len(participants)
     for first_run in range(0, len(participants), k):

@@ -1,7 +1,8 @@
-"""Compiled simulation of one staircase run of a participant, for power analyses (`simulated_study`).
+"""Compiled simulation of one staircase run of a simulated participant, for power analyses.
 
-The rule is that of `protocols.procedure.staircase.step`; tests check that both give identical runs. Levels are in dB re
-1 N.
+Order: `pack_rule` converts the rule to numbers, `simulate_staircase` plays trials; in each, `simulate_answer` draws an
+answer from the psychometric function. The rule is that of `protocols.procedure.staircase.step`; tests check that both
+give identical runs. Levels are in dB re 1 N. Called by `simulated_study`, parts also by `psi_kernel`.
 """
 
 import math
@@ -15,12 +16,13 @@ from protocols.definition.staircase_rule import StaircaseRule, StepChange
 from protocols.procedure.staircase import to_db
 
 MOST_TRIALS = 2000
-"""Largest number of trials of a run. A guesser needs about 110 trials under the published rule; the longest of 500
-simulated runs took 262."""
-SAME_DB = 1e-9
-"""Tolerance (dB) within which two levels count as equal: covers rounding errors."""
+"""Largest number of trials of a run, the length of its arrays. A participant who only guesses needs about 110 trials
+under the published rule; the longest of 500 simulated runs took 262."""
+LEVEL_TOLERANCE_DB = 1e-9
+"""Tolerance (dB) within which two levels count as equal, for rounding errors."""
 LARGEST_T = (3.2, 25.0, 6.7)
-"""t of each family at which 1 - F is 1e-11 to 2e-11. For a larger t, wrong answers occur practically by lapses only."""
+"""Upper limit of t by family (Weibull, logistic, Gauss), where 1 - F is 1e-11 to 2e-11: above it, wrong answers occur
+practically by lapses only."""
 
 
 class PackedRule(NamedTuple):
@@ -38,9 +40,13 @@ class PackedRule(NamedTuple):
     """Which reversals count towards the schedule at a reversal. 0: all, including the present one. 1: all but one. 2:
     the earlier ones only."""
     reversals: int
+    """Number of reversals at which the run ends."""
     averaged: int
+    """Number of last reversals whose levels are averaged."""
     has_initial_phase: bool
+    """Whether the level moves after every answer until the first reversal."""
     trial_limit: int
+    """Number of trials at which the run ends without its reversals; 0 = `MOST_TRIALS`."""
     rove_db: float = 0.0
     """Width (dB) of the range from which the level of each trial is drawn uniformly; its centre is the staircase's
     level."""
@@ -48,16 +54,16 @@ class PackedRule(NamedTuple):
 
 def pack_rule(rule: StaircaseRule, rove_db: float = 0.0) -> PackedRule:
     """Convert a staircase rule for the compiled kernel, with levels in dB re 1 N."""
-    sizes = [phase.step_db for phase in rule.steps for _ in range(phase.reversals)]
-    change = {StepChange.AT_REVERSAL: 0, StepChange.AT_NEXT_REVERSAL: 1, StepChange.AFTER_REVERSAL: 2}
+    steps_db = [phase.step_db for phase in rule.steps for _ in range(phase.reversals)]
+    step_change_codes = {StepChange.AT_REVERSAL: 0, StepChange.AT_NEXT_REVERSAL: 1, StepChange.AFTER_REVERSAL: 2}
     return PackedRule(
         to_db(rule.start_n),
         to_db(rule.cap_n),
         rule.cap_n,
         rule.up_after_wrong,
         rule.down_after_right,
-        np.array([*sizes, *[rule.steps[-1].step_db] * 3]),
-        change[rule.step_change],
+        np.array([*steps_db, *[rule.steps[-1].step_db] * 3]),
+        step_change_codes[rule.step_change],
         rule.reversals,
         rule.averaged_reversals,
         rule.initial_one_up_one_down,
@@ -67,7 +73,7 @@ def pack_rule(rule: StaircaseRule, rove_db: float = 0.0) -> PackedRule:
 
 
 EMPTY_TABLE = np.empty((0, 4))
-"""Table of felt stimuli of an ideal device: the felt level is the commanded level."""
+"""Table of delivered stimuli of an ideal device: the delivered stimulus is the commanded one."""
 NO_DIRECTION_DB = -400.0
 """Change of the equivalent level (dB) for a motion with no preferred direction, off-axis at least as large as
 on-axis."""
@@ -77,9 +83,9 @@ class Participant(NamedTuple):
     """One simulated participant at one frequency."""
 
     t0: float
-    """`AT_THRESHOLD` of the family."""
-    pace_per_db: float
-    """Slope: change of t per dB."""
+    """Value of t at the threshold: `T_AT_THRESHOLD` of the family."""
+    slope_per_db: float
+    """Slope of the psychometric function: change of t per dB."""
     threshold_db: float
     """True threshold, dB re 1 N."""
     lapse: float
@@ -87,7 +93,7 @@ class Participant(NamedTuple):
     criterion: float
     """Response criterion, in units of d'."""
     family: int
-    """Number of the family of curves, see `compute_evidence`."""
+    """Family of psychometric functions by number, see `compute_evidence`."""
     criterion_per_trial: float = 0.0
     """Drift of the criterion per trial, in units of d'."""
     trials_before: int = 0
@@ -98,7 +104,7 @@ class Participant(NamedTuple):
     repeats: int = 0
     """Largest number of repeats in this run."""
     felt_1: FloatArray = EMPTY_TABLE
-    """(n, 4): delivered stimulus by commanded level in direction 1: a `felt_delivery.Table` whose harmonics are
+    """(n, 4): delivered stimulus by commanded level in direction 1, a `felt_delivery.DeliveryTable` whose harmonics are
     multiplied by their masking weight."""
     felt_2: FloatArray = EMPTY_TABLE
     """The same in direction 2."""
@@ -114,8 +120,8 @@ class Track(NamedTuple):
     level_db: FloatArray
     """(MOST_TRIALS,): levels played (dB re 1 N)."""
     side: FloatArray
-    """(MOST_TRIALS,): 1 for direction 1, -1 for direction 2."""
-    right: FloatArray
+    """(MOST_TRIALS,): direction shown, 1 for direction 1, -1 for direction 2."""
+    correct: FloatArray
     """(MOST_TRIALS,): 1 for a correct answer, else 0."""
     reversal_db: FloatArray
     """(reversals,): levels of the staircase at its reversals (dB re 1 N); not filled by Psi."""
@@ -143,16 +149,16 @@ def compute_evidence(t: float, family: int) -> float:
 
 @njit(cache=True)
 def compute_equivalent_level_db(person: Participant, level_db: float, is_direction_1: bool, trial: int) -> float:
-    """Level (dB) that on an ideal device, without adaptation, would be felt like this level on the given device. trial:
-    index of the trial in the run."""
+    """Equivalent level (dB re 1 N): the level that without adaptation on an ideal device gives the same evidence as
+    this level on the given device. trial: index of the trial in the run."""
     table = person.felt_1 if is_direction_1 else person.felt_2
     equivalent_db = level_db
     if len(table) > 0:
         row = min(max(int(np.searchsorted(table[:, 0], level_db)), 1), len(table) - 1)
         low, high = table[max(row - 1, 0)], table[row]
-        share = (level_db - low[0]) / (high[0] - low[0]) if high[0] > low[0] else 0.0
-        share = min(max(share, 0.0), 1.0)
-        on_axis, off_axis, harmonics = low[1:] + share * (high[1:] - low[1:])
+        fraction = (level_db - low[0]) / (high[0] - low[0]) if high[0] > low[0] else 0.0
+        fraction = min(max(fraction, 0.0), 1.0)
+        on_axis, off_axis, harmonics = low[1:] + fraction * (high[1:] - low[1:])
         directed_square = on_axis**2 - off_axis**2
         equivalent_db += 10.0 * math.log10(directed_square) if directed_square > 0.0 else NO_DIRECTION_DB
         equivalent_db -= 10.0 * math.log10(1.0 + harmonics**2 * 10.0 ** ((level_db - person.threshold_db) / 10.0))
@@ -161,18 +167,20 @@ def compute_equivalent_level_db(person: Participant, level_db: float, is_directi
     return equivalent_db
 
 
-MOST_PRESENTATIONS = 5
-"""Largest number of presentations of a trial, as in `study.participants.unsure_repeater`."""
+MAX_PRESENTATIONS = 5
+"""Largest number of presentations of a trial, as `looks` of `study.participants.unsure_repeater`."""
 
 
 @njit(cache=True)
-def answer_with_repeats(mean_evidence: float, lapse: float, unsure: float, repeats_left: int) -> tuple[bool, int]:
-    """Simulate an answer with repeats. Returns whether it is right, and the number of repeats left. mean_evidence: mean
-    of the evidence for the direction shown, in units of d'."""
+def simulate_repeated_answer(mean_evidence: float, lapse: float, unsure: float, repeats_left: int) -> tuple[bool, int]:
+    """Simulate an answer with repeated presentations while the summed evidence is within `unsure` standard errors of
+    the criterion. Returns whether it is right, and the number of repeats left. mean_evidence: mean of the evidence of
+    one presentation for the direction shown, relative to the criterion, in units of d'. A lapse is a random answer with
+    probability 2 lapse, of which half are wrong."""
     if np.random.random() < 2.0 * lapse:
         return np.random.random() < 0.5, repeats_left
     presentations, total = 1, mean_evidence + np.random.normal()
-    while abs(total) < unsure * math.sqrt(presentations) and repeats_left > 0 and presentations < MOST_PRESENTATIONS:
+    while abs(total) < unsure * math.sqrt(presentations) and repeats_left > 0 and presentations < MAX_PRESENTATIONS:
         presentations, total, repeats_left = (
             presentations + 1,
             total + mean_evidence + np.random.normal(),
@@ -185,46 +193,49 @@ class SimulatedRun(NamedTuple):
     """Result of a simulated run."""
 
     trials: int
+    """Number of trials."""
     reversals: int
+    """Number of reversals."""
     mean_db: float = math.nan
-    """Posterior mean of the threshold (dB re 1 N); NaN unless Psi chooses the levels, as for the next."""
+    """Posterior mean of the threshold (dB re 1 N); NaN unless the Psi method chooses the levels."""
     above_cap: float = math.nan
-    """Probability that the threshold lies above the cap."""
+    """Posterior probability that the threshold lies above the cap; NaN unless the Psi method chooses the levels."""
 
 
 @njit(cache=True)
-def give_answer(person: Participant, level_db: float, trial: int, repeats_left: int) -> tuple[float, bool, int]:
+def simulate_answer(person: Participant, level_db: float, trial: int, repeats_left: int) -> tuple[float, bool, int]:
     """Simulate the answer at a trial. Returns the direction shown (1 or -1), whether the answer is right, and the
     number of repeats that are left."""
     side = 1.0 if np.random.random() < 0.5 else -1.0
     equivalent_db = compute_equivalent_level_db(person, level_db, side > 0.0, trial)
     mean_evidence = compute_evidence(
-        person.t0 + person.pace_per_db * (equivalent_db - person.threshold_db), person.family
+        person.t0 + person.slope_per_db * (equivalent_db - person.threshold_db), person.family
     ) - side * (person.criterion + person.criterion_per_trial * (person.trials_before + trial))
     if person.unsure > 0.0:
-        is_correct, repeats_left = answer_with_repeats(mean_evidence, person.lapse, person.unsure, repeats_left)
+        is_correct, repeats_left = simulate_repeated_answer(mean_evidence, person.lapse, person.unsure, repeats_left)
         return side, is_correct, repeats_left
     correct_probability = person.lapse + (1.0 - 2.0 * person.lapse) * 0.5 * math.erfc(-mean_evidence / math.sqrt(2.0))
     return side, np.random.random() < correct_probability, repeats_left
 
 
 @njit(cache=True)
-def rove_level(level_db: float, rove_db: float) -> float:
-    """Draw the level that is played (dB) around the staircase's level; unchanged where rove_db is 0."""
+def draw_roved_level(level_db: float, rove_db: float) -> float:
+    """Draw the level that is played (dB re 1 N), uniform in a range of width rove_db centred at the staircase's level;
+    unchanged where rove_db is 0."""
     return level_db + rove_db * (np.random.random() - 0.5) if rove_db > 0.0 else level_db
 
 
 @njit(cache=True)
-def play_run(rule: PackedRule, person: Participant, seed: int, track: Track) -> SimulatedRun:
-    """Simulate trials until the run ends, and fill the track."""
+def simulate_staircase(rule: PackedRule, person: Participant, seed: int, track: Track) -> SimulatedRun:
+    """Simulate trials until the run has its reversals or reaches its limit of trials, and fill the track."""
     np.random.seed(seed)
-    level, heading, right_in_row, wrong_in_row, trials, reversals = rule.start_db, 0, 0, 0, 0, 0
+    level_db, previous_direction, right_in_row, wrong_in_row, trials, reversals = rule.start_db, 0, 0, 0, 0, 0
     repeats_left = person.repeats
     trial_limit = min(rule.trial_limit, MOST_TRIALS) if rule.trial_limit > 0 else MOST_TRIALS
     while reversals < rule.reversals and trials < trial_limit:
-        played_db = rove_level(level, rule.rove_db)
-        side, is_correct, repeats_left = give_answer(person, played_db, trials, repeats_left)
-        track.level_db[trials], track.side[trials], track.right[trials] = played_db, side, is_correct
+        played_db = draw_roved_level(level_db, rule.rove_db)
+        side, is_correct, repeats_left = simulate_answer(person, played_db, trials, repeats_left)
+        track.level_db[trials], track.side[trials], track.correct[trials] = played_db, side, is_correct
         trials += 1
         right_in_row, wrong_in_row = (right_in_row + 1, 0) if is_correct else (0, wrong_in_row + 1)
         in_initial_phase = rule.has_initial_phase and reversals == 0
@@ -235,14 +246,14 @@ def play_run(rule: PackedRule, person: Participant, seed: int, track: Track) -> 
         else:
             continue
         right_in_row = wrong_in_row = 0
-        if direction == 1 and level >= rule.cap_db - SAME_DB:
+        if direction == 1 and level_db >= rule.cap_db - LEVEL_TOLERANCE_DB:
             continue
-        is_reversal = heading != 0 and direction != heading
+        is_reversal = previous_direction != 0 and direction != previous_direction
         reversal_count = reversals if rule.step_change == 2 else reversals + int(is_reversal) - rule.step_change
         step_db = rule.steps_db[max(0, reversal_count)]
         if is_reversal:
-            track.reversal_db[reversals] = level
+            track.reversal_db[reversals] = level_db
             reversals += 1
-        heading = direction
-        level = min(level + direction * step_db, rule.cap_db)
+        previous_direction = direction
+        level_db = min(level_db + direction * step_db, rule.cap_db)
     return SimulatedRun(trials, reversals, math.nan, math.nan)

@@ -25,7 +25,7 @@ from equalizer.effects.simulation.instant import (
     TIME_S,
 )
 from equalizer.effects.simulation.mechanism_kernel import compile_law
-from equalizer.laws.kernel import END, START, STARTED, commit_step, run
+from equalizer.laws.kernel import END, START, STARTED, commit_step, run_program
 from equalizer.laws.program import STACK_SIZE
 from equalizer.signals.signal import FloatArray
 
@@ -80,7 +80,9 @@ def _evaluate(
                 CONDITION_VALUES + sample * conditions + condition
             ]
     program = parameters[CONDITION_VALUES + sample_count * conditions :]
-    return float(run(program, signals, memory[STACK_SIZE + signal_count :], memory[:STACK_SIZE], phase, time_s, step_s))
+    return float(
+        run_program(program, signals, memory[STACK_SIZE + signal_count :], memory[:STACK_SIZE], phase, time_s, step_s)
+    )
 
 
 @njit(inline="always")

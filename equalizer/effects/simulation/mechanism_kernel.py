@@ -38,7 +38,7 @@ from equalizer.effects.simulation.instant import (
     V,
     X,
 )
-from equalizer.effects.simulation.linear_step_kernel import FAST, advance_state
+from equalizer.effects.simulation.linear_step_kernel import FAST_MATH_FLAGS, advance_state
 from equalizer.laws.kernel import NO_REFERENCE_COUNTS
 from equalizer.signals.signal import FloatArray
 
@@ -202,7 +202,7 @@ def _solve_force(  # noqa: PLR0913 - a kernel takes flat arrays
 
 @njit(
     types.void(_LAWS, _INT_MATRIX, _VECTOR, _VECTOR, _MATRIX, _MATRIX, _MATRIX, _VECTOR, _VECTOR),
-    cache=True, nogil=True, error_model="numpy", fastmath=FAST, **NO_REFERENCE_COUNTS,
+    cache=True, nogil=True, error_model="numpy", fastmath=FAST_MATH_FLAGS, **NO_REFERENCE_COUNTS,
 )  # fmt: skip
 def _solve_forces(  # noqa: PLR0913 - a kernel takes flat arrays
     laws: Any, table: Integers, parameters: FloatArray, memory: FloatArray, per_newton: FloatArray, ports: FloatArray,
@@ -247,7 +247,7 @@ def _solve_forces(  # noqa: PLR0913 - a kernel takes flat arrays
         _LAWS, _INT_MATRIX, _VECTOR, _VECTOR, _MATRICES, _MATRIX, READ_ONLY_MATRIX, _MATRIX, _VECTOR, _COUNTS,
         types.float64, _VECTOR, _VECTOR, _MATRIX, _VECTOR,
     ),
-    cache=True, nogil=True, error_model="numpy", fastmath=FAST, **NO_REFERENCE_COUNTS,
+    cache=True, nogil=True, error_model="numpy", fastmath=FAST_MATH_FLAGS, **NO_REFERENCE_COUNTS,
 )  # fmt: skip
 def step_mechanism(  # noqa: PLR0913 - a kernel takes flat arrays
     laws: Any, table: Integers, parameters: FloatArray, memory: FloatArray, step: StepMatrices, rows: FloatArray,

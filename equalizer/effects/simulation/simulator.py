@@ -18,7 +18,7 @@ from equalizer.effects.simulation.command_path import (
     has_intersample_changes,
     subdivide_commands,
 )
-from equalizer.effects.simulation.sensor_path import clip_to_range, low_pass
+from equalizer.effects.simulation.sensor_path import apply_low_pass, clip_to_range
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Hold
 from equalizer.signals.signal import FloatArray
@@ -213,9 +213,10 @@ def _change_response(
 def _filter_channels(response: FloatArray, sample_rate_hz: float, bandwidths_hz: Sequence[float]) -> FloatArray:
     """The response (n, p) through the low pass of each channel."""
     if len(set(bandwidths_hz)) == 1:
-        return low_pass(response, sample_rate_hz, bandwidths_hz[0])
+        return apply_low_pass(response, sample_rate_hz, bandwidths_hz[0])
     filtered = [
-        low_pass(row, sample_rate_hz, bandwidth_hz) for row, bandwidth_hz in zip(response.T, bandwidths_hz, strict=True)
+        apply_low_pass(row, sample_rate_hz, bandwidth_hz)
+        for row, bandwidth_hz in zip(response.T, bandwidths_hz, strict=True)
     ]
     return np.stack(filtered, axis=1)
 

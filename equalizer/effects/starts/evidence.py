@@ -1,7 +1,7 @@
-"""Evidence for the starting values of an effect: motion, commands, and residuals of a re-tuned model.
+"""Data class of the signals from which the starting values of an effect are estimated: one recording and its residuals.
 
-Sizes: n samples, m driven axes, p response channels, d position channels. SI units; on rotational axes N stands for N m
-and m for rad.
+Made by `evidence_from_residuals`, read by the effects (`Effect.starts`). Sizes: n samples, m driven axes, p response
+channels, d position channels. SI units; on rotational axes N stands for N m and m for rad.
 """
 
 from dataclasses import dataclass
@@ -12,30 +12,30 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """Arrays of one recording; the first dimension is time (n samples)."""
+    """Signals of one recording, with the predictions of the re-tuned model; the first dimension is time (n samples)."""
 
     model: MechanicalModel
-    """The model after re-tuning to the recording, to which the residuals belong."""
+    """Re-tuned model whose predictions are compared with the recording."""
     sample_rate_hz: float
     command: FloatArray
     """(n, m): commands, N."""
     axis_position: FloatArray
-    """(n, m): positions along the driven axes, m, as measured and smoothed by the model."""
+    """(n, m): position along each driven axis, m: simulated, plus the motion due to `axis_force`."""
     axis_velocity: FloatArray
-    """(n, m): velocities along the driven axes, m/s."""
+    """(n, m): velocity along each driven axis, m/s, in the same way."""
     axis_force: FloatArray
-    """(n, m): the additional force at each driven axis that would explain the residual, N."""
+    """(n, m): estimated missing force at each driven axis, N: it would explain the residual."""
     response: FloatArray
-    """(n, p): response as measured."""
+    """(n, p): measured response; where samples are missing, the predicted response."""
     predicted: FloatArray
     """(n, p): response that the model predicts."""
     noise: FloatArray
-    """(p,): rms of the noise, estimated from the part of the response that does not repeat."""
+    """(p,): rms of the noise of the response."""
     used: FloatArray
-    """(n,): 1 for samples that count, else 0."""
+    """(n,): 1 for samples that may be used for estimation, else 0."""
     position: FloatArray | None = None
-    """(n, d): position as measured; None where no position was recorded."""
+    """(n, d): measured position, filled like `response`; None where no position was recorded."""
     predicted_position: FloatArray | None = None
-    """(n, p): predicted position of each response channel; compared with `position` where d = p."""
+    """(n, d): position that the model predicts; None where no position was recorded."""
     position_noise: FloatArray | None = None
-    """(d,): rms of the position noise."""
+    """(d,): rms of the noise of the position; None where no position was recorded."""

@@ -1,19 +1,20 @@
-"""Frequency bands of a haptic device and the control method that suits each (figure 1 of Wilson, Chan, Salisbury and
-Niemeyer, Multi-DOF Equalization of Haptic Devices).
+"""Division of a haptic device's frequency range into three bands, with the control method that suits each.
 
-Two frequencies divide the range: the onset of coupling, above which the device mixes its axes, and the limit of
-direction perception, above which people hardly perceive the direction of a vibration.
+After figure 1 of Wilson, Chan, Salisbury and Niemeyer, Multi-DOF Equalization of Haptic Devices. Two frequencies divide
+the range: the onset of coupling, above which a force along one axis also moves others, and the limit of direction
+perception, above which people hardly perceive the direction of a vibration. Called by the reports of identification
+and of the reproduction.
 """
 
 from dataclasses import dataclass
 
 PUBLISHED_DIRECTION_LIMIT_HZ = 35.0
-"""Highest frequency (Hz) at which people could distinguish directions on an omega.3, as published (see above)."""
+"""Highest frequency (Hz) at which people distinguished directions on an omega.3; from the paper above."""
 
 
 @dataclass(frozen=True, slots=True)
 class FrequencyBand:
-    """A band of frequencies, the control method that suits it, and the reason as a sentence."""
+    """A frequency band with the control method that suits it, and the reason (`why`) as a sentence."""
 
     name: str
     """"low", "middle" or "high"."""
@@ -23,24 +24,24 @@ class FrequencyBand:
     why: str
 
 
-def frequency_bands(
+def compute_frequency_bands(
     coupling_onset_hz: float | None,
     direction_limit_hz: float = PUBLISHED_DIRECTION_LIMIT_HZ,
     lowest_hz: float = 1.0,
     highest_hz: float = 500.0,
 ) -> tuple[FrequencyBand, ...]:
     """Bands in ascending order, from lowest_hz to highest_hz. coupling_onset_hz: None = no coupling was found. There is
-    no middle band where coupling begins above the limit of direction perception or not at all, and no low band where it
-    begins below lowest_hz. Raises ValueError for a limit outside the range."""
+    no middle band where the onset is None or not below direction_limit_hz, and no low band where it is not above
+    lowest_hz. Raises ValueError for a limit that is not between lowest_hz and highest_hz."""
     if not lowest_hz < direction_limit_hz < highest_hz:
         raise ValueError(
             f"direction_limit_hz is {direction_limit_hz:g}; it must lie between {lowest_hz:g} and {highest_hz:g} Hz"
         )
     onset_hz = direction_limit_hz if coupling_onset_hz is None else min(coupling_onset_hz, direction_limit_hz)
-    edges = (lowest_hz, max(onset_hz, lowest_hz), direction_limit_hz, highest_hz)
+    edges_hz = (lowest_hz, max(onset_hz, lowest_hz), direction_limit_hz, highest_hz)
     return tuple(
         FrequencyBand(name, low, high, method, why)
-        for (name, method, why), low, high in zip(_METHODS, edges[:-1], edges[1:], strict=True)
+        for (name, method, why), low, high in zip(_METHODS, edges_hz[:-1], edges_hz[1:], strict=True)
         if low < high
     )
 

@@ -1,4 +1,4 @@
-"""Smoothing of a measured frequency response by local polynomials.
+"""Smoothing of a measured frequency response by local polynomial regression (weighted least squares).
 
 Around each line k a polynomial of low order in the frequency (default: a parabola) is fitted to the response on the
 neighbouring lines by least squares, each weighted with 1 / its standard deviation; its value at line k is the smoothed
@@ -8,7 +8,8 @@ lines and their noise only:  G_smooth(k) = sum over l of W(k, l) G(l).
 The bias stays below the noise while the neighbourhood is narrower than about the half width of a resonance.
 
 The idea is that of the local polynomial method (Pintelon and Schoukens, System Identification, 2nd ed., 2012, chapter
-7), which fits input and output spectra with their transients; here the estimated response itself is fitted.
+7), which fits input and output spectra with their transients; here the estimated response itself is fitted. Called by
+`identify_recordings` and `coupling_onset`.
 """
 
 from dataclasses import dataclass, replace
@@ -26,9 +27,9 @@ class LocalPolynomial:
     """Smoothing weights of the neighbours of each line: W in the equation of the module docstring."""
 
     window: npt.NDArray[np.int64]
-    """(lines, taken): indices of the `taken` neighbours of each line, which include the line itself."""
+    """(lines, width): indices of the neighbours of each line, the line itself included."""
     weights: FloatArray
-    """(lines, taken): weights of the neighbours; real, of sum 1."""
+    """(lines, width): weights of the neighbours; real, of sum 1."""
     order: int
     """Order of the polynomial."""
 
@@ -54,8 +55,8 @@ class LocalPolynomial:
 
     def apply(self, values: ComplexArray) -> ComplexArray:
         """Smoothed values, (lines, ...), of values of the same shape."""
-        smooth: ComplexArray = np.einsum("lk,lk...->l...", self.weights, values[self.window])
-        return smooth
+        smoothed: ComplexArray = np.einsum("lk,lk...->l...", self.weights, values[self.window])
+        return smoothed
 
     def propagate_variance(self, variances: FloatArray) -> FloatArray:
         """(lines, ...): variance after smoothing of errors that are independent between lines. variances: (lines, ...),
@@ -67,8 +68,8 @@ class LocalPolynomial:
 def smooth_response(
     response: FrequencyResponse, neighbours: int = 8, order: int = 2, baseline: ComplexArray | None = None
 ) -> FrequencyResponse:
-    """Smooth each line over itself and `neighbours` lines on either side; near the ends of the band over the same
-    number of lines, of which more lie towards its middle.
+    """Smooth each line over itself and `neighbours` lines on either side; near the ends of the band over an asymmetric
+    neighbourhood of the same number of lines.
 
     baseline: (lines, outputs, inputs), response of an approximate model: only the difference from it is smoothed, so
     that a resonance narrower than the neighbourhood is not flattened.
@@ -77,15 +78,15 @@ def smooth_response(
     the lines about the polynomial, so that lack of fit is included. Errors of adjacent lines are then no longer
     independent. Raises ValueError as `LocalPolynomial.from_response` does.
     """
-    local = LocalPolynomial.from_response(response, neighbours, order)
+    polynomial = LocalPolynomial.from_response(response, neighbours, order)
     subtracted = 0.0 if baseline is None else baseline
     difference = replace(response, response=np.asarray(response.response - subtracted, dtype=np.complex128))
-    smooth = np.asarray(local.apply(difference.response) + subtracted, dtype=np.complex128)
-    noise = local.propagate_variance(response.noise_variance)
-    scatter = _estimate_scatter(difference, local) * np.sum(local.weights**2, axis=1)[:, None, None]
+    smoothed = np.asarray(polynomial.apply(difference.response) + subtracted, dtype=np.complex128)
+    noise = polynomial.propagate_variance(response.noise_variance)
+    scatter = _estimate_scatter(difference, polynomial) * np.sum(polynomial.weights**2, axis=1)[:, None, None]
     remark = f"Smoothed: order {order} over {2 * neighbours + 1} lines."
     return replace(
-        response, response=smooth, noise_variance=np.fmax(noise, scatter), remarks=(*response.remarks, remark)
+        response, response=smoothed, noise_variance=np.fmax(noise, scatter), remarks=(*response.remarks, remark)
     )
 
 
@@ -100,18 +101,18 @@ def _compute_line_weights(response: FrequencyResponse) -> FloatArray:
 
 
 def _compute_powers(frequency_hz: FloatArray, window: npt.NDArray[np.int64], order: int) -> FloatArray:
-    """(lines, taken, order + 1): powers 0 to `order` of the frequency difference from the line, scaled to at most 1."""
+    """(lines, width, order + 1): powers 0 to `order` of the frequency difference from the line, scaled to at most 1."""
     offset_hz = frequency_hz[window] - frequency_hz[:, None]
     powers: FloatArray = (offset_hz / np.abs(offset_hz).max(axis=1, keepdims=True))[:, :, None] ** np.arange(order + 1)
     return powers
 
 
-def _estimate_scatter(response: FrequencyResponse, local: LocalPolynomial) -> FloatArray:
+def _estimate_scatter(response: FrequencyResponse, polynomial: LocalPolynomial) -> FloatArray:
     """(lines, outputs, inputs): residual variance of an unweighted polynomial fit in each window, per degree of
     freedom."""
-    basis, _ = np.linalg.qr(_compute_powers(response.frequency_hz, local.window, local.order))
-    values = response.response[local.window]
+    basis, _ = np.linalg.qr(_compute_powers(response.frequency_hz, polynomial.window, polynomial.order))
+    values = response.response[polynomial.window]
     explained_power = np.abs(np.einsum("lko,lkpm->lopm", basis, values)) ** 2
     residual_power = np.sum(np.abs(values) ** 2, axis=1) - np.sum(explained_power, axis=1)
-    power: FloatArray = np.maximum(residual_power, 0.0) / (values.shape[1] - local.order - 1)
+    power: FloatArray = np.maximum(residual_power, 0.0) / (values.shape[1] - polynomial.order - 1)
     return power

@@ -1,12 +1,12 @@
-"""Settings and result of a mechanical fit: the model, its errors, and the structures that were tried."""
+"""Data classes of the fit of a mechanical model (`mechanical_fit`): settings, errors, compared structures, result."""
 
 from dataclasses import dataclass, field
 
 from equalizer.plant.mechanical_model import ActuatorLimits, MechanicalModel, SensorLimits
 
 
-class MechanicalFitRefused(ValueError):  # noqa: N818 - an answer that a user reads, as in the rest of the package
-    """No mechanical model can be fitted to the recordings. The message states the reason and, where there is any, the
+class MechanicalFitRefused(ValueError):  # noqa: N818 - a message for the user, as in the rest of the package
+    """No mechanical model can be fitted to the recordings. The message states the cause and, if there is one, the
     remedy."""
 
 
@@ -20,20 +20,20 @@ class MechanicalFitSettings:
     most_modes: int = 8
     """Largest number of modes in addition to the driven axes."""
     sensor: SensorLimits = field(default_factory=SensorLimits)
-    """Sensor as its data sheet describes it: taken as known, not fitted."""
+    """Bandwidth and range of the sensor from its data sheet: assumed, not fitted."""
     actuator: ActuatorLimits = field(default_factory=ActuatorLimits)
-    """Actuator known beforehand; its delay is the starting value where a delay is fitted."""
+    """Known limits of the actuator; its delay is the starting value where a delay is fitted."""
     sensors_elsewhere: bool | None = None
-    """Whether response i may be another motion than that of the point at which command i acts (non-collocated: a cable
-    or joint lies between). None: decided by cross-validation."""
+    """Whether sensor i may be non-collocated with actuator i (a cable or joint lies between). None: decided by
+    cross-validation."""
     joint: bool = False
-    """Whether sensors and oscillators are connected to the driven axes by an elastic joint, such as cables. To be set
+    """Whether sensors and oscillators are connected to the driven axes by an elastic joint, such as cables. Set it only
     where that is known of the device; `sensors_elsewhere` is then ignored."""
     fit_delay: bool = True
-    """Whether a delay may be added where cross-validation calls for it."""
+    """Whether a delay is added where it lowers the cross-validated error."""
     floor: float = 0.02
-    """Model error that is expected of a linear model of a real device, as a share of a line's magnitude. It keeps a few
-    strong lines from dominating the fit."""
+    """Expected error of a linear model of a real device, as a share of a line's magnitude; it limits the weight of
+    strong lines in the fit. Chosen."""
 
     def __post_init__(self) -> None:
         if self.band_hz is not None and not 0 <= self.band_hz[0] < self.band_hz[1]:

@@ -1,7 +1,7 @@
 """State-space models of measured frequency responses.
 
 Order of the data: `weighted_lines` (data) -> `warped_subspace`, `canonical_variate` (starting models) -> `refinement`
-(maximum likelihood) -> `candidates` (choice) -> `relaxed_poles`, `settled_recordings` (long decays) -> `bootstrap`
+(maximum likelihood) -> `candidates` (choice) -> `relaxed_poles`, `free_decay` (long decays) -> `bootstrap`
 (uncertainty) -> `misfit`, `held_out_validation`. `order_report` compares orders; `refusals` holds the conditions
 under which no model is fitted. Begin at `identify.py`.
 """

@@ -13,7 +13,7 @@ from equalizer.identification.state_space.relaxed_poles import SlowPole
 from equalizer.identification.state_space.stable_poles import Radius
 from equalizer.identification.state_space.weighted_lines import WeightedLines
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.signal import FloatArray
 
 BAND_POINTS = 200
@@ -53,9 +53,9 @@ def estimate_response_deviation(model: IdentifiedModel, frequency_hz: FloatArray
     Raises ValueError for a model without samples."""
     if model.samples is None:
         raise ValueError("the model contains no samples of its uncertainty; identify it again with draws > 0")
-    nominal_response = model_response(model, frequency_hz)
+    nominal_response = compute_model_response(model, frequency_hz)
     squared_deviations = [
-        np.abs(model_response(model.with_parameters(parameters), frequency_hz) - nominal_response) ** 2
+        np.abs(compute_model_response(model.with_parameters(parameters), frequency_hz) - nominal_response) ** 2
         for parameters in model.samples
     ]
     return np.asarray(np.sqrt(np.mean(squared_deviations, axis=0)), dtype=np.float64)
@@ -75,5 +75,5 @@ def compute_relative_deviation(
         np.clip(np.concatenate([np.linspace(low_hz, high_hz, BAND_POINTS), *peak_frequencies_hz]), low_hz, high_hz)
     )
     spacing_hz = np.gradient(grid_hz)[:, None, None]
-    response_norm = np.sqrt((spacing_hz * np.abs(model_response(model, grid_hz)) ** 2).sum())
+    response_norm = np.sqrt((spacing_hz * np.abs(compute_model_response(model, grid_hz)) ** 2).sum())
     return float(np.sqrt((spacing_hz * estimate_response_deviation(model, grid_hz) ** 2).sum()) / response_norm)

@@ -8,13 +8,13 @@ from equalizer.identification.frequency_response.experiments import collect_peri
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.identification.frequency_response.local_polynomial import smooth_response
 from equalizer.identification.frequency_response.transfer_estimate import estimate_transfer
+from equalizer.identification.state_space.free_decay import extract_slow_modes, subtract_free_decay
 from equalizer.identification.state_space.identify import Identified, identify, write_outside_gain_remark
 from equalizer.identification.state_space.misfit import compute_estimate_misfit
 from equalizer.identification.state_space.misfit_causes import UNEXPLAINED_COST, describe_misfit_causes
 from equalizer.identification.state_space.settings import IdentificationSettings
-from equalizer.identification.state_space.settled_recordings import slow_part, subtract_free_decay
 from equalizer.identification.state_space.stable_poles import compute_pole_radius
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.recording import Recording
 
 DISTURBING_DECAY_S = 1.0
@@ -114,7 +114,7 @@ def _remove_transients(
     """Subtract the free decay of slow poles from the recordings, and identify again, until the decay settles."""
     radius, without_draws = compute_pole_radius(DISTURBING_DECAY_S, estimate.sample_rate_hz), replace(settings, draws=0)
     rounds = 0
-    while (slow := slow_part(identified, radius)) is not None and rounds < MOST_ROUNDS:
+    while (slow := extract_slow_modes(identified, radius)) is not None and rounds < MOST_ROUNDS:
         previous_decay_s, rounds = identified.slowest_decay_s, rounds + 1
         estimate = estimate_transfer(subtract_free_decay(recordings, slow))
         identified = identify(estimate, without_draws, initial=identified.chosen)
@@ -132,7 +132,7 @@ def _fit_smoothed(
 ) -> IdentifiedRecordings:
     relaxed = unsmoothed is not None and bool(unsmoothed.relaxed)
     if unsmoothed is not None and relaxed:
-        fitted = smooth_response(estimate, baseline=model_response(unsmoothed.model, estimate.frequency_hz))
+        fitted = smooth_response(estimate, baseline=compute_model_response(unsmoothed.model, estimate.frequency_hz))
         identified = identify(fitted, settings, initial=unsmoothed.chosen)
     else:
         fitted = smooth_response(estimate)

@@ -12,7 +12,7 @@ import numpy as np
 from equalizer.identification.frequency_response.frequency_response import BoolArray, FrequencyResponse
 from equalizer.identification.state_space.weighted_lines import WeightedLines, weight_lines
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 NOISE_POWER_MARGIN = 1.1
@@ -84,7 +84,7 @@ def _compute_lower_noise_bound(variance: FloatArray, parameter_count: int) -> fl
 def compute_estimate_misfit(model: IdentifiedModel, estimate: FrequencyResponse) -> Misfit:
     """Compute the misfit of a model on an estimate's reliable lines within the model's band."""
     lines = weight_lines((estimate,), model.band_hz)
-    modelled, all_lines = model_response(model, lines.frequency_hz), np.ones(len(lines), bool)
+    modelled, all_lines = compute_model_response(model, lines.frequency_hz), np.ones(len(lines), bool)
     return compute_misfit(lines, modelled, all_lines, count_unknowns(model.order, *model.D.shape))
 
 

@@ -1,5 +1,7 @@
-"""Settings of the identification of a state-space model: band, order, bound of the decay, and search. Defaults without
-a stated reason are heuristic."""
+"""Settings of the identification of a state-space model (`identify`): band, order, bound of the time constants, search.
+
+Defaults without a stated reason are heuristic.
+"""
 
 from dataclasses import dataclass
 
@@ -7,24 +9,24 @@ WIDE_OCTAVES = 4.5
 """Width of a band (octaves) above which it is fitted on logarithmic bins, because lines at equal distances in Hz are
 mostly at its upper end."""
 ORDINARY_DECAY_S = 0.5
-"""Longest time constant of a pole (s) unless the data require more. Superfluous poles move to the bound, where they do
-not raise the cost; without a bound they may end anywhere inside the unit circle, and a slow decay among them would
-corrupt simulations."""
+"""Upper bound of a pole's time constant (s) unless the data require a longer one. Superfluous poles move to the bound,
+where they do not raise the cost; without a bound, superfluous poles with a slow decay would corrupt simulations."""
 
 
 @dataclass(frozen=True, slots=True)
 class IdentificationSettings:
     """Band and order of a model, and settings of the search. Raises ValueError for a band that does not rise from above
-    0, an odd order, a bound of zero or less, or negative counts."""
+    0, an order that is odd or below 2, a longest decay that is not positive and finite, negative or no
+    `longer_horizons`, and a negative margin or number of draws."""
 
     band_hz: tuple[float, float] = (5.0, 35.0)
     order: int = 26
     """Number of states; even, because poles are fitted in pairs."""
     longest_decay_s: float | None = None
-    """Longest time constant of a pole (s). None: ORDINARY_DECAY_S, and more for poles that need it (see
-    `relaxed_poles`)."""
+    """Upper bound of the poles' time constants (s). None: ORDINARY_DECAY_S, relaxed for poles whose decay is
+    significantly longer (`relaxed_poles`)."""
     longer_horizons: tuple[int, ...] = (0, 2)
-    """Block rows beyond the shortest useful horizon; each number gives a starting model."""
+    """Numbers of block rows of subspace identification beyond the least possible; each gives a starting model."""
     spare_horizons: tuple[int, ...] = (1, 3, 4, 6)
     """Further block rows for a wide band, tried one after the other while the best fit leaves residuals above the
     noise, because a fit may end in a local optimum."""

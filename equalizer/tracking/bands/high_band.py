@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 SMALLEST_WEIGHT, LARGEST_WEIGHT = 1e-3, 1e-2
@@ -40,7 +40,7 @@ class ModelledResponse:
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
         """(lines, p, m), m/s² per N: response of the model."""
-        return model_response(self.model, frequency_hz)
+        return compute_model_response(self.model, frequency_hz)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.signal import FloatArray, Signal
 from equalizer.tracking.bands.banded_equalizer import BandedEqualizer, HighBand, LowBand
 from equalizer.tracking.bands.banded_forces import BandedForces
@@ -147,7 +147,7 @@ def rigid_part(model: IdentifiedModel) -> RigidModel:
     """Rigid model (mass, damping, stiffness) fitted to the model's response in the lowest RIGID_OCTAVES of its band."""
     low, high = model.band_hz
     lines_hz = np.geomspace(low, min(high, low * 2**RIGID_OCTAVES), RIGID_LINES)
-    return fit_rigid_model(lines_hz, model_response(model, lines_hz), model.sample_rate_hz)
+    return fit_rigid_model(lines_hz, compute_model_response(model, lines_hz), model.sample_rate_hz)
 
 
 def level_error(

@@ -1,8 +1,10 @@
-"""Rigid-body model of the device, force = M a + D v + K x, and its fit to a frequency response.
+"""Rigid-body model of a device, force = M a + D v + K x, and its least-squares fit to a frequency response.
 
 Below the first resonance the device moves as a rigid body. At a spectral line, with s = 2 pi i f,
 
     force per acceleration = M + D / s + K / s²        (m x m, N per m/s²)
+
+Called by `low_band`, `banded_equalizer` and `narrow_and_wide_models`.
 """
 
 from dataclasses import dataclass
@@ -11,8 +13,8 @@ import numpy as np
 
 from equalizer.signals.signal import ComplexArray, FloatArray
 
-WORST_CONDITION = 1e6
-"""Largest condition number of a response that is inverted."""
+MAX_CONDITION = 1e6
+"""Largest condition number of a response that is inverted. Chosen: a larger one means that an axis was not driven."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,15 +25,16 @@ class RigidModel:
     damping_n_s_per_m: FloatArray
     stiffness_n_per_m: FloatArray
     delay_s: float = 0.0
-    """Delay from a command to its acceleration, without the half sample of the hold."""
+    """Delay (s) from a command to its acceleration, without the half sample of the zero-order hold."""
 
     def __post_init__(self) -> None:
         shapes = {np.shape(part) for part in (self.mass_kg, self.damping_n_s_per_m, self.stiffness_n_per_m)}
         if len(shapes) != 1 or (shape := next(iter(shapes))) != shape[:1] * 2:
             raise ValueError(f"mass, damping and stiffness must be square matrices of one shape, not {sorted(shapes)}")
 
-    def force_per_acceleration(self, frequency_hz: FloatArray) -> ComplexArray:
-        """(lines, m, m), N per m/s²: inverse response, advanced by `delay_s`. frequency_hz: (lines,), above zero."""
+    def compute_force_per_acceleration(self, frequency_hz: FloatArray) -> ComplexArray:
+        """Inverse response (lines, m, m), N per m/s², with the delay compensated. frequency_hz: (lines,), above
+        zero."""
         s = 2j * np.pi * np.asarray(frequency_hz, dtype=np.float64)[:, None, None]
         ratio = self.mass_kg + self.damping_n_s_per_m / s + self.stiffness_n_per_m / s**2
         return np.asarray(ratio * np.exp(s * self.delay_s))
@@ -40,17 +43,18 @@ class RigidModel:
 def fit_rigid_model(
     frequency_hz: FloatArray, response: ComplexArray, sample_rate_hz: float, delay_s: float = 0.0
 ) -> RigidModel:
-    """Fit a rigid model to a measured response, by linear least squares on the relative error of its inverse at each
-    line.
+    """Fit a rigid-body model to a measured response, by linear least squares on the inverse response, each line
+    weighted by the reciprocal of its norm.
 
     frequency_hz: (lines,), above zero, below the first resonance; response: (lines, m, m), m/s² per N, with the delay
     of the hold. delay_s is given, not fitted: at low frequencies it cannot be distinguished from damping and mass.
-    Raises ValueError for fewer than two lines, a frequency that is not above zero, or a singular response.
+    Raises ValueError for fewer than two lines, a frequency that is not above zero, or a condition number of the
+    response above `MAX_CONDITION`.
     """
     frequency_hz = np.asarray(frequency_hz, dtype=np.float64)
     if len(frequency_hz) < 2 or not (frequency_hz > 0).all():
         raise ValueError("a rigid model needs the response at two or more frequencies above zero")
-    if np.linalg.cond(response).max() > WORST_CONDITION:
+    if np.linalg.cond(response).max() > MAX_CONDITION:
         raise ValueError(
             "the response at a line does not move all axes, so that it has no inverse; identify with all axes driven"
         )

@@ -17,7 +17,7 @@ from equalizer.laws.law import Law as FoundLaw
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.compensation.effect_roles import compute_lead_s, explain_not_compensated
 from equalizer.tracking.compensation.known_forces import LAWS, Law, compute_deadband_share, compute_equivalent_impedance
@@ -161,7 +161,7 @@ def _compute_force_beyond_model(
     length = find_padded_length(len(v), model.sample_rate_hz)
     lines_hz = np.asarray(np.fft.rfftfreq(length, 1 / model.sample_rate_hz), dtype=np.float64)
     in_band = np.flatnonzero(compute_band_gain(lines_hz, model.band_hz) > 0)
-    direct_gain = np.abs(model_response(model, lines_hz[in_band])[:, axis, axis])
+    direct_gain = np.abs(compute_model_response(model, lines_hz[in_band])[:, axis, axis])
     speed = np.maximum(direct_gain * identified_with_n / (2 * np.pi * lines_hz[in_band]), LEAST_SPEED_M_S)
     equivalent = np.zeros(len(lines_hz), dtype=np.complex128)
     equivalent[in_band] = compute_equivalent_impedance(law, effect.parameters, lines_hz[in_band], speed, SLIP_SHARE)

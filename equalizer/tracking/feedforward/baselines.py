@@ -13,7 +13,7 @@ import numpy as np
 
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.periodic_inverse import WEIGHT, compute_regularised_inverse, invert_regularised
 
@@ -52,7 +52,7 @@ def make_identity_inverse(model: IdentifiedModel, frequency_hz: FloatArray) -> I
 def make_static_gain_inverse(model: IdentifiedModel, frequency_hz: FloatArray) -> Inverse:
     """A common gain (N per m/s²) for all axes: the inverse of the geometric mean, over lines and axes, of the magnitude
     of the direct responses (diagonal elements). Cost: one multiplication per axis."""
-    direct_gains = np.abs(np.einsum("lii->li", model_response(model, frequency_hz)))
+    direct_gains = np.abs(np.einsum("lii->li", compute_model_response(model, frequency_hz)))
     static_gain = float(np.exp(-np.log(direct_gains).mean()))
     return Inverse(
         "static gain", _repeat_over_lines(static_gain * np.eye(*model.D.shape[::-1]), frequency_hz), model.D.shape[1]
@@ -63,7 +63,7 @@ def make_acceleration_matching_inverse(model: IdentifiedModel, frequency_hz: Flo
     """Acceleration matching (Kuchenbecker et al. 2006, IEEE Trans. Vis. Comput. Graph. 12:219): the direct response of
     each axis (diagonal element) is inverted, and coupling between axes is neglected. Cost: a transfer function of the
     model's order per axis. For as many forces as accelerations."""
-    direct_response = np.einsum("lii->li", model_response(model, frequency_hz))
+    direct_response = np.einsum("lii->li", compute_model_response(model, frequency_hz))
     inverse = np.einsum("li,ij->lij", 1 / direct_response, np.eye(direct_response.shape[1]))
     return Inverse("acceleration matching", inverse, direct_response.shape[1] * (2 * model.order + 1))
 
@@ -72,7 +72,7 @@ def fit_rigid_body_inverse(model: IdentifiedModel, frequency_hz: FloatArray) -> 
     """Rigid-body inverse dynamics, force = M a + B v + K x, with matrices (m, p) fitted by least squares so that the
     model's response to these forces is the reference acceleration at the given lines. Velocity and position are the
     accelerations divided by i w and -w²."""
-    G = model_response(model, frequency_hz)
+    G = compute_model_response(model, frequency_hz)
     line_count, p, m = G.shape
     angular_frequency = 2 * np.pi * frequency_hz
     integrators = (np.ones(line_count, dtype=complex), 1 / (1j * angular_frequency), -1 / angular_frequency**2)

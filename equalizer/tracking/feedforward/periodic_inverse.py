@@ -8,7 +8,7 @@ forces H y with H = (G* G + w I)^-1 G* minimise |G f - y|² + w |f|² for the re
 import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.signal import ComplexArray, FloatArray, Signal
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 
@@ -29,11 +29,11 @@ def compute_regularised_inverse(
 ) -> ComplexArray:
     """Compute the commands per reference output, (lines, m, p), N per unit of the output: H = (G* G + weight I)^-1 G*,
     the total force that enters the plant, less the part of it that the virtual spring supplies."""
-    G = model_response(model, frequency_hz)
+    G = compute_model_response(model, frequency_hz)
     H = invert_regularised(G, weight)
     if spring == NO_SPRING:
         return H
-    spring_share = spring.force_per_acceleration(frequency_hz)[:, None, None] * (G @ H)
+    spring_share = spring.compute_force_per_acceleration(frequency_hz)[:, None, None] * (G @ H)
     return np.asarray(H - spring_share)
 
 

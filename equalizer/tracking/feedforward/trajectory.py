@@ -1,7 +1,8 @@
-"""Trajectories of wanted accelerations or commanded forces: read from and written to CSV tables.
+"""Trajectories of desired accelerations or commanded forces: parsing and formatting of their CSV tables.
 
 A table has a header, the time in its first column (s) and constant time steps. Its header determines its kind:
-accelerations of three axes, forces of three axes, or a transient along a single direction.
+accelerations of three axes, forces of three axes, or a transient along a single direction. Called by
+`study.store.formats.trajectory_file`, which reads and writes the files.
 """
 
 import csv
@@ -14,10 +15,10 @@ from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.signal import FloatArray, Signal
 
 STEP_TOLERANCE = 0.01
-"""Largest relative deviation of a time step from the mean step, for the rate to count as constant. Set by hand."""
+"""Largest relative deviation of a time step from the mean step, for the rate to count as constant. Chosen."""
 RATE_TOLERANCE = 1e-5
-"""Largest relative distance from a whole number of hertz at which a rate is rounded to it, because printed time stamps
-are rounded."""
+"""Largest relative difference of a rate from a whole number of hertz at which it is rounded to it, because printed time
+stamps are rounded; also of two rates that count as equal."""
 
 
 class TableError(ListedProblemsError):
@@ -26,7 +27,7 @@ class TableError(ListedProblemsError):
 
 @dataclass(frozen=True, slots=True)
 class TableKind:
-    """Layout of a CSV table: header, and quantity and unit of all columns after the time."""
+    """Kind of a CSV table: its name, its header, and quantity and unit of all columns after the time."""
 
     name: str
     header: tuple[str, ...]
@@ -47,13 +48,13 @@ class Trajectory:
     """Samples at a constant rate. Raises ValueError where quantity, unit or channels are not those of its kind."""
 
     signal: Signal
-    """(n, 3): acceleration (m/s²) wanted, or force (N) commanded; (n, 1) for a transient."""
+    """(n, 3): desired acceleration (m/s²) or commanded force (N); (n, 1) for a transient."""
     start_s: float = 0.0
-    """Time of the first row, so that forces can have the same times as the accelerations."""
+    """Time of the first row (s): forces can have the same times as the accelerations from which they were computed."""
 
     @property
     def kind(self) -> TableKind:
-        """Layout of the table, by quantity and channels: FORCES, TRANSIENT or TRAJECTORY."""
+        """Kind of the table, by quantity and channels: FORCES, TRANSIENT or TRAJECTORY."""
         if self.signal.quantity == FORCES.quantity:
             return FORCES
         return TRANSIENT if self.signal.channels == TRANSIENT.header[1:] else TRAJECTORY
@@ -86,9 +87,9 @@ def parse_trajectory(text: str) -> Trajectory:
     return Trajectory(signal, float(table[0, 0]))
 
 
-def trajectory_csv(trajectory: Trajectory) -> str:
-    """CSV text from which `parse_trajectory` reads the same samples. Raises TableError for missing or infinite
-    samples."""
+def format_trajectory_csv(trajectory: Trajectory) -> str:
+    """Format a trajectory as CSV text, from which `parse_trajectory` reads the same samples. Raises TableError for NaN
+    or infinite samples."""
     samples = trajectory.signal.samples
     if not np.isfinite(samples).all():
         raise TableError((f"a table of {trajectory.kind.name} cannot hold missing or infinite values",))
@@ -99,16 +100,19 @@ def trajectory_csv(trajectory: Trajectory) -> str:
     return "\n".join(lines) + "\n"
 
 
-def require_rate(trajectory: Trajectory, rate_hz: float) -> None:
-    """Check that a trajectory has the model's sample rate, `rate_hz`. Raises TableError where it has another rate."""
-    found_hz = trajectory.signal.sample_rate_hz
-    if abs(found_hz - rate_hz) > RATE_TOLERANCE * rate_hz:
-        raise TableError((f"the rows are at {found_hz:g} Hz, but the model is at {rate_hz:g} Hz; resample them to it",))
+def require_rate(trajectory: Trajectory, model_rate_hz: float) -> None:
+    """Check that a trajectory has the model's sample rate, `rate_hz`. Raises TableError where
+    the rates differ by more than `RATE_TOLERANCE`."""
+    table_rate_hz = trajectory.signal.sample_rate_hz
+    if abs(table_rate_hz - model_rate_hz) > RATE_TOLERANCE * model_rate_hz:
+        raise TableError(
+            (f"the rows are at {table_rate_hz:g} Hz, but the model is at {model_rate_hz:g} Hz; resample them to it",)
+        )
 
 
 def _read_numbers(rows: list[list[str]], kind: TableKind) -> FloatArray:
-    """Numbers of the rows after the header, (n, columns), n >= 2. Raises TableError with the first wrong lines, six at
-    most."""
+    """Read the numbers of the rows after the header, (n, columns), n >= 2. Raises TableError for fewer rows, and for
+    invalid ones with at most six sentences."""
     width = len(kind.header)
     rows_of_values, problems = [], []
     for line, row in enumerate(rows, start=2):
@@ -134,19 +138,19 @@ def _find_rate_hz(time_s: FloatArray) -> float:
     """Sample rate (Hz) of rows at these times (n,), rounded to whole hertz within `RATE_TOLERANCE`. Raises TableError
     for times that do not increase and for steps that are not constant within `STEP_TOLERANCE`."""
     steps = np.diff(time_s)
-    mean = float(time_s[-1] - time_s[0]) / len(steps)
-    if mean <= 0 or (steps <= 0).any():
+    mean_s = float(time_s[-1] - time_s[0]) / len(steps)
+    if mean_s <= 0 or (steps <= 0).any():
         row = int(np.argmax(steps <= 0))
         raise TableError((f"time_s does not grow at row {row + 2} (line {row + 3})",))
-    deviation = np.abs(steps / mean - 1)
+    deviation = np.abs(steps / mean_s - 1)
     if (deviation > STEP_TOLERANCE).any():
         row = int(np.argmax(deviation > STEP_TOLERANCE))
         raise TableError(
             (
                 f"time_s is not at a constant rate: the step to row {row + 2} (line {row + 3}) is {steps[row]:g} s, "
-                f"the mean step {mean:g} s; allowed is 1 % (write more digits, or resample)",
+                f"the mean step {mean_s:g} s; allowed is 1 % (write more digits, or resample)",
             )
         )
-    rate = 1 / mean
-    whole_hz = round(rate)
-    return float(whole_hz) if whole_hz and abs(rate - whole_hz) <= RATE_TOLERANCE * whole_hz else rate
+    rate_hz = 1 / mean_s
+    rounded_hz = round(rate_hz)
+    return float(rounded_hz) if rounded_hz and abs(rate_hz - rounded_hz) <= RATE_TOLERANCE * rounded_hz else rate_hz

@@ -27,7 +27,7 @@ class VirtualSpring:
             if not (math.isfinite(value) and value >= 0):
                 raise ValueError(f"{name} is {value}; it must be a number that is not negative")
 
-    def force_per_acceleration(self, frequency_hz: FloatArray) -> ComplexArray:
+    def compute_force_per_acceleration(self, frequency_hz: FloatArray) -> ComplexArray:
         """Transfer function (lines,) from the handle's acceleration to the spring's force, N per m/s²: -(k + b s) / s²
         with s = 2 pi i f. frequency_hz: (lines,), above zero."""
         s = 2j * np.pi * np.asarray(frequency_hz, dtype=np.float64)

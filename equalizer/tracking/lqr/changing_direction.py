@@ -15,13 +15,13 @@ from equalizer.signals.signal import FloatArray
 from equalizer.tracking.lqr import lqr_kernel
 from equalizer.tracking.lqr.lqr import StoredGains, compute_costate_feedforward
 from equalizer.tracking.lqr.rotation import make_axis_recordings, make_axis_trajectories
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, read_only, require_trajectory
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, copy_read_only, require_trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TurningTransient:
     """Stored gains and feedforward of a transient of N rows, made by `make_rotatable_transient` or
-    `make_normal_transient`. Its arrays are arguments of `lqr_kernel.tick`, for compiled loops."""
+    `make_normal_transient`. Its arrays are arguments of `lqr_kernel.simulate_tick`, for compiled loops."""
 
     problem: TrackingProblem
     K: FloatArray
@@ -105,10 +105,10 @@ def play(transient: TurningTransient, directions: FloatArray, state: LiveState |
         )
     n, m = problem.order, problem.inputs
     workspace = np.zeros(2 * n + m + problem.outputs)
-    workspace[:n] = problem.state(start_state.x)
+    workspace[:n] = problem.make_state(start_state.x)
     outputs = np.empty((len(direction_rows), m + problem.outputs))
     flat_directions = np.ascontiguousarray(direction_rows.reshape(len(direction_rows), -1))
-    lqr_kernel.run_ticks(
+    lqr_kernel.simulate_ticks(
         problem.step,
         transient.K[start_state.tick :],
         transient.g[start_state.tick :],
@@ -124,4 +124,4 @@ def play(transient: TurningTransient, directions: FloatArray, state: LiveState |
 def _make_transient(gains: StoredGains, references: FloatArray, direction_shape: tuple[int, ...]) -> TurningTransient:
     """Transient from trajectories (c, N, p), one per element of the direction."""
     g = np.stack([compute_costate_feedforward(gains, reference) for reference in references], axis=2)
-    return TurningTransient(gains.problem, gains.gains.K, read_only(g), direction_shape)
+    return TurningTransient(gains.problem, gains.gains.K, copy_read_only(g), direction_shape)

@@ -30,7 +30,7 @@ from scipy.linalg import solve_discrete_lyapunov
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.lqr import lqr_kernel, riccati_kernel
 from equalizer.tracking.lqr.riccati import Gains, compute_backward_gains, require_terminal_weight
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, read_only, require_trajectory
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, copy_read_only, require_trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,7 +72,7 @@ def compute_stored_gains(
     P, K, H_inverse = terminal.copy(), np.empty((samples, m, n)), np.empty((samples, m, m))
     is_accurate = riccati_kernel.run_backward_recursion(problem.joined, problem.stage_cost, P, K, H_inverse)
     gains = Gains(K, H_inverse, P) if is_accurate else compute_backward_gains(problem, samples, terminal)
-    return StoredGains(problem, gains, read_only(terminal))
+    return StoredGains(problem, gains, copy_read_only(terminal))
 
 
 def track(
@@ -82,7 +82,7 @@ def track(
     None = at rest. final_state: x_f, (n,), target of the final state if the gains have a terminal weight (without one
     it has no effect); None = rest. Raises TrackingError for other shapes and values that are not finite."""
     problem, g = gains.problem, compute_costate_feedforward(gains, reference, final_state)
-    x = problem.state(x0).copy()
+    x = problem.make_state(x0).copy()
     forces, predicted = np.empty_like(g), np.empty((len(g), problem.outputs))
     lqr_kernel.simulate(problem.step, gains.gains.K, g, x, forces, predicted)
     return TrackResult(forces, predicted, x)
@@ -97,7 +97,7 @@ def compute_costate_feedforward(
     r = require_trajectory(problem, reference)
     if len(r) != len(gains):
         raise TrackingError(f"the trajectory has {len(r)} samples, but the gains are for {len(gains)}")
-    v = gains.terminal_weight @ problem.state(final_state)
+    v = gains.terminal_weight @ problem.make_state(final_state)
     g = np.empty((len(r), problem.inputs))
     lqr_kernel.compute_feedforward(problem.joined, r @ problem.linear_cost, gains.gains.K, gains.gains.H_inverse, v, g)
     return g

@@ -1,8 +1,9 @@
-"""Compiled passes of the tracker with stored gains; the equations and symbols are those of `lqr`.
+"""Compiled passes of the finite-horizon LQR tracker with stored gains; equations and symbols are those of `lqr`.
 
-`compute_feedforward`: backward pass, costate v and feedforward g. `simulate`: forward pass, model and forces. `tick`: a
-single step of the forward pass, for a direction that may change at each step; `run_ticks`: many ticks. n: order, m:
-forces, p: outputs.
+`compute_feedforward`: backward pass, costate v and feedforward g. `simulate`: forward pass, model and forces.
+`simulate_tick`: one time step of the forward pass, for a direction that may change at each step; `simulate_ticks`: many
+steps. Called by `lqr`, `preview`, `constrained` and `changing_direction`. n: order, m: forces, p: outputs; in
+all passes z = [x, u] is the state with the forces, and s its product with a matrix.
 """
 
 import numpy as np
@@ -20,8 +21,8 @@ _OUTPUT_MATRIX = types.float64[:, ::1]
 
 @njit(types.void(_VECTOR, _MATRIX, _VECTOR), cache=True, nogil=True, fastmath={"reassoc", "contract"})
 def _add_product(z: FloatArray, matrix: FloatArray, s: FloatArray) -> None:
-    """s += z @ matrix, for as many elements of z as matrix has rows. Four rows at a time, because s is then loaded and
-    stored a quarter as often."""
+    """Add z[:rows] @ matrix to s, (columns,), in place; z may be longer. Four rows at a time, because s is then loaded
+    and stored a quarter as often."""
     rows, columns = matrix.shape
     unrolled_rows = rows - rows % 4
     for j in range(0, unrolled_rows, 4):
@@ -92,11 +93,13 @@ def simulate(
     nogil=True,
     fastmath={"reassoc", "contract"},
 )
-def tick(step: FloatArray, K: FloatArray, g: FloatArray, direction: FloatArray, k: int, work: FloatArray) -> None:
-    """Step k of a transient: u = sum over c of direction_c g_kc - K_k x_k; no force after the last row.
+def simulate_tick(
+    step: FloatArray, K: FloatArray, g: FloatArray, direction: FloatArray, k: int, work: FloatArray
+) -> None:
+    """Simulate step k of a transient: u = sum over c of direction_c g_kc - K_k x_k, zero for k >= N.
 
     g: (N, m, c); direction: (c,); work: (2 n + m + p,), in this order: n numbers, the state, overwritten by the next
-    state; m, the force of this tick; n, work space; p, the model's response at this tick. step: as for `simulate`.
+    state; m, the force of this step; n, work space; p, the model's response at this step. step: as for `simulate`.
     """
     m, n = K.shape[1], K.shape[2]
     for i in range(m):
@@ -115,14 +118,14 @@ def tick(step: FloatArray, K: FloatArray, g: FloatArray, direction: FloatArray, 
 
 
 @njit(types.void(_MATRIX, _STACK, _STACK, _MATRIX, _VECTOR, _OUTPUT_MATRIX), cache=True, nogil=True)
-def run_ticks(
+def simulate_ticks(
     step: FloatArray, K: FloatArray, g: FloatArray, directions: FloatArray, work: FloatArray, outputs: FloatArray
 ) -> None:
-    """`tick` with each of the directions (T, c) in turn, from row 0 of K and g. outputs: (T, m + p), force and
-    response."""
+    """Simulate T steps by `simulate_tick`, with the directions (T, c), from row 0 of K and g on. Fill outputs (T, m +
+    p): force and response."""
     m, n = K.shape[1], K.shape[2]
     for row in range(directions.shape[0]):
-        tick(step, K, g, directions[row], row, work)
+        simulate_tick(step, K, g, directions[row], row, work)
         for i in range(m):
             outputs[row, i] = work[n + i]
         for i in range(outputs.shape[1] - m):

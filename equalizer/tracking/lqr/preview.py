@@ -15,7 +15,7 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.lqr import lqr_kernel
 from equalizer.tracking.lqr.lqr import TrackResult
 from equalizer.tracking.lqr.riccati import compute_stationary_gains
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, read_only, require_trajectory
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, copy_read_only, require_trajectory
 
 LINE_SPACING_HZ = 0.1
 """Spacing of the spectral lines over which a loss is averaged."""
@@ -66,7 +66,7 @@ def make_preview_tracker(problem: TrackingProblem, preview_samples: int) -> Prev
     for j in range(1, preview_samples):
         preview_gains[j] = H_inverse @ problem.B.T @ linear_cost
         linear_cost = closed_loop.T @ linear_cost
-    return PreviewTracker(problem, K, read_only(preview_gains))
+    return PreviewTracker(problem, K, copy_read_only(preview_gains))
 
 
 def track_stream(tracker: PreviewTracker, reference: FloatArray, x0: FloatArray | None = None) -> TrackResult:
@@ -78,7 +78,7 @@ def track_stream(tracker: PreviewTracker, reference: FloatArray, x0: FloatArray 
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(r, ((0, M - 1), (0, 0))), M, axis=0)
     g = np.ascontiguousarray(np.einsum("jmp,npj->nm", tracker.preview_gains, windows, optimize=True))
     K = np.repeat(tracker.K[np.newaxis], len(r), axis=0)
-    x = problem.state(x0).copy()
+    x = problem.make_state(x0).copy()
     forces, predicted = np.empty_like(g), np.empty_like(r)
     lqr_kernel.simulate(problem.step, K, g, x, forces, predicted)
     return TrackResult(forces, predicted, x)

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, solve_discrete_are, solve_triangular
 
 from equalizer.signals.signal import FloatArray
-from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, read_only
+from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProblem, copy_read_only
 
 NO_CURVATURE_MESSAGE = (
     "at step {step} from the end a force has no effect on what is penalised: with a delay or without feedthrough "
@@ -56,7 +56,7 @@ class Gains:
 
     def __post_init__(self) -> None:
         for name in ("K", "H_inverse", "P"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+            object.__setattr__(self, name, copy_read_only(getattr(self, name)))
 
     def __len__(self) -> int:
         return int(self.K.shape[0])

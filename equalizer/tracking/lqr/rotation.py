@@ -13,7 +13,7 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from equalizer.tracking.lqr.lqr import StoredGains, track
-from equalizer.tracking.lqr.tracking_problem import TrackingError, read_only, require_trajectory
+from equalizer.tracking.lqr.tracking_problem import TrackingError, copy_read_only, require_trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,4 +83,4 @@ def _solve_basis(gains: StoredGains, references: FloatArray, direction_shape: tu
     solutions = [track(gains, reference) for reference in references]
     forces = np.array([solution.forces.ravel() for solution in solutions])
     responses = np.array([solution.predicted.ravel() for solution in solutions])
-    return RotationBasis(read_only(forces), read_only(responses), gains.problem.inputs, direction_shape)
+    return RotationBasis(copy_read_only(forces), copy_read_only(responses), gains.problem.inputs, direction_shape)

@@ -1,12 +1,13 @@
-"""Cost of a finite-horizon tracker: a model, and the weights of deviations and forces.
+"""Quadratic cost of finite-horizon LQR tracking: a model, and the weights of tracking errors and forces.
 
     sum over k of (y_k - r_k)' Q (y_k - r_k) + u_k' R u_k,    x_{k+1} = A x_k + B u_k,  y_k = C x_k + D u_k
 
 A device without acceleration response to a constant force has zeros near z = 1: the forces of its model's exact inverse
-drift at low frequencies, where nothing was identified. The force weight R limits this drift at all frequencies; the
-low-frequency weight limits it only there: it penalises w, a first-order low pass of each force,
+drift at low frequencies, below the identified band. The force weight R penalises forces at all frequencies, the
+low-frequency weight only there: it penalises w, a first-order low pass of each force,
 w_{k+1} = a w_k + (1 - a) u_k, as a further output with zero reference (frequency-dependent weights by augmenting the
-plant: Anderson and Moore, Optimal Control: Linear Quadratic Methods, 1990, chapter 9).
+plant: Anderson and Moore, Optimal Control: Linear Quadratic Methods, 1990, chapter 9). Solved by `lqr` and its sibling
+modules.
 """
 
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from equalizer.signals.signal import FloatArray
 
 
 class TrackingError(ValueError):
-    """A tracking problem without a valid solution, or with inconsistent arguments."""
+    """A tracking problem has no valid solution, or its arguments are invalid."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,14 +29,14 @@ class TrackingWeights:
     """Weights of the cost. Raises TrackingError for weights that are negative, not finite, or of an invalid shape."""
 
     weight: float = 1e-3
-    """R = weight I, of |u|², (m/s² per N)². The delivered level is too low by about weight / |G|², relative, with the
-    response G."""
+    """Weight of |u|²: R = weight I, (m/s² per N)². The delivered acceleration is too low by the relative amount
+    weight / |G|², approximately, where G is the frequency response (m/s² per N)."""
     output_weight: FloatArray | None = None
     """Q, (p, p), symmetric, no negative eigenvalue; None = identity."""
     low_frequency_weight: float = 0.0
-    """Weight of |w|², (m/s² per N)²; 0 = none. It shortens the preview that the inverse needs."""
+    """Weight of |w|², (m/s² per N)²; 0 = none. A larger one shortens the preview that the inverse needs."""
     low_frequency_hz: float = 3.0
-    """Corner frequency of that low pass."""
+    """Corner frequency (Hz) of the low pass from u to w."""
 
     def __post_init__(self) -> None:
         for name in ("weight", "low_frequency_weight"):
@@ -69,11 +70,11 @@ class TrackingProblem:
     """p, the number of tracked outputs."""
     sample_rate_hz: float
     band_hz: tuple[float, float]
-    """Band in which the model is valid."""
+    """Band (Hz) in which the model is valid."""
 
     def __post_init__(self) -> None:
         for name in ("A", "B", "C", "D", "Q", "R"):
-            object.__setattr__(self, name, read_only(getattr(self, name)))
+            object.__setattr__(self, name, copy_read_only(getattr(self, name)))
 
     @property
     def order(self) -> int:
@@ -88,13 +89,13 @@ class TrackingProblem:
     @cached_property
     def joined(self) -> FloatArray:
         """(n, n + m): [A B]."""
-        return read_only(np.hstack((self.A, self.B)))
+        return copy_read_only(np.hstack((self.A, self.B)))
 
     @cached_property
     def step(self) -> FloatArray:
         """(n + m, n + p): [A B; C D]', so that [x_k, u_k] @ step = [x_{k+1}, y_k]."""
         p = self.outputs
-        return read_only(np.block([[self.A, self.B], [self.C[:p], self.D[:p]]]).T)
+        return copy_read_only(np.block([[self.A, self.B], [self.C[:p], self.D[:p]]]).T)
 
     @cached_property
     def stage_cost(self) -> FloatArray:
@@ -103,17 +104,17 @@ class TrackingProblem:
         n, outputs = self.order, np.hstack((self.C, self.D))
         cost = outputs.T @ self.Q @ outputs
         cost[n:, n:] += self.R
-        return read_only((cost + cost.T) / 2)
+        return copy_read_only((cost + cost.T) / 2)
 
     @cached_property
     def linear_cost(self) -> FloatArray:
-        """(p, n + m): Q [C D] of the tracked outputs, from a reference sample to the linear term of the cost in [x,
-        u]."""
-        return read_only((self.Q @ np.hstack((self.C, self.D)))[: self.outputs])
+        """(p, n + m): rows of Q [C D] of the tracked outputs; r' times it is the linear term of the cost in [x, u] for
+        a reference sample r."""
+        return copy_read_only((self.Q @ np.hstack((self.C, self.D)))[: self.outputs])
 
-    def state(self, x0: FloatArray | None) -> FloatArray:
-        """(n,): the state x0, or rest where None. x0: (n,), or the model's own state alone, to which low passes at rest
-        are appended. Raises TrackingError for another length and for values that are not finite."""
+    def make_state(self, x0: FloatArray | None) -> FloatArray:
+        """Complete an initial state to (n,); None = rest. x0: (n,), or the state of the model without the low passes,
+        which then start at rest. Raises TrackingError for another length and for values that are not finite."""
         if x0 is None:
             return np.zeros(self.order)
         x = np.ascontiguousarray(x0, dtype=np.float64)
@@ -128,7 +129,8 @@ class TrackingProblem:
 
 
 def make_tracking_problem(model: IdentifiedModel, weights: TrackingWeights) -> TrackingProblem:
-    """Problem of a model and its weights, with the low-passed forces as further outputs where these are penalised.
+    """Make the problem of a model and its weights, with the low-passed forces as further outputs if these have a
+    weight.
 
     Raises TrackingError for an output weight that is not (p, p).
     """
@@ -149,8 +151,8 @@ def make_tracking_problem(model: IdentifiedModel, weights: TrackingWeights) -> T
 
 
 def require_trajectory(problem: TrackingProblem, reference: FloatArray) -> FloatArray:
-    """The trajectory (N, p) as a contiguous array. Raises TrackingError for another shape, no rows, and values that are
-    not finite."""
+    """Return the reference trajectory (N, p) as a contiguous array. Raises TrackingError for another shape, no rows,
+    and values that are not finite."""
     r = np.ascontiguousarray(reference, dtype=np.float64)
     if r.ndim != 2 or r.shape[1] != problem.outputs or not len(r):
         raise TrackingError(f"the trajectory has shape {r.shape}; this problem takes (N, {problem.outputs}), N >= 1")
@@ -159,17 +161,17 @@ def require_trajectory(problem: TrackingProblem, reference: FloatArray) -> Float
     return r
 
 
-def read_only(values: FloatArray) -> FloatArray:
-    """A contiguous, read-only copy."""
+def copy_read_only(values: FloatArray) -> FloatArray:
+    """Return a contiguous, read-only copy as float64."""
     copy = np.array(values, dtype=np.float64, order="C")
     copy.flags.writeable = False
     return copy
 
 
 def _require_output_weight(Q: FloatArray) -> FloatArray:
-    """Read-only copy of Q. Raises TrackingError unless it is square, finite, symmetric and without negative
-    eigenvalue."""
-    Q = read_only(Q)
+    """Return a read-only copy of Q. Raises TrackingError unless it is square, finite, symmetric and positive
+    semidefinite (to within rounding, 1e-12)."""
+    Q = copy_read_only(Q)
     if Q.ndim != 2 or Q.shape[0] != Q.shape[1] or not np.isfinite(Q).all() or not np.allclose(Q, Q.T, rtol=1e-12):
         raise TrackingError("output_weight must be a square symmetric matrix of finite numbers")
     lowest = float(np.linalg.eigvalsh(Q)[0]) if Q.size else 0.0

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 BAND_MARGIN = 0.12
@@ -95,7 +95,7 @@ def compute_band_lines(model: IdentifiedModel, band_hz: tuple[float, float]) -> 
     )
     line_count = int(np.ceil(LINES_PER_OCTAVE * np.log2(widened_band_hz[1] / widened_band_hz[0])))
     frequency_hz = np.geomspace(*widened_band_hz, line_count)
-    response = model_response(model, frequency_hz)
+    response = compute_model_response(model, frequency_hz)
     return BandLines(
         frequency_hz,
         np.exp(2j * np.pi * frequency_hz / model.sample_rate_hz),

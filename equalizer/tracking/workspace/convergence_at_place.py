@@ -12,7 +12,7 @@ The condition of convergence is that of `equalizer.tracking.learning.convergence
 
 import numpy as np
 
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.virtual_spring import VirtualSpring
 from equalizer.tracking.learning.convergence import Convergence, predict_convergence
@@ -30,10 +30,10 @@ def convergence_at(at: ModelsAtPlace, weight: float, spring: VirtualSpring, beta
     used = [model for _, model in select_used_models(at)]
     band_hz = used[0].band_hz
     lines_hz = np.asarray(np.geomspace(*band_hz, LINES), dtype=np.float64)
-    devices = [model_response(model, lines_hz) for model in used] if len(used) > 1 else []
+    devices = [compute_model_response(model, lines_hz) for model in used] if len(used) > 1 else []
     for model in used:
         if model.samples is not None:
-            devices += [model_response(model.with_parameters(row), lines_hz) for row in model.samples]
+            devices += [compute_model_response(model.with_parameters(row), lines_hz) for row in model.samples]
     if not devices:
         return None
     closed_loops = np.array([_close_spring_loop(device, lines_hz, spring) for device in devices])
@@ -42,6 +42,6 @@ def convergence_at(at: ModelsAtPlace, weight: float, spring: VirtualSpring, beta
 
 def _close_spring_loop(device: ComplexArray, frequency_hz: FloatArray, spring: VirtualSpring) -> ComplexArray:
     """(lines, p, p), m/s² per N: closed loop (I - G K)^-1 G. device: G, (lines, p, p); frequency_hz: (lines,)."""
-    spring_force = spring.force_per_acceleration(frequency_hz)[:, None, None]
+    spring_force = spring.compute_force_per_acceleration(frequency_hz)[:, None, None]
     return_difference = np.eye(device.shape[1]) - device * spring_force
     return np.asarray(np.linalg.solve(return_difference, device), dtype=np.complex128)

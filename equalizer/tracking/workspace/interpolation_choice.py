@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.signal import ComplexArray, FloatArray
 from equalizer.tracking.feedforward.periodic_inverse import WEIGHT
 from equalizer.tracking.feedforward.quality import Quality, measure_quality
@@ -83,7 +83,7 @@ def make_held_out_place(model: IdentifiedModel, band_hz: tuple[float, float]) ->
     if model.place_m is None:
         raise ValueError("the model that is held out does not say where it was identified; identify it with its place")
     frequency_hz = np.geomspace(*band_hz, LINE_COUNT)
-    return HeldOutPlace(model.place_m, frequency_hz, model_response(model, frequency_hz))
+    return HeldOutPlace(model.place_m, frequency_hz, compute_model_response(model, frequency_hz))
 
 
 def choose_interpolation(

@@ -1,6 +1,7 @@
-"""Models of a single device, each identified at another place of its workspace, checked to be compatible.
+"""Set of models of one device, each identified at another place of its workspace, checked to be compatible.
 
-The response of a device changes with the pose of its mechanism; between the places, models are interpolated.
+The response of a device changes with the pose of its mechanism; `modal_interpolation` and `blended_inverse` interpolate
+between the places.
 """
 
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ Place = tuple[float, float, float]
 """Coordinates x, y, z of the handle, m."""
 
 SAME_PLACE_M = 1e-4
-"""Distance (m) below which two places count as the same."""
+"""Distance (m) below which two places count as the same. Chosen."""
 
 
 class WorkspaceError(ValueError):
@@ -48,21 +49,22 @@ class WorkspaceModels:
 
     @property
     def places_m(self) -> FloatArray:
-        """(models, 3), m; the origin for a single model without a place."""
+        """(models, 3), m; the origin for a model without a place, which only a single model may be."""
         return np.array([model.place_m or (0.0, 0.0, 0.0) for model in self.models], dtype=np.float64)
 
     @property
     def band_hz(self) -> tuple[float, float]:
-        """Lower and upper end of the band that all models cover."""
+        """Lower and upper end (Hz) of the band that all models cover."""
         return max(model.band_hz[0] for model in self.models), min(model.band_hz[1] for model in self.models)
 
     def without_model(self, index: int) -> "WorkspaceModels":
-        """All models except that of an index, from 0. Raises WorkspaceError for a single model."""
+        """All models except that at the index, from 0. Raises WorkspaceError where no model would remain."""
         return WorkspaceModels(self.models[:index] + self.models[index + 1 :])
 
 
 def _check_compatible(first: IdentifiedModel, model: IdentifiedModel, number: int) -> None:
-    """Check a model against the first. number: of the model, from 1, for the message. Raises WorkspaceError."""
+    """Raise WorkspaceError where a model differs from the first in rate, channels or units, or is unstable. number: of
+    the model, from 1, for the message."""
     for property_name, first_value, value in (
         ("sample rate", first.sample_rate_hz, model.sample_rate_hz),
         ("input channels", first.input_channels, model.input_channels),
@@ -77,15 +79,15 @@ def _check_compatible(first: IdentifiedModel, model: IdentifiedModel, number: in
 
 
 def _check_places(models: tuple[IdentifiedModel, ...]) -> None:
-    """Check that all models have different places. Raises WorkspaceError."""
+    """Raise WorkspaceError where a model has no place, or two have the same."""
     missing = [str(number) for number, model in enumerate(models, start=1) if model.place_m is None]
     if missing:
         raise WorkspaceError(
             f"of {len(models)} models, number {', '.join(missing)} does not say where it was identified; "
             "record with --place X Y Z, and identify again"
         )
-    places = np.array([model.place_m for model in models], dtype=np.float64)
-    distances_m = np.linalg.norm(places[:, None] - places[None], axis=2) + np.eye(len(places))
+    places_m = np.array([model.place_m for model in models], dtype=np.float64)
+    distances_m = np.linalg.norm(places_m[:, None] - places_m[None], axis=2) + np.eye(len(places_m))
     first, second = np.unravel_index(int(distances_m.argmin()), distances_m.shape)
     if distances_m[first, second] < SAME_PLACE_M:
         raise WorkspaceError(f"models {first + 1} and {second + 1} were identified at the same place; give one of them")

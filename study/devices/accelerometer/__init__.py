@@ -2,6 +2,6 @@
 
 A board (`serial_reader`, `parser`) or a data-acquisition device (`sources`) gives `samples`; a thread (`sensor`) keeps
 them (`history`, `newest_sample`). After a recording the sensor's clock is fitted to the computer's (`clock_fit`) and
-the samples are resampled to the ticks (`placement`). `six_positions` and `calibration` calibrate the sensor under
+the samples are resampled to the ticks (`tick_resampling`). `six_positions` and `calibration` calibrate the sensor under
 gravity; `sensor_findings` are the checks of `hapteq doctor`. Begin at `sensor.py`.
 """

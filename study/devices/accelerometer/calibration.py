@@ -1,7 +1,8 @@
 """Six-position calibration of an accelerometer under gravity: bias, sensitivity with cross-axis terms, and noise.
 
 raw = sensitivity a + bias is solved by least squares for six known directions of gravity. An accelerometer measures
-specific force: at rest it reads +g along the axis that points up.
+specific force: at rest it reads +g along the axis that points up. `six_positions` calls `calibrate`; `sensor` converts
+samples with a `Calibration`, which `study.devices.force_dimension.lab` reads from the laboratory's file.
 """
 
 from dataclasses import dataclass
@@ -18,14 +19,13 @@ POSITIONS = ("+x up", "-x up", "+y up", "-y up", "+z up", "-z up")
 UP_DIRECTIONS = np.kron(np.eye(3), np.array([[1.0], [-1.0]]))
 """(6, 3): unit vector along the axis that points up, in each position."""
 
-WORST_RESIDUAL = 0.05
-"""Largest accepted residual, in g. Six readings of three channels and twelve unknowns leave six degrees of freedom.
-Tilts of the sensor by 1 to 2 degrees give residuals of 0.02 to 0.04 g, a mistaken position more than 0.5 g."""
+MAX_RESIDUAL_G = 0.05
+"""Largest accepted residual, in g; chosen. Six readings of three channels and twelve unknowns leave six degrees of
+freedom. Tilts of the sensor by 1 to 2 degrees give residuals of 0.02 to 0.04 g, a mistaken position more than 0.5 g."""
 
-
-WORST_CONDITION = 10.0
-"""Largest accepted condition number of the sensitivity matrix. The channels of an ADXL335 differ by 10 %; a dead
-channel makes the number arbitrarily large."""
+MAX_CONDITION_NUMBER = 10.0
+"""Largest accepted condition number of the sensitivity matrix; chosen. The channels of an ADXL335 differ by 10 %, which
+gives about 1.1; a channel without a signal gives an arbitrarily large number."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,12 +39,13 @@ class Calibration:
     noise_mps2: FloatArray
     """(3,), standard deviation at rest, m/s²."""
     residual_g: float
-    """Largest residual of a position (norm over the channels), in g."""
+    """Largest residual of a position (norm over the channels, divided by the largest singular value of the
+    sensitivity), in g."""
 
-    def acceleration(self, raw: FloatArray) -> FloatArray:
+    def to_acceleration(self, raw: FloatArray) -> FloatArray:
         """Acceleration (n, 3) or (3,) in m/s², gravity included, of raw values of the same shape."""
-        by_column = np.linalg.solve(self.sensitivity, (np.asarray(raw, dtype=np.float64) - self.bias).T)
-        return np.asarray(by_column.T, dtype=np.float64)
+        transposed = np.linalg.solve(self.sensitivity, (np.asarray(raw, dtype=np.float64) - self.bias).T)
+        return np.asarray(transposed.T, dtype=np.float64)
 
     @property
     def cross_axis(self) -> float:
@@ -55,11 +56,11 @@ class Calibration:
 
 
 def calibrate(positions: tuple[FloatArray, ...]) -> Calibration:
-    """Bias, sensitivity matrix and noise by least squares from six positions under gravity. positions: raw samples (n,
-    3) at rest in each of `POSITIONS`.
+    """Fit bias and sensitivity matrix by least squares to six positions under gravity, and compute the noise.
+    positions: raw samples (n, 3), n >= 2, at rest in each of `POSITIONS`.
 
-    Raises ValueError for missing positions, for a position whose residual is too large (the message names it), and for
-    a channel that hardly responds to gravity.
+    Raises ValueError for missing positions or samples, for a position whose residual exceeds `MAX_RESIDUAL_G` (the
+    message names it), and for a channel that hardly responds to gravity.
     """
     if len(positions) != len(POSITIONS) or any(len(samples) < 2 for samples in positions):
         raise ValueError(f"{len(POSITIONS)} positions are needed, each with two samples or more")
@@ -67,15 +68,17 @@ def calibrate(positions: tuple[FloatArray, ...]) -> Calibration:
     design_matrix = np.hstack((GRAVITY_MPS2 * UP_DIRECTIONS, np.ones((len(UP_DIRECTIONS), 1))))
     solution = np.linalg.lstsq(design_matrix, means, rcond=None)[0]
     sensitivity, bias = solution[:3].T, solution[3]
-    scale = float(np.linalg.norm(sensitivity, 2))
-    if not scale > 0:
+    largest_sensitivity = float(np.linalg.norm(sensitivity, 2))
+    if not largest_sensitivity > 0:
         raise ValueError("no channel responds to gravity: check the wiring")
-    misfit_g = np.linalg.norm(means - design_matrix @ solution, axis=1) / (scale * GRAVITY_MPS2)
-    worst = int(np.argmax(misfit_g))
-    if misfit_g[worst] > WORST_RESIDUAL:
-        raise ValueError(f"'{POSITIONS[worst]}' is off by {misfit_g[worst]:.2f} g: lay the sensor down again")
-    if np.linalg.cond(sensitivity) > WORST_CONDITION:
+    residuals_g = np.linalg.norm(means - design_matrix @ solution, axis=1) / (largest_sensitivity * GRAVITY_MPS2)
+    worst_position = int(np.argmax(residuals_g))
+    if residuals_g[worst_position] > MAX_RESIDUAL_G:
+        raise ValueError(
+            f"'{POSITIONS[worst_position]}' is off by {residuals_g[worst_position]:.2f} g: lay the sensor down again"
+        )
+    if np.linalg.cond(sensitivity) > MAX_CONDITION_NUMBER:
         raise ValueError("a channel hardly responds to gravity: check its wiring")
     deviations = np.concatenate([samples - np.mean(samples, axis=0) for samples in positions])
-    noise = np.linalg.solve(sensitivity, deviations.T).T.std(axis=0)
-    return Calibration(bias, sensitivity, noise, float(misfit_g.max()))
+    noise_mps2 = np.linalg.solve(sensitivity, deviations.T).T.std(axis=0)
+    return Calibration(bias, sensitivity, noise_mps2, float(residuals_g.max()))

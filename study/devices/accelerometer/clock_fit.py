@@ -2,7 +2,7 @@
 
 A sample arrives after it was taken, never before. The line from device time to host time therefore lies below all
 arrivals. Of all such lines the fit takes the one with the smallest mean distance to the arrivals, which is the edge of
-their lower convex hull at the mean device time; no constant has to be chosen.
+their lower convex hull at the mean device time; no constant has to be chosen. Called by `tick_resampling`.
 Source: S. B. Moon, P. Skelly, D. Towsley, Estimation and removal of clock skew from network delay measurements,
 INFOCOM 1999.
 """
@@ -16,31 +16,31 @@ from equalizer.signals.signal import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class ClockFit:
-    """host_s = at_host_s + rate (device_s - at_device_s). The smallest delay of an arrival cannot be separated from the
-    offset of the clocks: `at_host_s` includes it."""
+    """Line from device time to host time: host_s = at_host_s + rate (device_s - at_device_s). The smallest delay of an
+    arrival cannot be separated from the offset of the clocks: `at_host_s` includes it."""
 
     at_device_s: float
-    """Device time of a point on the line."""
+    """Device time of a point on the line (s)."""
     at_host_s: float
-    """Host time of the same point."""
+    """Host time of the same point (s)."""
     rate: float
     """Host seconds per second of the device's clock."""
     longest_delay_s: float
-    """Largest delay of an arrival above the fitted line, that is in excess of the smallest delay."""
+    """Largest delay (s) of an arrival above the fitted line, that is in excess of the smallest delay."""
 
     @property
     def drift_ppm(self) -> float:
         """Drift of the device's clock, in parts per million; > 0: it is slow."""
         return 1e6 * (self.rate - 1.0)
 
-    def host_s(self, device_s: FloatArray) -> FloatArray:
-        """Host times (s) of device times (s), any shape."""
+    def to_host_s(self, device_s: FloatArray) -> FloatArray:
+        """Convert device times (s), of any shape, to host times (s) of the same shape."""
         return self.at_host_s + self.rate * (np.asarray(device_s) - self.at_device_s)
 
 
 def fit_clock(device_s: FloatArray, arrived_s: FloatArray) -> ClockFit:
-    """Fit the device's clock to the host's: a line through the earliest arrivals. device_s (n,), rising: when samples
-    were taken, by the device's clock; arrived_s (n,): when they arrived, by the host's.
+    """Fit the device's clock to the host's: a line below all arrivals. device_s (n,), strictly rising: times of the
+    samples by the device's clock (s); arrived_s (n,): their times of arrival by the host's clock (s).
 
     Raises ValueError for fewer than two samples, device times that do not rise, or arrivals that are not finite.
     """
@@ -49,26 +49,26 @@ def fit_clock(device_s: FloatArray, arrived_s: FloatArray) -> ClockFit:
         raise ValueError("a clock needs two samples or more, with device times that rise")
     # Both intervals since the first sample are nearly equal; their difference is fitted, for numerical precision.
     excess_delay_s = (arrived - arrived[0]) - (device - device[0])
-    hull = _lower_hull(device - device[0], excess_delay_s)
+    hull = _find_lower_hull(device - device[0], excess_delay_s)
     mean_device_s = float(np.mean(device - device[0]))
     edge_end = int(np.searchsorted(device[hull] - device[0], mean_device_s).clip(1, len(hull) - 1))
-    first, second = hull[edge_end - 1], hull[edge_end]
-    slope = float((excess_delay_s[second] - excess_delay_s[first]) / (device[second] - device[first]))
-    at_host_s = float(arrived[0] + excess_delay_s[first] + (device[first] - device[0]))
-    fit = ClockFit(float(device[first]), at_host_s, 1.0 + slope, 0.0)
-    return ClockFit(fit.at_device_s, at_host_s, fit.rate, float((arrived - fit.host_s(device)).max()))
+    start, end = hull[edge_end - 1], hull[edge_end]
+    slope = float((excess_delay_s[end] - excess_delay_s[start]) / (device[end] - device[start]))
+    at_host_s = float(arrived[0] + excess_delay_s[start] + (device[start] - device[0]))
+    fit = ClockFit(float(device[start]), at_host_s, 1.0 + slope, 0.0)
+    return ClockFit(fit.at_device_s, at_host_s, fit.rate, float((arrived - fit.to_host_s(device)).max()))
 
 
-def _lower_hull(x: FloatArray, y: FloatArray) -> list[int]:
-    """Indices of the corners of the lower convex hull, from left to right; x rises (monotone chain)."""
+def _find_lower_hull(x: FloatArray, y: FloatArray) -> list[int]:
+    """Find the corners of the lower convex hull of points whose x rises (monotone chain): indices in rising order."""
     hull: list[int] = []
-    for k in range(len(x)):
-        while len(hull) > 1 and _is_above_chord(x, y, hull[-2], hull[-1], k):
+    for index in range(len(x)):
+        while len(hull) > 1 and _is_above_chord(x, y, hull[-2], hull[-1], index):
             hull.pop()
-        hull.append(k)
+        hull.append(index)
     return hull
 
 
-def _is_above_chord(x: FloatArray, y: FloatArray, a: int, b: int, c: int) -> bool:
-    """Whether point b lies on or above the chord from a to c, and so is no corner of the lower hull."""
-    return bool((x[b] - x[a]) * (y[c] - y[a]) <= (y[b] - y[a]) * (x[c] - x[a]))
+def _is_above_chord(x: FloatArray, y: FloatArray, first: int, middle: int, last: int) -> bool:
+    """Whether the middle point lies on or above the chord from the first to the last, and so is no corner."""
+    return bool((x[middle] - x[first]) * (y[last] - y[first]) <= (y[middle] - y[first]) * (x[last] - x[first]))

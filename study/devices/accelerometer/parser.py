@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from study.devices.accelerometer.samples import Counts, Samples
+from study.devices.accelerometer.samples import PacketCounts, Samples
 
 Bytes = npt.NDArray[np.uint8]
 """Bytes of the stream as an array."""
@@ -118,7 +118,7 @@ class PacketParser:
         """Number and time (µs) of the newest packet that counts, without the wrap-around of the counters."""
         self._received_bytes = self._used_bytes = self._shared_bytes = 0
         """Bytes received; bytes up to the end of the newest packet that counts; bytes shared by two such packets."""
-        self.counts = Counts()
+        self.counts = PacketCounts()
 
     def feed(self, data: bytes) -> Samples:
         """Samples of the packets that are accepted with these bytes; updates `counts`."""
@@ -215,7 +215,7 @@ class PacketParser:
         sequence, time_us = self._sequence + np.cumsum(steps), self._time_us + np.cumsum(times)
         if len(packets):
             self._sequence, self._time_us = int(sequence[-1]), int(time_us[-1])
-        self.counts = Counts(
+        self.counts = PacketCounts(
             packets=previous.packets + len(packets),
             lost=previous.lost + int((steps - 1).sum()),
             spoiled_bytes=max(

@@ -1,7 +1,7 @@
-"""Samples of an accelerometer before any processing: sequence numbers, times by its own clock, counts of lost packets.
+"""Raw samples of an accelerometer: sequence numbers, times by the sensor's clock, counts of received and lost packets.
 
-`Source` is the interface of a serial line (`serial_reader`) and of a data-acquisition device (`sources`); all further
-processing is the same for both.
+`SampleSource` is the interface of a serial line (`serial_reader`) and of a data-acquisition device (`sources`); all
+further processing is the same for both. Used by `sensor`, `history` and `six_positions`.
 """
 
 from dataclasses import dataclass
@@ -30,30 +30,30 @@ class Samples:
 
 
 @dataclass(frozen=True, slots=True)
-class Counts:
-    """Counts since the source was opened."""
+class PacketCounts:
+    """Numbers of received and lost packets since the source was opened."""
 
     packets: int = 0
     """Complete packets received."""
     lost: int = 0
-    """Packets lost, counted by the gaps in the sequence numbers; incomplete and corrupt packets are included."""
+    """Packets lost, counted by gaps in the sequence numbers, so that incomplete and corrupt packets are included."""
     spoiled_bytes: int = 0
     """Bytes that belonged to no complete packet."""
     restarts: int = 0
     """Number of restarts of the board."""
 
 
-class Source(Protocol):
+class SampleSource(Protocol):
     """A source of samples; `read` is called by a single thread."""
 
     @property
-    def counts(self) -> Counts:
-        """Packets and lost packets since the source was opened."""
+    def counts(self) -> PacketCounts:
+        """Received and lost packets since the source was opened."""
         ...
 
     def read(self) -> tuple[Samples, float]:
-        """Samples since the last call, and the time of their arrival by `time.monotonic` (s). Waits for a few
-        milliseconds at most; zero samples where none arrived. May raise any exception when the connection fails."""
+        """Return the samples since the last call, and their time of arrival by `time.monotonic` (s). Waits for some
+        milliseconds; no samples where none arrived. May raise any exception where the connection fails."""
         ...
 
     def close(self) -> None:

@@ -2,8 +2,8 @@
 
 A thread reads the source and fills two buffers: the newest sample, which the control loop reads at every tick without
 waiting (`newest_sample`), and the samples of the last minutes (`history`), from which the accelerations at the ticks of
-a recording are computed afterwards (`clock_fit`, `placement`). Opened by `study.devices.force_dimension.lab`, used by
-`force_dimension.rig`.
+a recording are computed afterwards (`clock_fit`, `tick_resampling`). Opened by `study.devices.force_dimension.lab`,
+used by `force_dimension.rig`.
 """
 
 import contextlib
@@ -15,10 +15,10 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.calibration import Calibration
 from study.devices.accelerometer.clock_fit import ClockFit
-from study.devices.accelerometer.history import History
+from study.devices.accelerometer.history import SampleHistory
 from study.devices.accelerometer.newest_sample import NewestSample
-from study.devices.accelerometer.placement import HALF_PERIODS, ResampledValues, fit_and_resample
-from study.devices.accelerometer.samples import Counts, Source
+from study.devices.accelerometer.samples import PacketCounts, SampleSource
+from study.devices.accelerometer.tick_resampling import HALF_LENGTH_PERIODS, ResampledValues, fit_and_resample
 from study.devices.rig import SensedAcceleration
 from study.errors import DeviceError
 from study.session.facts.sensor_facts import SensorFacts
@@ -41,9 +41,9 @@ class Accelerometer:
     raw_range: lowest and highest raw value; a sample at or beyond either counts as clipped. The constructor starts the
     thread that reads the source."""
 
-    def __init__(self, source: Source, calibration: Calibration, raw_range: tuple[float, float]) -> None:
+    def __init__(self, source: SampleSource, calibration: Calibration, raw_range: tuple[float, float]) -> None:
         self._source, self._calibration, self._raw_range_limits = source, calibration, raw_range
-        self._history = History()
+        self._history = SampleHistory()
         self._newest = NewestSample()
         self._rest_mps2 = np.zeros(3)
         self._closed = threading.Event()
@@ -51,7 +51,7 @@ class Accelerometer:
         self._thread.start()
 
     @property
-    def counts(self) -> Counts:
+    def counts(self) -> PacketCounts:
         """Packets and lost packets since the source was opened."""
         return self._source.counts
 
@@ -63,7 +63,7 @@ class Accelerometer:
         rest_counts = self._history.select_interval(start_s, time.monotonic()).raw
         if not len(rest_counts):
             raise make_silence_error(seconds, self.counts.spoiled_bytes)
-        self._rest_mps2 = self._calibration.acceleration(rest_counts.mean(axis=0))
+        self._rest_mps2 = self._calibration.to_acceleration(rest_counts.mean(axis=0))
         self._newest.set_rest(self._rest_mps2)
 
     @property
@@ -81,7 +81,7 @@ class Accelerometer:
         samples after the last tick have arrived. Without ticks: no accelerations, and facts about the samples since
         since_s."""
         if len(tick_s):
-            time.sleep(max(0.0, tick_s[-1] + HALF_PERIODS / rate_hz + LATENESS_S - time.monotonic()))
+            time.sleep(max(0.0, tick_s[-1] + HALF_LENGTH_PERIODS / rate_hz + LATENESS_S - time.monotonic()))
         resampled = self._resample_to_ticks(tick_s, rate_hz) if len(tick_s) else ResampledValues(np.zeros((0, 3)), None)
         packet_counts = self._history.count_since(since_s)
         return SensedAcceleration(resampled.values, _make_sensor_facts(packet_counts, resampled.values, resampled.fit))
@@ -92,7 +92,7 @@ class Accelerometer:
         now_s = time.monotonic()
         interval = self._history.select_interval(now_s - seconds, now_s)
         noise_mps2 = (
-            self._calibration.acceleration(interval.raw).std(axis=0) if len(interval.raw) else np.full(3, np.nan)
+            self._calibration.to_acceleration(interval.raw).std(axis=0) if len(interval.raw) else np.full(3, np.nan)
         )
         fit = self._resample_to_ticks(np.array([now_s]), 1000.0).fit
         return (
@@ -112,7 +112,7 @@ class Accelerometer:
         """Accelerations at the ticks (m/s², less the reading at rest), and the fit of the clock. tick_s: at least one,
         s, by the monotonic clock; rate_hz: of the ticks."""
         interval = self._history.select_interval(tick_s[0] - CLOCK_FIT_S, time.monotonic())
-        accelerations_mps2 = self._calibration.acceleration(interval.raw) - self._rest_mps2
+        accelerations_mps2 = self._calibration.to_acceleration(interval.raw) - self._rest_mps2
         return fit_and_resample(interval, accelerations_mps2, tick_s, rate_hz)
 
     def _read(self) -> None:
@@ -126,7 +126,7 @@ class Accelerometer:
                         (samples.raw <= self._raw_range_limits[0]).any()
                         or (samples.raw >= self._raw_range_limits[1]).any()
                     )
-                    acceleration_mps2 = self._calibration.acceleration(samples.raw[-1].astype(float))
+                    acceleration_mps2 = self._calibration.to_acceleration(samples.raw[-1].astype(float))
                     self._newest.add_sample(arrived_s, acceleration_mps2, clipped)
                     self._history.add(samples, arrived_s, self._source.counts)
 
@@ -143,7 +143,7 @@ def make_silence_error(seconds: float, spoiled_bytes: int) -> DeviceError:
     )
 
 
-def _make_sensor_facts(counts: Counts, resampled: FloatArray, fit: ClockFit | None) -> SensorFacts:
+def _make_sensor_facts(counts: PacketCounts, resampled: FloatArray, fit: ClockFit | None) -> SensorFacts:
     """Facts for the log. counts: of the source; resampled: accelerations at the ticks, (k, 3), NaN where unknown; fit:
     of the sensor's clock."""
     return SensorFacts(

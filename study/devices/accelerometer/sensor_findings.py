@@ -1,13 +1,14 @@
 """Findings of `hapteq doctor` about an accelerometer at rest: sample rate, lost packets, clock drift and delay, noise.
 
-The findings are warnings: none of them prevents the use of a device. Each says what to do.
+Called by `study.devices.force_dimension.findings`. A finding out of its limits is a warning with a remedy: none
+prevents the use of a device. The limits are chosen; their docstrings state the typical values.
 """
 
 import time
 
 from study.devices.accelerometer.sensor import Accelerometer
 from study.session.facts.sensor_facts import SensorFacts
-from study.session.views.views import DeviceFinding
+from study.session.views.participant_views import DeviceFinding
 
 MEASUREMENT_S = 3.0
 """Time (s) for which the sensor is read; it determines the drift of its clock to about 50 ppm."""
@@ -24,33 +25,33 @@ MAX_DRIFT_PPM = 500.0
 varies."""
 
 MAX_DELAY_S = 0.05
-"""Longest accepted delay of a packet (s): a longer delay makes the newest sample too old for the current tick of the
-control loop."""
+"""Longest accepted delay of a packet (s), equal to the age from which the control loop treats the newest sample as
+missing (`newest_sample.MAX_AGE_S`)."""
 
 MAX_NOISE_MPS2 = 0.3
 """Largest accepted rms noise of an axis (m/s²). An ADXL335 with a 500 Hz low-pass has 0.04 (x, y) and 0.08 (z)."""
 
 
 def check_sensor(sensor: Accelerometer) -> tuple[DeviceFinding, ...]:
-    """Read the sensor for `MEASUREMENT_S` and judge it. The handle must be at rest."""
+    """Measure the sensor for `MEASUREMENT_S` and compare with the limits. The handle must be at rest."""
     time.sleep(MEASUREMENT_S)
     facts, noise_mps2, rate_hz = sensor.measure_rest(MEASUREMENT_S)
     return (
         _check_rate(rate_hz),
         _check_losses(facts),
         _check_clock(facts),
-        _check_noise([float(axis) for axis in noise_mps2]),
+        _check_noise([float(axis_noise) for axis_noise in noise_mps2]),
     )
 
 
 def _check_rate(rate_hz: float) -> DeviceFinding:
-    """Finding on the sample rate (Hz)."""
+    """Check the sample rate (Hz)."""
     advice = "At least 2000 are wanted: make PERIOD_US in the firmware smaller (docs/firmware/accelerometer.ino)."
     return _make_finding("Sensor rate", f"{rate_hz:.0f} samples per second", rate_hz >= MIN_RATE_HZ, advice)
 
 
 def _check_losses(facts: SensorFacts) -> DeviceFinding:
-    """Finding on lost packets and restarts of the board."""
+    """Check the share of lost packets, and that the board did not restart."""
     packet_count = facts.packets + facts.lost
     value = (
         f"{facts.lost} of {packet_count} packets lost, torn or garbled, {facts.spoiled_bytes} bytes that were no packet"
@@ -65,7 +66,7 @@ def _check_losses(facts: SensorFacts) -> DeviceFinding:
 
 
 def _check_clock(facts: SensorFacts) -> DeviceFinding:
-    """Finding on the drift of the sensor's clock and on the longest delay of a packet."""
+    """Check the drift of the sensor's clock and the longest delay of a packet; a warning where no clock was fitted."""
     if facts.drift_ppm is None or facts.longest_delay_s is None:
         advice = "Without it no sample can be put on a tick: close other programs that read this line, then try again."
         return _make_finding("Sensor clock", "it could not be fitted to this computer's", False, advice)
@@ -84,12 +85,12 @@ def _check_clock(facts: SensorFacts) -> DeviceFinding:
 
 
 def _check_noise(noise_mps2: list[float]) -> DeviceFinding:
-    """Finding on the noise of each axis (m/s² rms); exactly zero is a channel without a signal."""
-    value = f"{', '.join(f'{axis:.3f}' for axis in noise_mps2)} m/s² rms at rest (x, y, z)"
+    """Check the noise of the three axes (m/s² rms); exactly zero means a channel without a signal, NaN no samples."""
+    value = f"{', '.join(f'{axis_noise:.3f}' for axis_noise in noise_mps2)} m/s² rms at rest (x, y, z)"
     advice = (
         "Let go of the handle and check again. If the noise persists: check the sensor's capacitors, cable and supply."
     )
-    if any(axis == 0.0 for axis in noise_mps2):
+    if any(axis_noise == 0.0 for axis_noise in noise_mps2):
         value, advice = (
             f"{value}: a channel does not move at all",
             "Check its wire: it does not reach the board's input.",
@@ -100,5 +101,5 @@ def _check_noise(noise_mps2: list[float]) -> DeviceFinding:
 
 
 def _make_finding(name: str, value: str, is_ok: bool, advice: str) -> DeviceFinding:
-    """A finding; a warning with advice unless `is_ok`."""
+    """Make a finding; a warning with advice unless `is_ok`."""
     return DeviceFinding(name, value, is_ok, "" if is_ok else advice, warning=not is_ok)

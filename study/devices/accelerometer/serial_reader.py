@@ -8,7 +8,7 @@ import time
 from typing import Any, Protocol
 
 from study.devices.accelerometer.parser import PacketParser
-from study.devices.accelerometer.samples import Counts, Samples
+from study.devices.accelerometer.samples import PacketCounts, Samples
 from study.errors import DeviceError
 
 READ_BYTES = 4096
@@ -37,7 +37,7 @@ class SerialSource:
         self._port, self._parser = port, PacketParser()
 
     @property
-    def counts(self) -> Counts:
+    def counts(self) -> PacketCounts:
         """Packets received and lost since the line was opened."""
         return self._parser.counts
 

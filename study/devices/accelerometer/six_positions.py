@@ -11,9 +11,9 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, Calibration, calibrate
-from study.devices.accelerometer.samples import Source
+from study.devices.accelerometer.samples import SampleSource
 from study.devices.accelerometer.sensor import make_silence_error
-from study.devices.accelerometer.sources import open_source, reads_volts
+from study.devices.accelerometer.sources import has_volt_samples, open_source
 from study.errors import DeviceError
 
 AwaitPosition = Callable[[str, tuple[float, float, float] | None], None]
@@ -57,7 +57,7 @@ def format_calibration_toml(calibration: Calibration, path: str, baud: int) -> s
     half_range = np.abs(calibration.sensitivity).sum(axis=1) * RANGE_G * GRAVITY_MPS2
     lowest, highest = float((calibration.bias - half_range).min()), float((calibration.bias + half_range).max())
     count_range = f"[{max(0, round(lowest))}, {min(65_535, round(highest))}]"
-    raw_range = _format_toml_numbers(np.array([lowest, highest])) if reads_volts(path) else count_range
+    raw_range = _format_toml_numbers(np.array([lowest, highest])) if has_volt_samples(path) else count_range
     rows = ", ".join(_format_toml_numbers(row) for row in calibration.sensitivity)
     noise = ", ".join(f"{value:.3f}" for value in calibration.noise_mps2)
     return "\n".join(
@@ -74,7 +74,7 @@ def format_calibration_toml(calibration: Calibration, path: str, baud: int) -> s
     )
 
 
-def _record_positions(source: Source, await_position: AwaitPosition, rest_s: float) -> tuple[FloatArray, ...]:
+def _record_positions(source: SampleSource, await_position: AwaitPosition, rest_s: float) -> tuple[FloatArray, ...]:
     """Raw samples, (n, 3) for each of `POSITIONS`; rest_s: time per position (s)."""
     recordings: list[FloatArray] = []
     for position in POSITIONS:
@@ -84,7 +84,7 @@ def _record_positions(source: Source, await_position: AwaitPosition, rest_s: flo
     return tuple(recordings)
 
 
-def _record_position(source: Source, rest_s: float) -> FloatArray:
+def _record_position(source: SampleSource, rest_s: float) -> FloatArray:
     """Raw samples (n, 3) of one position, recorded for rest_s (s). Raises `DeviceError` where fewer than two arrive."""
     settled_at_s = time.monotonic() + SETTLE_S
     now_s, sample_count = time.monotonic(), 0

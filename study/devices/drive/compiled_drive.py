@@ -13,7 +13,7 @@ from typing import Any
 from numba import njit, types
 
 from equalizer.signals.signal import FloatArray
-from study.devices.governor.cells import IDLE, LATE, LATEST_S, PHASE, STAMP_S
+from study.devices.governor.cells import IDLE, LATE, LATEST_S, PHASE, READING_TIME_S
 from study.devices.governor.compiling import fingerprint, njit_inline
 from study.devices.governor.govern import (
     MATRIX_TYPE,
@@ -89,7 +89,7 @@ def _run_tick(  # noqa: PLR0913 - compiled code takes function pointers one by o
     if flags[RIG_GONE] != 0.0:
         return FINISHED
     if flags[STAMPS] != 0.0:
-        state[STAMP_S] = read_clock_s(calls)
+        state[READING_TIME_S] = read_clock_s(calls)
     flags[DECIDING] = 1.0
     is_finished = govern(state, settings, loop, buffer, reading, force)
     flags[WRITING] = 1.0

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from study.session.views.views import DeviceFinding
+from study.session.views.participant_views import DeviceFinding
 
 PRIORITY = 40
 """Real-time priority of the loop's thread under SCHED_FIFO of Linux, 1 to 99: below interrupt threads (50)."""

@@ -216,7 +216,7 @@ class SteppedRunner:
         if self._is_rig_gone:
             return True
         if self._now_s is not None:
-            governor.state[cells.STAMP_S] = self._now_s()
+            governor.state[cells.READING_TIME_S] = self._now_s()
         self.loop_state[DECIDING] = 1.0
         is_finished = govern.tick(
             governor.state, governor.settings, governor.loop, governor.buffer, reading, governor.force

@@ -7,11 +7,16 @@ after `open_model`, closing is the caller's task. Called by `rigs` (sessions), `
 
 import os
 
+from study.devices.force_dimension.device_models import DeviceModel, find_model_key
 from study.devices.force_dimension.handle import Handle
 from study.devices.force_dimension.library import DEVICE_IN_USE, Library, LibraryError
-from study.devices.force_dimension.locate import Computer, describe_this_computer, find_library, list_library_patterns
-from study.devices.force_dimension.models import DeviceModel, name_of_type
-from study.devices.force_dimension.usb import ADVICE, find_usb_devices
+from study.devices.force_dimension.locate_library import (
+    Computer,
+    describe_this_computer,
+    find_library,
+    list_library_patterns,
+)
+from study.devices.force_dimension.usb import PERMISSION_ADVICE, find_usb_devices
 from study.errors import DeviceError
 
 WATCHDOG_S = 0.03
@@ -54,7 +59,7 @@ def open_model(library: Library, model: DeviceModel) -> Handle:
             system_type = handle.read_system_type()
             if system_type in model.system_types:
                 return handle
-            other_devices.append((handle.read_system_name(), name_of_type(system_type)))
+            other_devices.append((handle.read_system_name(), find_model_key(system_type)))
         except LibraryError as error:
             failures.append(error)
         except BaseException:
@@ -141,7 +146,7 @@ def _make_missing_device_error(
     if other_devices:
         return _make_other_models_error(model, other_devices)
     if any(not device.may_open for device in find_usb_devices() or ()):
-        return DeviceError(title, "A device is plugged in, and this account may not open it.", ADVICE)
+        return DeviceError(title, "A device is plugged in, and this account may not open it.", PERMISSION_ADVICE)
     if failures:
         return DeviceError(
             title, f"A device is there and cannot be opened: {failures[0]}.", "Switch it off and on, then try again."

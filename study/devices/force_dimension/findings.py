@@ -10,15 +10,15 @@ import time
 from study.devices.accelerometer.sensor_findings import check_sensor
 from study.devices.drive.real_time_class import check_real_time_rights
 from study.devices.force_dimension.connect import CALIBRATION_ADVICE, load_library, make_ready, open_model
+from study.devices.force_dimension.device_models import MODELS, DeviceModel
 from study.devices.force_dimension.handle import Handle
 from study.devices.force_dimension.lab import LabSettings, locate_lab_file, read_lab
 from study.devices.force_dimension.library import Library, LibraryError
-from study.devices.force_dimension.models import MODELS, DeviceModel
 from study.devices.force_dimension.rigs import read_info
-from study.devices.force_dimension.usb import ADVICE, find_usb_devices
+from study.devices.force_dimension.usb import PERMISSION_ADVICE, find_usb_devices
 from study.devices.force_dimension.watchdog_check import check_watchdog
 from study.errors import DeviceError
-from study.session.views.views import DeviceFinding
+from study.session.views.participant_views import DeviceFinding
 
 CAP_N = 1.0
 """Force cap set in the library during the examination (N). Only zero forces are sent; the cap protects against an error
@@ -107,7 +107,9 @@ def _check_usb() -> list[DeviceFinding]:
     return [
         DeviceFinding("USB", device.product, fine=True)
         if device.may_open
-        else DeviceFinding("USB", f"{device.product}: this account may not open it", fine=False, advice=ADVICE)
+        else DeviceFinding(
+            "USB", f"{device.product}: this account may not open it", fine=False, advice=PERMISSION_ADVICE
+        )
         for device in find_usb_devices() or ()
     ]
 

@@ -17,10 +17,10 @@ from equalizer.linkage.calibration import LinkageReading
 from equalizer.signals.signal import FloatArray
 from study.devices.device import DeviceInfo
 from study.devices.force_dimension.connect import CALIBRATION_ADVICE, load_library, make_device_error, open_model
+from study.devices.force_dimension.device_models import MODELS, DeviceModel
 from study.devices.force_dimension.handle import Handle
 from study.devices.force_dimension.lab import read_lab
 from study.devices.force_dimension.library import GEOMETRY_ERROR, LibraryError
-from study.devices.force_dimension.models import MODELS, DeviceModel
 from study.devices.force_dimension.rigs import read_info
 from study.errors import DeviceError
 

@@ -13,10 +13,10 @@ from study.devices.accelerometer.sensor import Accelerometer
 from study.devices.device import DeviceInfo, DeviceSettings
 from study.devices.force_dimension.acceptance import check_accepted
 from study.devices.force_dimension.connect import load_library, make_device_error, make_ready, open_model
+from study.devices.force_dimension.device_models import MODELS, DeviceModel
 from study.devices.force_dimension.handle import UNKNOWN_SERIAL, Handle
 from study.devices.force_dimension.lab import LabSettings, read_lab
 from study.devices.force_dimension.library import Library, LibraryError
-from study.devices.force_dimension.models import MODELS, DeviceModel
 from study.devices.force_dimension.rig import ForceDimensionRig
 from study.devices.force_dimension.watchdog_check import check_watchdog
 from study.errors import DeviceError

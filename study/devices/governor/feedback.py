@@ -12,19 +12,19 @@ from equalizer.signals.signal import FloatArray
 from study.devices.governor.cells import (
     CENTRE_X,
     DAMPING,
-    EASE_TICKS,
-    EASED,
-    ELAPSED,
+    ELAPSED_TICKS,
     FEEDBACK_CAP,
     FEEDBACK_CLIPPED,
+    FEEDBACK_FORCE,
+    FEEDBACK_REDUCTION,
     FRICTION,
     LAST_POSITION,
-    PULL,
+    REDUCTION_TICKS,
     STIFFNESS,
     TICK_S,
-    UNCHANGED,
+    UNCHANGED_TICKS,
     VELOCITY,
-    VELOCITY_SHARE,
+    VELOCITY_SMOOTHING,
 )
 from study.devices.governor.compiling import njit_inline
 from study.devices.governor.confine import EXCESS_FACTOR, compute_limiting_factor, compute_norm
@@ -34,8 +34,8 @@ from study.devices.governor.confine import EXCESS_FACTOR, compute_limiting_facto
 def _track_velocity(state: FloatArray, settings: FloatArray, reading: FloatArray) -> None:
     """First-order low-pass filter of the velocity (m/s): v += share (dx/dt - v) per tick. It uses the time that
     actually passed since the last tick, so that its corner frequency stays the same when ticks are late."""
-    elapsed = state[ELAPSED]
-    share = settings[VELOCITY_SHARE]
+    elapsed = state[ELAPSED_TICKS]
+    share = settings[VELOCITY_SMOOTHING]
     if elapsed != 1.0:
         share = 1.0 - (1.0 - share) ** elapsed
     for i in range(3):
@@ -46,20 +46,20 @@ def _track_velocity(state: FloatArray, settings: FloatArray, reading: FloatArray
 
 @njit_inline
 def _ease_feedback(state: FloatArray, settings: FloatArray) -> None:
-    """Reduce the feedback force slowly while the position reading does not change (UNCHANGED, by `plausibility`).
+    """Reduce the feedback force slowly while the position reading does not change (UNCHANGED_TICKS, by `plausibility`).
 
     A handle that dry friction holds at rest looks like a frozen encoder. With the force reduced, a real handle moves
     and shows that the encoder works; an encoder whose reading still does not change is reported as stale. The reduction
     stays until the end of the hold.
     """
-    if state[UNCHANGED] >= settings[EASE_TICKS] and state[PULL] > settings[FRICTION]:
-        state[EASED] = min(1.0, state[EASED] + 1.0 / settings[EASE_TICKS])
+    if state[UNCHANGED_TICKS] >= settings[REDUCTION_TICKS] and state[FEEDBACK_FORCE] > settings[FRICTION]:
+        state[FEEDBACK_REDUCTION] = min(1.0, state[FEEDBACK_REDUCTION] + 1.0 / settings[REDUCTION_TICKS])
 
 
 @njit_inline
 def add_feedback(state: FloatArray, settings: FloatArray, reading: FloatArray, gain: float, force: FloatArray) -> None:
     """Add spring and damper to `force` (3,), N, each and their sum limited to FEEDBACK_CAP. gain: 0 to 1, the ramp at
-    the start and end of a hold. PULL (N) is their magnitude before `_ease_feedback` reduces it."""
+    the start and end of a hold. FEEDBACK_FORCE (N) is their magnitude before `_ease_feedback` reduces it."""
     _track_velocity(state, settings, reading)
     cap, stiffness, damping = settings[FEEDBACK_CAP], settings[STIFFNESS], settings[DAMPING]
     x = stiffness * (reading[0] - settings[CENTRE_X])
@@ -75,9 +75,9 @@ def add_feedback(state: FloatArray, settings: FloatArray, reading: FloatArray, g
     )
     total_norm = compute_norm(x, y, z)
     total_factor = compute_limiting_factor(total_norm, cap)
-    state[PULL] = abs(gain) * total_factor * total_norm
+    state[FEEDBACK_FORCE] = abs(gain) * total_factor * total_norm
     _ease_feedback(state, settings)
-    share = gain * (1.0 - state[EASED])
+    share = gain * (1.0 - state[FEEDBACK_REDUCTION])
     force[0] -= share * (total_factor * x)
     force[1] -= share * (total_factor * y)
     force[2] -= share * (total_factor * z)

@@ -29,12 +29,12 @@ from study.devices.rig import SENSOR_CLIPPED
 # isort: off
 # fmt: off
 from study.devices.governor.cells import (
-    ELAPSED, EXCITATION, FADE_IN, FADE_OUT, FAULT, FORCE, HELD_TOO_LONG, LAST_POSITION, LAST_SIGN, ONSET_TICKS, LENGTH,
-    LETTING_GO, LET_GO_ASKED, LET_GO_AT, LET_GO_FROM, LET_GO_TICKS, LONGEST, MISSED, NOT_A_NUMBER, NO_FAULT, PEAK,
-    PHASE, PLAYING, RAISED_COSINE, READ_AT, READ_AT_S, RECORDED, RECORD_FROM, RELEASED_AT, RELEASE_ASKED,
-    RELEASING, SENSOR_CLIPS, SIGN_OF_LIFE, SLEW_LIMITED, SLEW_STEP, SPRING_GAIN, SPRING_RAMP, STALLED, STAMP_S,
-    START, IDLE, STIMULUS_CAP, STIMULUS_CLIPPED, STIMULUS_GAIN, STOPPED, STOP_ASKED, TICK, TICKS, TICK_S,
-    TOTAL_CAP, TOTAL_CLIPPED, WATCHDOG_TICKS,
+    ELAPSED_TICKS, EXCITATION, FADE_IN, FADE_OUT, FAULT, FIRST_TICK, FORCE, HELD_TOO_LONG, IDLE, KEEP_ALIVE,
+    LAST_KEEP_ALIVE_TICK, LAST_POSITION, LAST_READING_TICK, LAST_READING_TIME_S, LENGTH, LETTING_GO, LET_GO_FORCE,
+    LET_GO_REQUEST, LET_GO_START, LET_GO_TICKS, LONGEST_HOLD, MISSED, NOT_A_NUMBER, NO_FAULT, ONSET_TICKS, PEAK_FORCE,
+    PHASE, PLAYING, RAISED_COSINE, READING_TIME_S, RECORDED_ROWS, RECORD_FROM, RELEASE_REQUEST, RELEASE_START,
+    RELEASING, SENSOR_CLIPS, SLEW_LIMITED, SLEW_STEP, SPRING_GAIN, SPRING_RAMP, STALLED, STIMULUS_CAP, STIMULUS_CLIPPED,
+    STIMULUS_GAIN, STOPPED, STOP_REQUEST, TICK, TICKS, TICK_S, TOTAL_CAP, TOTAL_CLIPPED, WATCHDOG_TICKS,
 )
 # fmt: on
 # isort: on
@@ -58,9 +58,9 @@ MISSED_TICKS_SIGNATURE = types.void(VECTOR_TYPE, MATRIX_TYPE, VECTOR_TYPE, types
 def _start_safety_fade(state: FloatArray, fault: int) -> None:
     """Begin the fade of the last force to zero, which needs neither sensor nor program. The first fault is kept."""
     state[PHASE] = LETTING_GO
-    state[LET_GO_AT] = state[TICK]
+    state[LET_GO_START] = state[TICK]
     for i in range(3):
-        state[LET_GO_FROM + i] = state[FORCE + i]
+        state[LET_GO_FORCE + i] = state[FORCE + i]
     if state[FAULT] == NO_FAULT:
         state[FAULT] = fault
 
@@ -69,15 +69,15 @@ def _start_safety_fade(state: FloatArray, fault: int) -> None:
 def _update_phase_while_playing(state: FloatArray, settings: FloatArray) -> None:
     """End the stimulus: by request, at its length, without a sign of life (watchdog), or after the longest time."""
     tick = state[TICK]
-    if state[SIGN_OF_LIFE] != 0.0:
-        state[SIGN_OF_LIFE] = 0.0
-        state[LAST_SIGN] = tick
-    if state[RELEASE_ASKED] != 0.0 or tick >= state[LENGTH]:
+    if state[KEEP_ALIVE] != 0.0:
+        state[KEEP_ALIVE] = 0.0
+        state[LAST_KEEP_ALIVE_TICK] = tick
+    if state[RELEASE_REQUEST] != 0.0 or tick >= state[LENGTH]:
         state[PHASE] = RELEASING
-        state[RELEASED_AT] = tick
-    elif tick - state[LAST_SIGN] > settings[WATCHDOG_TICKS]:
+        state[RELEASE_START] = tick
+    elif tick - state[LAST_KEEP_ALIVE_TICK] > settings[WATCHDOG_TICKS]:
         _start_safety_fade(state, STALLED)
-    elif tick >= state[LONGEST]:
+    elif tick >= state[LONGEST_HOLD]:
         _start_safety_fade(state, HELD_TOO_LONG)
 
 
@@ -85,15 +85,15 @@ def _update_phase_while_playing(state: FloatArray, settings: FloatArray) -> None
 def _update_phase(state: FloatArray, settings: FloatArray) -> None:
     """Change the phase by requests (stop before let-go before release) and by time."""
     phase = state[PHASE]
-    if state[STOP_ASKED] != 0.0:
+    if state[STOP_REQUEST] != 0.0:
         if phase != IDLE and state[FAULT] == NO_FAULT:
             state[FAULT] = STOPPED
         state[PHASE] = IDLE
-    elif state[LET_GO_ASKED] != 0.0 and phase in (PLAYING, RELEASING):
+    elif state[LET_GO_REQUEST] != 0.0 and phase in (PLAYING, RELEASING):
         _start_safety_fade(state, NO_FAULT)
     elif phase == PLAYING:
         _update_phase_while_playing(state, settings)
-    elif phase == RELEASING and state[TICK] - state[RELEASED_AT] > state[FADE_OUT]:
+    elif phase == RELEASING and state[TICK] - state[RELEASE_START] > state[FADE_OUT]:
         if state[FORCE] == 0.0 and state[FORCE + 1] == 0.0 and state[FORCE + 2] == 0.0:
             state[PHASE] = IDLE
         else:
@@ -120,20 +120,20 @@ def _compute_gains(state: FloatArray) -> tuple[float, float]:
     tick, raised_cosine = state[TICK], state[RAISED_COSINE]
     if state[PHASE] == PLAYING:
         state[STIMULUS_GAIN] = _compute_fade_gain(tick, state[FADE_IN], raised_cosine)
-        state[SPRING_GAIN] = _compute_fade_gain(tick - state[START], state[SPRING_RAMP], raised_cosine)
+        state[SPRING_GAIN] = _compute_fade_gain(tick - state[FIRST_TICK], state[SPRING_RAMP], raised_cosine)
         return state[STIMULUS_GAIN], state[SPRING_GAIN]
-    remaining_gain = 1.0 - _compute_fade_gain(tick - state[RELEASED_AT], state[FADE_OUT], raised_cosine)
+    remaining_gain = 1.0 - _compute_fade_gain(tick - state[RELEASE_START], state[FADE_OUT], raised_cosine)
     return remaining_gain * state[STIMULUS_GAIN], remaining_gain * state[SPRING_GAIN]
 
 
 @njit_inline
 def _update_elapsed(state: FloatArray, settings: FloatArray) -> None:
     """Set the time since the last reading (ticks); by the time stamps of the readings where there are any."""
-    elapsed_ticks = state[TICK] - state[READ_AT]
-    if state[STAMP_S] > 0.0 and state[READ_AT_S] > 0.0:
-        elapsed_ticks = (state[STAMP_S] - state[READ_AT_S]) / settings[TICK_S]
-    state[ELAPSED] = elapsed_ticks if elapsed_ticks > MIN_ELAPSED_TICKS else MIN_ELAPSED_TICKS
-    state[READ_AT], state[READ_AT_S] = state[TICK], state[STAMP_S]
+    elapsed_ticks = state[TICK] - state[LAST_READING_TICK]
+    if state[READING_TIME_S] > 0.0 and state[LAST_READING_TIME_S] > 0.0:
+        elapsed_ticks = (state[READING_TIME_S] - state[LAST_READING_TIME_S]) / settings[TICK_S]
+    state[ELAPSED_TICKS] = elapsed_ticks if elapsed_ticks > MIN_ELAPSED_TICKS else MIN_ELAPSED_TICKS
+    state[LAST_READING_TICK], state[LAST_READING_TIME_S] = state[TICK], state[READING_TIME_S]
 
 
 @njit_inline
@@ -185,9 +185,9 @@ def _compute_force(
 def _apply_safety_fade(state: FloatArray, settings: FloatArray, force: FloatArray) -> None:
     """Fill force (3,), N, during the safety fade: the last force before it, reduced linearly to zero within
     LET_GO_TICKS ticks. At zero the phase becomes IDLE."""
-    remaining_gain = 1.0 - (state[TICK] - state[LET_GO_AT] + 1.0) / settings[LET_GO_TICKS]
+    remaining_gain = 1.0 - (state[TICK] - state[LET_GO_START] + 1.0) / settings[LET_GO_TICKS]
     for i in range(3):
-        force[i] = max(remaining_gain, 0.0) * state[LET_GO_FROM + i]
+        force[i] = max(remaining_gain, 0.0) * state[LET_GO_FORCE + i]
     if remaining_gain <= 0.0:
         state[PHASE] = IDLE
 
@@ -197,13 +197,13 @@ def _record_row(state: FloatArray, buffer: FloatArray, reading: FloatArray) -> N
     """Write command, excitation and reading of a tick of the recorded part into the recording ring, in place of the
     oldest row; do nothing outside of it."""
     if state[PHASE] == PLAYING and state[RECORD_FROM] <= state[TICK] < state[LENGTH]:
-        row = int(state[RECORDED]) % buffer.shape[0]
+        row = int(state[RECORDED_ROWS]) % buffer.shape[0]
         for i in range(3):
             buffer[row, i] = state[FORCE + i]
             buffer[row, 3 + i] = state[EXCITATION + i]
         for i in range(9):
             buffer[row, 6 + i] = reading[i]
-        state[RECORDED] += 1
+        state[RECORDED_ROWS] += 1
 
 
 def _compile_publish(sources: int) -> Any:
@@ -252,7 +252,7 @@ def _compile_tick(sources: int) -> tuple[Any, Any]:
         confine(force, settings[TOTAL_CAP])
         for i in range(3):
             state[FORCE + i] = force[i]
-        state[PEAK] = max(state[PEAK], compute_norm(force[0], force[1], force[2]))
+        state[PEAK_FORCE] = max(state[PEAK_FORCE], compute_norm(force[0], force[1], force[2]))
         state[SENSOR_CLIPS] += reading[SENSOR_CLIPPED] == 1.0
         state[TICKS] += 1
         _record_row(state, buffer, reading)

@@ -91,7 +91,7 @@ class Governor:
         state[cells.RAISED_COSINE] = stimulus.fade_shape == "raised_cosine"
         state[cells.SPRING_RAMP] = max(fade_in, self.settings[cells.LET_GO_TICKS])
         state[cells.LENGTH] = math.inf
-        state[cells.LONGEST] = self._count_ticks(self._longest_hold_s)
+        state[cells.LONGEST_HOLD] = self._count_ticks(self._longest_hold_s)
         state[cells.RECORD_FROM] = max(fade_in, onset_ticks)
         state[cells.PHASE] = cells.PLAYING
 
@@ -101,39 +101,39 @@ class Governor:
         settle_ticks = self._count_ticks(SETTLE_S)
         self._reset_run(commands.samples, len(commands))
         state = self.state
-        state[cells.START] = state[cells.TICK] = state[cells.LAST_SIGN] = -settle_ticks
+        state[cells.FIRST_TICK] = state[cells.TICK] = state[cells.LAST_KEEP_ALIVE_TICK] = -settle_ticks
         state[cells.FADE_OUT] = self.settings[cells.LET_GO_TICKS]
         state[cells.RAISED_COSINE] = 1.0
         state[cells.SPRING_RAMP] = settle_ticks // 2
         state[cells.LENGTH] = len(commands)
-        state[cells.LONGEST] = math.inf
+        state[cells.LONGEST_HOLD] = math.inf
         state[cells.PHASE] = cells.PLAYING
 
     def set_begin_time(self, now_s: float) -> None:
         """Store the time of the begin (s, by the loop's clock); the first tick is due one tick later."""
-        self.state[cells.BEGAN_S] = now_s
+        self.state[cells.BEGIN_TIME_S] = now_s
 
     def restart_watchdog(self) -> None:
         """Restart the timeout of the safety layer's watchdog, at the next tick. Called for each keep-alive of the
         program."""
-        self.state[cells.SIGN_OF_LIFE] = 1.0
+        self.state[cells.KEEP_ALIVE] = 1.0
 
     def request_release(self) -> None:
         """Request the fade-out that the stimulus specifies."""
-        self.state[cells.RELEASE_ASKED] = 1.0
+        self.state[cells.RELEASE_REQUEST] = 1.0
 
     def request_let_go(self) -> None:
         """Request the safety layer's fade to zero within `release_s`, for any stimulus."""
-        self.state[cells.LET_GO_ASKED] = 1.0
+        self.state[cells.LET_GO_REQUEST] = 1.0
 
     def request_stop(self) -> None:
         """Request the emergency stop: no force from the next tick on. It cannot be undone."""
-        self.state[cells.STOP_ASKED] = 1.0
+        self.state[cells.STOP_REQUEST] = 1.0
 
     @property
     def stop_requested(self) -> bool:
         """Whether `request_stop` was called; it stays True."""
-        return bool(self.state[cells.STOP_ASKED] != 0.0)
+        return bool(self.state[cells.STOP_REQUEST] != 0.0)
 
     def abandon(self, fault: Fault) -> None:
         """End the stimulus at once, without waiting for the loop. The first fault is kept, except that FORCE_LEFT
@@ -165,29 +165,31 @@ class Governor:
             total_clipped=int(state[cells.TOTAL_CLIPPED]),
             slew_limited=int(state[cells.SLEW_LIMITED]),
             sensor_clipped=int(state[cells.SENSOR_CLIPS]),
-            peak_command_n=float(state[cells.PEAK]),
+            peak_command_n=float(state[cells.PEAK_FORCE]),
             late_ticks=int(state[cells.LATE]),
             latest_s=float(state[cells.LATEST_S]),
         )
 
     def copy_rows(self) -> FloatArray:
         """Copy the recorded rows, oldest first, shape (n, cells.ROW_SIZE), n at most the length of the ring."""
-        recorded_count, ring_rows = int(self.state[cells.RECORDED]), len(self.buffer)
+        recorded_count, ring_rows = int(self.state[cells.RECORDED_ROWS]), len(self.buffer)
         row_count = min(recorded_count, ring_rows)
         return self.buffer[np.arange(recorded_count - row_count, recorded_count) % ring_rows]
 
     def compute_row_times(self) -> FloatArray:
         """Times at which the ticks of `copy_rows` were due, (n,), s, by the clock of `set_begin_time`."""
         state, row_count = self.state, len(self.copy_rows())
-        last_tick = state[cells.RECORD_FROM] + state[cells.RECORDED] - 1.0
+        last_tick = state[cells.RECORD_FROM] + state[cells.RECORDED_ROWS] - 1.0
         ticks = last_tick - np.arange(row_count)[::-1]
-        due_s: FloatArray = state[cells.BEGAN_S] + (ticks - state[cells.START] + 1.0) * self.settings[cells.TICK_S]
+        due_s: FloatArray = (
+            state[cells.BEGIN_TIME_S] + (ticks - state[cells.FIRST_TICK] + 1.0) * self.settings[cells.TICK_S]
+        )
         return due_s
 
     @property
     def began_s(self) -> float:
         """Time of the begin of the stimulus (s), by the clock of `set_begin_time`."""
-        return float(self.state[cells.BEGAN_S])
+        return float(self.state[cells.BEGIN_TIME_S])
 
     @property
     def steady(self) -> FloatArray:
@@ -199,7 +201,7 @@ class Governor:
         self.loop = np.array(stimulus_n, order="C")
         self.buffer = np.full((max(rows, 1), cells.ROW_SIZE), np.nan)
         # Never clear the stop request, not even briefly: another thread may be setting it at this moment.
-        self.state[cells.STOP_ASKED + 1 :] = 0.0
+        self.state[cells.STOP_REQUEST + 1 :] = 0.0
         self.state[cells.LAST_POSITION : cells.LAST_POSITION + 3] = np.nan
         self.state[cells.LAST_STEP] = np.nan
 
@@ -227,7 +229,7 @@ def pack_settings(info: DeviceInfo, settings: DeviceSettings) -> FloatArray:
     packed[cells.TICK_S] = 1.0 / rate_hz
     packed[cells.STIFFNESS] = info.effective_mass_kg * (2 * math.pi * settings.spring_frequency_hz) ** 2
     packed[cells.DAMPING] = settings.spring_damping_n_s_per_m
-    packed[cells.VELOCITY_SHARE] = 1.0 - math.exp(-2 * math.pi * VELOCITY_CUTOFF_HZ / rate_hz)
+    packed[cells.VELOCITY_SMOOTHING] = 1.0 - math.exp(-2 * math.pi * VELOCITY_CUTOFF_HZ / rate_hz)
     packed[cells.CENTRE_X : cells.CENTRE_Z + 1] = settings.place_m
     packed[cells.STIMULUS_CAP] = limits.stimulus_cap_n
     packed[cells.FEEDBACK_CAP] = min(limits.feedback_cap_n, limits.total_cap_n)
@@ -244,14 +246,14 @@ def pack_settings(info: DeviceInfo, settings: DeviceSettings) -> FloatArray:
 def _pack_plausibility(packed: FloatArray, bounds: PlausibilitySettings, rate_hz: float) -> None:
     """Write the bounds of plausible position readings (`protocols.definition.plausibility`) into the array `packed`,
     converted to ticks."""
-    packed[cells.WORKSPACE] = bounds.workspace_m
+    packed[cells.WORKSPACE_RADIUS] = bounds.workspace_m
     packed[cells.LONGEST_JUMP] = bounds.longest_jump_m
     packed[cells.FASTEST_STEP] = bounds.fastest_m_per_s / rate_hz
-    packed[cells.ACCELERATION] = bounds.acceleration_mps2
-    packed[cells.ACCELERATION_SHARE] = 1.0 - math.exp(-1.0 / (ACCELERATION_TIME_CONSTANT_S * rate_hz))
-    packed[cells.PASSED_SHARE] = 1.0 - math.exp(-2 * math.pi * MOVING_BELOW_HZ / rate_hz)
+    packed[cells.MAX_ACCELERATION] = bounds.acceleration_mps2
+    packed[cells.ACCELERATION_SMOOTHING] = 1.0 - math.exp(-1.0 / (ACCELERATION_TIME_CONSTANT_S * rate_hz))
+    packed[cells.STIMULUS_SMOOTHING] = 1.0 - math.exp(-2 * math.pi * MOVING_BELOW_HZ / rate_hz)
     packed[cells.RESOLUTION] = bounds.resolution_m
     packed[cells.FRICTION] = bounds.friction_n
     packed[cells.STALE_TICKS] = math.ceil(bounds.stale_s * rate_hz)
     # Half of still_s until the feedback force begins to be reduced at an unchanged reading, half for the reduction.
-    packed[cells.EASE_TICKS] = max(1, math.floor(bounds.still_s * rate_hz / 2))
+    packed[cells.REDUCTION_TICKS] = max(1, math.floor(bounds.still_s * rate_hz / 2))

@@ -10,46 +10,46 @@ import math
 
 from equalizer.signals.signal import FloatArray
 from study.devices.governor.cells import (
-    ACCELERATION,
-    ACCELERATION_SHARE,
+    ACCELERATION_SMOOTHING,
     AXIS_EXPECTED,
     AXIS_FORCE,
     AXIS_HIGH,
     AXIS_LOW,
     AXIS_REFERENCE,
     AXIS_SPEED,
-    AXIS_UNCHANGED,
-    EASED,
-    EASED_BEFORE,
-    ELAPSED,
+    AXIS_UNCHANGED_TICKS,
+    ELAPSED_TICKS,
     EXCITATION,
-    EXPECTED,
+    EXPECTED_POSITION,
     EXPECTED_SPEED,
     FASTEST_STEP,
+    FEEDBACK_FORCE,
+    FEEDBACK_REDUCTION,
     FRICTION,
     JUMPED,
     LAST_POSITION,
     LAST_STEP,
     LONGEST_JUMP,
+    MAX_ACCELERATION,
     MOVING_FORCE,
     NO_FAULT,
     NOT_A_NUMBER,
     OUTSIDE,
-    PASSED,
-    PASSED_SHARE,
-    PASSED_TWICE,
-    PULL,
     RANGE_HIGH,
     RANGE_LOW,
-    REFERENCE,
+    REDUCTION_AT_CHANGE,
+    REFERENCE_POSITION,
     RESOLUTION,
     SHAKEN,
-    SHAKING,
+    SMOOTHED_ACCELERATION,
+    SMOOTHED_STIMULUS,
     STALE,
     STALE_TICKS,
+    STIMULUS_SMOOTHING,
     TICK_S,
-    UNCHANGED,
-    WORKSPACE,
+    TWICE_SMOOTHED_STIMULUS,
+    UNCHANGED_TICKS,
+    WORKSPACE_RADIUS,
 )
 from study.devices.governor.compiling import njit_inline
 from study.devices.governor.confine import compute_norm, is_bounded
@@ -95,18 +95,22 @@ def _expect_motion(state: FloatArray, settings: FloatArray) -> None:
     left out: a hand at rest balances them. Dry friction follows the play operator (Prandtl): the force that moves the
     handle changes only where the stimulus differs from it by more than the friction."""
     for i in range(3):
-        state[PASSED + i] += settings[PASSED_SHARE] * (state[EXCITATION + i] - state[PASSED + i])
-        state[PASSED_TWICE + i] += settings[PASSED_SHARE] * (state[PASSED + i] - state[PASSED_TWICE + i])
-    x = state[PASSED_TWICE] - state[MOVING_FORCE]
-    y = state[PASSED_TWICE + 1] - state[MOVING_FORCE + 1]
-    z = state[PASSED_TWICE + 2] - state[MOVING_FORCE + 2]
+        state[SMOOTHED_STIMULUS + i] += settings[STIMULUS_SMOOTHING] * (
+            state[EXCITATION + i] - state[SMOOTHED_STIMULUS + i]
+        )
+        state[TWICE_SMOOTHED_STIMULUS + i] += settings[STIMULUS_SMOOTHING] * (
+            state[SMOOTHED_STIMULUS + i] - state[TWICE_SMOOTHED_STIMULUS + i]
+        )
+    x = state[TWICE_SMOOTHED_STIMULUS] - state[MOVING_FORCE]
+    y = state[TWICE_SMOOTHED_STIMULUS + 1] - state[MOVING_FORCE + 1]
+    z = state[TWICE_SMOOTHED_STIMULUS + 2] - state[MOVING_FORCE + 2]
     difference_n = compute_norm(x, y, z)
     share = 1.0 - settings[FRICTION] / difference_n if difference_n > settings[FRICTION] else 0.0
     state[MOVING_FORCE] += share * x
     state[MOVING_FORCE + 1] += share * y
     state[MOVING_FORCE + 2] += share * z
     for i in range(3):
-        cell_indices = EXPECTED + i, EXPECTED_SPEED + i, RANGE_LOW + i, RANGE_HIGH + i
+        cell_indices = EXPECTED_POSITION + i, EXPECTED_SPEED + i, RANGE_LOW + i, RANGE_HIGH + i
         _move_gripped(state, settings[TICK_S], state[MOVING_FORCE + i], cell_indices)
 
 
@@ -115,14 +119,16 @@ def _has_changed(state: FloatArray, settings: FloatArray, reading: FloatArray) -
     """Whether the reading differs by half the resolution or more from the reference, the last reading that had changed.
     If so, it becomes the new reference, and the expected range starts anew."""
     distance_m = compute_norm(
-        reading[0] - state[REFERENCE], reading[1] - state[REFERENCE + 1], reading[2] - state[REFERENCE + 2]
+        reading[0] - state[REFERENCE_POSITION],
+        reading[1] - state[REFERENCE_POSITION + 1],
+        reading[2] - state[REFERENCE_POSITION + 2],
     )
     if distance_m < 0.5 * settings[RESOLUTION]:
         return False
     for i in range(3):
-        state[REFERENCE + i] = reading[i]
-        state[RANGE_LOW + i] = state[RANGE_HIGH + i] = state[EXPECTED + i]
-    state[EASED_BEFORE] = state[EASED]
+        state[REFERENCE_POSITION + i] = reading[i]
+        state[RANGE_LOW + i] = state[RANGE_HIGH + i] = state[EXPECTED_POSITION + i]
+    state[REDUCTION_AT_CHANGE] = state[FEEDBACK_REDUCTION]
     return True
 
 
@@ -130,7 +136,7 @@ def _has_changed(state: FloatArray, settings: FloatArray, reading: FloatArray) -
 def _must_have_moved(state: FloatArray, settings: FloatArray, distance_m: float) -> bool:
     """Whether the spring's force has been reduced so far, since the last change, that even a gripped handle must have
     moved by `distance_m` (m): by more than friction + stiffness of the grip * way."""
-    released_n = (state[EASED] - state[EASED_BEFORE]) * state[PULL]
+    released_n = (state[FEEDBACK_REDUCTION] - state[REDUCTION_AT_CHANGE]) * state[FEEDBACK_FORCE]
     return bool(released_n > settings[FRICTION] + GRIPPED_N_PER_M * distance_m)
 
 
@@ -138,9 +144,9 @@ def _must_have_moved(state: FloatArray, settings: FloatArray, distance_m: float)
 def _is_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> bool:
     """Whether the position has not changed for `STALE_TICKS`, although a gripped handle must have moved."""
     if _has_changed(state, settings, reading):
-        state[UNCHANGED] = 0.0
+        state[UNCHANGED_TICKS] = 0.0
         return False
-    state[UNCHANGED] += 1.0
+    state[UNCHANGED_TICKS] += 1.0
     expected = max(
         state[RANGE_HIGH] - state[RANGE_LOW],
         state[RANGE_HIGH + 1] - state[RANGE_LOW + 1],
@@ -148,7 +154,7 @@ def _is_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> b
     )
     distance_m = STEPS_OF_RESOLUTION * settings[RESOLUTION]
     return bool(
-        state[UNCHANGED] >= settings[STALE_TICKS]
+        state[UNCHANGED_TICKS] >= settings[STALE_TICKS]
         and (expected > distance_m or _must_have_moved(state, settings, distance_m))
     )
 
@@ -156,7 +162,7 @@ def _is_stale(state: FloatArray, settings: FloatArray, reading: FloatArray) -> b
 @njit_inline
 def _expect_along_axis(state: FloatArray, settings: FloatArray, i: int) -> None:
     """As `_expect_motion` for axis i by itself, with the full friction on its component of the force."""
-    difference_n = state[PASSED_TWICE + i] - state[AXIS_FORCE + i]
+    difference_n = state[TWICE_SMOOTHED_STIMULUS + i] - state[AXIS_FORCE + i]
     if abs(difference_n) > settings[FRICTION]:
         state[AXIS_FORCE + i] += difference_n - math.copysign(settings[FRICTION], difference_n)
     cell_indices = AXIS_EXPECTED + i, AXIS_SPEED + i, AXIS_LOW + i, AXIS_HIGH + i
@@ -171,15 +177,15 @@ def _is_axis_stale(state: FloatArray, settings: FloatArray, reading: FloatArray)
     for i in range(3):
         _expect_along_axis(state, settings, i)
         if abs(reading[i] - state[AXIS_REFERENCE + i]) >= half_resolution:
-            state[AXIS_REFERENCE + i], state[AXIS_UNCHANGED + i] = reading[i], 0.0
+            state[AXIS_REFERENCE + i], state[AXIS_UNCHANGED_TICKS + i] = reading[i], 0.0
             state[AXIS_LOW + i] = state[AXIS_HIGH + i] = state[AXIS_EXPECTED + i]
             continue
-        state[AXIS_UNCHANGED + i] += 1.0
-        if state[AXIS_UNCHANGED + i] % stretch_ticks != 0.0:
+        state[AXIS_UNCHANGED_TICKS + i] += 1.0
+        if state[AXIS_UNCHANGED_TICKS + i] % stretch_ticks != 0.0:
             continue
         if state[AXIS_HIGH + i] - state[AXIS_LOW + i] <= STEPS_OF_RESOLUTION * settings[RESOLUTION]:
-            state[AXIS_UNCHANGED + i] = 0.0
-        stale = stale or state[AXIS_UNCHANGED + i] >= AXIS_STRETCHES * stretch_ticks
+            state[AXIS_UNCHANGED_TICKS + i] = 0.0
+        stale = stale or state[AXIS_UNCHANGED_TICKS + i] >= AXIS_STRETCHES * stretch_ticks
         state[AXIS_LOW + i] = state[AXIS_HIGH + i] = state[AXIS_EXPECTED + i]
     return stale
 
@@ -193,18 +199,18 @@ def _is_shaken(state: FloatArray, settings: FloatArray, x: float, y: float, z: f
         change = compute_norm(x - last, y - state[LAST_STEP + 1], z - state[LAST_STEP + 2])
         change = max(0.0, change - STEPS_OF_RESOLUTION * settings[RESOLUTION])
         acceleration = change / (settings[TICK_S] * settings[TICK_S])
-        state[SHAKING] += settings[ACCELERATION_SHARE] * (acceleration - state[SHAKING])
+        state[SMOOTHED_ACCELERATION] += settings[ACCELERATION_SMOOTHING] * (acceleration - state[SMOOTHED_ACCELERATION])
     state[LAST_STEP], state[LAST_STEP + 1], state[LAST_STEP + 2] = x, y, z
-    return bool(state[SHAKING] > settings[ACCELERATION])
+    return bool(state[SMOOTHED_ACCELERATION] > settings[MAX_ACCELERATION])
 
 
 @njit_inline
 def fault_of_reading(state: FloatArray, settings: FloatArray, reading: FloatArray) -> int:
     """NO_FAULT, or the code of the fault for which the force must be released. reading: (3,), m. `state` holds the last
-    position and the ticks since then (LAST_POSITION, ELAPSED)."""
+    position and the ticks since then (LAST_POSITION, ELAPSED_TICKS)."""
     if not is_bounded(reading, IMPLAUSIBLE_M):
         return NOT_A_NUMBER
-    if not compute_norm(reading[0], reading[1], reading[2]) <= settings[WORKSPACE]:
+    if not compute_norm(reading[0], reading[1], reading[2]) <= settings[WORKSPACE_RADIUS]:
         return OUTSIDE
     last_x = state[LAST_POSITION]
     if math.isnan(last_x):  # the first reading
@@ -214,7 +220,7 @@ def fault_of_reading(state: FloatArray, settings: FloatArray, reading: FloatArra
         return NO_FAULT
     x, y, z = reading[0] - last_x, reading[1] - state[LAST_POSITION + 1], reading[2] - state[LAST_POSITION + 2]
     # Driver and loop have separate clocks: successive samples of the driver may seem to be less than a tick apart.
-    ticks = max(1.0, state[ELAPSED])
+    ticks = max(1.0, state[ELAPSED_TICKS])
     step_m = compute_norm(x, y, z)
     if not (step_m <= settings[LONGEST_JUMP] and step_m <= settings[FASTEST_STEP] * ticks + settings[RESOLUTION]):
         return JUMPED

@@ -10,13 +10,15 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.governor.cells import (
-    BEGAN_S,
+    BEGIN_TIME_S,
     EXCITATION,
     FAULT,
+    FIRST_TICK,
     FORCE,
     MISSED,
     PHASE,
     PLAYING,
+    READING_TIME_S,
     RELEASING,
     RING_ACCELERATION,
     RING_APPLIED,
@@ -33,8 +35,6 @@ from study.devices.governor.cells import (
     RING_TICK,
     RING_TIME_S,
     RING_VELOCITY,
-    STAMP_S,
-    START,
     TICK,
     TICK_S,
     VELOCITY,
@@ -51,9 +51,9 @@ def write_row(state: FloatArray, settings: FloatArray, ring: FloatArray, reading
     # The excitation and the velocity are computed in these two phases only.
     aims = state[PHASE] in (PLAYING, RELEASING)
     row[RING_INDEX] = count
-    row[RING_TIME_S] = state[STAMP_S]
-    if not state[STAMP_S] > 0.0:
-        row[RING_TIME_S] = state[BEGAN_S] + (state[TICK] - state[START]) * settings[TICK_S]
+    row[RING_TIME_S] = state[READING_TIME_S]
+    if not state[READING_TIME_S] > 0.0:
+        row[RING_TIME_S] = state[BEGIN_TIME_S] + (state[TICK] - state[FIRST_TICK]) * settings[TICK_S]
     row[RING_TICK] = state[TICK] - 1.0
     for i in range(3):
         row[RING_POSITION + i] = reading[i]

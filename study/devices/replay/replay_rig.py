@@ -16,7 +16,7 @@ from numba import njit, types
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
 from study.devices.device import REPLAY, DeviceInfo
-from study.devices.force_dimension.models import MODELS
+from study.devices.force_dimension.device_models import MODELS
 from study.devices.governor.compiling import fingerprint
 from study.devices.rig import ACCELERATION, POSITION, READING_SIZE, SENSOR_CLIPPED, TRUE_ACCELERATION, CompiledRig
 from study.errors import DeviceError, StudyError

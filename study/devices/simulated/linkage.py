@@ -20,7 +20,7 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.devices.simulated.inlined import inlined
-from study.devices.simulated.layout import AZIMUTH, FOREARM, PLATFORM_DEPTH, RADIUS, UPPER_ARM
+from study.devices.simulated.layout import AZIMUTH, FOREARM_LENGTH, PLATFORM_DEPTH, RADIUS_DIFFERENCE, UPPER_ARM_LENGTH
 
 
 @inlined
@@ -31,10 +31,10 @@ def solve_leg(parameters: FloatArray, position: FloatArray, leg: int, angle_grad
     Where the handle is out of reach, which the mechanical stops exclude, the cosine is clipped: the angle is that of an
     upper arm in line with the handle, and the gradient is singular.
     """
-    upper_arm, forearm = parameters[UPPER_ARM], parameters[FOREARM]
+    upper_arm, forearm = parameters[UPPER_ARM_LENGTH], parameters[FOREARM_LENGTH]
     cosine, sine = parameters[AZIMUTH + 2 * leg], parameters[AZIMUTH + 2 * leg + 1]
     depth = position[0] + parameters[PLATFORM_DEPTH]
-    inward = position[1] * cosine + position[2] * sine - parameters[RADIUS]
+    inward = position[1] * cosine + position[2] * sine - parameters[RADIUS_DIFFERENCE]
     lateral = position[2] * cosine - position[1] * sine
     reach = math.sqrt(inward * inward + depth * depth)
     # Law of cosines for the angle between the upper arm and the line from its pivot to the handle, in the leg's plane.
@@ -71,8 +71,8 @@ def solve_forward_kinematics(parameters: FloatArray, angles: FloatArray, positio
     angles: (3,), rad."""
     elbows = np.empty((3, 3))
     for leg in range(3):
-        radial = parameters[RADIUS] + parameters[UPPER_ARM] * math.cos(angles[leg])
-        elbows[leg, 0] = parameters[UPPER_ARM] * math.sin(angles[leg])
+        radial = parameters[RADIUS_DIFFERENCE] + parameters[UPPER_ARM_LENGTH] * math.cos(angles[leg])
+        elbows[leg, 0] = parameters[UPPER_ARM_LENGTH] * math.sin(angles[leg])
         elbows[leg, 1] = radial * parameters[AZIMUTH + 2 * leg]
         elbows[leg, 2] = radial * parameters[AZIMUTH + 2 * leg + 1]
     first_side, second_side, normal = np.empty(3), np.empty(3), np.empty(3)
@@ -87,7 +87,7 @@ def solve_forward_kinematics(parameters: FloatArray, angles: FloatArray, positio
     second_share = 0.5 * g11 * (g22 - g12) / squared_area
     squared_radius = first_share * first_share * g11 + 2.0 * first_share * second_share * g12 + second_share**2 * g22
     # Distance of the handle from the elbows' plane, in units of the normal.
-    height = math.sqrt(max(parameters[FOREARM] ** 2 - squared_radius, 0.0) / squared_area)
+    height = math.sqrt(max(parameters[FOREARM_LENGTH] ** 2 - squared_radius, 0.0) / squared_area)
     if normal[0] < 0.0:
         height = -height
     for axis in range(3):

@@ -12,7 +12,7 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from study.devices.simulated import layout
 from study.devices.simulated.compiled import solve_pose
-from study.devices.simulated.parameters import GRAVITY_M_S2, Linkage, Omega3Parameters, Vector
+from study.devices.simulated.parameters import GRAVITY_MPS2, Linkage, Omega3Parameters, Vector
 
 
 def compute_isotropic_depth_m(linkage: Linkage) -> float:
@@ -48,8 +48,10 @@ def make_rest_state(packed: FloatArray, place_m: Vector) -> FloatArray:
     """The state (layout.STATE_SIZE,) at rest: the handle at place_m, the motors at the corresponding joint angles,
     cables and modes without load. packed: the result of `pack_parameters`."""
     state = np.zeros(layout.STATE_SIZE)
-    _write_elements(state, layout.RELATIVE, place_m)
-    solve_pose(packed, np.array(place_m, dtype=float), state[layout.MOTOR : layout.MOTOR + 3], np.empty((3, 3)))
+    _write_elements(state, layout.HANDLE_POSITION, place_m)
+    solve_pose(
+        packed, np.array(place_m, dtype=float), state[layout.MOTOR_ANGLE : layout.MOTOR_ANGLE + 3], np.empty((3, 3))
+    )
     return state
 
 
@@ -84,9 +86,9 @@ def _compute_low_pass_coefficient(frequency_hz: float) -> float:
 
 def _pack_linkage(packed: FloatArray, parameters: Omega3Parameters) -> None:
     linkage = parameters.linkage
-    packed[layout.UPPER_ARM] = linkage.upper_arm_m
-    packed[layout.FOREARM] = linkage.forearm_m
-    packed[layout.RADIUS] = linkage.radius_m
+    packed[layout.UPPER_ARM_LENGTH] = linkage.upper_arm_m
+    packed[layout.FOREARM_LENGTH] = linkage.forearm_m
+    packed[layout.RADIUS_DIFFERENCE] = linkage.radius_m
     packed[layout.PLATFORM_DEPTH] = compute_isotropic_depth_m(linkage) if linkage.depth_m is None else linkage.depth_m
     azimuths = np.radians(linkage.azimuths_deg)
     _write_elements(packed, layout.AZIMUTH, np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1))
@@ -98,13 +100,13 @@ def _pack_linkage(packed: FloatArray, parameters: Omega3Parameters) -> None:
 
 def _pack_drives(packed: FloatArray, parameters: Omega3Parameters) -> None:
     drives = parameters.drives
-    packed[layout.AMPLIFIER] = _compute_low_pass_coefficient(drives.amplifier_hz)
-    packed[layout.FRICTION] = drives.friction_n_m
-    packed[layout.PRESLIDING] = drives.presliding_rad
+    packed[layout.AMPLIFIER_COEFFICIENT] = _compute_low_pass_coefficient(drives.amplifier_hz)
+    packed[layout.COULOMB_FRICTION] = drives.friction_n_m
+    packed[layout.PRESLIDING_RANGE] = drives.presliding_rad
     packed[layout.DRIVE_DAMPING] = drives.damping_n_m_s
-    packed[layout.COUNT] = 2 * math.pi / drives.counts_per_turn
+    packed[layout.ENCODER_STEP] = 2 * math.pi / drives.counts_per_turn
     stiffness = np.array(drives.cable_n_m_per_rad)
-    _write_elements(packed, layout.CABLE, stiffness)
+    _write_elements(packed, layout.CABLE_STIFFNESS, stiffness)
     damping = 2 * drives.cable_damping_ratio * np.sqrt(stiffness * parameters.masses.drive_kg_m2)
     _write_elements(packed, layout.CABLE_DAMPING, damping)
 
@@ -147,8 +149,8 @@ def _pack_sensor(packed: FloatArray, parameters: Omega3Parameters) -> None:
     rotation = np.array([[1, about_z, -about_y], [-about_z, 1, about_x], [about_y, -about_x, 1]])
     cross_axis = np.array([[1, xy, zx], [xy, 1, yz], [zx, yz, 1]])
     _write_elements(packed, layout.SENSOR_MATRIX, cross_axis @ rotation)
-    packed[layout.SENSOR_POLE] = _compute_low_pass_coefficient(sensor.bandwidth_hz)
+    packed[layout.SENSOR_COEFFICIENT] = _compute_low_pass_coefficient(sensor.bandwidth_hz)
     noise_bandwidth_hz = math.pi / 2 * sensor.bandwidth_hz
     density = np.array(sensor.noise_g_per_rthz)
-    _write_elements(packed, layout.SENSOR_NOISE, density * math.sqrt(noise_bandwidth_hz) * GRAVITY_M_S2)
-    packed[layout.SENSOR_RANGE] = sensor.range_g * GRAVITY_M_S2
+    _write_elements(packed, layout.SENSOR_NOISE, density * math.sqrt(noise_bandwidth_hz) * GRAVITY_MPS2)
+    packed[layout.SENSOR_RANGE] = sensor.range_g * GRAVITY_MPS2

@@ -1,7 +1,8 @@
-"""The single parameter set of the simulated omega.3, the same for all figures; see docs/simulated_omega3.md.
+"""Physical parameters of the simulated omega.3, one set for all figures; see docs/simulated_omega3.md.
 
 No link length, inertia, friction or stiffness of the omega.3 is public. The numbers below describe a device of its
-size. Each has its reason: a source, or the feature of the published measurements for which the number was chosen.
+size. The docstrings state their source, or the feature of the published measurements for which they were chosen.
+`omega3` takes them from here, `packing` converts them to the array of the compiled functions.
 """
 
 from dataclasses import dataclass, field
@@ -9,8 +10,8 @@ from dataclasses import dataclass, field
 Vector = tuple[float, float, float]
 """Three numbers for x, y, z, or for the three legs."""
 
-GRAVITY_M_S2 = 9.81
-"""Acceleration of gravity, and unit g of the accelerometer's data (m/s²)."""
+GRAVITY_MPS2 = 9.81
+"""Acceleration of gravity, rounded, and unit g of the accelerometer's data (m/s²)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +47,8 @@ class Masses:
 
 @dataclass(frozen=True, slots=True)
 class Drives:
-    """The three equal drives: amplifier, motor, capstan and cable; angles and torques about the arm's pivot."""
+    """The three drives, equal but for the cables: amplifier, motor, capstan and cable; angles and torques about the
+    arm's pivot."""
 
     amplifier_hz: float = 600.0
     """Corner frequency of the current loop, a first-order low pass: common for such amplifiers."""
@@ -60,7 +62,7 @@ class Drives:
     """17-22 N/mm at the handle, order of the data sheet's 14.5 N/mm closed loop; the first structural modes then are
     at 80 Hz and above. Unequal, as cables tensioned by hand: this couples the axes at these modes."""
     cable_damping_ratio: float = 0.03
-    """Damping ratio of the inertia of a motor on its cable, with the arm at rest."""
+    """Damping ratio of the inertia of a motor on its cable, with the arm at rest. Assumed."""
     counts_per_turn: float = 64000.0
     """1000 lines, four edges, ratio 16: 8.8 um of motion along one leg's forearm; the data sheet says below 10 um."""
 
@@ -124,7 +126,8 @@ class Accelerometer:
 
 @dataclass(frozen=True, slots=True)
 class Stops:
-    """End stop, a spring and damper beyond a sphere: no force within the radius that CHAI3D states as usable."""
+    """End stop, a spring and damper beyond a sphere: no force within the radius that CHAI3D states as usable. Spring
+    and damper are chosen: 12 N, the largest force, reach 87 mm at most."""
 
     radius_m: float = 0.075
     stiffness_n_per_m: float = 2500.0

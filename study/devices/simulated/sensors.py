@@ -15,16 +15,16 @@ from equalizer.signals.signal import FloatArray
 from study.devices import rig
 from study.devices.simulated.inlined import inlined
 from study.devices.simulated.layout import (
-    COUNT,
-    FILTERED,
-    MOTOR,
+    ENCODER_STEP,
+    FILTERED_ACCELERATION,
+    MOTOR_ANGLE,
     SENSOR_MATRIX,
     SENSOR_NOISE,
     SENSOR_RANGE,
-    TRUE,
+    TRUE_ACCELERATION,
 )
 from study.devices.simulated.linkage import solve_forward_kinematics
-from study.devices.simulated.parameters import GRAVITY_M_S2
+from study.devices.simulated.parameters import GRAVITY_MPS2
 
 _STEP = np.uint64(0x9E3779B97F4A7C15)
 """Increment of the state in SplitMix64; below, the factors and shifts of its output function (the cited paper)."""
@@ -66,13 +66,13 @@ def read_sensors(state: FloatArray, parameters: FloatArray, noise: npt.NDArray[n
     """Fill reading (READING_SIZE,), laid out as in `study.devices.rig`. Advances `noise`; `state` stays. The position
     is the forward kinematics of the motor angles, rounded to whole counts, so it does not show the cables' stretch."""
     angles = np.empty(3)
-    count = parameters[COUNT]
+    count = parameters[ENCODER_STEP]
     for drive in range(3):
-        angles[drive] = count * math.floor(state[MOTOR + drive] / count + 0.5)
+        angles[drive] = count * math.floor(state[MOTOR_ANGLE + drive] / count + 0.5)
     solve_forward_kinematics(parameters, angles, reading[_POSITION:_ACCELERATION])
     reading[rig.SENSOR_CLIPPED] = _read_accelerometer(state, parameters, noise, reading[_ACCELERATION:_TRUE])
     for axis in range(3):
-        reading[_TRUE + axis] = state[TRUE + axis]
+        reading[_TRUE + axis] = state[TRUE_ACCELERATION + axis]
 
 
 @inlined
@@ -86,10 +86,10 @@ def _read_accelerometer(
     clipped = 0.0
     for axis in range(3):
         row = SENSOR_MATRIX + 3 * axis
-        gravity_mps2 = parameters[row + 2] * GRAVITY_M_S2
+        gravity_mps2 = parameters[row + 2] * GRAVITY_MPS2
         force = gravity_mps2 + parameters[SENSOR_NOISE + axis] * channels[axis]
         for column in range(3):
-            force += parameters[row + column] * state[FILTERED + column]
+            force += parameters[row + column] * state[FILTERED_ACCELERATION + column]
         if abs(force) >= limit:
             force = math.copysign(limit, force)
             clipped = 1.0

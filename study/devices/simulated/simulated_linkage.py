@@ -20,7 +20,7 @@ from study.devices.simulated import layout
 from study.devices.simulated.compiled import solve_pose
 from study.devices.simulated.omega3 import NAME, make_omega3_info
 from study.devices.simulated.packing import compute_effective_mass_kg, compute_isotropic_depth_m, pack_parameters
-from study.devices.simulated.parameters import GRAVITY_M_S2, Linkage, Masses, Omega3Parameters
+from study.devices.simulated.parameters import GRAVITY_MPS2, Linkage, Masses, Omega3Parameters
 
 MAX_MISFIT = 0.1
 """Largest accepted relative misfit of Jacobian or inertia; above it, the simulated device would not represent the
@@ -46,7 +46,7 @@ class SimulatedLinkage:
         moving_mass_kg = self._masses.handle_kg + self._masses.forearm_kg
         arm_inertia = self._packed[layout.ARM_INERTIA] + self._packed[layout.DRIVE_INERTIA]
         inertia = moving_mass_kg * np.eye(3) + arm_inertia * rates.T @ rates
-        gravity_force_n = np.array([0.0, 0.0, GRAVITY_M_S2 * moving_mass_kg])
+        gravity_force_n = np.array([0.0, 0.0, GRAVITY_MPS2 * moving_mass_kg])
         jacobian: FloatArray = np.asarray(np.linalg.inv(rates), dtype=np.float64)
         return LinkageReading(np.array(position_m), angles, jacobian, inertia, gravity_force_n)
 

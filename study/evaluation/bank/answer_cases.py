@@ -22,7 +22,7 @@ from typing import Any, cast
 import analysis.diagnosis
 import equalizer
 import study
-from study.evaluation.bank.proof_folder import ANSWER, CLEAN_FOLDER, MODEL, RECORDING, SETTINGS
+from study.evaluation.bank.proof_folder import ANSWER_FILE, CLEAN_FOLDER, MODEL_FILE, RECORDING_FILE, SETTINGS_FILE
 from study.store.disk.provenance import compute_sha256
 from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
@@ -78,7 +78,7 @@ def isolate_process(open_folder: Path) -> None:
 
 def hash_other_recordings(case_folder: Path) -> dict[str, str]:
     """SHA-256 of every recording of a case but the first, by its path relative to the case's folder `case_folder`."""
-    paths = [path for path in sorted(case_folder.rglob("*.h5")) if path != case_folder / RECORDING]
+    paths = [path for path in sorted(case_folder.rglob("*.h5")) if path != case_folder / RECORDING_FILE]
     return {str(path.relative_to(case_folder)): compute_sha256(path) for path in paths}
 
 
@@ -94,13 +94,13 @@ def answer_case(case_folder: Path, engine_hash: str) -> None:
         "name": case_folder.name,
         "seconds": time.perf_counter() - start_s,
         "cpu_seconds": time.process_time() - processor_start_s,
-        "recording_sha256": compute_sha256(case_folder / RECORDING),
-        "model_sha256": compute_sha256(case_folder / MODEL),
+        "recording_sha256": compute_sha256(case_folder / RECORDING_FILE),
+        "model_sha256": compute_sha256(case_folder / MODEL_FILE),
         "others_sha256": hash_other_recordings(case_folder),
         "engine": engine_hash,
         "knows_the_challenge": is_challenge_loaded(),
     }
-    write_text(case_folder / ANSWER, json.dumps(document, indent=1) + "\n", overwrite=True)
+    write_text(case_folder / ANSWER_FILE, json.dumps(document, indent=1) + "\n", overwrite=True)
 
 
 def is_challenge_loaded() -> bool:
@@ -139,7 +139,7 @@ def _diagnose_case(case_folder: Path) -> dict[str, Any]:
     from study.store.formats.mechanical_model_file import read_mechanical_model
     from study.store.formats.recording_file import read_recording
 
-    case_settings = load_json(read_text(case_folder / SETTINGS))
+    case_settings = load_json(read_text(case_folder / SETTINGS_FILE))
     recordings = [read_recording(path) for path in sorted(case_folder.glob("*.h5"))]
     clean_recordings = tuple(read_recording(path) for path in sorted(case_folder.glob(f"{CLEAN_FOLDER}/*.h5")))
     settings = DiagnosisSettings(
@@ -148,7 +148,9 @@ def _diagnose_case(case_folder: Path) -> dict[str, Any]:
         discovery=bool(case_settings.get("discovery")),
         time_left=_make_time_budget(case_settings.get("processor_s")),
     )
-    findings = diagnose(recordings, read_mechanical_model(case_folder / MODEL), settings, map, lambda step, share: None)
+    findings = diagnose(
+        recordings, read_mechanical_model(case_folder / MODEL_FILE), settings, map, lambda step, share: None
+    )
     errors = {stage: dict(channels) for stage, channels in findings.channel_errors.items()}
     answer = {
         "diagnosis": diagnosis_to_json(findings.diagnosis),

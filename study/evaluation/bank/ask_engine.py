@@ -17,9 +17,15 @@ from queue import Empty, SimpleQueue
 from tempfile import TemporaryDirectory
 
 from study.errors import StudyError
-from study.evaluation.bank.proof_folder import ANSWER, FURTHER_RECORDING, RECORDING, WORKER_DIED, ProofFolder
+from study.evaluation.bank.proof_folder import (
+    ANSWER_FILE,
+    FURTHER_RECORDING_FILE,
+    RECORDING_FILE,
+    WORKER_DIED_KEY,
+    ProofFolder,
+)
 from study.evaluation.bank.proof_seals import read_answer
-from study.store.disk.folder_contents import Files, read_files, write_files
+from study.store.disk.folder_contents import FileContents, read_files, write_files
 from study.store.disk.text_file import read_text, write_text
 from study.workflows.run_on_executor import run_tasks
 
@@ -166,11 +172,11 @@ def _diagnose_on_executor(
         if document is None:
             _write_failure(folder.open / name)
         else:
-            write_text(folder.open / name / ANSWER, document, overwrite=True)
+            write_text(folder.open / name / ANSWER_FILE, document, overwrite=True)
         on_answered(name)
 
 
-def answer_sent_case(name: str, case: Files) -> str | None:
+def answer_sent_case(name: str, case: FileContents) -> str | None:
     """Diagnose a case on a worker of an executor. Returns the text of answer.json, from a process in a temporary folder
     with nothing but the files of the case. None if the process died or timed out at every attempt."""
     with TemporaryDirectory() as temporary:
@@ -182,7 +188,7 @@ def answer_sent_case(name: str, case: Files) -> str | None:
         finally:
             engine.end()
             engine.close()
-        return read_text(folder.open / name / ANSWER) if is_done else None
+        return read_text(folder.open / name / ANSWER_FILE) if is_done else None
 
 
 @contextmanager
@@ -238,20 +244,20 @@ def _make_processes_ended_error(folder: ProofFolder, missing_count: int) -> Stud
 def is_answered(case_folder: Path) -> bool:
     """Whether the case has an answer. The failure of a process that died does not count, because it may have been
     killed: the next run diagnoses the case again."""
-    return (case_folder / ANSWER).exists() and WORKER_DIED not in read_answer(case_folder)
+    return (case_folder / ANSWER_FILE).exists() and WORKER_DIED_KEY not in read_answer(case_folder)
 
 
 def _write_failure(case_folder: Path) -> None:
     """Write an answer that says that the process died or timed out."""
     reason = f"the process died {MAX_ATTEMPTS} times, or took longer than {CASE_TIMEOUT_S:g} s"
-    document = {"name": case_folder.name, "failed": reason, WORKER_DIED: True}
-    write_text(case_folder / ANSWER, json.dumps(document, indent=1) + "\n", overwrite=True)
+    document = {"name": case_folder.name, "failed": reason, WORKER_DIED_KEY: True}
+    write_text(case_folder / ANSWER_FILE, json.dumps(document, indent=1) + "\n", overwrite=True)
 
 
 def delete_answered_recordings(case_folder: Path) -> None:
     """Delete the recordings of an answered case to save disk space, and ignore errors; nothing for an unanswered one.
     The label has their hash, and the seed reproduces them."""
     if is_answered(case_folder):
-        for path in (case_folder / RECORDING, *case_folder.glob(FURTHER_RECORDING.format("*"))):
+        for path in (case_folder / RECORDING_FILE, *case_folder.glob(FURTHER_RECORDING_FILE.format("*"))):
             with suppress(OSError):
                 path.unlink(missing_ok=True)

@@ -3,7 +3,8 @@ the process that draws the cases is killed at any point.
 
 The files of a case are written into a folder under `begun`; then the label is written; last, the folder is renamed into
 `open`. After a kill, the next run renames the folders in `begun` that have a label, and removes the others, whose cases
-are drawn again.
+are drawn again. Called by the modules that write cases: `seal_cases`, `follow_up`, `laws.seal_laws` and
+`study.evaluation.real.inject_real`.
 """
 
 import secrets
@@ -21,14 +22,14 @@ NAME_BYTES = 6
 
 
 def begin_case(folder: ProofFolder) -> Path:
-    """Make a folder for the files of a new case; its random name is the name of the case."""
+    """Make a folder under `begun` for the files of a new case; its random name is the name of the case."""
     case_folder = folder.unfinished / secrets.token_hex(NAME_BYTES)
     case_folder.mkdir(parents=True)
     return case_folder
 
 
-def show_case(folder: ProofFolder, case_folder: Path) -> None:
-    """Rename the folder of a case into `open`, after its label was written."""
+def publish_case(folder: ProofFolder, case_folder: Path) -> None:
+    """Move the folder of a case from `begun` to `open`; its label must be written before."""
     sync_folder(case_folder)
     case_folder.rename(folder.open / case_folder.name)
     sync_folder(folder.open)
@@ -37,20 +38,20 @@ def show_case(folder: ProofFolder, case_folder: Path) -> None:
 @contextmanager
 def finish_begun_cases(folder: ProofFolder) -> Iterator[None]:
     """Context in which cases are drawn: on entry, finish or remove the cases of an earlier run that was killed; on
-    normal exit, remove the folder `begun`, which must be empty."""
-    _finish_begun(folder)
+    normal exit, remove the folder `begun`. Raises OSError where it is not empty then."""
+    _publish_or_remove(folder)
     yield
     with suppress(FileNotFoundError):
         folder.unfinished.rmdir()
 
 
-def _finish_begun(folder: ProofFolder) -> None:
-    """Rename begun cases that have a label into `open`, and remove the others."""
+def _publish_or_remove(folder: ProofFolder) -> None:
+    """Move begun cases that have a label to `open`, and remove the others."""
     begun_folders = sorted(folder.unfinished.iterdir()) if folder.unfinished.exists() else []
     labels = [read_text(path) for path in sorted(folder.sealed.glob("*.json"))] if begun_folders else []
     for case_folder in begun_folders:
-        # A label of follow-ups names several cases, each by its quoted name.
+        # The label of a follow-up contains the names of several cases, each in quotation marks.
         if any(f'"{case_folder.name}"' in label for label in labels):
-            show_case(folder, case_folder)
+            publish_case(folder, case_folder)
         else:
             shutil.rmtree(case_folder)

@@ -19,12 +19,12 @@ from analysis.evaluation.blind_test.follow_up import FollowUp
 from analysis.evaluation.blind_test.outcome import Outcome
 from study.evaluation.bank.answer_cases import hash_other_recordings
 from study.evaluation.bank.ask_engine import Workers, diagnose_and_count
-from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, show_case
+from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, publish_case
 from study.evaluation.bank.proof_folder import (
-    FURTHER_RECORDING,
-    MODEL,
-    RECORDING,
-    SETTINGS,
+    FURTHER_RECORDING_FILE,
+    MODEL_FILE,
+    RECORDING_FILE,
+    SETTINGS_FILE,
     ProofFolder,
     open_proof_folder,
 )
@@ -69,10 +69,10 @@ def follow_up(
     next_bank = open_proof_folder(folder.path / FOLLOW_UP_FOLDER, plan.seed, plan.brief)
     with finish_begun_cases(next_bank):
         for start in undecided:
-            if not next_bank.label_file(start.number).exists():
+            if not next_bank.get_label_file(start.number).exists():
                 _seal(folder, next_bank, plan, start)
     seal(next_bank)
-    labels = [read_label(next_bank.label_file(undecided_case.number)) for undecided_case in undecided]
+    labels = [read_label(next_bank.get_label_file(undecided_case.number)) for undecided_case in undecided]
     names = [label[key]["name"] for label in labels for key in (PROPOSED_KEY, RANDOM_KEY) if key in label]
     diagnose_and_count(next_bank, names, workers, on_done, keep=keep)
     return tuple(
@@ -83,12 +83,12 @@ def follow_up(
 
 def _seal(folder: ProofFolder, next_bank: ProofFolder, plan: BankPlan, start: Outcome) -> None:
     """Write both follow-up cases of `start` and their label, which is written last, when both are complete."""
-    first_label = read_label(folder.label_file(start.number))
+    first_label = read_label(folder.get_label_file(start.number))
     first_folder = folder.open / first_label["name"]
     proposal = read_answer(first_folder).get("proposal")
     label: dict[str, Any] = {"number": start.number, "salt": secrets.token_hex(SALT_BYTES)}
     if proposal is not None:
-        model = read_mechanical_model(first_folder / MODEL)
+        model = read_mechanical_model(first_folder / MODEL_FILE)
         menu = list_experiments(model, RATE_HZ, proposal["axis"], proposal["level"])
         best = proposal["best"]
         proposed_words = [best] if isinstance(best, str) else best or ()  # a single text in answers of older versions
@@ -100,9 +100,9 @@ def _seal(folder: ProofFolder, next_bank: ProofFolder, plan: BankPlan, start: Ou
             key: _write_case(next_bank, plan, (first_label, first_folder), experiments)
             for key, experiments in experiments_by_key.items()
         }
-    write_text(next_bank.label_file(start.number), json.dumps(label, indent=1) + "\n")
+    write_text(next_bank.get_label_file(start.number), json.dumps(label, indent=1) + "\n")
     for key in {PROPOSED_KEY, RANDOM_KEY} & label.keys():
-        show_case(next_bank, next_bank.unfinished / label[key]["name"])
+        publish_case(next_bank, next_bank.unfinished / label[key]["name"])
 
 
 def _write_case(
@@ -115,14 +115,14 @@ def _write_case(
     case = redraw_recording(case_folder, plan, label)
     for number, experiment in enumerate(experiments):
         recording = case.record_again(experiment.commands, experiment.kind, experiment.added, NOISE_SEED + number)
-        write_recording(case_folder / FURTHER_RECORDING.format(number + 2), recording, precision="float32")
-    for file_name in (MODEL, SETTINGS):
+        write_recording(case_folder / FURTHER_RECORDING_FILE.format(number + 2), recording, precision="float32")
+    for file_name in (MODEL_FILE, SETTINGS_FILE):
         write_text(case_folder / file_name, read_text(first_folder / file_name))
     return {
         "name": case_folder.name,
         "words": "; ".join(experiment.words for experiment in experiments),
-        "recording_sha256": compute_sha256(case_folder / RECORDING),
-        "model_sha256": compute_sha256(case_folder / MODEL),
+        "recording_sha256": compute_sha256(case_folder / RECORDING_FILE),
+        "model_sha256": compute_sha256(case_folder / MODEL_FILE),
         "others_sha256": hash_other_recordings(case_folder),
     }
 

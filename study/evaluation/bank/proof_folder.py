@@ -2,7 +2,8 @@
 
 Layout: bank.json (settings of the bank), open/CASE/ (all that the diagnosis gets, and its answer), sealed/NUMBER.json
 (labels), labels.sha256 (seals), engine.log, and begun/ while cases are written. The random name of a case does not
-reveal its number, so that the diagnosis cannot find its label.
+reveal its number, so that the diagnosis cannot find its label. Used by all modules of this folder, in particular
+`seal_cases` (writes cases), `ask_engine` (diagnoses them) and `prove`.
 """
 
 import json
@@ -22,7 +23,7 @@ class ProofFolder:
 
     @property
     def open(self) -> Path:
-        """Folder of the cases, one folder each, as the diagnosis gets them."""
+        """Folder of the complete cases, one folder each, as the diagnosis gets them."""
         return self.path / "open"
 
     @property
@@ -32,7 +33,7 @@ class ProofFolder:
 
     @property
     def sealed(self) -> Path:
-        """Folder of the labels, a file each."""
+        """Folder of the labels, one file for each number."""
         return self.path / "sealed"
 
     @property
@@ -45,39 +46,39 @@ class ProofFolder:
         """File with what the processes of the diagnosis wrote to stderr."""
         return self.path / "engine.log"
 
-    def label_file(self, number: int) -> Path:
-        """File of the label of a case, by its number."""
+    def get_label_file(self, number: int) -> Path:
+        """Path of the label with this number; a follow-up has one label for several cases."""
         return self.sealed / f"{number:05d}.json"
 
 
-RECORDING, MODEL, SETTINGS, ANSWER = "recording.h5", "model.toml", "settings.json", "answer.json"
+RECORDING_FILE, MODEL_FILE, SETTINGS_FILE, ANSWER_FILE = "recording.h5", "model.toml", "settings.json", "answer.json"
 """Files in a case's folder under `open`; the last is written by the diagnosis."""
-FURTHER_RECORDING = "recording_{}.h5"
-"""File of a further recording of a case, by its number."""
-WORKER_DIED = "died"
-"""Key in an answer that marks that the worker process ended before it answered."""
+FURTHER_RECORDING_FILE = "recording_{}.h5"
+"""File name of a further recording of a case; the braces stand for its number."""
+WORKER_DIED_KEY = "died"
+"""Key in an answer which states that the worker process ended before it answered."""
 CLEAN_FOLDER = "clean"
 """Sub-folder of a case with reference recordings of the intact device, where it has any."""
 
 
 def open_proof_folder(path: Path, seed: int, short_recordings: bool, bank_kind: str = "") -> ProofFolder:
-    """Create the folder of a bank, or open an existing folder to continue. short_recordings:
+    """Create the folder of a bank, or open an existing folder to continue. seed: of the bank's cases. short_recordings:
     whether the recordings are short, for tests. bank_kind: kind of the bank; empty where effects of the catalogue are
     concealed.
 
-    Raises StudyError where the folder holds something else or a bank with other settings.
+    Raises StudyError where the folder contains other files or a bank with other settings.
     """
-    folder, plan_path = ProofFolder(path), path / "bank.json"
-    bank = {
+    folder, bank_path = ProofFolder(path), path / "bank.json"
+    bank_settings = {
         "format": "hapteq-bank",
         "version": 1,
         "seed": seed,
         "brief": short_recordings,
         **({"of": bank_kind} if bank_kind else {}),
     }
-    document_text = json.dumps(bank, indent=1) + "\n"
-    if plan_path.exists():
-        if parse_json(plan_path, read_text(plan_path), "bank") != json.loads(document_text):
+    document_text = json.dumps(bank_settings, indent=1) + "\n"
+    if bank_path.exists():
+        if parse_json(bank_path, read_text(bank_path), "bank") != json.loads(document_text):
             raise StudyError(
                 "This folder holds another bank",
                 f"{path} was begun with another --seed, other options, or another length of its recordings.",
@@ -94,5 +95,5 @@ def open_proof_folder(path: Path, seed: int, short_recordings: bool, bank_kind: 
         )
     for subfolder in (folder.open, folder.sealed):
         subfolder.mkdir(parents=True, exist_ok=True)
-    write_text(plan_path, document_text)
+    write_text(bank_path, document_text)
     return folder

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from study.errors import StudyError
-from study.evaluation.bank.proof_folder import ANSWER, WORKER_DIED, ProofFolder
+from study.evaluation.bank.proof_folder import ANSWER_FILE, WORKER_DIED_KEY, ProofFolder
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.json_document import parse_json
 from study.store.disk.provenance import compute_sha256
@@ -59,20 +59,20 @@ def read_answer(case_folder: Path) -> dict[str, Any]:
     """The answer.json in `case_folder`, parsed; it may contain NaN (an unknown error). Raises StudyError where
     it cannot be read or is no JSON object."""
     try:
-        document = load_json(read_text(case_folder / ANSWER), with_nan=True)
+        document = load_json(read_text(case_folder / ANSWER_FILE), with_nan=True)
     except ValueError as problem:
         raise UnusableFileError(
-            case_folder / ANSWER, "answer of a diagnosis", (f"this is not JSON: {problem}",)
+            case_folder / ANSWER_FILE, "answer of a diagnosis", (f"this is not JSON: {problem}",)
         ) from problem
     if not isinstance(document, dict):
-        raise UnusableFileError(case_folder / ANSWER, "answer of a diagnosis", ("it contains no JSON object",))
+        raise UnusableFileError(case_folder / ANSWER_FILE, "answer of a diagnosis", ("it contains no JSON object",))
     return document
 
 
 def is_answer_to_sealed_case(label: dict[str, Any], answer: dict[str, Any]) -> bool:
     """Whether an answer belongs to the sealed files and comes from a process that had not imported the challenge. True
     for the answer of a process that died, which contains no diagnosis. label: of the case, revealed."""
-    if WORKER_DIED in answer:
+    if WORKER_DIED_KEY in answer:
         return True
     return answer.get("knows_the_challenge") is False and all(
         key in answer and answer[key] == label[key] for key in HASH_KEYS if key in label

@@ -12,12 +12,12 @@ from typing import Any
 
 from analysis.evaluation.blind_test.control_claims import ControlOutcome
 from analysis.evaluation.blind_test.follow_up import FollowUp
-from analysis.evaluation.blind_test.outcome import Concealed, Outcome
+from analysis.evaluation.blind_test.outcome import ConcealedEffect, Outcome
 from analysis.evaluation.blind_test.score import Score, compute_score
-from study.errors import resumable
+from study.errors import convert_interrupts
 from study.evaluation.bank.ask_engine import diagnose_and_count, is_answered
 from study.evaluation.bank.follow_up import FOLLOW_UP_FOLDER, follow_up
-from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, open_proof_folder
+from study.evaluation.bank.proof_folder import RECORDING_FILE, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.run_controls import run_controls
 from study.evaluation.bank.seal_cases import (
@@ -39,7 +39,7 @@ from study.evaluation.bank.sealed_bank import (
 def outcome_of(label: dict[str, Any], answer: dict[str, Any]) -> Outcome:
     """The outcome of a case from its revealed label and the answer of the diagnosis."""
     concealed = tuple(
-        Concealed(truth["effect"], truth["place"], truth["axis"], {**truth["values"], **truth["unseen"]})
+        ConcealedEffect(truth["effect"], truth["place"], truth["axis"], {**truth["values"], **truth["unseen"]})
         for truth in label["truth"]
     )
     return Outcome(
@@ -81,7 +81,7 @@ def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progres
     number done and the total. Raises StudyError."""
     folder = open_proof_folder(path, plan.seed, plan.brief)
     numbers = [case_draw.number for case_draw in list_drawable_cases(plan)]
-    with resumable("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
+    with convert_interrupts("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
         seal = seal_cases(folder, plan, options.workers, lambda done: on_progress("sealing", done, len(numbers)))
         names = read_case_names(folder, numbers)
         _answer_cases(folder, plan, options, dict(zip(names, numbers, strict=True)), on_progress)
@@ -115,8 +115,8 @@ def _answer_cases(
 ) -> None:
     """Diagnose the open cases without an answer; a deleted recording is drawn again. numbers: case number by name."""
     for name, number in numbers.items():
-        if not is_answered(folder.open / name) and not (folder.open / name / RECORDING).exists():
-            redraw_recording(folder.open / name, plan, read_label(folder.label_file(number)))
+        if not is_answered(folder.open / name) and not (folder.open / name / RECORDING_FILE).exists():
+            redraw_recording(folder.open / name, plan, read_label(folder.get_label_file(number)))
     diagnose_and_count(folder, tuple(numbers), options.answering, partial(on_progress, "diagnosing"), keep=options.keep)
 
 

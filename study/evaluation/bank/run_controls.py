@@ -9,7 +9,7 @@ from analysis.diagnosis.document import Diagnosis, diagnosis_from_json
 from analysis.evaluation.blind_test.control_claims import ControlOutcome, judge_control
 from study.errors import StudyError
 from study.evaluation.bank.ask_engine import Workers, diagnose_and_count
-from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
+from study.evaluation.bank.proof_folder import MODEL_FILE, RECORDING_FILE, SETTINGS_FILE, ProofFolder
 from study.evaluation.bank.proof_seals import read_answer
 from study.evaluation.challenge.case_settings import CaseSettings
 from study.evaluation.challenge.controls import CONTROLS, Control, ControlInput
@@ -74,10 +74,12 @@ def _read_case_names(names_path: Path, prefix: str) -> tuple[str, ...] | None:
 
 def _write_input(case_folder: Path, control_input: ControlInput) -> None:
     case_folder.mkdir(exist_ok=True)
-    write_recording(case_folder / RECORDING, control_input.recording, precision="float32", overwrite=True)
-    write_mechanical_model(case_folder / MODEL, control_input.model, overwrite=True)
+    write_recording(case_folder / RECORDING_FILE, control_input.recording, precision="float32", overwrite=True)
+    write_mechanical_model(case_folder / MODEL_FILE, control_input.model, overwrite=True)
     write_text(
-        case_folder / SETTINGS, json.dumps({"without": list(control_input.excluded_effects)}) + "\n", overwrite=True
+        case_folder / SETTINGS_FILE,
+        json.dumps({"without": list(control_input.excluded_effects)}) + "\n",
+        overwrite=True,
     )
 
 

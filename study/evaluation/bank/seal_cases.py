@@ -16,17 +16,17 @@ from pathlib import Path
 from typing import Any
 
 from study.errors import StudyError
-from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, show_case
-from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
+from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, publish_case
+from study.evaluation.bank.proof_folder import MODEL_FILE, RECORDING_FILE, SETTINGS_FILE, ProofFolder
 from study.evaluation.bank.proof_seals import read_label, seal
 from study.evaluation.challenge.draw_bank import CaseDraw, draw_case_plan, generate_case
 from study.evaluation.challenge.draw_case import Case
-from study.evaluation.challenge.second_engine import second_engine
+from study.evaluation.challenge.second_engine import mujoco_access
 from study.store.disk.provenance import compute_sha256
 from study.store.disk.text_file import write_text
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.recording_file import write_recording
-from study.workflows.worker_processes import worker_processes
+from study.workflows.worker_processes import open_worker_processes
 
 
 def list_concealed_effects(case: Case) -> list[dict[str, Any]]:
@@ -54,7 +54,7 @@ class BankPlan:
 def list_drawable_cases(plan: BankPlan) -> tuple[CaseDraw, ...]:
     """All cases that can be drawn on this machine: without MuJoCo its cases are left out."""
     draws = (draw_case_plan(plan.seed, number, plan.brief) for number in range(plan.cases))
-    return tuple(case_draw for case_draw in draws if case_draw.bank != "engine" or second_engine.is_installed())
+    return tuple(case_draw for case_draw in draws if case_draw.bank != "engine" or mujoco_access.is_installed())
 
 
 def seal_cases(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Callable[[int], None]) -> str:
@@ -71,10 +71,10 @@ def seal_missing_cases(
 ) -> str:
     """Write the cases without a label in worker processes, and seal the bank. case_writers: function that writes a
     case, by its number; on_sealed: called with the number of sealed cases. Returns the seal as `seal_cases`."""
-    missing_writers = [write for number, write in case_writers.items() if not folder.label_file(number).exists()]
+    missing_writers = [write for number, write in case_writers.items() if not folder.get_label_file(number).exists()]
     sealed_count = len(case_writers) - len(missing_writers)
     on_sealed(sealed_count)
-    with finish_begun_cases(folder), worker_processes(workers if len(missing_writers) > 1 else 1) as pool:
+    with finish_begun_cases(folder), open_worker_processes(workers if len(missing_writers) > 1 else 1) as pool:
         for written_case in as_completed([pool.submit(write) for write in missing_writers]):
             written_case.result()
             sealed_count += 1
@@ -87,14 +87,14 @@ def write_sealed_case(folder: ProofFolder, case_draw: CaseDraw) -> None:
     unfinished."""
     case_folder = begin_case(folder)
     case = generate_case(case_draw, case_folder.name)
-    write_recording(case_folder / RECORDING, case.recording, precision="float32")
-    write_mechanical_model(case_folder / MODEL, case.model)
-    write_text(case_folder / SETTINGS, format_settings(case_draw.excluded_effects, SEARCH_CPU_S))
+    write_recording(case_folder / RECORDING_FILE, case.recording, precision="float32")
+    write_mechanical_model(case_folder / MODEL_FILE, case.model)
+    write_text(case_folder / SETTINGS_FILE, format_settings(case_draw.excluded_effects, SEARCH_CPU_S))
     write_text(
-        folder.label_file(case_draw.number),
+        folder.get_label_file(case_draw.number),
         json.dumps(_make_label(case_draw, case, case_folder), indent=1, allow_nan=False) + "\n",
     )
-    show_case(folder, case_folder)
+    publish_case(folder, case_folder)
 
 
 def format_settings(excluded_effects: Sequence[str], processor_s: float | None = None) -> str:
@@ -106,8 +106,8 @@ def format_settings(excluded_effects: Sequence[str], processor_s: float | None =
 def redraw_recording(case_folder: Path, plan: BankPlan, label: dict[str, Any]) -> Case:
     """Draw and write the recording of a sealed case again. Raises StudyError where its hash is not the sealed one."""
     case = generate_case(draw_case_plan(plan.seed, label["number"], plan.brief), label["name"])
-    write_recording(case_folder / RECORDING, case.recording, precision="float32", overwrite=True)
-    if compute_sha256(case_folder / RECORDING) != label["recording_sha256"]:
+    write_recording(case_folder / RECORDING_FILE, case.recording, precision="float32", overwrite=True)
+    if compute_sha256(case_folder / RECORDING_FILE) != label["recording_sha256"]:
         raise StudyError(
             "A device of the bank cannot be drawn again",
             f"Case {label['number']} gives another recording than the one that was sealed.",
@@ -129,13 +129,13 @@ def _make_label(case_draw: CaseDraw, case: Case, case_folder: Path) -> dict[str,
         "without": list(case_draw.excluded_effects),
         "truth": list_concealed_effects(case),
         "adds": case.detectability,
-        "recording_sha256": compute_sha256(case_folder / RECORDING),
-        "model_sha256": compute_sha256(case_folder / MODEL),
+        "recording_sha256": compute_sha256(case_folder / RECORDING_FILE),
+        "model_sha256": compute_sha256(case_folder / MODEL_FILE),
         "salt": secrets.token_hex(SALT_BYTES),
     }
 
 
 def read_case_names(folder: ProofFolder, numbers: Sequence[int]) -> tuple[str, ...]:
     """Folder names of the cases under `open`, in the order of their numbers."""
-    labels = [read_label(folder.label_file(number)) for number in numbers]
+    labels = [read_label(folder.get_label_file(number)) for number in numbers]
     return tuple(str(label["name"]) for label in labels)

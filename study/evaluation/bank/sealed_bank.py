@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from analysis.diagnosis.document import diagnosis_from_json
 from study.evaluation.bank.ask_engine import Workers
-from study.evaluation.bank.proof_folder import ANSWER, ProofFolder
+from study.evaluation.bank.proof_folder import ANSWER_FILE, ProofFolder
 from study.evaluation.bank.proof_seals import (
     is_answer_to_sealed_case,
     make_broken_seal_error,
@@ -67,7 +67,7 @@ def reveal_bank(
             broken_names.append(path.name)
             continue
         case_folder = folder.open / label["name"]
-        if label["number"] >= case_count or not (case_folder / ANSWER).exists():
+        if label["number"] >= case_count or not (case_folder / ANSWER_FILE).exists():
             continue
         answer = read_answer(case_folder)
         if not is_answer_to_sealed_case(label, answer):
@@ -92,5 +92,5 @@ def collect_answered_fields(label: Mapping[str, Any], answer: Mapping[str, Any])
 def list_engine_digests(folder: ProofFolder, names: Iterable[str]) -> tuple[str, ...]:
     """Digests of the code that gave the answers to the cases `names`, sorted; several if the code changed during the
     run. Cases without an answer, or whose answer names no digest, are left out."""
-    answers = [read_answer(folder.open / name) for name in names if (folder.open / name / ANSWER).exists()]
+    answers = [read_answer(folder.open / name) for name in names if (folder.open / name / ANSWER_FILE).exists()]
     return tuple(sorted({answer["engine"] for answer in answers if "engine" in answer}))

@@ -199,19 +199,20 @@ def _run_git(folder: Path, *arguments: str) -> str:
 
 def _make_row(outcome: Outcome, counts_as_miss: bool) -> CaseRow:
     """The row of a case. counts_as_miss: whether it counts as a miss in the score."""
-    is_named_right = outcome.kind == "single" and outcome.right and bool(outcome.concealed)
+    is_named_right = outcome.kind == "single" and outcome.is_correct and bool(outcome.concealed)
     return CaseRow(
         outcome.number, outcome.seed, outcome.kind, outcome.bank, " ".join(outcome.axes), outcome.model,
         " ".join(outcome.names),
         " ".join(concealed.axis or "all" for concealed in outcome.concealed),
         " ".join(f"{value:.3f}" for value in outcome.strengths),
         round(outcome.adds, 4), outcome.detectable, outcome.verdict,
-        " ".join(outcome.named_names),
+        " ".join(outcome.named_effect_names),
         " ".join(effect.axis or "all" for effect in outcome.named),
         " ".join(f"{effect.probability:.3f}" for effect in outcome.named),
         " ".join(outcome.returned),
         _round(compute_main_error(outcome.concealed[0], outcome.named[0]) if is_named_right else None),
-        _round(outcome.worst_error("retuned")), _round(outcome.worst_error("after")), _round(outcome.seconds),
+        _round(outcome.compute_worst_error("retuned")), _round(outcome.compute_worst_error("after")),
+        _round(outcome.seconds),
         counts_as_miss,
     )  # fmt: skip
 

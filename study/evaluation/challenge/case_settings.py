@@ -1,5 +1,7 @@
-"""Settings of a simulated case: driven axes, length of the recording, size of the nuisance effects, integration
-step."""
+"""Settings of a simulated case of the blind test: driven axes, recording, nuisance effects, integration steps.
+
+Drawn by `draw_bank`; read by `draw_case`, `drive_plan` (excitation) and the other modules that simulate cases.
+"""
 
 from dataclasses import dataclass
 
@@ -9,23 +11,24 @@ class CaseSettings:
     """Settings of a case. Axes that are not driven move passively, and their parameters are known exactly."""
 
     axes: tuple[int, ...] = (0, 1, 2)
-    """Driven and measured axes."""
+    """Driven and measured axes, 0 to 2."""
     period: int = 2000
     """Period of a multisine (samples); sweeps and slow sines scale with it."""
     periods: int = 4
-    """Periods of each multisine for the fit."""
+    """Number of periods of each multisine for the fit."""
     extras: float = 0.0
     """Factor of the nuisance effects (`extras`), which no label names; 0 = none, 1 = about a tenth of the noise."""
 
     steps: int = 20
-    """Integration steps per sample. At 20 the integration error looks like a sensor gain error of 0.2 % on one axis."""
+    """Integration steps per sample. With 20 the integration error equals a sensor gain error of 0.2 % on one axis
+    (measured)."""
     loud_n: float = 0.0
     """Level (N) of an additional test segment with all axes at once; 0 = none."""
 
     def scale_duration(self, samples: int) -> int:
-        """Scale a duration (samples), stated for a period of 2000 samples, to this period."""
+        """Scale a duration (samples), stated for a period of 2000 samples, to this period; rounded down."""
         return samples * self.period // 2000
 
 
 DEFAULT_SETTINGS = CaseSettings()
-"""Three axes, four periods of 2000 samples, no unlabelled effects."""
+"""Three axes, four periods of 2000 samples, no nuisance effects."""

@@ -26,7 +26,7 @@ STEPS_PER_SAMPLE = 20
 def _make_zero_forces() -> FloatArray:
     """Table (3, 11) of forces that are all zero, with end stops at infinity."""
     forces = np.zeros((3, 11))
-    forces[:, handle.ABOVE], forces[:, handle.BELOW] = np.inf, -np.inf
+    forces[:, handle.UPPER_STOP], forces[:, handle.LOWER_STOP] = np.inf, -np.inf
     return forces
 
 

@@ -2,7 +2,10 @@
 
 A block of forty cases has ten with nothing missing, eighteen with one effect, four with two, four with an effect
 outside the catalogue, and four where the diagnosis may not name the true effect. Five of the forty have larger
-nuisance effects (`extras`), and five come from a second physics engine. The order within a block is random.
+nuisance effects (`extras`), and five come from a second physics engine. The order within a block is random. All counts
+and shares are chosen. Called by `study.evaluation.bank.seal_cases`.
+
+The random streams of a bank's seed have the keys 1 (order of a block), 2 (a case) and 3 (order of the effects).
 """
 
 from dataclasses import dataclass
@@ -12,35 +15,37 @@ import numpy as np
 
 from study.evaluation.challenge.case_settings import CaseSettings
 from study.evaluation.challenge.draw_case import DECOYS, EFFECTS, Case, ModelOrigin, draw_case
-from study.evaluation.challenge.second_engine import second_engine
+from study.evaluation.challenge.second_engine import mujoco_access
 
-Kind = Literal["nothing", "single", "pair", "outside", "without"]
+CaseKind = Literal["nothing", "single", "pair", "outside", "without"]
 """How many effects are missing in the model: none, one or two; an effect outside the catalogue; or an effect that the
 diagnosis may not name."""
-Bank = Literal["main", "dirty", "engine"]
-"""Nuisance effects (`extras`) of ordinary size, of twice that size, or the second engine without nuisance effects."""
+BankPart = Literal["main", "dirty", "engine"]
+"""Part of a bank: nuisance effects (`extras`) of ordinary size (main), of twice that size (dirty), or the second
+physics engine without nuisance effects (engine)."""
 
-COUNTS: dict[tuple[Kind, Bank], int] = {
+CASE_COUNTS: dict[tuple[CaseKind, BankPart], int] = {
     ("nothing", "main"): 8, ("nothing", "dirty"): 1, ("nothing", "engine"): 1,
     ("single", "main"): 10, ("single", "dirty"): 4, ("single", "engine"): 4,
     ("pair", "main"): 4, ("outside", "main"): 4, ("without", "main"): 4,
 }  # fmt: skip
-"""Number of cases of each kind and bank in a block of forty."""
-BLOCK: tuple[tuple[Kind, Bank], ...] = tuple(
-    kind_and_bank for kind_and_bank, count in COUNTS.items() for _ in range(count)
+"""Number of cases of each kind and part of the bank in a block of forty."""
+CASE_BLOCK: tuple[tuple[CaseKind, BankPart], ...] = tuple(
+    kind_and_bank for kind_and_bank, count in CASE_COUNTS.items() for _ in range(count)
 )
-"""Kind and bank of each case of a block, before randomisation of the order."""
-NUISANCE_SIZES: dict[Bank, float] = {"main": 1.0, "dirty": 2.0, "engine": 0.0}
-"""Size of the nuisance effects, relative to the main bank."""
-LOWEST_STRENGTHS: dict[Kind, float] = {"nothing": 0.0, "single": 0.0, "pair": 0.4, "outside": 0.3, "without": 0.4}
-"""Lowest strength per kind. Single effects range from undetectable to strong; the other kinds test the answer to a
-detectable effect and begin at a higher strength."""
+"""Kind and part of the bank of each case of a block, before randomisation of the order."""
+NUISANCE_SIZES: dict[BankPart, float] = {"main": 1.0, "dirty": 2.0, "engine": 0.0}
+"""Size of the nuisance effects by part of the bank, relative to the main part."""
+LOWEST_STRENGTHS: dict[CaseKind, float] = {"nothing": 0.0, "single": 0.0, "pair": 0.4, "outside": 0.3, "without": 0.4}
+"""Lowest strength (0 to 1) per kind. Single effects range from undetectable to strong; the other kinds test the answer
+to a detectable effect and begin at a higher strength."""
 GOLDEN_STEP = 0.5 * (5**0.5 - 1)
-"""Step between the successive strengths of an effect, modulo 1: multiples of the golden ratio fill a range evenly."""
+"""Step between the successive strengths of an effect, modulo 1: multiples of the golden ratio 0.618 fill a range
+evenly."""
 AXIS_COUNT_SHARES = (0.72, 0.14)
 """Fractions of the cases with one and with two driven axes; the others have three."""
 STEPS_PER_SAMPLE = 80
-"""Integration steps per sample: so many that the integration error stays below what a diagnosis can detect."""
+"""Integration steps per sample, so many that a diagnosis cannot detect the integration error."""
 THREE_AXIS_EFFECTS = ("sensor_misalignment", "cross_axis_sensitivity", "crossed_axes", "extra_mode")
 """Effects that can be identified with three axes only: they need the readings of the other axes, or the direction of a
 mode, whose reaction on a single axis equals that of a smaller mass."""
@@ -48,7 +53,7 @@ EXCLUSIVE_EFFECTS = (
     frozenset(name for name in EFFECTS if "friction" in name or name == "presliding_hysteresis"),
     frozenset(("sensor_misalignment", "cross_axis_sensitivity")),
 )
-"""Sets of effects that use the same table row of a device, which can have only one effect of each set."""
+"""Sets of effects that use the same parameters of the simulated device, which can have only one effect of each set."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,10 +61,13 @@ class CaseDraw:
     """The drawn design of a case: concealed effects, origin of the model, driven axes and size of the recording."""
 
     number: int
+    """Number in the bank, from 0."""
     seed: int
-    kind: Kind
-    bank: Bank
+    """Seed of the simulation: the bank's seed plus the number."""
+    kind: CaseKind
+    bank: BankPart
     effects: tuple[str, ...]
+    """Names of the concealed effects."""
     strengths: tuple[float, ...]
     """Strength of each effect, 0 to 1."""
     concealed: ModelOrigin
@@ -73,14 +81,17 @@ class CaseDraw:
 
 
 def draw_case_plan(seed: int, number: int, short_periods: bool = False) -> CaseDraw:
-    """Draw the case of a number. The same seed and number give the same case in a bank of any size. short_periods:
-    1000 samples per period in place of 2000, and three periods in place of four, for tests."""
-    block, position = divmod(number, len(BLOCK))
-    order = np.random.default_rng([seed, 1, block]).permutation(len(BLOCK))
-    kind, bank = BLOCK[order[position]]
+    """Draw the design of a case. The same seed and number give the same case in a bank of any size. short_periods: 1000
+    samples per period in place of 2000, for tests. A multisine has three periods with short periods or fewer than three
+    axes, else four."""
+    block, position = divmod(number, len(CASE_BLOCK))
+    block_order = np.random.default_rng([seed, 1, block]).permutation(len(CASE_BLOCK))
+    kind, bank = CASE_BLOCK[block_order[position]]
     random = np.random.default_rng([seed, 2, number])
     # Number of earlier cases of this kind and bank: all effects are used in turn, each with evenly spread strengths.
-    earlier_cases = block * BLOCK.count((kind, bank)) + sum(BLOCK[k] == (kind, bank) for k in order[:position])
+    earlier_cases = block * CASE_BLOCK.count((kind, bank)) + sum(
+        CASE_BLOCK[case_index] == (kind, bank) for case_index in block_order[:position]
+    )
     effects, strengths = _draw_effects(seed, kind, bank, earlier_cases, random)
     axes = _draw_axes(effects, random)
     has_three_periods = len(axes) < 3 or short_periods
@@ -93,10 +104,10 @@ def draw_case_plan(seed: int, number: int, short_periods: bool = False) -> CaseD
 
 
 def generate_case(case_draw: CaseDraw, name: str) -> Case:
-    """Generate the drawn case. name: device name in recording and model. Raises ImportError where MuJoCo is needed
-    and not installed."""
+    """Simulate the drawn case. name: device name in recording and model. Raises ImportError where MuJoCo is needed and
+    not installed."""
     if case_draw.bank == "engine":
-        return second_engine.draw_engine_case(
+        return mujoco_access.draw_engine_case(
             case_draw.seed, case_draw.effects, case_draw.concealed, case_draw.strengths, name, case_draw.settings
         )
     return draw_case(
@@ -105,26 +116,27 @@ def generate_case(case_draw: CaseDraw, name: str) -> Case:
 
 
 def _draw_effects(
-    seed: int, kind: Kind, bank: Bank, earlier_cases: int, random: np.random.Generator
+    seed: int, kind: CaseKind, bank: BankPart, earlier_cases: int, random: np.random.Generator
 ) -> tuple[tuple[str, ...], tuple[float, ...]]:
-    """Effects and strengths of a case. earlier_cases: number of earlier cases of the same kind and bank. Each visit of
-    all effects has the same random order; the strength of an effect advances by `GOLDEN_STEP` from visit to visit."""
+    """Draw effects and strengths of a case. earlier_cases: number of earlier cases of the same kind and bank. The cases
+    pass through all effects in the same random order; the strength of an effect advances by `GOLDEN_STEP` at each
+    pass. Pairs are drawn independently."""
     lowest = LOWEST_STRENGTHS[kind]
     if kind == "nothing":
         return (), ()
     if kind == "pair":
         return _draw_pair(random), tuple(float(value) for value in random.uniform(lowest, 1.0, 2))
-    names = tuple(DECOYS if kind == "outside" else second_engine.EFFECTS if bank == "engine" else EFFECTS)
-    seed_words = [seed, 3, sorted(LOWEST_STRENGTHS).index(kind), sorted(NUISANCE_SIZES).index(bank)]
-    order = np.random.default_rng(seed_words).permutation(len(names))
-    visit, index = divmod(earlier_cases, len(names))
-    effect_index = int(order[index])
-    strength_share = (np.random.default_rng([*seed_words, effect_index]).random() + visit * GOLDEN_STEP) % 1.0
+    names = tuple(DECOYS if kind == "outside" else mujoco_access.EFFECTS if bank == "engine" else EFFECTS)
+    stream_seed = [seed, 3, sorted(LOWEST_STRENGTHS).index(kind), sorted(NUISANCE_SIZES).index(bank)]
+    effect_order = np.random.default_rng(stream_seed).permutation(len(names))
+    pass_number, position = divmod(earlier_cases, len(names))
+    effect_index = int(effect_order[position])
+    strength_share = (np.random.default_rng([*stream_seed, effect_index]).random() + pass_number * GOLDEN_STEP) % 1.0
     return (names[effect_index],), (float(lowest + (1.0 - lowest) * strength_share),)
 
 
 def _draw_pair(random: np.random.Generator) -> tuple[str, str]:
-    """Two different effects that a device can have together."""
+    """Draw two different effects that a device can have together."""
     while True:
         first, second = (str(name) for name in random.choice(list(EFFECTS), 2, replace=False))
         if not any({first, second} <= names for names in EXCLUSIVE_EFFECTS):
@@ -132,13 +144,13 @@ def _draw_pair(random: np.random.Generator) -> tuple[str, str]:
 
 
 def _draw_axes(effects: tuple[str, ...], random: np.random.Generator) -> tuple[int, ...]:
-    """Driven axes of a case, in ascending order."""
-    size_draw, first_axis = random.random(), int(random.integers(3))
+    """Draw the driven axes of a case, in ascending order; three where an effect needs them."""
+    axis_count_draw, first_axis = random.random(), int(random.integers(3))
     if "hand_impedance" in effects:
         first_axis = 0  # its parameters `mass`, `damping` and `stiffness` are those of x
-    if size_draw > sum(AXIS_COUNT_SHARES) or any(name in THREE_AXIS_EFFECTS for name in effects):
+    if axis_count_draw > sum(AXIS_COUNT_SHARES) or any(name in THREE_AXIS_EFFECTS for name in effects):
         return (0, 1, 2)
-    if size_draw > AXIS_COUNT_SHARES[0]:
+    if axis_count_draw > AXIS_COUNT_SHARES[0]:
         second_axis = (first_axis + int(random.integers(1, 3))) % 3
         return (min(first_axis, second_axis), max(first_axis, second_axis))
     return (first_axis,)

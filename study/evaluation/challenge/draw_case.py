@@ -1,7 +1,8 @@
 """Draws a case of the blind test from a seed: a recording, a model that lacks some physics, and the truth.
 
 Steps: draw bench and excitation, add nuisance effects (`extras`), draw and build in the concealed effects, simulate and
-measure, make the model that a laboratory would have (`nominal`).
+measure, make the model that a laboratory would have (`nominal`). Called by `draw_bank` and `controls`; the other
+simulations of this folder use its parts.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,9 +30,9 @@ EFFECTS: dict[str, ConcealedEffect] = {
     for group in (friction, springs, inertia_and_drag, hand, actuator, sensor)
     for effect in group.EFFECTS
 }
-"""All effects of the vocabulary."""
+"""All effects of the vocabulary (`equalizer.plant.effect_vocabulary`) by name."""
 DECOYS: dict[str, ConcealedEffect] = {effect.name: effect for effect in decoys.DECOYS}
-"""Effects outside the vocabulary, which a diagnosis must not name."""
+"""Effects outside the vocabulary by name, for which a diagnosis has no name."""
 
 ModelOrigin = Literal["calibrated", "retuned"]
 """How the given model was made: `calibrated` from the device without the effect, `retuned` on the recording itself."""
@@ -41,11 +42,14 @@ MotionPair = tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """An effect that the device has and the model lacks."""
+    """Label of an effect that the device has and the model lacks."""
 
     effect: str
+    """Name of the effect or decoy."""
     place: str
+    """Place at which it acts (`concealed_effect.Place`)."""
     axis: str | None
+    """Axis at which it acts, x, y or z; None for an effect on all axes."""
     values: dict[str, float]
     """Parameters by their names in the vocabulary; all parameters of a decoy."""
     unseen: dict[str, float]
@@ -59,7 +63,7 @@ noise seed."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Case:
-    """A recording with a model that lacks some physics, and the truth."""
+    """A recording with a model that lacks some physics, and the truth, which is empty where nothing is concealed."""
 
     recording: Recording
     model: MechanicalModel
@@ -70,8 +74,9 @@ class Case:
     """Detectability: change of the readings by the concealed effects over the noise, both rms, in the worst channel."""
 
 
-NOISE = np.array([*NOISE_MPS2, *[float(np.hypot(POSITION_NOISE_M, POSITION_STEP_M / 12**0.5))] * 3])
-"""Standard deviation of the noise of acceleration (m/s^2), then of position (m), which includes its quantization."""
+NOISE_STD = np.array([*NOISE_MPS2, *[float(np.hypot(POSITION_NOISE_M, POSITION_STEP_M / 12**0.5))] * 3])
+"""(6,): standard deviation of the noise of acceleration (m/s^2), then of position (m), x y z each. Position includes
+its quantization: a step s has the standard deviation s / sqrt(12)."""
 
 
 def draw_case(
@@ -83,10 +88,11 @@ def draw_case(
     settings: CaseSettings = DEFAULT_SETTINGS,
 ) -> Case:
     """Draw a case. effects: names from EFFECTS or DECOYS; none = nothing is missing. strength: 0 (weakest) to 1, a
-    single value for all or a value each; None draws it uniformly. The same arguments give the same case.
+    single value for all or a value each; None draws it uniformly. name: of the device; empty for one with the seed. The
+    same arguments give the same case.
 
-    Raises ValueError for an unknown name, a strength outside 0..1, or a hand with a re-tuned model, which would absorb
-    the hand into the device.
+    Raises ValueError for an unknown name, a strength outside 0..1, a wrong number of strengths, or a hand with a
+    re-tuned model, which would absorb the hand into the device.
     """
     chosen_effects = [_find_effect(effect) for effect in effects]
     if origin == "retuned" and any(effect.name == "hand_impedance" for effect in chosen_effects):
@@ -103,27 +109,28 @@ def draw_case(
         nominal, tolerance = draw_calibration(bench, random, settings.axes)
     else:
         nominal, tolerance = retune(bench, response, plan, settings.axes)
-    label = name or f"bench {seed}"
-    model = as_model(label, nominal, tolerance, settings.axes)
-    recording = make_recording(label, plan, response, position, settings)
+    device_name = name or f"bench {seed}"
+    model = as_model(device_name, nominal, tolerance, settings.axes)
+    recording = make_recording(device_name, plan, response, position, settings)
 
-    def record_again(command: FloatArray, kind: str, added_kg: float, noise: int) -> Recording:
-        repeat_plan = make_further_plan(command, kind, settings)
-        heavier = replace(device, bench=replace(bench, mass=bench.mass + added_kg * np.eye(3)))
+    def record_again(command: FloatArray, kind: str, added_kg: float, noise_seed: int) -> Recording:
+        drive = make_further_plan(command, kind, settings)
+        loaded = replace(device, bench=replace(bench, mass=bench.mass + added_kg * np.eye(3)))
         readings = read_sensor(
-            device.sensor, *simulate_motion(heavier, repeat_plan.command), RATE_HZ, np.random.default_rng([seed, noise])
+            device.sensor, *simulate_motion(loaded, drive.command), RATE_HZ, np.random.default_rng([seed, noise_seed])
         )
-        return replace(make_recording(label, repeat_plan, *readings, settings), meta=describe_added_mass(added_kg))
+        return replace(make_recording(device_name, drive, *readings, settings), meta=describe_added_mass(added_kg))
 
     return Case(
         recording, model, truth, record_again,
-        measure_detectability(baseline, device, (base_motion, true_motion), settings) if chosen_effects else 0.0,
+        compute_detectability(baseline, device, (base_motion, true_motion), settings) if chosen_effects else 0.0,
     )  # fmt: skip
 
 
-def measure_detectability(baseline: Device, device: Device, motions: MotionPair, settings: CaseSettings) -> float:
-    """Difference between the readings of two devices over the noise, both rms, in the worst channel of acceleration or
-    position. motions: acceleration and position of each device."""
+def compute_detectability(baseline: Device, device: Device, motions: MotionPair, settings: CaseSettings) -> float:
+    """Compute the difference between the readings of two devices over the noise, both rms, in the channel of
+    acceleration or position where it is largest. motions: acceleration and position of each device. Position is taken
+    without its sensor."""
     readings = []
     for measured_device, (acceleration, position) in zip((baseline, device), motions, strict=True):
         # The same noise and lost samples for both, so that the difference of the readings is that of the devices.
@@ -131,13 +138,13 @@ def measure_detectability(baseline: Device, device: Device, motions: MotionPair,
             measured_device.sensor, acceleration, position, RATE_HZ, np.random.default_rng(0)
         )
         readings.append(np.hstack([acceleration_reading[:, settings.axes], position[:, settings.axes]]))
-    noise = NOISE[[*settings.axes, *(3 + axis for axis in settings.axes)]]
-    power = np.mean(((readings[1] - readings[0]) / noise) ** 2, axis=0)
+    noise_std = NOISE_STD[[*settings.axes, *(3 + axis for axis in settings.axes)]]
+    power = np.mean(((readings[1] - readings[0]) / noise_std) ** 2, axis=0)
     return float(np.sqrt(power.max()))
 
 
 def _find_effect(name: str) -> ConcealedEffect:
-    """The effect or decoy with this name. Raises ValueError for an unknown name."""
+    """Find the effect or decoy with this name. Raises ValueError for an unknown name."""
     effect = EFFECTS.get(name) or DECOYS.get(name)
     if effect is None:
         raise ValueError(f"there is no way to conceal '{name}'; known are {', '.join((*EFFECTS, *DECOYS))}")
@@ -145,7 +152,8 @@ def _find_effect(name: str) -> ConcealedEffect:
 
 
 def _draw_strengths(requested: float | Sequence[float] | None, count: int, random: np.random.Generator) -> FloatArray:
-    """(count,): the given strengths, or uniform draws. Raises ValueError for a strength outside 0..1."""
+    """Return the given strengths or uniform draws, (count,). Raises ValueError for a strength outside 0..1, or for
+    another number of strengths than 1 and count."""
     strengths = (
         random.random(count)
         if requested is None
@@ -163,9 +171,9 @@ def _conceal_effects(
     random: np.random.Generator,
     settings: CaseSettings,
 ) -> tuple[Device, tuple[Truth, ...]]:
-    """Draw the parameters of the effects, each for a random driven axis, and build them into the device.
-    base_motion: acceleration and position without the effects. effects_and_strengths: the effects and their
-    strengths."""
+    """Draw the parameters of the effects, each for a random driven axis, and build them into the device. base_motion:
+    acceleration (m/s^2) and position (m) without the effects, (samples, 3) each. effects_and_strengths: the effects and
+    their strengths."""
     (effects, strengths), (acceleration, position) = effects_and_strengths, base_motion
     bench, truth = device.bench, []
     peak_mps2 = np.minimum(np.abs(acceleration).max(axis=0), RANGE_MPS2)
@@ -180,35 +188,37 @@ def _conceal_effects(
 
 
 def make_further_plan(command: FloatArray, kind: str, settings: CaseSettings) -> DrivePlan:
-    """Excitation plan of a further recording, a single segment to fit. command: (samples, axes), N; kind: of
-    excitation."""
+    """Make the excitation plan of a further recording, a single segment to fit. command: (samples, driven axes), N;
+    kind: of excitation."""
     full_command = np.zeros((len(command), 3))
     full_command[:, settings.axes] = command
     return DrivePlan(full_command, (Segment(0, len(full_command), kind, float(np.abs(full_command).max()), 0, "fit"),))
 
 
 def describe_added_mass(added_kg: float) -> dict[str, float]:
-    """Recording metadata of an added mass; empty for none."""
+    """Make the recording's metadata of an added mass (kg); empty for none."""
     return {"added_mass_kg": added_kg} if added_kg else {}
 
 
 def make_truth(effect: ConcealedEffect, axis: int, values: dict[str, float]) -> Truth:
-    """The label of one concealed effect."""
+    """Make the label of one concealed effect. axis: 0 to 2; values: its drawn parameters."""
     vocabulary_entry = EFFECTS_BY_NAME.get(effect.name)
-    names = set(values) if vocabulary_entry is None else {parameter.name for parameter in vocabulary_entry.parameters}
+    vocabulary_names = (
+        set(values) if vocabulary_entry is None else {parameter.name for parameter in vocabulary_entry.parameters}
+    )
     return Truth(
         effect.name,
         effect.place,
         AXES[axis] if effect.of_axis else None,
-        {name: float(value) for name, value in values.items() if name in names},
-        {name: float(value) for name, value in values.items() if name not in names},
+        {name: float(value) for name, value in values.items() if name in vocabulary_names},
+        {name: float(value) for name, value in values.items() if name not in vocabulary_names},
     )
 
 
 def make_recording(
     name: str, plan: DrivePlan, response: FloatArray, position: FloatArray, settings: CaseSettings
 ) -> Recording:
-    """Recording of the driven axes. response (m/s^2), position (m): (samples, 3)."""
+    """Make the recording of the driven axes. response (m/s^2), position (m): (samples, 3), of all axes."""
     axes, axis_names = list(settings.axes), tuple(AXES[axis] for axis in settings.axes)
     return Recording(
         device=name,

@@ -12,8 +12,14 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.evaluation.challenge.device import Device
-from study.evaluation.challenge.friction_kernel import NEGATIVE, POSITIVE, STIFFNESS
-from study.evaluation.challenge.handle_force_kernel import CUBE, DRAG, PHASE, PITCH, RIPPLE
+from study.evaluation.challenge.friction_kernel import BRISTLE_STIFFNESS, LEVEL_NEGATIVE, LEVEL_POSITIVE
+from study.evaluation.challenge.handle_force_kernel import (
+    COGGING_AMPLITUDE,
+    COGGING_PHASE,
+    COGGING_PITCH,
+    CUBIC_STIFFNESS,
+    QUADRATIC_DAMPING,
+)
 
 Extra = Callable[[Device, float, np.random.Generator], Device]
 """extra(device, factor, random): the device with this effect added, of a random size times the factor."""
@@ -44,28 +50,35 @@ def _add_friction(device: Device, factor: float, random: np.random.Generator) ->
     """Add dry friction of 25 to 100 µN per axis, as a bristle of 3e5 N/m."""
     friction_n = factor * random.uniform(0.25e-4, 1e-4, 3)
     return replace(
-        device, friction=_with_columns(device.friction, {STIFFNESS: 3e5, POSITIVE: friction_n, NEGATIVE: friction_n})
+        device,
+        friction=_with_columns(
+            device.friction, {BRISTLE_STIFFNESS: 3e5, LEVEL_POSITIVE: friction_n, LEVEL_NEGATIVE: friction_n}
+        ),
     )
 
 
 def _add_ripple(device: Device, factor: float, random: np.random.Generator) -> Device:
     """Add cogging of 50 to 200 µN per axis, with a pitch of 0.7 to 3 mm and any phase."""
     cells = {
-        RIPPLE: factor * random.uniform(0.5e-4, 2e-4, 3),
-        PITCH: random.uniform(7e-4, 3e-3, 3),
-        PHASE: random.uniform(0.0, 2 * np.pi, 3),
+        COGGING_AMPLITUDE: factor * random.uniform(0.5e-4, 2e-4, 3),
+        COGGING_PITCH: random.uniform(7e-4, 3e-3, 3),
+        COGGING_PHASE: random.uniform(0.0, 2 * np.pi, 3),
     }
     return replace(device, forces=_with_columns(device.forces, dict(cells)))
 
 
 def _add_hardening(device: Device, factor: float, random: np.random.Generator) -> Device:
     """Add a cubic stiffness of up to 40 N/m³ of either sign per axis (hardening or softening)."""
-    return replace(device, forces=_with_columns(device.forces, {CUBE: factor * random.uniform(-40.0, 40.0, 3)}))
+    return replace(
+        device, forces=_with_columns(device.forces, {CUBIC_STIFFNESS: factor * random.uniform(-40.0, 40.0, 3)})
+    )
 
 
 def _add_drag(device: Device, factor: float, random: np.random.Generator) -> Device:
     """Add quadratic damping of up to 0.004 N s²/m² per axis."""
-    return replace(device, forces=_with_columns(device.forces, {DRAG: factor * random.uniform(0.0, 0.004, 3)}))
+    return replace(
+        device, forces=_with_columns(device.forces, {QUADRATIC_DAMPING: factor * random.uniform(0.0, 0.004, 3)})
+    )
 
 
 def _shift_modes(device: Device, factor: float, random: np.random.Generator) -> Device:
@@ -86,7 +99,7 @@ def _mix_channels(device: Device, factor: float, random: np.random.Generator) ->
 
 def _add_hum(device: Device, factor: float, random: np.random.Generator) -> Device:
     """Set the mains hum in the acceleration: sine and cosine of up to 0.004 m/s² per channel."""
-    return replace(device, sensor=replace(device.sensor, hum=factor * random.uniform(-0.004, 0.004, (2, 3))))
+    return replace(device, sensor=replace(device.sensor, hum_mps2=factor * random.uniform(-0.004, 0.004, (2, 3))))
 
 
 EXTRAS: tuple[Extra, ...] = (

@@ -1,10 +1,13 @@
-"""Dry friction on one axis as a bristle, in an integration step (compiled).
+"""Dry friction on one axis by Dahl's bristle model, one integration step at a time (compiled).
 
-Dahl's model with a level that depends on position x and velocity v:
+The friction level L depends on position x and velocity v:
 
-    dz/dt = v - |v| K z / L,    F = -K z,    L = level (1 + slope x + bend x^2) (1 + (ratio - 1) exp(-(v/speed)^2))
+    dz/dt = v - |v| K z / L,    F = -K z,    L = level (1 + a x + b x^2) (1 + (ratio - 1) exp(-(v/speed)^2))
 
-z: deflection of the bristle (m); K: its stiffness (N/m); the last factor is Stribeck's. No friction where L <= 0.
+z: deflection of the bristle (m); K: its stiffness (N/m). The last factor is Stribeck's; it applies where ratio > 1.
+Where L <= 0 there is no friction and z is reset to 0. Called by `mechanism_kernel` at every integration step.
+
+Source: P. R. Dahl, Solid friction damping of mechanical vibrations, AIAA Journal 14(12), 1976, 1675-1682.
 """
 
 from math import exp
@@ -13,25 +16,25 @@ from numba import njit
 
 from equalizer.signals.signal import FloatArray
 
-POSITIVE, NEGATIVE, STATIC_RATIO, SPEED, STIFFNESS, SLOPE, BEND = range(7)
-"""Columns of an axis: level (N) for positive velocity, level (N) for negative velocity, ratio of static to moving
-level, speed at which the excess of the static level has fallen to 1/e (m/s), stiffness of the bristle (N/m), change of
-the level with position (1/m and 1/m^2)."""
+LEVEL_POSITIVE, LEVEL_NEGATIVE, STATIC_RATIO, STRIBECK_SPEED, BRISTLE_STIFFNESS, LEVEL_SLOPE, LEVEL_CURVATURE = range(7)
+"""Columns of an axis: level (N) for positive velocity, level (N) for zero and negative velocity, ratio of static to
+kinetic level, Stribeck speed at which the excess of the static level has fallen to 1/e (m/s), stiffness K of the
+bristle (N/m), change of the level with position: a (1/m) and b (1/m^2)."""
 
 
 @njit(cache=True, nogil=True)
-def bristle_force(row: FloatArray, x: float, v: float, bend: float, step_s: float) -> tuple[float, float]:
-    """Force on the handle (N) and new deflection of the bristle (m). row: the columns above; x (m), v (m/s); bend: old
-    deflection (m).
+def step_bristle(parameters: FloatArray, x: float, v: float, deflection_m: float, step_s: float) -> tuple[float, float]:
+    """Integrate the bristle over one step: friction force on the handle (N) and new deflection (m). parameters (7,):
+    the columns above; x: position (m); v: velocity (m/s); deflection_m: previous deflection.
 
-    The relaxation of the deflection is integrated implicitly, so that a stiff bristle does not oscillate from step to
-    step.
+    The relaxation of the deflection is integrated implicitly (backward Euler), so that a stiff bristle does not
+    oscillate from step to step.
     """
-    level = row[POSITIVE] if v > 0.0 else row[NEGATIVE]
-    level *= 1.0 + (row[SLOPE] + row[BEND] * x) * x
-    if level <= 0.0:
+    level_n = parameters[LEVEL_POSITIVE] if v > 0.0 else parameters[LEVEL_NEGATIVE]
+    level_n *= 1.0 + (parameters[LEVEL_SLOPE] + parameters[LEVEL_CURVATURE] * x) * x
+    if level_n <= 0.0:
         return 0.0, 0.0
-    if row[STATIC_RATIO] > 1.0:
-        level *= 1.0 + (row[STATIC_RATIO] - 1.0) * exp(-((v / row[SPEED]) ** 2))
-    bend = (bend + step_s * v) / (1.0 + step_s * abs(v) * row[STIFFNESS] / level)
-    return -row[STIFFNESS] * bend, bend
+    if parameters[STATIC_RATIO] > 1.0:
+        level_n *= 1.0 + (parameters[STATIC_RATIO] - 1.0) * exp(-((v / parameters[STRIBECK_SPEED]) ** 2))
+    deflection_m = (deflection_m + step_s * v) / (1.0 + step_s * abs(v) * parameters[BRISTLE_STIFFNESS] / level_n)
+    return -parameters[BRISTLE_STIFFNESS] * deflection_m, deflection_m

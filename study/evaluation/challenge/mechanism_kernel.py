@@ -16,8 +16,8 @@ import numpy as np
 from numba import njit
 
 from equalizer.signals.signal import FloatArray
-from study.evaluation.challenge.friction_kernel import bristle_force
-from study.evaluation.challenge.handle_force_kernel import handle_force
+from study.evaluation.challenge.friction_kernel import step_bristle
+from study.evaluation.challenge.handle_force_kernel import compute_handle_force
 from study.evaluation.challenge.law_kernel import advance_law_memory, sum_law_forces
 
 RATE, DAMPING_DEPTH, STIFFNESS_DEPTH, PHASE, SQUARE = range(5)
@@ -146,11 +146,11 @@ def _set_linear_forces(m: Mechanism, q: FloatArray, v: FloatArray, f: FloatArray
 def _add_ground_forces(
     m: Mechanism, q: FloatArray, v: FloatArray, deflection: FloatArray, h: float, f: FloatArray
 ) -> None:
-    """Add friction, `handle_force` and the coupling of x and y to `f`. deflection: deflections of the bristles,
+    """Add friction, `compute_handle_force` and the coupling of x and y to `f`. deflection: deflections of the bristles,
     updated."""
     for j in range(3):
-        friction_n, deflection[j] = bristle_force(m.friction[j], q[j], v[j], deflection[j], h)
-        f[j] += friction_n + handle_force(m.forces[j], q[j], v[j])
+        friction_n, deflection[j] = step_bristle(m.friction[j], q[j], v[j], deflection[j], h)
+        f[j] += friction_n + compute_handle_force(m.forces[j], q[j], v[j])
     if m.coupling != 0.0:
         f[0] -= m.coupling * q[0] * q[1]
         f[1] -= 0.5 * m.coupling * q[0] * q[0]

@@ -16,7 +16,7 @@ from study.evaluation.challenge.bench import Bench
 from study.evaluation.challenge.device import Device, simulate_motion
 from study.evaluation.challenge.drive_plan import AXES, LEVELS_N, RATE_HZ, DrivePlan
 from study.evaluation.challenge.sensor import BANDWIDTH_HZ, NOISE_MPS2, RANGE_MPS2
-from study.evaluation.challenge.sensor_kernel import one_pole
+from study.evaluation.challenge.sensor_kernel import filter_first_order
 
 MODES_TOLERANCE = 0.005
 """Relative tolerance (standard deviation) of the modes, stated by every model of the challenge."""
@@ -117,7 +117,7 @@ def _simulate_linear_response(bench: Bench, command: FloatArray) -> FloatArray:
     """(samples, 3): acceleration of the bench, m/s^2, behind the sensor's first-order low pass. command: (samples, 3),
     N."""
     acceleration, _ = simulate_motion(Device(bench), command)
-    smoothed: FloatArray = one_pole(acceleration, 1.0 - np.exp(-2 * np.pi * BANDWIDTH_HZ / RATE_HZ))
+    smoothed: FloatArray = filter_first_order(acceleration, 1.0 - np.exp(-2 * np.pi * BANDWIDTH_HZ / RATE_HZ))
     return smoothed
 
 

@@ -1,7 +1,9 @@
-"""Sensors of the bench: accelerometer, position sensor, and the clock and line that carry both.
+"""Simulated sensors of the bench: accelerometer, position encoders, and the sampling clock and data line of both.
 
-Order: accelerometer pole, orientation, gain, nonlinearity, drift, hum; clock; noise; range; quantization; lost samples.
-Clock drift and lost samples affect acceleration and position alike.
+Order of the effects on the acceleration: low-pass, orientation, static law, gain and cubic term, saturation, play
+hysteresis; offset, drift, mains hum; clock error and delay; noise; range; quantization; lost samples. The position has
+clock error, noise, quantization and the same lost samples. Called by `device.record`, `laws.draw_law`, `draw_case` and
+`second_engine.mujoco_case`.
 """
 
 from collections.abc import Callable
@@ -10,104 +12,111 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from equalizer.signals.signal import FloatArray
-from study.evaluation.challenge.sensor_kernel import one_pole, play_hysteresis
+from study.evaluation.challenge.sensor_kernel import apply_play_hysteresis, filter_first_order
 
 BANDWIDTH_HZ, RANGE_MPS2 = 500.0, 29.43
-"""ADXL335 behind its 500 Hz filter: range 3 g."""
+"""Cut-off frequency (Hz) and range (m/s^2, 3 g) of the accelerometer ADXL335 with a 500 Hz output filter."""
 NOISE_MPS2 = (0.042, 0.042, 0.083)
-"""Standard deviation of x, y, z: 150 and 300 ug per root Hz over the filter's noise bandwidth of 1.6 x 500 Hz (data
-sheet)."""
+"""Standard deviation of the noise of x, y, z (m/s^2): 150 (x, y) and 300 (z) ug per root Hz over the noise bandwidth of
+the filter, 1.6 x 500 Hz (data sheet of the ADXL335)."""
 POSITION_NOISE_M, POSITION_STEP_M = 4e-6, 1e-5
-"""Noise and resolution of the encoders at the handle."""
+"""Standard deviation of the noise, and resolution, of the position at the handle (m). Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensor:
-    """Parameters of a simulated accelerometer and its faults; by default it has no fault."""
+    """Parameters of a simulated accelerometer and of its faults; by default it has noise and a limited band and range,
+    but no fault. Arrays (3,) have a value per channel."""
 
     bandwidth_hz: float = BANDWIDTH_HZ
-    """One pole."""
+    """Cut-off frequency (-3 dB) of the first-order low-pass (Hz)."""
     orientation: FloatArray = field(default_factory=lambda: np.eye(3))
-    """Rows are channels: rotation, and cross-axis sensitivity."""
+    """(channels, axes): rotation and cross-axis sensitivity."""
     gain: FloatArray = field(default_factory=lambda: np.ones(3))
-    cubic: FloatArray = field(default_factory=lambda: np.zeros(3))
-    """1/(m/s^2)^2"""
-    drift: FloatArray = field(default_factory=lambda: np.zeros(3))
-    """m/s^2, reached at the end."""
-    offset: FloatArray = field(default_factory=lambda: np.zeros(3))
-    """m/s^2"""
-    late_s: float = 0.0
-    """Delay of the acceleration's record behind the commands."""
-    hum: FloatArray = field(default_factory=lambda: np.zeros((2, 3)))
-    """m/s^2 of sine and cosine."""
+    """Ratio of reading to acceleration."""
+    cubic_gain: FloatArray = field(default_factory=lambda: np.zeros(3))
+    """Coefficient of the third power of the acceleration, 1/(m/s^2)^2."""
+    drift_mps2: FloatArray = field(default_factory=lambda: np.zeros(3))
+    """Drift (m/s^2) at the end of the recording; it grows linearly from 0."""
+    offset_mps2: FloatArray = field(default_factory=lambda: np.zeros(3))
+    """Constant error of the acceleration."""
+    delay_s: float = 0.0
+    """Delay of the recorded acceleration relative to the commands; negative: it is early."""
+    hum_mps2: FloatArray = field(default_factory=lambda: np.zeros((2, 3)))
+    """Amplitudes of the mains hum, (sine and cosine, channels)."""
     hum_hz: float = 50.0
-    limit: FloatArray = field(default_factory=lambda: np.full(3, RANGE_MPS2))
-    """m/s^2, clipping per channel."""
-    step: float = 0.0
-    """m/s^2, quantization; 0 = none."""
-    ppm: float = 0.0
-    """Clock error; positive: the response is taken at t (1 + ppm 1e-6)."""
-    lost: float = 0.0
-    """Fraction of the samples that repeat the one before."""
-    bend: float = 0.0
-    """1/(m/s^2): curvature of a saturating characteristic."""
-    play: float = 0.0
-    """m/s^2, half the width of a hysteresis."""
-    law: Callable[[FloatArray], FloatArray] | None = None
-    """Maps the readings (samples, 3)."""
+    """Frequency of the hum."""
+    range_mps2: FloatArray = field(default_factory=lambda: np.full(3, RANGE_MPS2))
+    """Magnitude at which the acceleration is clipped."""
+    resolution_mps2: float = 0.0
+    """Quantization step of the acceleration; 0: not quantized."""
+    clock_error_ppm: float = 0.0
+    """Relative error e of the sampling clock, in 1e-6: a sample with the time stamp t was taken at t (1 + 1e-6 e)."""
+    lost_fraction: float = 0.0
+    """Probability that a sample is lost; the last received sample is then repeated."""
+    inverse_saturation: float = 0.0
+    """s of the saturating characteristic tanh(s a) / s, 1/(m/s^2): inverse of its largest output; 0: none."""
+    play_half_width_mps2: float = 0.0
+    """Half of the width of the play hysteresis; 0: none."""
+    static_law: Callable[[FloatArray], FloatArray] | None = None
+    """Additional static characteristic: maps accelerations (samples, 3) to accelerations; None: the identity."""
 
 
 def read_sensor(
     sensor: Sensor, acceleration: FloatArray, position: FloatArray, rate_hz: float, random: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
-    """Measured acceleration and position, (samples, 3) each."""
-    smoothed = one_pole(acceleration, 1.0 - np.exp(-2 * np.pi * sensor.bandwidth_hz / rate_hz))
-    signal = _apply_nonlinearity(sensor, smoothed @ sensor.orientation.T)
-    elapsed_share = np.linspace(0.0, 1.0, len(signal))[:, None]
-    turns = 2 * np.pi * sensor.hum_hz * np.arange(len(signal))[:, None] / rate_hz
-    signal = (
-        signal
-        + sensor.offset
-        + sensor.drift * elapsed_share
-        + sensor.hum[0] * np.sin(turns)
-        + sensor.hum[1] * np.cos(turns)
+    """Simulate the readings of acceleration (m/s^2) and position (m), (samples, 3) each, from the true values of the
+    same shape and unit at `rate_hz`. random: of noise and lost samples."""
+    low_passed = filter_first_order(acceleration, 1.0 - np.exp(-2 * np.pi * sensor.bandwidth_hz / rate_hz))
+    reading = _apply_nonlinearity(sensor, low_passed @ sensor.orientation.T)
+    elapsed_share = np.linspace(0.0, 1.0, len(reading))[:, None]
+    hum_phase_rad = 2 * np.pi * sensor.hum_hz * np.arange(len(reading))[:, None] / rate_hz
+    reading = (
+        reading
+        + sensor.offset_mps2
+        + sensor.drift_mps2 * elapsed_share
+        + sensor.hum_mps2[0] * np.sin(hum_phase_rad)
+        + sensor.hum_mps2[1] * np.cos(hum_phase_rad)
     )
-    signal = _resample(signal, sensor.ppm, sensor.late_s * rate_hz)
-    position_reading = _resample(position, sensor.ppm, 0.0)
-    signal = np.clip(signal + random.normal(size=signal.shape) * NOISE_MPS2, -sensor.limit, sensor.limit)
-    if sensor.step > 0.0:
-        signal = sensor.step * np.round(signal / sensor.step)
+    reading = _resample(reading, sensor.clock_error_ppm, sensor.delay_s * rate_hz)
+    position_reading = _resample(position, sensor.clock_error_ppm, 0.0)
+    reading = np.clip(reading + random.normal(size=reading.shape) * NOISE_MPS2, -sensor.range_mps2, sensor.range_mps2)
+    if sensor.resolution_mps2 > 0.0:
+        reading = sensor.resolution_mps2 * np.round(reading / sensor.resolution_mps2)
     position_reading = position_reading + POSITION_NOISE_M * random.normal(size=position_reading.shape)
     position_reading = POSITION_STEP_M * np.round(position_reading / POSITION_STEP_M)
-    sample_index = _last_received(len(signal), sensor.lost, random)
-    return signal[sample_index], position_reading[sample_index]
+    sample_index = _find_last_received(len(reading), sensor.lost_fraction, random)
+    return reading[sample_index], position_reading[sample_index]
 
 
-def _apply_nonlinearity(sensor: Sensor, signal: FloatArray) -> FloatArray:
-    """Static law, gain, cubic term, soft saturation, then hysteresis."""
-    signal = signal if sensor.law is None else sensor.law(signal)
-    signal = sensor.gain * signal + sensor.cubic * signal**3
-    if sensor.bend > 0.0:
-        signal = np.tanh(sensor.bend * signal) / sensor.bend
-    return signal if sensor.play == 0.0 else play_hysteresis(signal, sensor.play)
+def _apply_nonlinearity(sensor: Sensor, reading: FloatArray) -> FloatArray:
+    """Apply static law, gain and cubic term, saturation and hysteresis, in this order. reading: (samples, 3)."""
+    reading = reading if sensor.static_law is None else sensor.static_law(reading)
+    reading = sensor.gain * reading + sensor.cubic_gain * reading**3
+    if sensor.inverse_saturation > 0.0:
+        reading = np.tanh(sensor.inverse_saturation * reading) / sensor.inverse_saturation
+    return (
+        reading if sensor.play_half_width_mps2 == 0.0 else apply_play_hysteresis(reading, sensor.play_half_width_mps2)
+    )
 
 
-def _resample(samples: FloatArray, ppm: float, delay_samples: float) -> FloatArray:
-    """Resample with linear interpolation for a clock error (ppm) and a delay. delay_samples: in samples."""
-    if ppm == 0.0 and delay_samples == 0.0:
+def _resample(samples: FloatArray, clock_error_ppm: float, delay_samples: float) -> FloatArray:
+    """Resample (samples, 3) by linear interpolation at the times of a faulty clock, with a delay in samples. Beyond the
+    ends, the first or last sample is repeated."""
+    if clock_error_ppm == 0.0 and delay_samples == 0.0:
         return samples
-    k = np.arange(len(samples), dtype=np.float64)
-    times = k * (1.0 + 1e-6 * ppm) - delay_samples
-    return np.column_stack([np.interp(times, k, column) for column in samples.T])
+    sample_indices = np.arange(len(samples), dtype=np.float64)
+    positions = sample_indices * (1.0 + 1e-6 * clock_error_ppm) - delay_samples
+    return np.column_stack([np.interp(positions, sample_indices, column) for column in samples.T])
 
 
-def _last_received(
-    samples: int, lost: float, random: np.random.Generator
+def _find_last_received(
+    sample_count: int, lost_fraction: float, random: np.random.Generator
 ) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """Index of the last sample that was not lost, for every sample."""
-    is_received = random.random(samples) >= lost
+    """Index of the last received sample at every sample, (sample_count,). The first sample is never lost."""
+    is_received = random.random(sample_count) >= lost_fraction
     is_received[0] = True
     sample_index: np.ndarray[tuple[int], np.dtype[np.int64]] = np.maximum.accumulate(
-        np.where(is_received, np.arange(samples), 0)
+        np.where(is_received, np.arange(sample_count), 0)
     )
     return sample_index

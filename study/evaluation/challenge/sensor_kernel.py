@@ -1,4 +1,7 @@
-"""First-order lag and play hysteresis of a simulated sensor, at the sample rate (compiled); used by `sensor`."""
+"""First-order low-pass and play hysteresis of a simulated accelerometer, sample by sample (compiled).
+
+Called by `sensor`; `nominal` uses the low-pass for the linear model of the sensor.
+"""
 
 import numpy as np
 from numba import njit
@@ -7,25 +10,26 @@ from equalizer.signals.signal import FloatArray
 
 
 @njit(cache=True, nogil=True)
-def one_pole(samples: FloatArray, share: float) -> FloatArray:
-    """First-order low-pass y += share (x - y), with y = 0 at the start. samples: (n, channels); share: 0 to 1."""
+def filter_first_order(samples: FloatArray, smoothing_factor: float) -> FloatArray:
+    """First-order low-pass y += smoothing_factor (x - y) per channel, with y = 0 before the first sample. samples:
+    (n, channels); smoothing_factor: 1 - exp(-2 pi f_c / sample rate), 0 to 1."""
     smoothed = np.zeros(samples.shape)
     for j in range(samples.shape[1]):
-        y = 0.0
+        state = 0.0
         for k in range(samples.shape[0]):
-            y += share * (samples[k, j] - y)
-            smoothed[k, j] = y
+            state += smoothing_factor * (samples[k, j] - state)
+            smoothed[k, j] = state
     return smoothed
 
 
 @njit(cache=True, nogil=True)
-def play_hysteresis(samples: FloatArray, half_width: float) -> FloatArray:
-    """Play operator: the output stays within `half_width` of the input and moves only when it must; 0 at the start.
-    samples: (n, channels)."""
+def apply_play_hysteresis(samples: FloatArray, half_width: float) -> FloatArray:
+    """Play operator per channel: the output is the previous output, clipped to within `half_width` of the input; it is
+    0 before the first sample. samples: (n, channels); half_width: in their unit."""
     output = np.zeros(samples.shape)
     for j in range(samples.shape[1]):
-        y = 0.0
+        state = 0.0
         for k in range(samples.shape[0]):
-            y = min(max(y, samples[k, j] - half_width), samples[k, j] + half_width)
-            output[k, j] = y
+            state = min(max(state, samples[k, j] - half_width), samples[k, j] + half_width)
+            output[k, j] = state
     return output

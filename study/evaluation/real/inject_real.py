@@ -21,8 +21,15 @@ from equalizer.signals.recording import Recording
 from study.errors import StudyError
 from study.evaluation.bank.answer_cases import hash_other_recordings
 from study.evaluation.bank.ask_engine import Workers, diagnose_cases, is_answered
-from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, show_case
-from study.evaluation.bank.proof_folder import CLEAN_FOLDER, MODEL, RECORDING, SETTINGS, ProofFolder, open_proof_folder
+from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, publish_case
+from study.evaluation.bank.proof_folder import (
+    CLEAN_FOLDER,
+    MODEL_FILE,
+    RECORDING_FILE,
+    SETTINGS_FILE,
+    ProofFolder,
+    open_proof_folder,
+)
 from study.evaluation.bank.proof_seals import (
     is_answer_to_sealed_case,
     make_broken_seal_error,
@@ -96,7 +103,7 @@ def seal_injections(folder: ProofFolder, carriers: Sequence[Carrier], count: int
 def _write_injection(folder: ProofFolder, carriers: Sequence[Carrier], number: int, seed: int) -> str:
     """Draw one case, and write its files and its label, to be sealed by `seal`; returns its name. An existing case is
     kept."""
-    label_path = folder.label_file(number)
+    label_path = folder.get_label_file(number)
     if label_path.exists():
         return str(read_label(label_path)["name"])
     generator = np.random.default_rng([seed, number])
@@ -112,10 +119,10 @@ def _write_injection(folder: ProofFolder, carriers: Sequence[Carrier], number: i
     change = compute_held_out_change(intact, faultless, faulty) if effects else 1.0
     case_folder = begin_case(folder)
     (case_folder / CLEAN_FOLDER).mkdir()
-    write_recording(case_folder / RECORDING, faulty, precision="float64")
-    write_recording(case_folder / CLEAN_FOLDER / RECORDING, intact, precision="float64")
-    write_mechanical_model(case_folder / MODEL, carrier.model)
-    write_text(case_folder / SETTINGS, format_settings((), PROCESSOR_S))
+    write_recording(case_folder / RECORDING_FILE, faulty, precision="float64")
+    write_recording(case_folder / CLEAN_FOLDER / RECORDING_FILE, intact, precision="float64")
+    write_mechanical_model(case_folder / MODEL_FILE, carrier.model)
+    write_text(case_folder / SETTINGS_FILE, format_settings((), PROCESSOR_S))
     label_values = {
         "name": case_folder.name,
         "number": number,
@@ -126,13 +133,13 @@ def _write_injection(folder: ProofFolder, carriers: Sequence[Carrier], number: i
         "strength": strength if effects else 0.0,
         "values": values,
         "change": change,
-        "recording_sha256": compute_sha256(case_folder / RECORDING),
-        "model_sha256": compute_sha256(case_folder / MODEL),
+        "recording_sha256": compute_sha256(case_folder / RECORDING_FILE),
+        "model_sha256": compute_sha256(case_folder / MODEL_FILE),
         "others_sha256": hash_other_recordings(case_folder),
         "salt": secrets.token_hex(16),
     }
     write_text(label_path, json.dumps(label_values, indent=1, allow_nan=False) + "\n")
-    show_case(folder, case_folder)
+    publish_case(folder, case_folder)
     return case_folder.name
 
 
@@ -174,7 +181,7 @@ def run_injections(
         on_done(answered, count)
 
     diagnose_cases(folder, names, workers, count_answer)
-    labels = [read_label(folder.label_file(number)) for number in range(len(names))]
+    labels = [read_label(folder.get_label_file(number)) for number in range(len(names))]
     answers = [read_answer(folder.open / name) for name in names]
     if broken_names := [
         label["name"]

@@ -20,7 +20,7 @@ from analysis.diagnosis.search.time_budget import CountedBudget
 from analysis.diagnosis.types import TimeBudget
 from analysis.evaluation.blind_test.injected import InjectedOutcome
 from study.devices.clock import Clock, RealClock
-from study.errors import StudyError, UserInterruptError, WrongUseError, resumable
+from study.errors import StudyError, UserInterruptError, WrongUseError, convert_interrupts
 from study.evaluation.bank.ask_engine import Workers
 from study.evaluation.real.diagnose_real import RealDiagnosis, diagnose_real, report_crash
 from study.evaluation.real.inject_real import load_carriers, run_injections
@@ -36,11 +36,11 @@ from study.evaluation.real.write_real import PAGE_NAME, RealResults, WrittenReal
 from study.local_clock import convert_to_machine_zone
 from study.session.views.local_time import format_time_in_zone
 from study.store.disk.file_errors import CannotWriteError
-from study.store.disk.folder_contents import Files, read_files, write_files
-from study.store.disk.new_folder import new_folder
+from study.store.disk.folder_contents import FileContents, read_files, write_files
+from study.store.disk.new_folder import create_new_folder
 from study.store.disk.provenance import Provenance
 from study.store.formats.mechanical_model_file import write_mechanical_model
-from study.store.formats.real_answer_file import read_answer_and_origin, write_real_answer
+from study.store.formats.real_answer_file import read_answer_and_provenance, write_real_answer
 from study.workflows.crash_guard import make_crash_guard
 from study.workflows.diagnosis.write_diagnosis import write_diagnosis_into
 from study.workflows.forked_map import measure_processor_s, without_forking
@@ -98,7 +98,7 @@ def diagnose_folder(
     reused = find_reusable_answers(plan.out, inventory.recordings, plan.seconds)
     _make_writable(plan.out)
     saved = f"What was answered so far is in {plan.out}."
-    with resumable("Not all recordings were diagnosed.", saved, further_types=(UserInterruptError,)):
+    with convert_interrupts("Not all recordings were diagnosed.", saved, further_types=(UserInterruptError,)):
         if executor is None:
             answers = _diagnose_here(plan, inventory, reused, on_progress, used_clock)
         else:
@@ -209,12 +209,12 @@ def _diagnose_on_executor(
     for answer_path, files in run_tasks(executor, answer_sent_recording, tasks, MAX_TASKS_IN_FLIGHT):
         with _new_folder_in_parents(answer_path) as part:
             write_files(part, files)
-        answers[answer_path] = read_answer_and_origin(answer_path / ANSWER_NAME)[0]
+        answers[answer_path] = read_answer_and_provenance(answer_path / ANSWER_NAME)[0]
         on_progress(f"{len(answers)} of {len(answer_paths)} answered", end_share * len(answers) / len(answer_paths))
     return tuple(answers[answer_path] for answer_path in answer_paths)
 
 
-def answer_sent_recording(folder: str, name: str, files: Files) -> Files:
+def answer_sent_recording(folder: str, name: str, files: FileContents) -> FileContents:
     """Diagnose one recording on a worker, and return the files of its results. folder, files: name and content of its
     sub-folder; name: of the recording. Raises StudyError where the recording is not in these files."""
     with TemporaryDirectory() as temporary, without_forking():
@@ -275,10 +275,10 @@ def _write_diagnosis(folder: Path, result: RealDiagnosis, origin: Provenance) ->
 
 @contextmanager
 def _new_folder_in_parents(folder: Path) -> Iterator[Path]:
-    """Open a new folder as `new_folder` does, and create its parents. Raises StudyError."""
+    """Open a new folder as `create_new_folder` does, and create its parents. Raises StudyError."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
         raise CannotWriteError(folder, problem) from problem
-    with new_folder(folder) as part:
+    with create_new_folder(folder) as part:
         yield part

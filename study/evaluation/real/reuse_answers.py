@@ -13,7 +13,7 @@ from analysis.diagnosis.real_answer.real_answer import RealAnswer
 from study.errors import StudyError
 from study.evaluation.real.real_folder import RealRecording
 from study.store.disk.provenance import Provenance, gather_provenance
-from study.store.formats.real_answer_file import read_answer_and_origin
+from study.store.formats.real_answer_file import read_answer_and_provenance
 
 ANSWER_NAME, INJECTED_NAME = "answer.json", "injected"
 """File with the answer to a recording, and folder with the answers to injected faults."""
@@ -56,7 +56,7 @@ def find_reusable_answers(
 def _read_earlier_answer(folder: Path, real_recording: RealRecording, seconds: float | None) -> _EarlierAnswer:
     """The answer in a folder of results, with its changes. Raises StudyError where it is damaged."""
     try:
-        answer, origin = read_answer_and_origin(folder / ANSWER_NAME)
+        answer, origin = read_answer_and_provenance(folder / ANSWER_NAME)
     except StudyError as error:
         raise StudyError(
             f"{real_recording.folder.name}/{real_recording.name}/{error.title}",

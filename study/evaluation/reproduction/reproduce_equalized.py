@@ -15,7 +15,7 @@ from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError
 from equalizer.tracking.workspace.models_at_place import ModelsAtPlace
 from equalizer.tracking.workspace.workspace_models import WorkspaceModels
 from study.devices.opening import FRICTIONLESS
-from study.evaluation.reproduction.reproduce_playback import Driver, PlaybackRow, not_equalized, play_row
+from study.evaluation.reproduction.reproduce_playback import Driver, PlaybackRow, drive_without_equalizer, play_row
 from study.evaluation.reproduction.reproduction_plan import EDGE, ReproductionPlan
 
 
@@ -58,7 +58,7 @@ def play_equalized(
     for number, (key, row) in enumerate(rows.items(), start=1):
         response = play_row(plan, row)
         # A static gain would correct its level: only the shape of the response is compared.
-        unscaled = row.driver is not_equalized
+        unscaled = row.driver is drive_without_equalizer
         responses[key] = replace(response, response=normalise_gain(response.response)) if unscaled else response
         on_share(number / len(rows))
     return _split_rows(responses, (*blended.remarks, *remarks, *_describe_clipping(responses)))
@@ -78,17 +78,21 @@ def _list_rows(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, Playba
     centre = make_single_model_driver(models.centre)
     frictionless = make_single_model_driver(models.frictionless)
     return {
-        "plain": PlaybackRow("Not equalized, centre", not_equalized),
+        "plain": PlaybackRow("Not equalized, centre", drive_without_equalizer),
         "equalized": PlaybackRow("Equalized, centre", centre),
-        "edge_plain": PlaybackRow("Not equalized, edge", not_equalized, EDGE),
+        "edge_plain": PlaybackRow("Not equalized, edge", drive_without_equalizer, EDGE),
         "edge": PlaybackRow("Edge, model of the centre", centre, EDGE),
         "edge_blended": PlaybackRow("Edge, models blended (ours)", make_blending_driver(blended), EDGE),
-        "broad_plain": PlaybackRow("Not equalized, centre, all frequencies", not_equalized, signal="multisine"),
+        "broad_plain": PlaybackRow(
+            "Not equalized, centre, all frequencies", drive_without_equalizer, signal="multisine"
+        ),
         "broad": PlaybackRow("Equalized, centre, all frequencies", centre, signal="multisine"),
         "edge_broad": PlaybackRow(
             "Edge, models blended (ours), all frequencies", make_blending_driver(blended), EDGE, signal="multisine"
         ),
-        "slick_plain": PlaybackRow("Not equalized, centre, without friction", not_equalized, device=FRICTIONLESS),
+        "slick_plain": PlaybackRow(
+            "Not equalized, centre, without friction", drive_without_equalizer, device=FRICTIONLESS
+        ),
         "slick": PlaybackRow("Equalized, centre, without friction", frictionless, device=FRICTIONLESS),
         "frictionless": PlaybackRow(
             "Equalized, centre, all frequencies, without friction",

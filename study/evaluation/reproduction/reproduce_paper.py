@@ -16,11 +16,11 @@ from equalizer.identification.state_space.held_out_validation import HeldOutVali
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.signals.recording import Recording
 from study.devices.opening import FRICTIONLESS
-from study.errors import StudyError, UserInterruptError, resumable
+from study.errors import StudyError, UserInterruptError, convert_interrupts
 from study.evaluation.reproduction.reproduce_baselines import play_baselines
 from study.evaluation.reproduction.reproduce_equalized import PlacedModels, play_equalized
 from study.evaluation.reproduction.reproduce_recordings import CachedRecording, RecordingRequest, record_or_load
-from study.evaluation.reproduction.reproduction_plan import INTERMEDIATE_PLACES, ReproductionPlan, Steps
+from study.evaluation.reproduction.reproduction_plan import INTERMEDIATE_PLACES, ReproductionPlan, StepProgress
 from study.evaluation.reproduction.reproduction_results import Results
 from study.evaluation.reproduction.write_reproduction import WrittenReproduction, write_reproduction_folder
 from study.store.disk.file_errors import CannotWriteError, UnusableFileError
@@ -92,20 +92,20 @@ def reproduce_paper(plan: ReproductionPlan, on_progress: Callable[[float], None]
     """Make all figures. `on_progress(share)`, 0 to 1. Resumable after UserInterruptError. Raises StudyError."""
     requests = _list_requests(plan)
     model_names = _list_model_names()
-    steps = Steps(_estimate_step_durations_s(plan, requests, model_names), on_progress)
-    saved = f"Sessions, recordings and models so far are in {plan.out}."
-    with resumable("The reproduction is not finished.", saved, further_types=(UserInterruptError,)):
+    steps = StepProgress(_estimate_step_durations_s(plan, requests, model_names), on_progress)
+    saved = f"Sessions, recordings and models so far are in {plan.output_folder}."
+    with convert_interrupts("The reproduction is not finished.", saved, further_types=(UserInterruptError,)):
         _make_folders(plan)
         recordings = {
-            name: record_or_load(plan, request, steps.progress_of(f"recording {name}"))
+            name: record_or_load(plan, request, steps.make_callback(f"recording {name}"))
             for name, request in requests.items()
         }
         collected = _rehearse_study(plan, steps)
         identified = {
-            name: identify_or_load(plan, recordings[name], steps.progress_of(f"model {name}")) for name in model_names
+            name: identify_or_load(plan, recordings[name], steps.make_callback(f"model {name}")) for name in model_names
         }
         results = _collect_results(plan, recordings, identified, collected, steps)
-        return write_reproduction_folder(plan, results, steps.progress_of("writing"))
+        return write_reproduction_folder(plan, results, steps.make_callback("writing"))
 
 
 def _list_requests(plan: ReproductionPlan) -> Mapping[str, RecordingRequest]:
@@ -158,11 +158,11 @@ def _make_folders(plan: ReproductionPlan) -> None:
             raise CannotWriteError(folder, problem) from problem
 
 
-def _rehearse_study(plan: ReproductionPlan, steps: Steps) -> CollectedTrials:
+def _rehearse_study(plan: ReproductionPlan, steps: StepProgress) -> CollectedTrials:
     """Run the study with simulated participants, and collect its trials."""
     source = read_study_protocol(plan.protocols.study, plan.study)
     rehearsal = Rehearsal(source.protocol, source.text, subjects=plan.subjects, seed=plan.seed, data=plan.study)
-    report_share = steps.progress_of("study")
+    report_share = steps.make_callback("study")
     rehearse_study(rehearsal, plan.workers, lambda subjects_done: report_share(subjects_done / plan.subjects))
     return collect_sessions(plan.study, source.protocol.name)
 
@@ -172,7 +172,7 @@ def _collect_results(
     recordings: Mapping[str, CachedRecording],
     identified: Mapping[str, ReproducedModel],
     collected: CollectedTrials,
-    steps: Steps,
+    steps: StepProgress,
 ) -> Results:
     """Compute all figures. Raises StudyError where a recording does not suffice for its figure."""
     models = PlacedModels(
@@ -191,15 +191,15 @@ def _collect_results(
             "The recordings do not carry the figures",
             f"{problem}.",
             "Take other recording protocols, or another folder with --out.",
-            saved=f"Sessions, recordings and models are in {plan.out}.",
+            saved=f"Sessions, recordings and models are in {plan.output_folder}.",
         ) from problem
     return Results(
         study=analyse_study(collected.trials, collected.protocol),
         ellipsoids=ellipsoid_results,
         device=device,
         device_name=centre_recording.device,
-        played=play_equalized(plan, models, steps.progress_of("playing")),
-        baselines=play_baselines(plan, models, estimate, steps.progress_of("baselines")),
+        played=play_equalized(plan, models, steps.make_callback("playing")),
+        baselines=play_baselines(plan, models, estimate, steps.make_callback("baselines")),
         models=tuple(reproduced.as_used_model(name) for name, reproduced in identified.items()),
         tested=identified[CENTRE_NAME].tested,
         tested_frictionless=identified[FRICTIONLESS_NAME].tested,

@@ -1,8 +1,9 @@
-"""Play wanted accelerations axis by axis on the simulated device and measure its true acceleration (figure 5).
+"""Playback of wanted accelerations on a simulated device: response from wanted to true acceleration (figure 5).
 
 Figure 5 of the paper compares wanted and delivered accelerations with and without the equalizer. Each row of the figure
-is one place, one device and one way to convert the wanted acceleration to forces (a driver). The three axes are played
-one after the other, all rows at the same peak force.
+is one position of the handle, one device and one way to convert the wanted acceleration to forces (a driver). The three
+axes are played one after the other, all rows at the same peak force. Called by `reproduce_equalized` and
+`reproduce_baselines`.
 """
 
 import contextlib
@@ -29,27 +30,29 @@ from study.store.formats.protocol_files import read_recording_protocol
 
 AXES = ("ax", "ay", "az")
 """Names of the channels of a wanted acceleration."""
-PEAK_OVER_CAP = 0.93
-"""Peak of the norm of the force, as a fraction of the cap: far above friction, and not clipped."""
-PERIODS = 2
-"""Periods played; the transient decays in the first, and the last is measured."""
+PEAK_FORCE_RATIO = 0.93
+"""Peak of the norm of the force, as a fraction of the protocol's force cap. Chosen: far above friction, not clipped."""
+PLAYED_PERIODS = 2
+"""Number of periods played: the transient decays in the first, and the last is measured."""
 FADE_S = 0.5
-"""Fade-in of the periodic forces (s)."""
+"""Duration of the fade-in of the periodic forces (s). Chosen."""
 WAVE_SEED = 5
 """Seed of the wanted acceleration, the same for all rows, so that they can be compared."""
 
 Driver = Callable[[Signal], FloatArray]
-"""Forces (period, 3), up to a common factor, that should cause one period of wanted accelerations (period, 3), m/s²."""
+"""Converts one period of wanted accelerations (period, 3), m/s², to the forces (period, 3) that should cause it, up to
+a common factor."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlaybackRow:
-    """One row of the figure: place, device, and how the wanted signal is converted to forces."""
+    """One row of figure 5: position of the handle, device, and driver."""
 
     name: str
+    """Label of the row in the figure and its table."""
     driver: Driver
     place_m: Place = CENTRE
-    """Place of the handle in the workspace: x, y, z (m)."""
+    """Position of the handle in the workspace: x, y, z (m)."""
     device: str = SIMULATED
     """Name of the device, as the option `--device` takes it."""
     hand: bool = False
@@ -58,40 +61,41 @@ class PlaybackRow:
     """Kind of the wanted acceleration: sweep or multisine."""
 
 
-def not_equalized(target: Signal) -> FloatArray:
-    """(period, 3): forces proportional to the wanted acceleration, as without an equalizer."""
+def drive_without_equalizer(target: Signal) -> FloatArray:
+    """Driver without an equalizer: forces (period, 3) equal to the wanted accelerations, up to a common factor."""
     return target.samples
 
 
 def play_row(plan: ReproductionPlan, row: PlaybackRow) -> PlayedResponse:
-    """Play one row. Raises DeviceError, or StudyError where the device does not report its true acceleration."""
+    """Measure the response of one row. Raises DeviceError, and StudyError where the device does not play the forces to
+    their end or does not report its true acceleration."""
     protocol = read_recording_protocol(plan.protocols.band).protocol
     settings = DeviceSettings(
         limits=make_recording_limits(protocol),
         spring_frequency_hz=protocol.spring.natural_frequency_hz,
         spring_damping_n_s_per_m=protocol.spring.damping_n_s_per_m,
-        keep_s=1.0,
+        keep_s=1.0,  # without effect: it limits the recording of held stimuli only
         hand_on_handle=row.hand,
         place_m=row.place_m,
     )
-    peak_n = PEAK_OVER_CAP * protocol.safety.stimulus_cap_n
+    peak_n = PEAK_FORCE_RATIO * protocol.safety.stimulus_cap_n
     with contextlib.closing(open_device(row.device, settings, VirtualClock(), plan.seed)) as device:
         return _play_axes(plan, row, device, peak_n)
 
 
 def _play_axes(plan: ReproductionPlan, row: PlaybackRow, device: Device, peak_n: float) -> PlayedResponse:
-    """Response from wanted to true acceleration, (lines, 3, 3). Each axis is played in turn; its forces are scaled to
-    the peak `peak_n` (N), and the wanted acceleration by the same factor."""
+    """Measure the response from wanted to true acceleration, (lines, 3, 3). Each axis is played in turn; its forces are
+    scaled to the peak `peak_n` (N), and the wanted acceleration by the same factor."""
     rate_hz = device.info.sample_rate_hz
-    wave = make_target_wave(row.signal, plan.band_hz, round(plan.period_s * rate_hz), rate_hz, WAVE_SEED)
+    target_wave = make_target_wave(row.signal, plan.band_hz, round(plan.period_s * rate_hz), rate_hz, WAVE_SEED)
     targets, delivered, total_clipped = [], [], 0
     for axis in range(3):
-        samples = np.zeros((len(wave), 3))
-        samples[:, axis] = wave
-        loop = row.driver(Signal(samples, rate_hz, "acceleration", "m/s^2", AXES))
-        scale = peak_n / float(np.linalg.norm(loop, axis=1).max())
-        true_acceleration, clipped_ticks = _play_to_steady_state(device, scale * loop)
-        targets.append(scale * wave)
+        samples = np.zeros((len(target_wave), 3))
+        samples[:, axis] = target_wave
+        period_force = row.driver(Signal(samples, rate_hz, "acceleration", "m/s^2", AXES))
+        scale = peak_n / float(np.linalg.norm(period_force, axis=1).max())
+        true_acceleration, clipped_ticks = _play_to_steady_state(device, scale * period_force)
+        targets.append(scale * target_wave)
         delivered.append(true_acceleration)
         total_clipped += clipped_ticks
     frequency_hz, response = estimate_response(np.array(targets), delivered, plan.band_hz, rate_hz)
@@ -108,11 +112,12 @@ def _play_axes(plan: ReproductionPlan, row: PlaybackRow, device: Device, peak_n:
     )
 
 
-def _play_to_steady_state(device: Device, loop: FloatArray) -> tuple[FloatArray, int]:
-    """The last period of the handle's true acceleration, (period, 3) in m/s², and the number of ticks at which a cap
-    cut the force. loop: (period, 3), N."""
+def _play_to_steady_state(device: Device, period_force: FloatArray) -> tuple[FloatArray, int]:
+    """Play `PLAYED_PERIODS` periods: true acceleration of the handle in the last, (period, 3) in m/s², and the ticks at
+    which a cap limited the force, summed over the three caps. period_force: (period, 3), N. Raises StudyError where the
+    device does not play to the end or reports no true acceleration."""
     rate_hz = device.info.sample_rate_hz
-    forces = apply_fades(np.tile(loop, (PERIODS, 1)), round(FADE_S * rate_hz), 0)
+    forces = apply_fades(np.tile(period_force, (PLAYED_PERIODS, 1)), round(FADE_S * rate_hz), 0)
     run = device.play(Signal(forces, rate_hz, "force", "N", ("fx", "fy", "fz")))
     if run.truth is None or run.recording is None:
         raise StudyError(
@@ -122,5 +127,5 @@ def _play_to_steady_state(device: Device, loop: FloatArray) -> tuple[FloatArray,
             saved="Recordings and models so far are in the folder.",
         )
     health = run.health
-    clipped = health.stimulus_clipped + health.feedback_clipped + health.total_clipped
-    return run.truth.samples[-len(loop) :], clipped
+    clipped_ticks = health.stimulus_clipped + health.feedback_clipped + health.total_clipped
+    return run.truth.samples[-len(period_force) :], clipped_ticks

@@ -1,7 +1,7 @@
-"""Recordings for the reproduced figures: made once and reused by the next run.
+"""Cache of the recordings for the reproduced figures: each is made once and reused by later runs.
 
-An existing recording is reused only where protocol, seed and place of the handle agree with the request. One that
-differs is never overwritten (StudyError); an interrupted one is removed and made again.
+A recording is reused only where protocol, seed and position of the handle agree with the request. One that differs is
+never overwritten (StudyError); an interrupted one is removed and made again. Called by `reproduce_paper`.
 """
 
 from collections.abc import Callable
@@ -23,12 +23,12 @@ from study.workflows.recording.record_device import RecordingPlan, record_device
 
 @dataclass(frozen=True, slots=True)
 class RecordingRequest:
-    """A recording that is needed."""
+    """Settings of one recording, and the name of its file."""
 
     name: str
-    """Name of the file, without its ending."""
+    """Name of the file, without the ending .h5."""
     protocol: str
-    """Name of a shipped recording protocol, or a file."""
+    """Name of a shipped recording protocol, or path of a protocol file."""
     place_m: Place = CENTRE
     """Position of the handle, x, y, z (m)."""
     device: str = SIMULATED
@@ -37,7 +37,7 @@ class RecordingRequest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CachedRecording:
-    """A recording of the reproduction, loaded or just made."""
+    """A recording of the reproduction, loaded from its file or new."""
 
     path: Path
     recording: Recording
@@ -48,15 +48,15 @@ class CachedRecording:
 def record_or_load(
     plan: ReproductionPlan, request: RecordingRequest, on_share: Callable[[float], None]
 ) -> CachedRecording:
-    """Load the cached recording, or make it. on_share: called with the completed share, 0 to 1. Raises StudyError where
-    the folder contains a recording of another run under this name."""
+    """Load the cached recording, or make it. on_share: called with the completed fraction, 0 to 1. Raises DeviceError,
+    and StudyError where the folder contains a recording of another run under this name."""
     path = plan.recordings / f"{request.name}.h5"
     protocol = read_recording_protocol(request.protocol).protocol
     cached = _load_cached_recording(path, plan, request, protocol)
     if cached is None:
-        recording = RecordingPlan(protocol, request.device, request.place_m, plan.seed, path)
-        total_s = recording.total_s
-        record_device(recording, lambda seconds: on_share(seconds / total_s))
+        recording_plan = RecordingPlan(protocol, request.device, request.place_m, plan.seed, path)
+        total_s = recording_plan.total_s
+        record_device(recording_plan, lambda seconds: on_share(seconds / total_s))
         cached = read_recording(path)
     on_share(1.0)
     return CachedRecording(path, cached, _warn_of_reduced_amplitudes(cached))
@@ -72,15 +72,15 @@ def _load_cached_recording(
     try:
         cached = read_recording(path)
     except UnusableFileError as problem:
-        raise _foreign_file_error(path, "it cannot be read") from problem
+        raise _make_foreign_file_error(path, "it cannot be read") from problem
     meta = cached.meta
-    origin: dict[str, Any] = meta.get("provenance", {})
-    if origin.get("protocol_hash") != protocol_hash(protocol):
-        raise _foreign_file_error(path, "it follows another protocol")
-    if origin.get("seeds") != {"device": plan.seed}:
-        raise _foreign_file_error(path, "it was made with another seed")
+    provenance: dict[str, Any] = meta.get("provenance", {})
+    if provenance.get("protocol_hash") != protocol_hash(protocol):
+        raise _make_foreign_file_error(path, "it follows another protocol")
+    if provenance.get("seeds") != {"device": plan.seed}:
+        raise _make_foreign_file_error(path, "it was made with another seed")
     if tuple(meta.get("place_m", ())) != request.place_m:
-        raise _foreign_file_error(path, "it was made at another place")
+        raise _make_foreign_file_error(path, "it was made at another place")
     if meta.get("interrupted"):
         path.unlink()
         return None
@@ -88,7 +88,7 @@ def _load_cached_recording(
 
 
 def _warn_of_reduced_amplitudes(recording: Recording) -> tuple[str, ...]:
-    """Sentences about segments whose amplitude (N) was lower than the protocol requests; repeated on every run."""
+    """Sentences about segments whose amplitude (N) was lower than requested, for new and cached recordings alike."""
     return tuple(
         f"Played at {segment['played_amplitude_n']:.3g} N instead of {segment['requested_amplitude_n']:.3g} N along "
         f"{segment['along']}, because something was at its limit."
@@ -97,8 +97,8 @@ def _warn_of_reduced_amplitudes(recording: Recording) -> tuple[str, ...]:
     )
 
 
-def _foreign_file_error(path: Path, reason: str) -> StudyError:
-    """The error for a file that does not belong to this reproduction. reason: a clause."""
+def _make_foreign_file_error(path: Path, reason: str) -> StudyError:
+    """Make the error for a file that does not belong to this reproduction. reason: a clause."""
     return StudyError(
         "This folder holds another reproduction",
         f"{path} is in the way: {reason}.",

@@ -1,4 +1,7 @@
-"""Settings of `hapteq reproduce`, the folders of its results, and the progress over its steps."""
+"""Settings of `hapteq reproduce`, the folders of its results, and its overall progress.
+
+Used by all modules of this package; `study.cli.reproduce` makes the plan.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -10,10 +13,10 @@ Place = tuple[float, float, float]
 CENTRE: Place = (0.0, 0.0, 0.0)
 """Centre of the workspace."""
 EDGE: Place = (0.0, 0.05, 0.0)
-"""Near the edge of a workspace whose soft stops begin at 75 mm."""
+"""Near the edge of the workspace, whose soft stops begin at 75 mm. Chosen."""
 INTERMEDIATE_PLACES: tuple[Place, ...] = ((0.0, 0.03, 0.0), (0.0, 0.065, 0.0))
-"""Places at which further models are identified for interpolation, in addition to the centre. `EDGE` is not among them,
-so that playback there tests the interpolation."""
+"""Positions at which further models are identified for interpolation, in addition to the centre. `EDGE` is not among
+them, so that playback there tests the interpolation. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,9 +24,11 @@ class ReproducedProtocols:
     """Protocols of the reproduction: names of shipped protocols, or paths of files."""
 
     study: str = "direction_threshold"
+    """Threshold study of the simulated participants, for figure 2."""
     ellipsoid: str = "ellipsoid"
+    """Recording along many directions, for figure 3 (acceleration ellipsoids)."""
     sweep: str = "sweep"
-    """Sweep over the whole range, for figures 1 and 4."""
+    """Sweep over the whole frequency range, for figures 1 and 4."""
     band: str = "sweep_band"
     """Sweep over the equalized band, for figure 5."""
     hand: str = "sweep_hand"
@@ -32,16 +37,16 @@ class ReproducedProtocols:
 
 @dataclass(frozen=True, slots=True)
 class ReproductionPlan:
-    """Settings of a reproduction: output folder, number of participants, seed, and settings of the identified
-    models."""
+    """Settings of a reproduction: output folder, numbers of simulated participants and of worker processes, seed, and
+    settings of the identified models."""
 
-    out: Path
+    output_folder: Path
     subjects: int = 10
     seed: int = 1
     workers: int = 2
     protocols: ReproducedProtocols = ReproducedProtocols()
     order: int = 26
-    """Order of the identified models."""
+    """Order (number of states) of the identified models."""
     band_hz: tuple[float, float] = (5.0, 35.0)
     """Equalized band: lowest and highest frequency (Hz)."""
     period_s: float = 10.0
@@ -50,38 +55,43 @@ class ReproductionPlan:
     @property
     def study(self) -> Path:
         """Data folder of the simulated participants."""
-        return self.out / "study"
+        return self.output_folder / "study"
 
     @property
     def recordings(self) -> Path:
         """Folder of the recordings of the simulated device."""
-        return self.out / "recordings"
+        return self.output_folder / "recordings"
 
     @property
     def models(self) -> Path:
         """Folder of the identified models."""
-        return self.out / "models"
+        return self.output_folder / "models"
 
     @property
     def figures(self) -> Path:
         """Folder of the figures."""
-        return self.out / "figures"
+        return self.output_folder / "figures"
 
 
-class Steps:
-    """Overall progress of steps of different duration: the mean of their progress, weighted by `weights`."""
+class StepProgress:
+    """Overall progress of several steps: the mean of their completed fractions, weighted by their expected durations.
+
+    weights: by name of the step; on_progress: called with the overall progress, 0 to 1.
+    """
 
     def __init__(self, weights: Mapping[str, float], on_progress: Callable[[float], None]) -> None:
         self._weights = weights
         self._on_progress = on_progress
-        self._done: dict[str, float] = {}
+        self._completed_shares: dict[str, float] = {}
 
-    def progress_of(self, step: str) -> Callable[[float], None]:
-        """Progress callback for one step: takes its own share, 0 to 1."""
+    def make_callback(self, step: str) -> Callable[[float], None]:
+        """Make the callback by which a step reports its completed fraction, 0 to 1. A step without a weight does not
+        count."""
         return lambda share: self._report_share(step, share)
 
     def _report_share(self, step: str, share: float) -> None:
+        """Store the completed fraction of a step and report the overall progress."""
         # A step that is repeated reports a smaller share again; the overall progress must not decrease.
-        self._done[step] = max(self._done.get(step, 0.0), min(share, 1.0))
-        done = sum(weight * self._done.get(name, 0.0) for name, weight in self._weights.items())
-        self._on_progress(done / sum(self._weights.values()))
+        self._completed_shares[step] = max(self._completed_shares.get(step, 0.0), min(share, 1.0))
+        weighted_sum = sum(weight * self._completed_shares.get(name, 0.0) for name, weight in self._weights.items())
+        self._on_progress(weighted_sum / sum(self._weights.values()))

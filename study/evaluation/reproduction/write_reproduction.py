@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.evaluation.reproduction.document import FigureFindings, Reproduction
-from analysis.evaluation.reproduction.ellipsoid_findings import ellipsoid_findings
+from analysis.evaluation.reproduction.ellipsoid_findings import make_ellipsoid_findings
 from analysis.evaluation.reproduction.equalized_findings import make_equalized_findings
 from analysis.evaluation.reproduction.played_response import make_played_row
 from analysis.evaluation.reproduction.response_findings import make_band_findings, make_response_findings
@@ -15,7 +15,7 @@ from analysis.reports.reproduction_report import render_reproduction_report, sum
 from equalizer.identification.frequency_response.frequency_bands import (
     PUBLISHED_DIRECTION_LIMIT_HZ,
     FrequencyBand,
-    frequency_bands,
+    compute_frequency_bands,
 )
 from study.evaluation.reproduction.reproduction_plan import ReproductionPlan
 from study.evaluation.reproduction.reproduction_results import Results
@@ -50,7 +50,7 @@ def write_reproduction_folder(
     limit_hz = find_direction_limit(results.study)
     # Where the thresholds give no limit of direction, the published one separates the bands.
     used_limit_hz = PUBLISHED_DIRECTION_LIMIT_HZ if limit_hz is None else limit_hz
-    bands = frequency_bands(results.device.onset.frequency_hz, used_limit_hz)
+    bands = compute_frequency_bands(results.device.onset.frequency_hz, used_limit_hz)
     reproduction = _make_document(plan, results, bands, limit_hz, used_limit_hz)
     pictures = reproduction_pictures(
         results.study, results.ellipsoids, results.device, bands, used_limit_hz, results.played.rows
@@ -61,7 +61,7 @@ def write_reproduction_folder(
     provenance = gather_provenance(
         protocol_hash=results.protocol_hash, seeds={"reproduction": plan.seed}, parents=results.sources
     )
-    document, report = plan.out / REPRODUCTION_NAME, plan.out / PAGE_NAME
+    document, report = plan.output_folder / REPRODUCTION_NAME, plan.output_folder / PAGE_NAME
     write_reproduction(document, reproduction, provenance)
     page_html = render_reproduction_report(reproduction, pictures, _format_provenance(provenance), format_local_now())
     write_text(report, page_html, overwrite=True)
@@ -88,7 +88,7 @@ def _make_document(
         figures=(
             make_band_findings(bands, limit_hz, used_limit_hz),
             make_study_findings(results.study),
-            ellipsoid_findings(results.ellipsoids),
+            make_ellipsoid_findings(results.ellipsoids),
             make_response_findings(results.device.response, results.device.resonances, results.device.onset),
             _make_equalization_findings(results),
         ),

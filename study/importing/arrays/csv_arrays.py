@@ -1,7 +1,7 @@
-"""Read the columns of a text table (CSV) as arrays, for an import.
+"""Read the columns of a text table (CSV) as arrays; called by `read_arrays`, and `workbook_arrays` for its sheets.
 
 Encoding, delimiter, decimal sign, header and units are detected (`table_text`, `table_layout`). Empty fields are
-missing samples. An invalid field is reported with its line and column, but only where its column is used.
+missing samples. A column of numbers and words is reported with line and column, but only where the column is used.
 """
 
 import io
@@ -19,37 +19,37 @@ from study.importing.arrays.table_cells import EMPTY, Line, holds_number, is_com
 from study.importing.arrays.table_layout import TableLayout, find_layout
 from study.importing.arrays.table_marks import NO_THOUSANDS
 from study.importing.arrays.table_text import read_text
-from study.importing.arrays.time_stamps import STAMP_WORDS, is_stamp, join_stamps, read_stamps
+from study.importing.arrays.time_stamps import STAMP_NOTATIONS, is_stamp, join_stamps, read_stamps
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.signal_words import split_bracketed_unit
 
 if TYPE_CHECKING:
     import pandas as pd
 
-MOST_ROWS = 20_000_000
-"""Most rows of a table: more than five hours at 1 kHz."""
-MOST_COLUMNS = 10_000
-"""Most columns of a table: a file with more is no recording, and would fill the memory."""
-_LONGEST_LINE = 2**20
-"""Longest line, in characters: about a hundred for each of `MOST_COLUMNS` columns."""
-_LONGEST_QUOTED = 60
+MAX_ROWS = 20_000_000
+"""Most lines of a table that are read: more than five hours at 1 kHz. Chosen."""
+MAX_COLUMNS = 10_000
+"""Most columns of a table that are read. Chosen: a file with more is no recording, and would fill the memory."""
+_MAX_LINE_CHARACTERS = 2**20
+"""Longest line that is read, in characters: about a hundred for each of `MAX_COLUMNS` columns."""
+_MAX_QUOTED_CHARACTERS = 60
 """Most characters of an invalid field that its message quotes."""
-_HOLDS_NUMBER = re.compile(r'(?:^|[,;\t|])[\s"]*[-+.]?\d[\d.,:eE+-]*[\s"]*(?:[,;\t|]|$)')
+_NUMBER_FIELD = re.compile(r'(?:^|[,;\t|])[\s"]*[-+.]?\d[\d.,:eE+-]*[\s"]*(?:[,;\t|]|$)')
 """Matches a line with a field that is a number, with any delimiter between its fields."""
-_THOUSANDS = re.compile(r"[-+]?\d{1,3}([.,' \u00a0\u202f]\d{3})+([.,]\d*)?")
-"""A number with thousands separators, which is not read."""
-_MISSING = [*EMPTY, *(word.upper() for word in EMPTY), "NaN", "None", "Null"]
+_GROUPED_NUMBER = re.compile(r"[-+]?\d{1,3}([.,' \u00a0\u202f]\d{3})+([.,]\d*)?")
+"""Matches a number with thousands separators, which is not read."""
+_MISSING_FIELDS = [*EMPTY, *(word.upper() for word in EMPTY), "NaN", "None", "Null"]
 """Fields that stand for a missing sample."""
 
 
 class FaultyColumn(str):
-    """Problem of a column with an invalid field, in place of its values: reported only where the column is used."""
+    """Problem of a column with words among its numbers, in place of its values; shown where the column is used."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Table:
-    """by_name: columns (n,) or scalars. clocks: names of columns that were dates or clock times, now in seconds since
-    the first. notes: remarks."""
+    """by_name: columns (n,), scalars (), or placeholders for columns that are not read. clocks: names of columns of
+    dates or clock times, converted to seconds since the first. notes: sentences on conversions and omissions."""
 
     by_name: dict[str, npt.NDArray[Any]]
     clocks: tuple[str, ...]
@@ -57,20 +57,19 @@ class Table:
 
 
 def read_csv_arrays(path: Path, settings: CsvMap) -> Table:
-    """Read the columns of a table. Empty fields are missing samples. Raises CannotReadError; ValueError with line and
-    column of a problem."""
+    """Read the columns of a table file. Raises CannotReadError; ValueError with line and column of a problem."""
     source = read_text(path, settings.encoding)
     table = read_lines(_split_lines(source.text, settings), settings)
     return replace(table, notes=(*table.notes, *filter(None, (source.note,))))
 
 
 def read_lines(lines: list[Line], settings: CsvMap) -> Table:
-    """Columns from the lines of a table that are not empty. Raises ValueError with line and column of a problem."""
+    """Read columns from the non-empty lines of a table. Raises ValueError with line and column of a problem."""
     layout = find_layout(lines, settings)
     if not layout.body:
         raise ValueError("it has a header, but no rows below it")
-    if len(layout.names) > MOST_COLUMNS:
-        raise ValueError(f"it has {len(layout.names)} columns; up to {MOST_COLUMNS} are read")
+    if len(layout.names) > MAX_COLUMNS:
+        raise ValueError(f"it has {len(layout.names)} columns; up to {MAX_COLUMNS} are read")
     if repeated := sorted(name for name, count in Counter(layout.names).items() if count > 1):
         raise ValueError(f"its header names '{repeated[0]}' twice; give the columns names of their own in [csv] names")
     body = list(layout.body)
@@ -78,17 +77,17 @@ def read_lines(lines: list[Line], settings: CsvMap) -> Table:
     comments = _find_comments(lines, layout)
     text = "\n".join(line for _, line in body)
     texts = {name for place, name in enumerate(layout.names) if place in layout.texts}
-    first = next((fields for _, line in body if all(fields := split_row(line, layout.delimiter))), [])
-    stamp_names = {name for name, field in zip(layout.names, first, strict=False) if is_stamp(field)}
-    kinds = {name: str if name in stamp_names | texts else np.float64 for name in layout.names}
+    first_fields = next((fields for _, line in body if all(fields := split_row(line, layout.delimiter))), [])
+    stamp_names = {name for name, field in zip(layout.names, first_fields, strict=False) if is_stamp(field)}
+    dtypes = {name: str if name in stamp_names | texts else np.float64 for name in layout.names}
     try:
-        frame = _read_frame(text, layout, {"dtype": kinds, "na_values": _MISSING})
+        frame = _read_frame(text, layout, {"dtype": dtypes, "na_values": _MISSING_FIELDS})
     except ValueError:
         frame = _read_frame(text, layout, {"dtype": str})  # slower, but it finds the invalid field
     if len(frame) != len(body):
         number = next((number for number, line in body if line.count('"') % 2), body[0][0])
         raise ValueError(f"line {number}: a quote is opened and not closed in its line; remove it, or close it")
-    table = _classify({name: frame[name] for name in layout.names if name not in texts}, body, layout)
+    table = _classify_columns({name: frame[name] for name in layout.names if name not in texts}, body, layout)
     faulty = {name: problem for name in texts if (problem := _find_number(frame[name], name, body, layout))}
     faulty |= {name: array.item() for name, array in table.by_name.items() if array.dtype.kind == "O"}
     omitted = [f"Left out: '{name}' holds words, not numbers." for name in layout.names if name in texts - {*faulty}]
@@ -97,21 +96,21 @@ def read_lines(lines: list[Line], settings: CsvMap) -> Table:
     return Table(by_name, table.clocks, (*table.notes, *omitted, *comments, *layout.notes))
 
 
-def _classify(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: TableLayout) -> Table:
-    """The columns without those that contain only words. A column with words among its numbers is replaced by its
-    problem. Raises ValueError for a number in another notation."""
+def _classify_columns(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout: TableLayout) -> Table:
+    """Convert columns to numbers or seconds; leave out those of words only. A column with words among its numbers is
+    replaced by its problem. Raises ValueError for a number in another notation."""
     numbers: dict[str, npt.NDArray[Any]] = {}
-    stamps, texts = {}, []
+    stamps, text_names = {}, []
     for name, column in columns.items():
         if column.dtype == np.float64:
             numbers[name] = _reduce_to_scalar(column.to_numpy())
         elif (stamp_column := read_stamps(column.mask(_is_missing(column)))) is not None:
             stamps[name] = stamp_column
         elif all(map(is_text, column[~_is_missing(column)].str.strip())):
-            texts.append(name)
+            text_names.append(name)
         else:
             try:
-                numbers[name] = _reduce_to_scalar(_to_numbers(column, name, body, layout))
+                numbers[name] = _reduce_to_scalar(_parse_numbers(column, name, body, layout))
             except ValueError as problem:
                 if not all(is_number(field, layout.decimal) or is_text(field) for field in column.str.strip()):
                     raise  # a number in another notation is an error, not a remark
@@ -120,25 +119,25 @@ def _classify(columns: "Mapping[str, pd.Series[Any]]", body: list[Line], layout:
     in_seconds = {name: _rename_in_seconds(name, columns) for name in joined_stamps}
     all_columns = numbers | {name: _subtract_first(stamp.seconds) for name, stamp in joined_stamps.items()}
     notes = tuple(f"{name}: read as seconds since {stamp.first}." for name, stamp in joined_stamps.items())
-    notes += tuple(f"Left out: '{name}' holds words, not numbers." for name in texts)
+    notes += tuple(f"Left out: '{name}' holds words, not numbers." for name in text_names)
     by_name = {in_seconds.get(name, name): all_columns[name] for name in columns if name in all_columns}
     return Table(by_name, tuple(in_seconds.values()), notes)
 
 
 def _reduce_to_scalar(column: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """The number (scalar) of a column with a value in its first row only, such as a rate; else the column."""
+    """Scalar () for a column with a value in its first row only, such as a rate; else the column (n,)."""
     single = len(column) > 1 and not np.isnan(column[0]) and bool(np.isnan(column[1:]).all())
     return np.asarray(column[0]) if single else column
 
 
 def _rename_in_seconds(name: str, names: Iterable[str]) -> str:
-    """Name of a column of time stamps after its conversion to seconds."""
+    """Name of a column of time stamps after its conversion to seconds, different from all `names`."""
     stem = split_bracketed_unit(name)[0]
     return f"{stem} [s]" if f"{stem} [s]" not in names else f"{stem} stamp [s]"
 
 
 def _find_number(column: "pd.Series[str]", name: str, body: list[Line], layout: TableLayout) -> FaultyColumn:
-    """The problem of a column that was recognised as words but contains a number; empty without one."""
+    """Find the first number in a column that was recognised as words: the problem, empty without a number."""
     numbers = column.fillna("").map(lambda field: holds_number([field.strip()], layout.decimal)).to_numpy()
     if not numbers.any():
         return FaultyColumn()
@@ -151,7 +150,8 @@ def _is_missing(column: "pd.Series[str]") -> "pd.Series[bool]":
 
 
 def convert_times(stored: Mapping[str, npt.NDArray[Any]]) -> Table:
-    """Convert arrays of dates, times, or texts of them to seconds, like columns of a table. Raises ValueError."""
+    """Convert arrays of dates and clock times to seconds since the first; other arrays are unchanged. Raises ValueError
+    for stamps that do not exist or are ambiguous (`read_stamps`)."""
     converted, clocks, notes = {}, [], []
     for name, array in stored.items():
         times = _convert_to_seconds(array)
@@ -164,18 +164,18 @@ def convert_times(stored: Mapping[str, npt.NDArray[Any]]) -> Table:
 
 
 def _convert_to_seconds(array: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float64], str] | None:
-    """Seconds since the first of an array of dates or times, and the first; None for other arrays."""
-    line = np.ravel(array)
-    if len(line) < 2 or len(line) != max(array.shape) or array.dtype.kind not in "MmSU":
+    """Seconds (n,) since the first of an array of dates or times, and the first as text; None for other arrays."""
+    values = np.ravel(array)
+    if len(values) < 2 or len(values) != max(array.shape) or array.dtype.kind not in "MmSU":
         return None
     if array.dtype.kind in "Mm":
-        first = line[int(np.argmin(np.isnat(line)))]
-        return np.where(np.isnat(line), np.nan, (line - first) / np.timedelta64(1, "s")), str(first)
-    if not is_stamp(str(line[0].decode("utf-8", "replace") if isinstance(line[0], bytes) else line[0]).strip()):
+        first = values[int(np.argmin(np.isnat(values)))]
+        return np.where(np.isnat(values), np.nan, (values - first) / np.timedelta64(1, "s")), str(first)
+    if not is_stamp(str(values[0].decode("utf-8", "replace") if isinstance(values[0], bytes) else values[0]).strip()):
         return None
     import pandas as pd
 
-    stamps = read_stamps(pd.Series(np.char.decode(line, "utf-8") if array.dtype.kind == "S" else line))
+    stamps = read_stamps(pd.Series(np.char.decode(values, "utf-8") if array.dtype.kind == "S" else values))
     if stamps is None:
         return None
     stamp_column = join_stamps({"": stamps})[""]
@@ -183,27 +183,26 @@ def _convert_to_seconds(array: npt.NDArray[Any]) -> tuple[npt.NDArray[np.float64
 
 
 def _subtract_first(seconds: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Seconds since the first stamp that is not missing."""
+    """Seconds (n,) since the first stamp that is not missing; NaN stays NaN."""
     return np.asarray(seconds - seconds[int(np.argmax(np.isfinite(seconds)))])
 
 
 def _split_lines(text: str, settings: CsvMap) -> list[Line]:
-    """Lines that are not empty, with their numbers, after the skipped ones. Raises ValueError for too many or too long
-    lines."""
-    if max(text.count("\n"), text.count("\r")) > MOST_ROWS:
-        raise ValueError(f"it has more than {MOST_ROWS} lines; save it as .npz or .h5")
-    numbered: list[Line] = []
+    """Number the lines from 1; leave out skipped and empty ones. Raises ValueError for too many or too long lines."""
+    if max(text.count("\n"), text.count("\r")) > MAX_ROWS:
+        raise ValueError(f"it has more than {MAX_ROWS} lines; save it as .npz or .h5")
+    numbered_lines: list[Line] = []
     for number, line in enumerate(text.splitlines(), start=1):
-        if len(line) > _LONGEST_LINE:
-            raise ValueError(f"line {number} has {len(line)} characters; up to {_LONGEST_LINE} are read")
+        if len(line) > _MAX_LINE_CHARACTERS:
+            raise ValueError(f"line {number} has {len(line)} characters; up to {_MAX_LINE_CHARACTERS} are read")
         if number > settings.skip_lines and line.strip():
-            numbered.append((number, line))
-    return _join_header(numbered)
+            numbered_lines.append((number, line))
+    return _join_header(numbered_lines)
 
 
 def _join_header(lines: list[Line]) -> list[Line]:
-    """Join header lines within a quoted name that contains a line break; lines with a number are not changed."""
-    first = next((index for index, (_, text) in enumerate(lines) if _HOLDS_NUMBER.search(text)), 0)
+    """Join header lines within a quoted name that contains a line break; lines from the first number on are kept."""
+    first = next((index for index, (_, text) in enumerate(lines) if _NUMBER_FIELD.search(text)), 0)
     header: list[Line] = []
     for number, text in lines[:first]:
         if header and header[-1][1].count('"') % 2:
@@ -215,7 +214,7 @@ def _join_header(lines: list[Line]) -> list[Line]:
 
 
 def _find_comments(lines: list[Line], layout: TableLayout) -> tuple[str, ...]:
-    """A remark on comment lines below the first row. Raises ValueError for a comment that has the fields of a row."""
+    """Remark on the comment lines below the first row. Raises ValueError for a comment that has the fields of a row."""
     first, width = layout.body[0][0], len(layout.names)
     header = max((number for number, line in lines if number < first and not is_comment(line)), default=first)
     below = [line for line in lines if line[0] > header and is_comment(line[1])]
@@ -247,7 +246,7 @@ def _require_equal_rows(body: list[Line], layout: TableLayout) -> None:
 
 def _suggest_remedy(number: int, line: str, body: list[Line], delimiter: str) -> str:
     """Remedy for a row with the wrong number of fields, by the likely cause."""
-    if any(_THOUSANDS.fullmatch(field.strip(' "')) for field in re.split(r"[;\t|]", line)):
+    if any(_GROUPED_NUMBER.fullmatch(field.strip(' "')) for field in re.split(r"[;\t|]", line)):
         return NO_THOUSANDS
     if delimiter in ", " and re.search(rf"(?<![\d.])[1-9]\d{{0,2}}{delimiter}\d{{3}}(?!\d)", line):
         return f"where '{delimiter}' separates thousands, {NO_THOUSANDS}; else remove that line, or complete it"
@@ -259,8 +258,7 @@ def _suggest_remedy(number: int, line: str, body: list[Line], delimiter: str) ->
 
 
 def _read_frame(text: str, layout: TableLayout, options: dict[str, Any]) -> "pd.DataFrame":
-    # Imported only here, because the import takes longer than reading a file of any other format.
-    import pandas as pd
+    import pandas as pd  # imported only here, because the import takes longer than reading a file of another format
 
     table: pd.DataFrame = pd.read_csv(
         io.StringIO(text),
@@ -275,8 +273,10 @@ def _read_frame(text: str, layout: TableLayout, options: dict[str, Any]) -> "pd.
     return table
 
 
-def _to_numbers(column: "pd.Series[str]", name: str, body: list[Line], layout: TableLayout) -> npt.NDArray[np.float64]:
-    """A column of texts as numbers. Raises ValueError with line, field and remedy for an invalid field."""
+def _parse_numbers(
+    column: "pd.Series[str]", name: str, body: list[Line], layout: TableLayout
+) -> npt.NDArray[np.float64]:
+    """Parse a column of texts as numbers (n,), NaN where empty. Raises ValueError with line, field and remedy."""
     import pandas as pd
 
     fields = column.str.strip()
@@ -292,9 +292,9 @@ def _to_numbers(column: "pd.Series[str]", name: str, body: list[Line], layout: T
         text = str(column.iloc[int(invalid[0])])
         comma = layout.decimal == "." and re.fullmatch(r"[-+]?\d*,\d+([eE][-+]?\d+)?", text.strip())
         hint = '; where the decimal sign is a comma, the map says decimal = "," under [csv]' if comma else ""
-        stamp_hint = f"; {STAMP_WORDS}" if re.search(r"\d[-/:]\d", text) else ""
-        thousands = f"; {NO_THOUSANDS}" if _THOUSANDS.fullmatch(text.strip()) else ""
+        stamp_hint = f"; {STAMP_NOTATIONS}" if re.search(r"\d[-/:]\d", text) else ""
+        thousands = f"; {NO_THOUSANDS}" if _GROUPED_NUMBER.fullmatch(text.strip()) else ""
         remedy = hint or stamp_hint or thousands or "; correct it, or leave it empty where the sample is missing"
-        excerpt = text if len(text) <= _LONGEST_QUOTED else f"{text[:_LONGEST_QUOTED]}…"
+        excerpt = text if len(text) <= _MAX_QUOTED_CHARACTERS else f"{text[:_MAX_QUOTED_CHARACTERS]}…"
         raise ValueError(f"line {number}, column '{name}': '{excerpt}' is not a number{remedy}")
     return np.asarray(values, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Read arrays from JSON files; called by `study.importing.arrays.arrays`.
+"""Read arrays from JSON files; called by `study.importing.arrays.read_arrays`.
 
 Three forms are read: records (`[{"t": 0, "u": 1}, ...]`), columns (`{"t": [...], "u": [...]}`), and JSON Lines (a
 record per line). Arrays inside an object have its name as prefix (`run1/u`), unless it is the only object with arrays.
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from study.importing.arrays.csv_arrays import MOST_COLUMNS
+from study.importing.arrays.csv_arrays import MAX_COLUMNS
 from study.importing.arrays.table_cells import is_empty, is_number
 from study.importing.arrays.table_layout import append_units
 from study.regular_file import open_regular, read_regular
@@ -137,9 +137,9 @@ def _collect_columns(records: list[dict[str, Any]]) -> dict[str, list[Any]]:
     deep, as `imu.x`. Raises ValueError with too many keys or values."""
     rows = [dict(_flatten_record(record)) for record in records]
     keys = dict.fromkeys(key for record in rows for key in record)
-    if len(keys) > MOST_COLUMNS or len(keys) * len(rows) > _MAX_VALUES:
+    if len(keys) > MAX_COLUMNS or len(keys) * len(rows) > _MAX_VALUES:
         raise ValueError(
-            f"its {len(rows)} records have {len(keys)} keys; up to {MOST_COLUMNS} are read, and {_MAX_VALUES} values"
+            f"its {len(rows)} records have {len(keys)} keys; up to {MAX_COLUMNS} are read, and {_MAX_VALUES} values"
         )
     return {key: [record.get(key) for record in rows] for key in keys}
 

@@ -1,4 +1,4 @@
-"""Read arrays from MAT files of version 5 (Matlab's -v6 and -v7); called by `study.importing.arrays.arrays`.
+"""Read arrays from MAT files of version 5 (Matlab's -v6 and -v7); called by `study.importing.arrays.read_arrays`.
 
 They are read in Python, not by a C library, so that declared sizes and nesting are checked against the file before
 memory is allocated. Real numeric arrays, structures, and cells of similar arrays are read; texts, objects, functions
@@ -49,7 +49,7 @@ _CONVERSIONS = {
 
 def suggest_conversion(name: str, kind: str) -> str:
     """Advice with the Matlab statement that converts an array before it is saved; empty where none is known. kind: the
-    description of its kind, from `unread_reason`."""
+    description of its kind, from `find_unread_reason`."""
     for pattern, statement in _CONVERSIONS.items():
         if pattern in kind:
             return f"in Matlab: {statement.format(name=name, plain=name.replace('.', '_'))}"
@@ -124,9 +124,9 @@ def read_mat5_arrays(path: Path) -> dict[str, Array]:
 def _decompress(compressed: _ElementReader, limit: SizeLimit) -> _ElementReader:
     """Decompress a variable. Raises DeclaredSizeError where it is larger than the limit."""
     decompressor = zlib.decompressobj()
-    content = decompressor.decompress(compressed.content, limit.most_bytes)
+    content = decompressor.decompress(compressed.content, limit.limit_bytes)
     if decompressor.unconsumed_tail:
-        limit.add_size("a compressed variable", limit.most_bytes + 1)
+        limit.add_size("a compressed variable", limit.limit_bytes + 1)
     limit.add_size("a compressed variable", len(content))
     return _ElementReader(memoryview(content), compressed.order)
 

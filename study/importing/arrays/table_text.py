@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study.importing.map_format.signal_words import FOREIGN_WORDS
-from study.regular_file import TABLE_BYTES, read_regular
+from study.regular_file import MAX_TABLE_BYTES, read_regular
 from study.store.disk.file_errors import CannotReadError
 
 _MAX_UTF16_SEARCH_BYTES = 4096
@@ -43,7 +43,7 @@ def read_text(path: Path, encoding: str) -> TableText:
     """Read the text of a table. encoding: as stated by the map; empty = detect it. Raises CannotReadError, and
     ValueError if the encoding is wrong, unknown or ambiguous (then with the map's key that would state it)."""
     try:
-        data = read_regular(path, TABLE_BYTES)
+        data = read_regular(path, MAX_TABLE_BYTES)
     except OSError as error:
         raise CannotReadError(path, error) from error
     if encoding:

@@ -1,8 +1,8 @@
-"""Read dates and clock times (`2024-03-01T12:00:00.123+01:00`, `12:00:00.123`) as seconds.
+"""Read dates and clock times (`2024-03-01T12:00:00.123+01:00`, `12:00:00.123`) as seconds, for tables of an import.
 
 A field holds a date, a clock time with or without an offset from UTC, or both. Where one column holds dates and another
 clock times, they are added. In dates that do not begin with the year, day and month cannot be distinguished: they are
-accepted only where all dates are the same.
+accepted only where all dates are the same. Called by `csv_arrays`, `table_cells` and `table_layout`.
 """
 
 import math
@@ -17,19 +17,22 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     import pandas as pd
 
-Seconds = npt.NDArray[np.float64]
+SecondsArray = npt.NDArray[np.float64]
+"""Times (n,) in seconds."""
 
 _DATE = r"\d{4}(?P<between>[-/.])\d{1,2}(?P=between)\d{1,2}|\d{1,2}(?P<mark>[-/.])\d{1,2}(?P=mark)\d{4}"
 """Date with the year first or last, and the same separator twice."""
 _CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d{2}):(?P<second>\d{2}(?:[.,]\d+|:\d{3})?)\s?(?P<half>[AaPp]\.?[Mm]\.?)?"
-"""Hour, minute, and second with its fraction behind a point, a comma or a colon; AM or PM where present."""
+"""Hour, minute, and second with a fraction after a point, a comma or a colon; AM or PM where present."""
 _ZONE = r"\s?(?P<zone>Z|UTC|GMT|[+-]\d{2}(?::?\d{2})?)"
 """Time zone: UTC, or an offset from it."""
 _STAMP = re.compile(rf"(?:(?P<date>{_DATE})(?:[T ]\s*|$))?(?:{_CLOCK}(?:{_ZONE})?)?")
 """Date, clock time, or both; an empty text matches too."""
 DAY_S, HOUR_S = 86400.0, 3600.0
 """Length of a day and of an hour (s)."""
-STAMP_WORDS = "dates and clock times are understood as 2024-03-01T12:00:00.123, with or without a zone, or 12:00:00.123"
+STAMP_NOTATIONS = (
+    "dates and clock times are understood as 2024-03-01T12:00:00.123, with or without a zone, or 12:00:00.123"
+)
 """Notations that are read, for messages."""
 
 
@@ -38,11 +41,12 @@ class StampColumn:
     """Time stamps of one column: dates, clock times, or both."""
 
     seconds: npt.NDArray[np.float64]
-    """(n,), since midnight of the first date, in UTC where a zone is stated; NaN where the field is empty."""
+    """(n,), since midnight of the date in the first filled field, or of any day without dates; in UTC where a zone is
+    stated; NaN where the field is empty."""
     has_date: bool
     has_clock: bool
     first: str
-    """The first stamp, as in the file."""
+    """Text of the first filled field."""
 
 
 def is_stamp(field: str) -> bool:
@@ -51,8 +55,9 @@ def is_stamp(field: str) -> bool:
 
 
 def read_stamps(fields: "pd.Series[Any]") -> StampColumn | None:
-    """Time stamps of a column; None unless each field is a stamp or missing, and all are of one kind. Raises ValueError
-    for dates of ambiguous order, for stamps that do not exist, and where only some have a time zone."""
+    """Read the time stamps of a column of texts; None where no field is filled, where one is no stamp, or where not all
+    are of the same kind (date, clock time, both). fields: texts, missing ones as NaN or None. Raises ValueError for
+    dates of ambiguous order, for stamps that do not exist, and where only some have a time zone."""
     is_filled = fields.notna()
     text = fields[is_filled].str.strip()
     if text.empty or not text.map(is_stamp).all():
@@ -71,9 +76,9 @@ def read_stamps(fields: "pd.Series[Any]") -> StampColumn | None:
     return StampColumn(seconds, bool(has_date.all()), bool(has_clock.all()), str(text.iloc[0]))
 
 
-def _compute_clock_s(text: "pd.Series[str]", parts: "pd.DataFrame") -> Seconds:
-    """Seconds since midnight, in UTC where a zone is stated. Raises ValueError for minutes or seconds above 59, and
-    where only some have a zone."""
+def _compute_clock_s(text: "pd.Series[str]", parts: "pd.DataFrame") -> SecondsArray:
+    """Seconds (n,) since midnight, in UTC where a zone is stated. Raises ValueError for minutes or seconds above 59,
+    for hours beyond the day or half day, and where only some have a zone. text, parts: the fields and their parts."""
     for index in np.flatnonzero((parts["minute"].astype(int) > 59) | (parts["second"].str[:2].astype(int) > 59)):
         raise ValueError(f"'{text.iloc[index]}' is no clock time, with more than 59 minutes or seconds")
     if parts["zone"].isna().any() != parts["zone"].isna().all():
@@ -81,7 +86,7 @@ def _compute_clock_s(text: "pd.Series[str]", parts: "pd.DataFrame") -> Seconds:
     seconds = parts["second"].str.replace(r"[,:]", ".", regex=True).astype(float)
     hour = parts["hour"].astype(float)
     half_day = parts["half"].fillna("").str.lower().str[:1]
-    # Alone, a clock time may be the time since a start, which has more hours.
+    # A clock time without a date and without AM or PM may be a time since a start, with any number of hours.
     highest_hour = np.select([half_day == "a", half_day == "p", parts["date"].notna()], [12.0, 23.0, 24.0], math.inf)
     # 24:00:00 is the end of a day (ISO 8601); no time comes after it.
     after_midnight = parts["date"].notna() & (hour == 24) & ((parts["minute"].astype(int) > 0) | (seconds > 0))
@@ -93,15 +98,15 @@ def _compute_clock_s(text: "pd.Series[str]", parts: "pd.DataFrame") -> Seconds:
 
 
 def _parse_zone_s(zone: str) -> float:
-    """Offset of a zone from UTC (s), positive to the east; 0 without a zone."""
+    """Offset of a zone from UTC (s), positive to the east; 0 for UTC, GMT, Z or an empty text."""
     digits = re.sub(r"\D", "", zone)
     offset_s = (int(digits[:2]) * 60 + int(digits[2:] or 0)) * 60.0 if digits else 0.0
     return -offset_s if zone.startswith("-") else offset_s
 
 
-def _compute_date_s(dates: "pd.Series[str]") -> Seconds:
-    """Seconds since the first date; seconds since 1970 would be resolved to 0.24 µs only (float64). Raises ValueError
-    for several dates of ambiguous order."""
+def _compute_date_s(dates: "pd.Series[str]") -> SecondsArray:
+    """Seconds (n,) from midnight of the first date to that of each date; seconds since 1970 would be resolved to 0.24
+    µs only (float64). Raises ValueError for several dates of ambiguous order, and for dates that do not exist."""
     date_s_by_text: dict[str, float] = {}  # no value for a single date of ambiguous order
     has_several_dates = dates.nunique() > 1
     for date in dates.unique():
@@ -124,8 +129,8 @@ def _parse_day_s(numbers: list[int], date: str) -> float:
 
 
 def join_stamps(columns: Mapping[str, StampColumn]) -> dict[str, StampColumn]:
-    """Add the only column of dates to the only column of clock times, and remove it. Otherwise clock times without a
-    date continue into the next day where they fall by more than half a day."""
+    """Merge a single column of dates and a single column of clock times into one, under the name of the latter. In any
+    other case, clock times without a date are counted into the next day where they fall by more than half a day."""
     dates = {name: column for name, column in columns.items() if not column.has_clock}
     clocks = {name: column for name, column in columns.items() if not column.has_date}
     merged_columns = dict(columns)

@@ -1,7 +1,8 @@
-"""Limit of the cost of a map's expressions: array elements held at once, elements computed in total, and nesting.
+"""Limits of the cost of a map's expressions: array elements held at once, elements computed in total, nesting depth.
 
-A definition may use another twice, and that one a third twice: forty of these are 10^12 values, although the map is
-short. Therefore the cost is counted during evaluation, not estimated from the text.
+A definition may use another one twice, and that one a third one twice: a chain of 40 such definitions computes
+2^40 = 10^12 values, although the map is short. Therefore the cost is counted during evaluation, not estimated from the
+text. Called by `expression` and `namespace`.
 """
 
 from collections.abc import Iterator
@@ -10,44 +11,46 @@ from contextlib import contextmanager
 from study.importing.map_format.map_errors import ImportProblemError
 
 MAX_EXPRESSION_DEPTH = 200
-"""Nesting of one expression and of the definitions that it uses; below Python's own recursion limit."""
+"""Largest nesting depth of an expression, with the definitions that it uses. Chosen: below Python's recursion limit."""
 HELD_NUMBERS, HELD_PER_NUMBER = 20_000_000, 20
-"""Numbers that may be held at once (64-bit: 160 MB), and how many more for each number that the files hold. By hand."""
-MAX_HELD = 400_000_000
-"""Most numbers held at once, for any file (3.2 GB). By hand."""
+"""Numbers that may be held at once (64-bit: 160 MB), and how many more for each number that the files hold. Chosen."""
+MAX_HELD_NUMBERS = 400_000_000
+"""Upper limit of the numbers held at once, for files of any size (3.2 GB). Chosen."""
 COMPUTED_NUMBERS, COMPUTED_PER_NUMBER = 500_000_000, 500
-"""Numbers that may be computed in total, and how many more for each number that the files hold. By hand."""
-_STEP = 10_000
-"""Fixed cost of a single operation, in additions. By hand."""
+"""Cost that may be computed in total, in additions of two numbers, and how much more for each number that the files
+hold. Chosen."""
+_OPERATION_COST = 10_000
+"""Fixed cost of a single operation, in additions of two numbers. Chosen."""
 
 
 class Budget:
-    """Budget of one import. Methods raise ImportProblemError; text: the expression, for messages."""
+    """Remaining allowance of one import: numbers held, cost, nesting depth."""
 
     def __init__(self) -> None:
-        self._most_held = HELD_NUMBERS
-        self._left_to_compute = COMPUTED_NUMBERS
+        self._max_held = HELD_NUMBERS
+        self._remaining_cost = COMPUTED_NUMBERS
         self._held = 0
         self._depth = 0
 
-    def allow_for(self, numbers: int) -> None:
-        """Add the allowance for a file of this many numbers."""
-        self._most_held = min(MAX_HELD, self._most_held + HELD_PER_NUMBER * numbers)
-        self._left_to_compute += COMPUTED_PER_NUMBER * numbers
+    def add_allowance(self, numbers: int) -> None:
+        """Add the allowance for files that hold this many numbers."""
+        self._max_held = min(MAX_HELD_NUMBERS, self._max_held + HELD_PER_NUMBER * numbers)
+        self._remaining_cost += COMPUTED_PER_NUMBER * numbers
 
-    def spend(self, numbers: float, text: str, times: int = 1) -> None:
-        """Count the cost before an array of this many numbers is computed. times: cost of each, in additions."""
-        if self._held + numbers > self._most_held:
-            raise ImportProblemError(f"'{text}' would give more than {self._most_held} numbers")
-        self._left_to_compute -= _STEP + times * int(numbers)
-        if self._left_to_compute < 0:
+    def spend(self, numbers: float, expression: str, cost_per_number: int = 1) -> None:
+        """Count the cost before an array of this many numbers is computed. expression: its text, for messages;
+        cost_per_number: in additions. Raises ImportProblemError where a limit would be exceeded."""
+        if self._held + numbers > self._max_held:
+            raise ImportProblemError(f"'{expression}' would give more than {self._max_held} numbers")
+        self._remaining_cost -= _OPERATION_COST + cost_per_number * int(numbers)
+        if self._remaining_cost < 0:
             raise ImportProblemError(
-                f"'{text}' takes too long: it and what it uses compute far more numbers than the file holds"
+                f"'{expression}' takes too long: it and what it uses compute far more numbers than the file holds"
             )
 
     @contextmanager
     def hold_numbers(self, numbers: int) -> Iterator[None]:
-        """Count a value that is kept while another one is computed."""
+        """Count a value of this many numbers as held while the block runs."""
         self._held += numbers
         try:
             yield
@@ -55,12 +58,13 @@ class Budget:
             self._held -= numbers
 
     @contextmanager
-    def nested(self, text: str, levels: int = 1) -> Iterator[None]:
-        """Count levels of nesting while the block runs. Raises ImportProblemError beyond `MAX_EXPRESSION_DEPTH`."""
+    def enter_nesting(self, expression: str, levels: int = 1) -> Iterator[None]:
+        """Count levels of nesting while the block runs. expression: its text, for messages. Raises
+        ImportProblemError beyond `MAX_EXPRESSION_DEPTH`."""
         self._depth += levels
         try:
             if self._depth > MAX_EXPRESSION_DEPTH:
-                raise ImportProblemError(f"'{text}' is nested too deeply")
+                raise ImportProblemError(f"'{expression}' is nested too deeply")
             yield
         finally:
             self._depth -= levels

@@ -96,7 +96,7 @@ class _Evaluation:
 
     def evaluate_node(self, node: ast.expr) -> Any:
         """Value of a node of the syntax tree: numbers, or a text."""
-        with self.budget.nested(self.text):
+        with self.budget.enter_nesting(self.text):
             match node:
                 case ast.Constant() | ast.Name():
                     return self._evaluate_leaf(node)
@@ -205,7 +205,7 @@ class _Evaluation:
         array = self._evaluate_numbers(operand)
         entries = index.elts if isinstance(index, ast.Tuple) else [index]
         indices: list[int | slice] = []
-        with self.budget.hold_numbers(np.size(array)), self.budget.nested(self.text):
+        with self.budget.hold_numbers(np.size(array)), self.budget.enter_nesting(self.text):
             for entry in entries:
                 indices.append(self._evaluate_index(entry))
         try:

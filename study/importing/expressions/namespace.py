@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from study.importing.arrays.arrays import Arrays, unread_reason
 from study.importing.arrays.csv_arrays import FaultyColumn
 from study.importing.arrays.mat_arrays import suggest_conversion
+from study.importing.arrays.read_arrays import Arrays, find_unread_reason
 from study.importing.expressions.budget import Budget
 from study.importing.expressions.expression import evaluate
 from study.importing.expressions.functions import Clock, Value
@@ -89,7 +89,7 @@ class Namespace:
             raise ImportProblemError(f"the definition of '{name}' refers to itself")
         self._open_definitions.add(name)
         try:
-            with self.budget.nested(name, 2):
+            with self.budget.enter_nesting(name, 2):
                 return self.compute_value(self.definitions[name], clock)
         finally:
             self._open_definitions.discard(name)
@@ -97,7 +97,7 @@ class Namespace:
     def _convert_to_float(self, name: str) -> Value:
         """An array as float64. Raises ImportProblemError where it holds no real numbers."""
         array = self.arrays[name]
-        problem = unread_reason(array)
+        problem = find_unread_reason(array)
         if isinstance(problem, FaultyColumn):
             raise ImportProblemError(problem)
         if array.dtype.kind not in "fiub":
@@ -120,7 +120,7 @@ def make_namespace(arrays: Arrays, definitions: Mapping[str, str], prefix: str, 
     if prefix and not unprefixed:
         names_text = Namespace(arrays.by_name, {}, arrays.name, budget).list_names()
         raise ImportProblemError(f"no array of {arrays.name} begins with '{prefix}'; there are {names_text}")
-    budget.allow_for(sum(array.size for array in arrays.by_name.values()))
+    budget.add_allowance(sum(array.size for array in arrays.by_name.values()))
     return Namespace({**unitless, **arrays.by_name, **unprefixed}, definitions, arrays.name, budget)
 
 

@@ -1,6 +1,7 @@
-"""The import map: array, unit and clock of each channel, and the role of the samples.
+"""Data classes of an import map: which arrays of a file are channels of a recording, with unit, clock and use.
 
-Every key of a map's TOML is a field here; docs/importing.md is generated from these descriptions.
+An import map is a TOML document; every key of it is a field here, and docs/importing.md is generated from the
+descriptions. `map_toml` parses and validates a document, `study.importing.build_recording` applies it.
 """
 
 from dataclasses import field
@@ -9,20 +10,20 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
-STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
-"""Validation of every table of a map: no unknown keys, no NaN or infinity."""
+TABLE_CONFIG = ConfigDict(extra="forbid", allow_inf_nan=False)
+"""Validation of every table of a map: unknown keys, NaN and infinity are refused."""
 
 Resampling = Literal["", "held", "band-limited", "linear"]
-"""How samples are put onto the recording's grid; empty: they must lie on it."""
+"""Interpolation of samples at the times of the recording's grid; empty: the samples must lie on the grid."""
 SignalRole = Literal["command", "response", "position", "excitation", "condition", "helper"]
-"""What a channel is in the recording; a helper is not written."""
-Kind = Literal["multisine", "sweep", "sine", "slow", "noise", "binary", "step", "impact", "free", "rest"]
+"""Role of a channel in the recording; a helper is used by computed channels only and is not written."""
+ExcitationKind = Literal["multisine", "sweep", "sine", "slow", "noise", "binary", "step", "impact", "free", "rest"]
 """Kind of the excitation of a segment."""
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=TABLE_CONFIG)
 class CsvMap:
-    """Notation of tables, where it cannot be detected from the file itself."""
+    """Notation of a text table or workbook, where it is not detected from the file."""
 
     skip_lines: Annotated[int, Field(ge=0, description="Number of lines before the header. Default 0.")] = 0
     delimiter: Annotated[str, Field(description="Separator of the fields. Default: detected.")] = ""
@@ -42,9 +43,9 @@ class CsvMap:
     ] = ()
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=TABLE_CONFIG)
 class ClockMap:
-    """The clock of one data logger. The first clock is the reference; the others are aligned to it."""
+    """Clock of one data logger. The first clock of a map is the reference, to which the others are aligned."""
 
     name: Annotated[str, Field(description='Name by which channels refer to the clock. Default "clock".')] = "clock"
     file: Annotated[
@@ -83,9 +84,9 @@ class ClockMap:
     ] = 1.0
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=TABLE_CONFIG)
 class ChannelMap:
-    """One channel, from an array or an expression over arrays; all its samples are on one clock."""
+    """One channel, from an array or an expression with arrays; all its samples are on one clock."""
 
     role: Annotated[
         SignalRole,
@@ -112,9 +113,9 @@ class ChannelMap:
     ] = ""
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=TABLE_CONFIG)
 class ComputedMap:
-    """One channel computed on the recording's own grid from other channels, in the units of the map."""
+    """One channel that is computed from other channels on the grid of the recording, in the units of the map."""
 
     role: Annotated[SignalRole, Field(description="As for a channel.")]
     name: Annotated[str, Field(min_length=1, max_length=64, description="Name of the channel in the recording.")]
@@ -123,9 +124,9 @@ class ComputedMap:
     quantity: Annotated[str, Field(description="As for a channel.")] = ""
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=TABLE_CONFIG)
 class PartMap:
-    """A part of the recording, from one file. Without any entry, every file is one part, in the order given."""
+    """A part of the recording, from one file. Without any entry, each file is one part, in the given order."""
 
     file: Annotated[str, Field(description='Pattern; each file that matches is one part, in order. Default "*".')] = "*"
     prefix: Annotated[
@@ -140,11 +141,11 @@ class PartMap:
     )
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=TABLE_CONFIG)
 class SegmentMap:
-    """Excitation and use of a range of samples, counted on the recording's grid within each part that matches."""
+    """Excitation and use of a range of samples, counted on the grid of the recording within each matching part."""
 
-    kind: Annotated[Kind, Field(description="Kind of the excitation.")]
+    kind: Annotated[ExcitationKind, Field(description="Kind of the excitation.")]
     file: Annotated[str, Field(description='Pattern of the file names of the parts. Default "*".')] = "*"
     prefix: Annotated[str, Field(description='Pattern of the prefixes of the parts. Default "*".')] = "*"
     start: Annotated[int, Field(description="First sample. Default 0. Negative: counted from the end.")] = 0
@@ -174,16 +175,16 @@ class SegmentMap:
     ] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=TABLE_CONFIG)
 class PairMap:
-    """The same device before and after something was changed on it."""
+    """Two files of the same device, recorded before and after a change of the device."""
 
     before: Annotated[str, Field(min_length=1, description="Pattern of the file from before the change.")]
     after: Annotated[str, Field(min_length=1, description="Pattern of the file from after the change.")]
     changed: Annotated[str, Field(min_length=1, description="The change, in words.")]
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=TABLE_CONFIG)
 class DiagnosisMap:
     """Information for `hapteq real` in addition to the samples: model, tests, pairs, known parameters."""
 
@@ -216,9 +217,9 @@ class DiagnosisMap:
     ] = ()
 
 
-@dataclass(frozen=True, config=STRICT)
+@dataclass(frozen=True, config=TABLE_CONFIG)
 class ImportMap:
-    """One kind of recording of a laboratory."""
+    """An import map: how one kind of file of a laboratory becomes a recording."""
 
     channel: Annotated[tuple[ChannelMap, ...], Field(min_length=1, description="Channels, one [[channel]] each.")]
     device: Annotated[str, Field(min_length=1, max_length=200, description="Name of the recorded device.")]

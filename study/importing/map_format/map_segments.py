@@ -1,6 +1,6 @@
-"""Segments of an imported recording: converts the segments of an import map, in seconds or samples, to sample ranges.
+"""Convert the segments of an import map, in seconds or samples, to the segments of a recording, in samples.
 
-Called by `study.importing.build_recording` for each part: the arrays of a file that share a prefix.
+Called by `study.importing.build_recording` for each part of the recording (a file, or its arrays with one prefix).
 """
 
 from collections.abc import Iterator
@@ -18,8 +18,9 @@ from study.importing.map_format.map_errors import ImportProblemError
 def place_segments(
     segment_maps: tuple[SegmentMap, ...], part: tuple[str, str], command: FloatArray, rate_hz: float
 ) -> Iterator[Segment]:
-    """The map's segments that apply to a part, as sample ranges. part: name of its file, and its prefix. command: (n,
-    m) in the map's unit, which amplitudes also have. Raises ImportProblemError."""
+    """Segments of one part, in the order of the map. part: name of its file, and its prefix. command: (samples,
+    channels), in the unit of the map, which amplitudes also have. Raises ImportProblemError with the number of the
+    segment in the map, from 1."""
     file, prefix = part
     for number, segment_map in enumerate(segment_maps, start=1):
         if fnmatchcase(file, segment_map.file) and (
@@ -32,7 +33,7 @@ def place_segments(
 
 
 def _place_segment(segment_map: SegmentMap, command: FloatArray, rate_hz: float) -> Iterator[Segment]:
-    """The segments of one entry of the map; a negative amplitude stands for the peak of the command. Raises
+    """Segments of one entry of the map; a negative amplitude is replaced by the peak of the command. Raises
     ImportProblemError."""
     start, stop = _find_bounds(segment_map, len(command), rate_hz)
     spans = list(_divide_span(segment_map, start, stop))
@@ -43,20 +44,21 @@ def _place_segment(segment_map: SegmentMap, command: FloatArray, rate_hz: float)
         yield Segment(first, last, segment_map.kind, amplitude, segment_map.period, role)
 
 
-def _find_bounds(segment_map: SegmentMap, samples: int, rate_hz: float) -> tuple[int, int]:
-    """First sample, and sample after the last. Times in seconds take precedence unless 0; negative values count from
-    the end of the part, as does a stop of 0. Raises ImportProblemError for bounds outside the part."""
+def _find_bounds(segment_map: SegmentMap, sample_count: int, rate_hz: float) -> tuple[int, int]:
+    """First sample, and sample after the last. Times in seconds take precedence unless 0. Negative samples count from
+    the end of the part; a stop of 0 is its end. Raises ImportProblemError for bounds outside the part."""
     start = round(segment_map.start_s * rate_hz) if segment_map.start_s else segment_map.start
     stop = round(segment_map.stop_s * rate_hz) if segment_map.stop_s else segment_map.stop
-    start, stop = (start + samples if start < 0 else start), (stop + samples if stop <= 0 else stop)
-    if not 0 <= start < stop <= samples:
-        raise ImportProblemError(f"it goes from sample {start} to {stop}, but the part has {samples} samples")
+    start, stop = (start + sample_count if start < 0 else start), (stop + sample_count if stop <= 0 else stop)
+    if not 0 <= start < stop <= sample_count:
+        raise ImportProblemError(f"it goes from sample {start} to {stop}, but the part has {sample_count} samples")
     return start, stop
 
 
 def _divide_span(segment_map: SegmentMap, start: int, stop: int) -> Iterator[tuple[int, int]]:
-    """The range from start to stop; with `every`, pieces of `length` samples (0: of `every`) that begin every `every`
-    samples, without an incomplete last one. Raises ImportProblemError for pieces that would overlap."""
+    """Divide the range from start to stop (exclusive) into pieces (first, stop): with `every`, pieces of `length`
+    samples (0: of `every`) that begin every `every` samples, without an incomplete last one; else one piece. Raises
+    ImportProblemError for pieces that would overlap."""
     if not segment_map.every:
         yield start, stop
         return
@@ -70,8 +72,9 @@ def _divide_span(segment_map: SegmentMap, start: int, stop: int) -> Iterator[tup
 
 
 def _assign_roles(segment_map: SegmentMap, spans: list[tuple[int, int]]) -> tuple[list[tuple[int, int]], list[str]]:
-    """Ranges and their roles by the shares of `split`: a single range is cut in proportion to the shares; of several,
-    each gets the role of the share in which its middle lies. Raises ImportProblemError for a share without samples."""
+    """Ranges and their roles. With `split`, a single range is cut in proportion to the shares, and of several ranges
+    each gets the role of the share in which its middle lies (all ranges count equally). Raises ImportProblemError for a
+    share of a single range without samples."""
     if not segment_map.split:
         return spans, [segment_map.role] * len(spans)
     ends = np.cumsum(list(segment_map.split.values()))
@@ -88,6 +91,6 @@ def _assign_roles(segment_map: SegmentMap, spans: list[tuple[int, int]]) -> tupl
 
 
 def _find_peak(command: FloatArray) -> float:
-    """Largest magnitude of the samples that are not missing; 0 without any."""
+    """Largest magnitude of the finite samples; 0 without any."""
     finite = command[np.isfinite(command)]
     return float(np.max(np.abs(finite))) if finite.size else 0.0

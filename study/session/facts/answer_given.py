@@ -1,6 +1,7 @@
-"""The event of an answer, with the counters of the device at that moment.
+"""Logged event of an answer, with the counters of the device at that moment.
 
 If the program is killed before the measurement of the trial is logged, these counters decide whether the trial counts.
+Made by `study.workflows.trial.trial_events`; part of the events in `events`. Types of fields: `fact_types`.
 """
 
 from typing import Annotated, Literal
@@ -9,17 +10,17 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from study.session.facts.fact_types import Count, Index, Magnitude, Seconds, UtcTime
-from study.session.facts.sitting_events import FACT
+from study.session.facts.sitting_events import FACT_CONFIG
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class AnswerHealth:
-    """Counters of the device, in ticks since the stimulus began, as in `study.devices.device.Health`."""
+    """Counters of the device at the answer, in ticks since the stimulus began, as in `study.devices.device.Health`."""
 
     fault: Annotated[str, Field(pattern="^[A-Z_]{1,40}$")]
     """Name of the fault of the device; NONE without a fault."""
     felt_whole: bool
-    """Whether the stimulus was complete until the answer: no fault had stopped it."""
+    """Whether the stimulus was complete until the answer: no fault had ended it."""
     ticks: Count
     missed_ticks: Count
     stimulus_clipped: Count
@@ -27,16 +28,17 @@ class AnswerHealth:
     slew_limited: Count
     sensor_clipped: Count
     peak_command_n: Magnitude
-    """Largest magnitude of the commanded force (N)."""
+    """Largest norm of a commanded force (N)."""
     late_ticks: Count | None = None
     latest_s: Seconds | None = None
-    """Longest time from when a tick was due until its work was done (s). This field and `late_ticks` are null in logs
-    of older versions."""
+    """Longest time from when a tick was due to the end of its work (s). This field and `late_ticks` are null in logs of
+    older versions."""
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class AnswerGiven:
-    """The participant's answer, written before the program acts on it."""
+    """The participant's answer, logged before the program acts on it. Run, trial and attempt are indices from 0; the
+    answer is the number of a direction or interval; the response time counts from the start of the stimulus (s)."""
 
     utc: UtcTime
     run: Index

@@ -1,8 +1,11 @@
-"""The facts of a session, one JSON line each in `events.jsonl`.
+"""Logged events of a session (its facts): one JSON line each in `events.jsonl`; their parser and formatter.
 
 A fact is what the program cannot recompute: what was opened, presented, answered, measured. Quantities that follow from
 facts (levels, reversals, thresholds) are computed from them (`study.session.state.fold`); where a fact states one of
-them, too, it serves as a check.
+them, too, it serves as a check. `study.store.sessions.event_log` writes and reads the log.
+
+In all events, `run`, `trial` and `attempt` are indices from 0, `utc` is the wall-clock time, and `monotonic_s` is as in
+`sitting_events`. Units are in the names; ranges are in `fact_types`.
 """
 
 from typing import Annotated, Literal
@@ -31,7 +34,7 @@ from study.session.facts.fact_types import (
 from study.session.facts.level_scale import EqualizedFacts
 from study.session.facts.sensor_facts import SensorFacts
 from study.session.facts.sitting_events import (
-    FACT,
+    FACT_CONFIG,
     DemoFinished,
     DemoPlayed,
     DeviceChecked,
@@ -74,7 +77,7 @@ __all__ = [
     "TrialMeasured",
     "TrialPresented",
     "TrialSpoiled",
-    "event_line",
+    "encode_event",
     "parse_event",
 ]
 
@@ -83,7 +86,7 @@ SESSION_FORMAT: Literal["hapteq-session"] = "hapteq-session"
 SESSION_VERSION: Literal[1] = 1
 """Version of the format of the log; facts and fields may be added within it."""
 
-FIELDS_SINCE: dict[str, object] = {
+ADDED_FIELD_DEFAULTS: dict[str, object] = {
     "monotonic_s": None,
     "dose_elsewhere": None,
     "rules": 1,
@@ -95,12 +98,13 @@ FIELDS_SINCE: dict[str, object] = {
     "nominal_n": None,
     "sensor": None,
 }
-"""Defaults of fields that were added after the first logs; fields with these values are not written."""
+"""Default of each field that was added after the first logs; a field with this value is not written."""
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class DeviceFacts:
-    """The device of a session: its name, whether it is simulated, and the rate of its control loop (Hz)."""
+    """The device of a session: its name, whether it is simulated, the rate of its control loop (Hz), and further
+    details in words."""
 
     name: str
     simulated: bool
@@ -108,9 +112,9 @@ class DeviceFacts:
     details: str = ""
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class SessionOpened:
-    """First line of every log: everything that the rest of the session depends on."""
+    """First line of every log: all settings on which the rest of the session depends."""
 
     utc: UtcTime
     format: Literal["hapteq-session"]
@@ -118,7 +122,8 @@ class SessionOpened:
     session: str
     subject: str
     participant_number: Index
-    """Number of participants who began this protocol before; it selects the row of a balanced order."""
+    """Number of participants who began this protocol before; it selects the row of the counterbalanced order. Later
+    replaced by that of `PlaceTaken`, if there is one."""
     observer: str | None
     """Name of the simulated participant; null for a person."""
     protocol_text: str
@@ -127,20 +132,22 @@ class SessionOpened:
     seed: Seed
     device: DeviceFacts
     equalizer: str
+    """Name of the method that converts a wanted stimulus to commanded forces."""
     versions: dict[str, str]
+    """Versions of Python and of the packages that hapteq uses, by name."""
     equalized: EqualizedFacts | None = None
-    """Equalizer of the stimuli; null: commanded and wanted force are the same."""
+    """Model and level scales of the equalizer; null: commanded and wanted force are the same."""
     monotonic_s: Seconds | None = None
     dose_elsewhere: DoseElsewhere | None = None
     rules: Literal[1, 2] = 1
-    """Version of the rules for void trials, refusals and places, see `state.rules`. A session keeps the version that it
-    began with."""
+    """Version of the rules for void trials, refusals and participant numbers (`study.session.state.rules`); a session
+    keeps it."""
     event: Literal["session_opened"] = "session_opened"
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class TrialPresented:
-    """The stimulus of a trial. Written before the device moves."""
+    """The stimulus of a trial; logged before the device moves."""
 
     utc: UtcTime
     run: Index
@@ -149,35 +156,40 @@ class TrialPresented:
     phase: Phase
     frequency_hz: FrequencyHz
     level_db: LevelDb
+    """Level in dB relative to 1 N."""
     level_n: ForceN
+    """Amplitude of the force; for equalized stimuli, the level (`level_scale`)."""
     direction: Literal[1, 2]
     """Number of the correct answer; with swapped labels it differs from the number of the protocol's direction."""
     angle_deg: AngleDeg
+    """Angle of the played direction in the plane of the test directions."""
     polarity: Literal[-1, 1]
+    """Sign of the force at its onset."""
     wanted_mps2: Magnitude | None = None
-    """Wanted acceleration of the level; null where levels are commanded forces."""
+    """Target acceleration that the level stands for; null where levels are commanded forces."""
     nominal_n: ForceN | None = None
     """Level of the staircase, around which the amplitude was drawn; null without roving."""
     monotonic_s: Seconds | None = None
     event: Literal["trial_presented"] = "trial_presented"
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class TrialMeasured:
-    """Measurement of an answered trial. It closes the trial: the answer counts."""
+    """Measurement of an answered trial; it closes the trial, and the answer counts."""
 
     utc: UtcTime
     run: Index
     trial: Index
     attempt: Index
     status: Literal["ok", "flagged", "unmeasured"]
+    """`flagged`: with `flags`; `unmeasured`: no acceleration was measured."""
     flags: tuple[str, ...] = ()
     recording: RecordingPath | None = None
     sha256: Sha256 | None = None
     delivered_mps2: Measured | None = None
     off_axis_mps2: Measured | None = None
     """Amplitudes of the delivered acceleration at the stimulus frequency (m/s²), along the direction (`delivered_mps2`)
-    and across it."""
+    and across it. These and the next two as in `study.session.stimulus.delivered`; null where not measured."""
     displacement_mm: Measured | None = None
     harmonics_mps2: Magnitude | None = None
     missed_ticks: Count | None = None
@@ -186,17 +198,18 @@ class TrialMeasured:
     vibrated_s: Seconds | None = None
     """Duration of the vibration (s), fades included, for the vibration dose."""
     offset_mm: Magnitude | None = None
-    """Largest distance of the handle from its place during the recording (mm): large if the participant leaned on the
-    spring."""
+    """Largest distance of the handle from its rest position during the recording (mm): large if the participant leaned
+    on the spring."""
     sensor: SensorFacts | None = None
-    """Null where the acceleration is read with each tick, and in logs of older versions."""
+    """Facts about the accelerometer; null where the acceleration is read with each tick, and in logs of older
+    versions."""
     monotonic_s: Seconds | None = None
     event: Literal["trial_measured"] = "trial_measured"
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class TrialSpoiled:
-    """The presentation is void, answered or not; the trial is repeated as the next attempt."""
+    """The presentation is void, answered or not; the trial is presented again as the next attempt."""
 
     utc: UtcTime
     run: Index
@@ -209,14 +222,14 @@ class TrialSpoiled:
     vibrated_s: Seconds | None = None
     monotonic_s: Seconds | None = None
     cause: VoidCause | None = None
-    """Null in logs of versions that did not record causes."""
+    """Kind of the reason; null in logs of versions that did not record it."""
     sensor: SensorFacts | None = None
     event: Literal["trial_spoiled"] = "trial_spoiled"
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class SessionInterrupted:
-    """The participant or experimenter ended the sitting, or a fault did. The session can be resumed."""
+    """The sitting was ended by the participant, the experimenter or a fault; the session can be resumed."""
 
     utc: UtcTime
     reason: str
@@ -224,7 +237,7 @@ class SessionInterrupted:
     event: Literal["session_interrupted"] = "session_interrupted"
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class SessionResumed:
     """A session continues after a crash or a pause, possibly with another device or version of the program."""
 
@@ -232,7 +245,7 @@ class SessionResumed:
     device: DeviceFacts
     versions: dict[str, str]
     mended: str = ""
-    """An incomplete last line that a crash left behind; it was removed from the log and is kept here."""
+    """Incomplete last line of the log after a crash, which was removed from the log; empty without one."""
     dose_elsewhere: DoseElsewhere | None = None
     monotonic_s: Seconds | None = None
     event: Literal["session_resumed"] = "session_resumed"
@@ -260,20 +273,22 @@ Event = (
     | SessionResumed
     | SessionClosed
 )
-"""Any fact of a session."""
+"""Any logged event of a session."""
 
 EVENTS: TypeAdapter[Event] = TypeAdapter(Annotated[Event, Field(discriminator="event")])
-"""Reads and writes facts; the field `event` states the kind of a fact."""
+"""Validator and serializer of events; the field `event` states the kind."""
 
 
-def event_line(event: Event) -> bytes:
-    """One line of JSON, newline included. Fields that earlier versions did not log are left out where they have their
-    default value."""
-    unsaid = {name for name, untouched in FIELDS_SINCE.items() if getattr(event, name, untouched) == untouched}
-    return EVENTS.dump_json(event, exclude=unsaid) + b"\n"
+def encode_event(event: Event) -> bytes:
+    """Encode an event as a line of JSON in UTF-8, newline included. Fields of `ADDED_FIELD_DEFAULTS` are left out where
+    they have their default."""
+    omitted_fields = {
+        name for name, default in ADDED_FIELD_DEFAULTS.items() if getattr(event, name, default) == default
+    }
+    return EVENTS.dump_json(event, exclude=omitted_fields) + b"\n"
 
 
 def parse_event(line: bytes) -> Event:
-    """Parse a line of the log. Raises pydantic.ValidationError (a ValueError) where the line is not a fact of this
-    format."""
+    """Parse a line of the log, without its checksum. Raises pydantic.ValidationError (a ValueError) where it is no
+    event of this format."""
     return EVENTS.validate_json(line, strict=True)

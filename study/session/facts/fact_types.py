@@ -1,7 +1,8 @@
-"""Types of the fields of logged facts: constraints on values, so that no later reader can fail on them.
+"""Types of the fields of logged events: constraints on values, which pydantic checks when a log is written and read.
 
-Bounds are wider than anything that a device or a person can do. They keep powers finite, numbers printable, times
-comparable and files inside the session's folder.
+The bounds are chosen wider than the values of any device or person. They keep powers finite, numbers printable, times
+comparable and files inside the session's folder, so that no reader fails on a logged value. Used by all modules of this
+package that define events, and by `study.store.sessions`.
 """
 
 import re
@@ -11,53 +12,59 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 _ISO_8601 = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d{1,6})?(Z|[+-]\d\d:\d\d)", re.ASCII)
-"""Date, time, and UTC offset; ASCII digits only."""
-_YEARS = range(1970, 3000)
-"""Conversion to local time and differences stay within what `datetime` can hold."""
+"""Matches a date, time and UTC offset in ASCII digits."""
+_ACCEPTED_YEARS = range(1970, 3000)
+"""Years for which conversion to local time and differences cannot leave the range of `datetime`."""
 
-_RECORDING = re.compile(r"recordings/[A-Za-z0-9][A-Za-z0-9_.-]{0,199}\.h5", re.ASCII)
-"""Path of a recording within a session's folder: no way out of it."""
+_RECORDING_PATH = re.compile(r"recordings/[A-Za-z0-9][A-Za-z0-9_.-]{0,199}\.h5", re.ASCII)
+"""Matches the path of a recording inside a session's folder."""
 _FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,199}", re.ASCII)
-"""Name without a path, as the project's own files have."""
+"""Matches the name of a file without a path, as hapteq writes it."""
 
 
-def utc_time(text: str) -> str:
-    """The text, unchanged. Raises ValueError unless it is a time with UTC offset that can be converted and
-    subtracted."""
+def check_utc_time(text: str) -> str:
+    """Return the text unchanged. Raises ValueError unless it is a valid date and time with UTC offset, in the accepted
+    years."""
     if not _ISO_8601.fullmatch(text):
         raise ValueError("is no time with date and UTC offset in ISO 8601")
-    if datetime.fromisoformat(text).year not in _YEARS:
-        raise ValueError(f"lies outside the years {_YEARS.start} to {_YEARS.stop - 1}")
+    if datetime.fromisoformat(text).year not in _ACCEPTED_YEARS:
+        raise ValueError(f"lies outside the years {_ACCEPTED_YEARS.start} to {_ACCEPTED_YEARS.stop - 1}")
     return text
 
 
 def _check_recording_path(text: str) -> str:
-    if not _RECORDING.fullmatch(text):
+    """Return the text unchanged. Raises ValueError unless it is the path of a recording."""
+    if not _RECORDING_PATH.fullmatch(text):
         raise ValueError("is no file in the session's folder recordings")
     return text
 
 
 def _check_file_name(text: str) -> str:
+    """Return the text unchanged. Raises ValueError unless it is the name of a file."""
     if not _FILE_NAME.fullmatch(text):
         raise ValueError("is no file name in the session's folder")
     return text
 
 
-UtcTime = Annotated[str, AfterValidator(utc_time)]
+UtcTime = Annotated[str, AfterValidator(check_utc_time)]
 """Date, time and UTC offset, ISO 8601. `datetime.fromisoformat` reads it as an aware datetime."""
 Count = Annotated[int, Field(ge=0, le=10**9)]
-"""A number of things, from 0."""
+"""A number of items, 0 or more."""
 Index = Annotated[int, Field(ge=0, le=10**6)]
 """Index of a run, a trial or an attempt, from 0."""
 Seed = Annotated[int, Field(ge=0, lt=2**256)]
-"""Seed of random numbers: 256 bits."""
+"""Seed of random numbers, at most 256 bits."""
 Seconds = Annotated[float, Field(ge=0, le=1e9)]
-"""A duration; as `monotonic_s`, a reading of the computer's monotonic clock beside `utc`, which is meaningful only in
-differences within a sitting (null where it was not logged)."""
+"""A duration (s); as `monotonic_s`, a reading of the computer's monotonic clock beside `utc`, which is meaningful only
+in differences within a sitting (null where it was not logged)."""
 FrequencyHz = Annotated[float, Field(gt=0, le=1e6)]
+"""A frequency above 0 (Hz)."""
 ForceN = Annotated[float, Field(ge=0, le=1e3)]
+"""Magnitude of a force (N)."""
 LevelDb = Annotated[float, Field(ge=-1e4, le=1e4)]
+"""A level in dB; the field states the reference."""
 AngleDeg = Annotated[float, Field(ge=-1e4, le=1e4)]
+"""An angle in degrees."""
 Measured = Annotated[float, Field(ge=-1e9, le=1e9)]
 """A signed value that was measured or computed, in the field's unit."""
 Magnitude = Annotated[float, Field(ge=0, le=1e9)]

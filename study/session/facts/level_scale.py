@@ -8,10 +8,10 @@ The facts are written into the log when a session is opened; `due_trial` and the
 from pydantic.dataclasses import dataclass
 
 from study.session.facts.fact_types import FileName, FrequencyHz, Magnitude, Positive, Sha256
-from study.session.facts.sitting_events import FACT
+from study.session.facts.sitting_events import FACT_CONFIG
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class LevelScale:
     """Relation of level and acceleration at one frequency."""
 
@@ -22,7 +22,7 @@ class LevelScale:
     """Acceleration at the cap of the staircase, in either direction (m/s²)."""
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class EqualizedFacts:
     """The equalizer of a session's stimuli."""
 

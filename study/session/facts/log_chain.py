@@ -1,58 +1,67 @@
-"""Hash chain of a log: each line carries a checksum of its own bytes and of all lines before it.
+"""Hash chain of a session's log: each line contains a checksum over its event and all lines before it.
 
 The checksum of line n is the first 128 bits of SHA-256(checksum of line n - 1, line feed, bytes of the event). A line
 without checksum (of an older version) enters the hash, too, so that when such a log is continued, the first checksum
 covers all lines before it. There is no key: the chain detects damage, and edits without recomputed checksums; it does
-not prove who wrote a log.
+not prove who wrote a log. Called by `study.store.sessions.event_log`, `log_seal` and the readers of running sessions.
 """
 
 import hashlib
 from dataclasses import dataclass
 
-DIGITS = 32
+CHECKSUM_DIGITS = 32
 """Length of a checksum in hexadecimal digits: the first 128 bits of SHA-256."""
-SEED = "0" * DIGITS
+INITIAL_CHECKSUM = "0" * CHECKSUM_DIGITS
 """Checksum before the first line."""
 
-_FIELD, _END = b',"chain":"', b'"}'
-_LENGTH = len(_FIELD) + DIGITS + len(_END)
-"""Length in bytes of the field with the checksum, at the end of a line."""
+_FIELD_START, _FIELD_END = b',"chain":"', b'"}'
+"""Bytes around the checksum at the end of a line; the second closes the JSON object."""
+_FIELD_BYTES = len(_FIELD_START) + CHECKSUM_DIGITS + len(_FIELD_END)
+"""Length of the field with the checksum, at the end of a line, in bytes."""
 _HEXADECIMAL = frozenset(b"0123456789abcdef")
 """Bytes that a checksum may contain."""
 
 
 @dataclass(frozen=True, slots=True)
 class Chain:
-    """State of the chain after the lines read or written so far."""
+    """State of the hash chain after the lines that were read or written."""
 
-    head: str = SEED
+    head: str = INITIAL_CHECKSUM
     """Checksum of the last line."""
     lines: int = 0
-    since: int = 0
+    """Number of lines."""
+    first_checksum_line: int = 0
     """Number of the first line with a checksum, from 1; 0 if there is none."""
 
-    def in_words(self) -> str:
-        """How much of the log has checksums, in words."""
-        if not self.since:
+    def describe(self) -> str:
+        """Describe in words which lines of the log have checksums."""
+        if not self.first_checksum_line:
             return "without checksums (an older version wrote it)"
-        return "with checksums" if self.since == 1 else f"with checksums from line {self.since} on"
+        return (
+            "with checksums"
+            if self.first_checksum_line == 1
+            else f"with checksums from line {self.first_checksum_line} on"
+        )
 
 
 class ChainBrokenError(ValueError):
-    """A line does not match its checksum, or lacks one."""
+    """A line does not match its checksum, or has none although an earlier line has. The message continues a sentence
+    that begins with the line."""
 
 
-def write_chained(chain: Chain, event: bytes) -> tuple[Chain, bytes]:
-    """Append an event (a JSON object without a line end). Returns the line with its checksum, line end included."""
+def append_checksum(chain: Chain, event: bytes) -> tuple[Chain, bytes]:
+    """Append a checksum to an event (a JSON object, not empty, without a line end): the extended chain, and the line
+    with checksum and line end."""
     extended = _extend_chain(chain, event, has_checksum=True)
-    return extended, event[:-1] + _FIELD + extended.head.encode() + _END + b"\n"
+    return extended, event[:-1] + _FIELD_START + extended.head.encode() + _FIELD_END + b"\n"
 
 
-def read_chained(chain: Chain, line: bytes) -> tuple[Chain, bytes]:
-    """Check a line without its end. Returns the chain and the event's own bytes. Raises ChainBrokenError."""
+def verify_checksum(chain: Chain, line: bytes) -> tuple[Chain, bytes]:
+    """Verify the checksum of a line (without its line end): the extended chain, and the event without the checksum.
+    Raises ChainBrokenError where the checksum is wrong, or missing although an earlier line has one."""
     event, head = _split_checksum(line)
     extended = _extend_chain(chain, event, has_checksum=head is not None)
-    if head is None and chain.since:
+    if head is None and chain.first_checksum_line:
         raise ChainBrokenError("has no checksum, although lines before it have")
     if head is not None and head != extended.head:
         raise ChainBrokenError("does not match its checksum")
@@ -60,17 +69,17 @@ def read_chained(chain: Chain, line: bytes) -> tuple[Chain, bytes]:
 
 
 def _extend_chain(chain: Chain, event: bytes, has_checksum: bool) -> Chain:
-    """The chain after one more event. has_checksum: whether its line has a checksum."""
+    """Extend the chain by one event. has_checksum: whether its line has a checksum."""
     lines = chain.lines + 1
-    head = hashlib.sha256(chain.head.encode() + b"\n" + event).hexdigest()[:DIGITS]
-    return Chain(head, lines, chain.since or (lines if has_checksum else 0))
+    head = hashlib.sha256(chain.head.encode() + b"\n" + event).hexdigest()[:CHECKSUM_DIGITS]
+    return Chain(head, lines, chain.first_checksum_line or (lines if has_checksum else 0))
 
 
 def _split_checksum(line: bytes) -> tuple[bytes, str | None]:
-    """Bytes of the event, and its checksum or None. The raw bytes are split, so that nothing is parsed and written
-    again."""
-    digits = line[-len(_END) - DIGITS : -len(_END)]
-    ends_so = line[-_LENGTH:].startswith(_FIELD) and line.endswith(_END)
-    if not ends_so or len(line) <= _LENGTH or not _HEXADECIMAL.issuperset(digits):
+    """Split a line into the event and its checksum; None where the line does not end in a checksum field. The bytes are
+    split unparsed, so that the event keeps exactly the bytes that were hashed."""
+    digits = line[-len(_FIELD_END) - CHECKSUM_DIGITS : -len(_FIELD_END)]
+    has_field = line[-_FIELD_BYTES:].startswith(_FIELD_START) and line.endswith(_FIELD_END)
+    if not has_field or len(line) <= _FIELD_BYTES or not _HEXADECIMAL.issuperset(digits):
         return line, None
-    return line[:-_LENGTH] + b"}", digits.decode()
+    return line[:-_FIELD_BYTES] + b"}", digits.decode()

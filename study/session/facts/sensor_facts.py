@@ -7,10 +7,10 @@ accelerometer, and gets a remark otherwise: `study.workflows.trial.judge_trial`.
 from pydantic.dataclasses import dataclass
 
 from study.session.facts.fact_types import Count, Measured, Seconds
-from study.session.facts.sitting_events import FACT
+from study.session.facts.sitting_events import FACT_CONFIG
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class SensorFacts:
     """Counts and clock of the accelerometer over an interval: of a trial, from the onset of the stimulus until the
     handle was at rest; also of a device check, and of a recording."""

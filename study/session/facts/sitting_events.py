@@ -1,4 +1,4 @@
-"""Logged events of a sitting apart from its trials: forms, checks, demonstrations, probes, rests, pauses, notes, end.
+"""Logged events of a sitting except its trials: forms, checks, demonstrations, probes, rests, pauses, notes, end.
 
 Each class with a field `event` is one kind of line of the session's log `events.jsonl`; `event` names the kind. `utc`
 is the wall-clock time, `monotonic_s` the session's monotonic clock (s; None where it was not logged). A unit that is
@@ -24,14 +24,15 @@ from study.session.facts.fact_types import (
     UtcTime,
 )
 
-FACT = ConfigDict(extra="forbid", allow_inf_nan=False)
+FACT_CONFIG = ConfigDict(extra="forbid", allow_inf_nan=False)
 """Configuration of all event classes: unknown fields, NaN and infinity are refused."""
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class DoseElsewhere:
     """Vibration dose of the same hand since its last night's rest, in other sessions of the participant: a field of the
-    events that begin a sitting. squared_s, vibrated_s, unmeasured_s: as in `vibration_dose.Dose`."""
+    events that begin a sitting, computed by `study.session.state.daily_dose`. squared_s, vibrated_s, unmeasured_s: as
+    in `vibration_dose.Dose`."""
 
     sessions: tuple[str, ...]
     """Names of these sessions."""
@@ -44,7 +45,7 @@ class DoseElsewhere:
     """Names of sessions that could not be read and are not included."""
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class FormFilled:
     """A form that was filled in: consent, exclusion, questions before the trials, set-up or debrief. Only answers that
     the study needs are kept in `answers`; the reason why a person may not take part, for example, is not."""
@@ -62,10 +63,10 @@ class FormFilled:
     event: Literal["form_filled"] = "form_filled"
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class PlaceTaken:
-    """A person takes part: consent, exclusion questions, set-up and device check are passed. The event assigns the
-    participant's place in the counterbalanced order."""
+    """The participant's place in the counterbalanced order is assigned: consent, exclusion questions, set-up and device
+    check were passed."""
 
     utc: UtcTime
     participant_number: Count
@@ -75,7 +76,7 @@ class PlaceTaken:
     event: Literal["place_taken"] = "place_taken"
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class DeviceChecked:
     """Result of the device check before a sitting."""
 
@@ -87,7 +88,7 @@ class DeviceChecked:
     event: Literal["device_checked"] = "device_checked"
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class DemoPlayed:
     """A stimulus of the labelled demonstration; logged before the device moves."""
 
@@ -96,19 +97,19 @@ class DemoPlayed:
     level_n: ForceN
     """Amplitude of the force; for equalized stimuli, the level (`level_scale`)."""
     direction: Literal[1, 2]
-    """Number of the direction on the screen."""
+    """Number of the direction as labelled on the screen."""
     angle_deg: AngleDeg
     """Angle of the direction in the plane of the test directions."""
     seconds: Seconds
-    """Duration, as the protocol sets it."""
+    """Duration of the stimulus, as the protocol sets it."""
     monotonic_s: Seconds | None = None
     event: Literal["demo_played"] = "demo_played"
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class OnsetPulsed:
     """A trigger pulse on an output line of the laboratory, at the onset of the trial's force. It is logged after the
-    trial, because writing to the disk must not delay the trial."""
+    trial because writing to the disk must not delay the trial."""
 
     utc: UtcTime
     run: Index
@@ -124,7 +125,7 @@ class OnsetPulsed:
     event: Literal["onset_pulsed"] = "onset_pulsed"
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class ProbePlayed:
     """A probe: a known force between two trials (`probe_state`). It is logged before the device moves."""
 
@@ -140,10 +141,10 @@ class ProbePlayed:
     event: Literal["probe_played"] = "probe_played"
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class ProbeMeasured:
-    """Result of the last probe. Where this event is missing after a probe, the program ended while the probe was
-    playing. A reference that was declined has this event alone."""
+    """Result of the last probe. Where this event is missing after `ProbePlayed`, the program ended while the probe was
+    playing. A reference that was declined has this event without `ProbePlayed`."""
 
     utc: UtcTime
     number: Index
@@ -164,12 +165,13 @@ class ProbeMeasured:
     event: Literal["probe_measured"] = "probe_measured"
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class MaskingPlayed:
-    """The program started or stopped the masking noise, which makes the device inaudible."""
+    """The masking noise, which makes the device inaudible, was started or stopped."""
 
     utc: UtcTime
     playing: bool
+    """Whether it was started."""
     output: str
     """Name of the sound output."""
     level_db: float
@@ -185,7 +187,7 @@ class MaskingPlayed:
     event: Literal["masking_played"] = "masking_played"
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class DemoFinished:
     """The participant ended the labelled demonstration."""
 
@@ -194,7 +196,7 @@ class DemoFinished:
     event: Literal["demo_finished"] = "demo_finished"
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class RestTaken:
     """An enforced rest has ended."""
 
@@ -207,7 +209,7 @@ class RestTaken:
     event: Literal["rest_taken"] = "rest_taken"
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class PauseTaken:
     """A pause has ended."""
 
@@ -219,7 +221,7 @@ class PauseTaken:
     event: Literal["pause_taken"] = "pause_taken"
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class NoteTaken:
     """A note for the log, or a report of an adverse event."""
 
@@ -232,7 +234,7 @@ class NoteTaken:
     event: Literal["note_taken"] = "note_taken"
 
 
-@dataclass(frozen=True, config=FACT)
+@dataclass(frozen=True, config=FACT_CONFIG)
 class SessionClosed:
     """Last event of a session: all runs were completed, or the person does not take part (consent refused,
     excluded)."""

@@ -1,7 +1,8 @@
 """Vibration dose of the same hand in other sessions of the day.
 
 The daily exposure A(8) of hand-transmitted vibration (ISO 5349-1, `vibration_dose`) adds up over all sessions since
-the last night's rest; it does not restart with each session.
+the last night's rest, not per session. The dose is found when a sitting begins, logged in the event that begins it, and
+set in the state by `state` and `fold`.
 """
 
 from collections.abc import Mapping
@@ -16,14 +17,15 @@ from study.session.state.vibration_dose import NO_DOSE, Dose, sum_doses
 def find_dose_elsewhere(
     sessions: Mapping[str, SittingState], own_session: str, utc: str, unread: tuple[str, ...] = ()
 ) -> DoseElsewhere | None:
-    """Vibration dose from the participant's other sessions since the last rest of a night's length (`NIGHT_S`).
+    """Vibration dose from the participant's other sessions since the last pause of at least `NIGHT_S` without
+    vibration.
 
     sessions: states of all sessions of the participant, by name; own_session: the session that continues at the time
     utc (ISO 8601); unread: names of sessions that could not be read. None where no other session counts and all were
     read.
 
-    The sessions are searched backwards up to the first pause of a night's length between two of them. Between sessions
-    only the wall clock is known; a clock set back counts as no time.
+    The sessions are searched backwards in time up to the first such pause, between two of them or after the last. Only
+    the wall clock is known between sessions; where it was set back, no time is counted.
     """
     present_states = {name: pass_time(sitting, Moment(utc), resumed=True) for name, sitting in sessions.items()}
     exposed = {name: sitting for name, sitting in present_states.items() if sitting.still_s is not None}
@@ -47,7 +49,8 @@ def find_dose_elsewhere(
 
 
 def set_dose_elsewhere(sitting: SittingState, other_dose: DoseElsewhere | None) -> SittingState:
-    """The state with this dose, at the beginning of a sitting; it replaces an earlier value."""
+    """Set the dose from other sessions in the state, at the beginning of a sitting; None: no dose. Where a handle moved
+    later in another session, the time since its last motion is that one."""
     if other_dose is None:
         return replace(sitting, other_sessions_dose=NO_DOSE, unread_sessions=())
     updated = replace(sitting, unread_sessions=other_dose.unread, other_sessions_dose=NO_DOSE)

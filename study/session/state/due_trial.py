@@ -18,7 +18,7 @@ from protocols.procedure.staircase import StaircaseState, level_n, to_db
 from protocols.trial import Phase
 from study.session.facts.events import SessionOpened
 from study.session.facts.level_scale import convert_level_to_acceleration
-from study.session.state.rules import repeats_same_stimulus
+from study.session.state.rules import is_same_stimulus_repeated
 from study.session.stimulus.stimulus import compute_direction_angle_deg
 
 _ROVED = (Phase.TRAINING, Phase.TEST)
@@ -62,7 +62,7 @@ class Place:
 def due_trial(protocol: StudyProtocol, opened: SessionOpened, rule: StaircaseRule, place: Place) -> PresentTrial:
     """The presentation at this place."""
     run, polarity = place.run, protocol.stimulus.onset_polarity
-    draws = 0 if repeats_same_stimulus(opened) else place.attempt
+    draws = 0 if is_same_stimulus_repeated(opened) else place.attempt
     draw = draw_trial(protocol.schedule, polarity, opened.seed, run.index, place.trial, draws)
     label, direction = label_direction(draw.direction, has_swapped_labels(protocol, opened)), draw.direction
     if run.phase is Phase.DETECTION:  # the answer is an interval; the direction does not matter

@@ -1,8 +1,9 @@
-"""A session's state as the fold of its logged events: `state.begin_session` takes the first event, `apply_event` each
-other.
+"""State of a session as the fold of its logged events (event sourcing): state = apply_event(state, event).
 
-Event sourcing: the state holds only what follows from the log, so that a session can be resumed after a crash. An event
-that cannot follow the previous ones raises LogContradiction. Events within a trial are in `fold_trial`.
+`state.begin_session` makes the state from the first event, `apply_event` applies each further one. The state contains
+only what follows from the log, so that a session can be resumed after a crash. An event that cannot follow the previous
+ones raises LogContradiction. The events of a trial are applied by `fold_trial`. Called by
+`study.workflows.trial.sitting` for new events and by `study.workflows.results.fold_session` for stored logs.
 """
 
 import math
@@ -31,8 +32,8 @@ from study.session.facts.events import (
 )
 from study.session.facts.log_time import Moment
 from study.session.state.daily_dose import set_dose_elsewhere
-from study.session.state.draw_check import LogContradiction
 from study.session.state.fold_trial import answer_trial, measure_trial, present_trial, spoil_trial
+from study.session.state.presentation_check import LogContradiction
 from study.session.state.probe_state import LARGEST_WEIGHT_HZ, ProbeState, apply_break, begin_probe, end_probe
 from study.session.state.rules import is_place_assigned_later
 from study.session.state.sitting_state import (
@@ -50,7 +51,7 @@ from study.session.state.state import SessionState, assign_place
 
 
 def apply_event(state: SessionState, event: Event) -> SessionState:
-    """The state after one more event. Raises LogContradiction where the event cannot follow the state."""
+    """Apply one event: the next state. Raises LogContradiction where the event cannot follow the previous ones."""
     if state.closed and not isinstance(event, NoteTaken | SessionInterrupted):
         raise LogContradiction(f"{event.event} after the session was closed")
     if state.is_finally_ineligible and not isinstance(event, NoteTaken | SessionInterrupted | SessionClosed):
@@ -70,12 +71,13 @@ def apply_event(state: SessionState, event: Event) -> SessionState:
 
 
 def _advance_time(sitting: SittingState, event: Event) -> SittingState:
-    """The sitting advanced to the time of the event."""
+    """Advance the sitting to the time of the event: elapsed times, dose and rest."""
     return pass_time(sitting, Moment(event.utc, event.monotonic_s), resumed=isinstance(event, SessionResumed))
 
 
 def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
-    """Apply an event that is not part of a trial. Raises LogContradiction for a second opening."""
+    """Apply an event that is not part of a trial. Raises LogContradiction for a second opening, and as the functions
+    for single events."""
     match event:
         case RestTaken():
             return _apply_rest(state, event)
@@ -99,7 +101,7 @@ def _apply_between_trials(state: SessionState, event: Event) -> SessionState:
 
 
 def _apply_rest(state: SessionState, event: RestTaken) -> SessionState:
-    """Apply a rest: none is due any more. Raises LogContradiction where none was due."""
+    """Apply a rest: no rest is due afterwards. Raises LogContradiction where none was due."""
     if state.rest_due_s <= 0:
         raise LogContradiction(f"a rest before trial {event.trial} of run {event.run}, where none was due")
     rested = _set_probing(state, apply_break(state.sitting.probing, event, state.protocol.probes))
@@ -107,6 +109,7 @@ def _apply_rest(state: SessionState, event: RestTaken) -> SessionState:
 
 
 def _set_probing(state: SessionState, probing: ProbeState) -> SessionState:
+    """Replace the state of the probes."""
     return replace(state, sitting=replace(state.sitting, probing=probing))
 
 
@@ -124,7 +127,7 @@ def _apply_probe(state: SessionState, event: ProbePlayed | ProbeMeasured) -> Ses
     updated = _set_probing(state, end_probe(probing, event))
     if probing.open is None or probing.open.kind != "hand":
         return updated
-    # The dose takes an amplitude: that of a sine with the measured root mean square.
+    # The dose is computed from the amplitude of a sine with the measured root mean square.
     amplitude_mps2 = None if event.rms_mps2 is None else math.sqrt(2) * event.rms_mps2
     sitting = add_exposure(updated.sitting, LARGEST_WEIGHT_HZ, amplitude_mps2, event.vibrated_s)
     return replace(updated, sitting=sitting)

@@ -22,7 +22,7 @@ from study.session.facts.events import (
 from study.session.facts.log_time import compute_wall_clock_s
 from study.session.facts.sensor_facts import SensorFacts
 from study.session.facts.void_reasons import is_computer_busy
-from study.session.state.draw_check import LogContradiction, check_draw, describe_place
+from study.session.state.presentation_check import LogContradiction, check_presentation, describe_place
 from study.session.state.sitting_state import (
     add_exposure,
     estimate_amplitude_mps2,
@@ -44,7 +44,7 @@ def present_trial(state: SessionState, event: TrialPresented) -> SessionState:
         raise LogContradiction(f"{describe_place(event)} presented while another trial is open")
     if state.finished:
         raise LogContradiction(f"{describe_place(event)} presented after the last run")
-    check_draw(event, find_due_presentation(state))
+    check_presentation(event, find_due_presentation(state))
     repeat_cause = state.trials[-1].void_cause if state.attempt else None
     row = _trial_row(state.opened, event, is_felt_by_person(state.opened), repeat_cause)
     return replace(state, presented=event, trials=(*state.trials, row), sitting=start_motion(state.sitting))

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from study.session.facts.sitting_events import PauseTaken, ProbeMeasured, ProbePlayed, RestTaken
-from study.session.state.draw_check import LogContradiction
+from study.session.state.presentation_check import LogContradiction
 
 if TYPE_CHECKING:
     from protocols.definition.probes import ProbeSettings

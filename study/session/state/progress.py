@@ -10,7 +10,7 @@ from statistics import median
 from protocols.procedure.schedule import Run
 from protocols.trial import Phase
 from study.session.state.state import SessionState
-from study.session.views.views import Progress
+from study.session.views.participant_views import Progress
 
 TYPICAL_STAIRCASE_TRIALS = 65
 """Typical number of trials of a staircase with 13 reversals; about 60 with few errors, 110 for pure guessing.

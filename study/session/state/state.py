@@ -16,9 +16,9 @@ from protocols.trial import Trial, VoidCause
 from study.session.facts.events import AnswerGiven, SessionOpened, TrialPresented
 from study.session.facts.log_time import Moment
 from study.session.state.daily_dose import set_dose_elsewhere
-from study.session.state.draw_check import LogContradiction
 from study.session.state.due_trial import Place, PresentTrial, due_trial
-from study.session.state.rules import is_place_assigned_later, is_refusal_final, repeats_same_stimulus
+from study.session.state.presentation_check import LogContradiction
+from study.session.state.rules import is_place_assigned_later, is_refusal_final, is_same_stimulus_repeated
 from study.session.state.sitting_state import SittingState
 
 
@@ -128,7 +128,7 @@ def find_due_presentation(state: SessionState) -> PresentTrial:
 
 def count_repeats_left(state: SessionState) -> int | None:
     """Number of further repeats of a stimulus that the participant may request in this run; None if unlimited."""
-    if not repeats_same_stimulus(state.opened):
+    if not is_same_stimulus_repeated(state.opened):
         return None
     requested = sum(trial.run == state.run and trial.void_cause is VoidCause.ASKED for trial in state.trials)
     return max(0, state.protocol.trial.repeats_per_run - requested)

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from protocols.definition.apparatus import SafetySettings
 from protocols.definition.plausibility import PlausibilitySettings
 from protocols.definition.recording_protocol import RecordingProtocol
-from protocols.definition.recording_segments import MultisineSegment, highest_hz
-from protocols.definition.study_contradictions import highest_roved_n
+from protocols.definition.recording_segments import MultisineSegment, find_highest_hz
+from protocols.definition.study_contradictions import compute_highest_roved_n
 from protocols.definition.study_protocol import StudyProtocol
 
 SPRING_SLEW_N_PER_S = 100.0
@@ -64,14 +64,16 @@ def make_study_limits(protocol: StudyProtocol) -> Limits:
 def compute_highest_level_n(protocol: StudyProtocol) -> float:
     """Compute the highest level (N) of a trial: the staircase's cap plus the largest roving, limited by the safety
     cap."""
-    return min(highest_roved_n(protocol.staircase.cap_n, protocol.stimulus.rove_db), protocol.safety.stimulus_cap_n)
+    return min(
+        compute_highest_roved_n(protocol.staircase.cap_n, protocol.stimulus.rove_db), protocol.safety.stimulus_cap_n
+    )
 
 
 def make_recording_limits(protocol: RecordingProtocol) -> Limits:
     """Limits of a recording, with a slew rate just above that of its steepest excitation."""
     slew_rates_n_per_s = [
         (MULTISINE_PEAK_FACTOR if isinstance(segment, MultisineSegment) else 1.0)
-        * _bound_slew_n_per_s(highest_hz(segment), segment.amplitude_n, protocol.fade_s)
+        * _bound_slew_n_per_s(find_highest_hz(segment), segment.amplitude_n, protocol.fade_s)
         for segment in protocol.segments
     ]
     return _make_limits(protocol.safety, max(slew_rates_n_per_s))

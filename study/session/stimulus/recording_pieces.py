@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from equalizer.signals.excitation import apply_fades, log_sweep, sine
+from equalizer.signals.excitation import apply_fades, make_log_sweep, make_sine
 from equalizer.signals.multisine import list_lines_between, make_multisines
 from equalizer.signals.recording import Segment
 from equalizer.signals.signal import FloatArray, Signal
@@ -86,7 +86,7 @@ def _make_sine_piece(
     fade_samples = round(protocol.fade_s * rate_hz)
     settle_samples = max(fade_samples, round(segment.settle_s * rate_hz))
     evaluated_samples = max(1, round(segment.duration_s * rate_hz) // period) * period
-    wave = sine(frequency_hz, segment.amplitude_n, settle_samples + evaluated_samples + fade_samples, rate_hz)
+    wave = make_sine(frequency_hz, segment.amplitude_n, settle_samples + evaluated_samples + fade_samples, rate_hz)
     vector = make_unit_vector(protocol.directions, segment.along)
     commands, shift = _add_rests(protocol, apply_fades(wave, fade_samples, fade_samples)[:, None] * vector, rate_hz)
     start = shift + settle_samples
@@ -106,7 +106,9 @@ def _make_sweep_piece(
     """A sweep. With several periods it is faded in during the first, which contains the transient; every period ends at
     zero, so that no fade-out is needed."""
     period = round(segment.duration_s * rate_hz)
-    wave = np.tile(log_sweep(segment.from_hz, segment.to_hz, segment.amplitude_n, period, rate_hz), segment.periods)
+    wave = np.tile(
+        make_log_sweep(segment.from_hz, segment.to_hz, segment.amplitude_n, period, rate_hz), segment.periods
+    )
     vector = make_unit_vector(protocol.directions, segment.along)
     fade_in = round(protocol.fade_s * rate_hz) if segment.periods > 1 else 0
     commands, start = _add_rests(protocol, apply_fades(wave, min(fade_in, period), 0)[:, None] * vector, rate_hz)

@@ -1,9 +1,9 @@
-"""Timing requirements of a device, and the verdict on a computer whose timing was measured (`hapteq doctor`, device
-check). Whether a single trial is void for its timing is decided by `study.workflows.trial.judge_trial`.
+"""Timing requirements of a device's control loop, and the verdict on a computer whose timing was measured.
 
 Lateness is the time from the moment at which a tick of the control loop is due to its actual wake-up. A real device
 does not wait: a loop that wakes up more than one tick late has missed that tick. A simulated device waits for its
-computer, so that lateness is only a warning there.
+computer, so that lateness is only a warning there. Called by `study.workflows.checks` (`hapteq doctor`, device check);
+whether a single trial is void for its timing is decided by `study.workflows.trial.judge_trial`.
 """
 
 import math
@@ -13,48 +13,50 @@ import numpy as np
 
 from equalizer.signals.signal import FloatArray
 from study.session.facts.void_reasons import LOAD_PER_PROCESSOR
-from study.session.views.views import DeviceFinding
+from study.session.views.participant_views import DeviceFinding
 
 MS_PER_S = 1000.0
+"""Milliseconds per second."""
 
-LATE_TICKS = 1.0
-"""Limit of the 99th percentile of the lateness, in ticks: 1 ms at 1 kHz."""
+MAX_P99_TICKS = 1.0
+"""Limit, exclusive, of the 99th percentile of the lateness, in ticks: 1 ms at 1 kHz. A tick that is later is missed."""
 
-LATE_SHARE = 0.002
-"""Allowed fraction of late ticks, missed ones included, on an idle computer: a loop with real-time priority stays
-below it."""
+MAX_LATE_SHARE = 0.002
+"""Allowed fraction of late ticks, missed ones included, on an idle computer. Chosen: a loop with real-time priority
+stays below it."""
 
-BUSY_LATE_SHARE = 0.01
-"""Allowed fraction of late ticks, missed ones included, with all cores busy."""
+MAX_LATE_SHARE_BUSY = 0.01
+"""Allowed fraction of late ticks, missed ones included, with all cores busy. Chosen."""
 
-ALL_BUSY = 1.0
-"""Load average per processor from which all cores are taken as busy."""
+BUSY_LOAD = 1.0
+"""Load average per processor from which all cores count as busy: one running task per processor."""
 
 ADVICE = "Close other programs, switch power saving off, and measure again."
-"""Advice that is shown where the timing is too late."""
+"""Advice for a finding that is not fine because of late or missed ticks."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lateness:
-    """Statistics of the lateness (ms) of a real device's own loop, or of this program when it wakes up at every
+    """Statistics of the lateness (ms) of a control loop, or of a test loop of this program that wakes up at every
     tick."""
 
     median_ms: float
     p99_ms: float
     longest_ms: float
-    missing_a_tick: float
+    missed_fraction: float
     """Fraction of the wake-ups that were more than one tick late."""
     tick_ms: float
     """Duration of a tick."""
 
     @property
     def too_late(self) -> bool:
-        """Whether a real device's loop is too late. NaN counts as too late."""
-        return not self.p99_ms < LATE_TICKS * self.tick_ms
+        """Whether the 99th percentile is not below `MAX_P99_TICKS` ticks. NaN counts as too late."""
+        return not self.p99_ms < MAX_P99_TICKS * self.tick_ms
 
 
 def measure_lateness(late_s: FloatArray, rate_hz: float) -> Lateness:
-    """Lateness statistics. late_s (n,): how late each wake-up was (s), not negative. Raises ValueError if empty."""
+    """Compute statistics of the lateness. late_s (n,): lateness of each wake-up (s), not negative; rate_hz: tick rate.
+    Raises ValueError if empty."""
     if len(late_s) == 0:
         raise ValueError("no wake-up was measured")
     late_ms = MS_PER_S * np.asarray(late_s, dtype=float)
@@ -63,20 +65,20 @@ def measure_lateness(late_s: FloatArray, rate_hz: float) -> Lateness:
         median_ms=float(np.median(late_ms)),
         p99_ms=float(np.percentile(late_ms, 99)),
         longest_ms=float(late_ms.max()),
-        missing_a_tick=float(np.mean(late_ms > tick_ms)),
+        missed_fraction=float(np.mean(late_ms > tick_ms)),
         tick_ms=tick_ms,
     )
 
 
 def judge_lateness(lateness: Lateness, simulated: bool) -> DeviceFinding:
-    """Verdict on the wake-ups. Too late is only a warning for a simulated device."""
+    """Judge the wake-ups; too late is only a warning for a simulated device."""
     value = (
         f"half of the wake-ups within {lateness.median_ms:.2f} ms, 99 % within {lateness.p99_ms:.2f} ms, "
         f"the latest {lateness.longest_ms:.1f} ms"
     )
     if not lateness.too_late:
         return DeviceFinding("Lateness", value, fine=True)
-    limit = f"99 % must come within {LATE_TICKS * lateness.tick_ms:g} ms"
+    limit = f"99 % must come within {MAX_P99_TICKS * lateness.tick_ms:g} ms"
     if simulated:
         value += f"; too late for a real device ({limit}); a simulated one waits"
     else:
@@ -84,10 +86,12 @@ def judge_lateness(lateness: Lateness, simulated: bool) -> DeviceFinding:
     return DeviceFinding("Lateness", value, fine=False, advice=ADVICE, warning=simulated)
 
 
-def judge_missed(missed_ticks: int, ticks: int, simulated: bool, load_per_processor: float | None) -> DeviceFinding:
-    """Verdict on missed ticks, by the limit of late ticks: missed ticks have no limit of their own. load_per_processor:
-    None if unknown."""
-    share, limit = missed_ticks / max(ticks, 1), _late_limit(load_per_processor)
+def judge_missed_ticks(
+    missed_ticks: int, ticks: int, simulated: bool, load_per_processor: float | None
+) -> DeviceFinding:
+    """Judge missed ticks by the limit of late ticks; they have no separate limit. load_per_processor: None if unknown,
+    which counts as idle."""
+    share, limit = missed_ticks / max(ticks, 1), _choose_late_limit(load_per_processor)
     fine = share <= limit
     value = f"{missed_ticks} of {ticks} ({share:.2%})"
     if simulated:
@@ -98,24 +102,27 @@ def judge_missed(missed_ticks: int, ticks: int, simulated: bool, load_per_proces
 
 
 def _is_busy(load_per_processor: float | None) -> bool:
-    return load_per_processor is not None and load_per_processor >= ALL_BUSY
+    """Whether all cores are busy; False if the load is unknown."""
+    return load_per_processor is not None and load_per_processor >= BUSY_LOAD
 
 
-def _late_limit(load_per_processor: float | None) -> float:
-    """Allowed fraction of late ticks at this load; None: that of an idle computer."""
-    return BUSY_LATE_SHARE if _is_busy(load_per_processor) else LATE_SHARE
+def _choose_late_limit(load_per_processor: float | None) -> float:
+    """Choose the allowed fraction of late ticks for this load; that of an idle computer if the load is unknown
+    (None)."""
+    return MAX_LATE_SHARE_BUSY if _is_busy(load_per_processor) else MAX_LATE_SHARE
 
 
-def judge_late(late_ticks: int, latest_ms: float, ticks: int, load_per_processor: float | None) -> DeviceFinding:
-    """Verdict on late ticks of a real device. late_ticks: ticks whose work ended after the next tick was due, missed
-    ones included. load_per_processor: None if unknown; the limit is then that of an idle computer."""
+def judge_late_ticks(late_ticks: int, latest_ms: float, ticks: int, load_per_processor: float | None) -> DeviceFinding:
+    """Judge late ticks of a real device. late_ticks: ticks whose work ended after the next tick was due, missed ones
+    included; latest_ms: longest time from when a tick was due to the end of its work; load_per_processor: None if
+    unknown, which counts as idle."""
     share = late_ticks / max(ticks, 1)
-    busy, limit = _is_busy(load_per_processor), _late_limit(load_per_processor)
+    busy, limit = _is_busy(load_per_processor), _choose_late_limit(load_per_processor)
     fine = share <= limit
     value = f"{late_ticks} of {ticks} ({share:.2%}) ended after the next was due, missed ones among them"
     value += f"; the latest {latest_ms:.1f} ms after its time"
-    if share > LATE_SHARE:
-        normal_limit = f"{LATE_SHARE:.1%}"
+    if share > MAX_LATE_SHARE:
+        normal_limit = f"{MAX_LATE_SHARE:.1%}"
         value += (
             f"; at most {limit:.1%} are fine with all cores busy ({normal_limit} else)"
             if busy
@@ -125,8 +132,8 @@ def judge_late(late_ticks: int, latest_ms: float, ticks: int, load_per_processor
 
 
 def judge_load(per_processor: float | None) -> DeviceFinding:
-    """Verdict on the load average; per_processor: None if unknown. A high load is only a warning, because the measured
-    lateness decides."""
+    """Judge the load average per processor; None if unknown. A high load is only a warning, because the measured
+    lateness is decisive."""
     if per_processor is None:
         return DeviceFinding("Load", "this system does not report it, so it was not checked", fine=True)
     value = f"{per_processor:.0%} of what its processors can do, over the last minute"

@@ -1,14 +1,14 @@
-"""Data classes that the start screen and the viewers of past sessions and diagnoses show.
+"""Data classes of the start screen and of the viewers of past sessions and diagnoses.
 
-They hold plain values and import no analysis, so that a screen opens quickly. `study.workflows.views` fills them from
-the files.
+They contain plain values and import no analysis, so that a screen opens quickly. `study.workflows.views` fills them
+from files; `study.tui` and `study.cli` show them.
 """
 
 from dataclasses import dataclass
 from typing import Literal
 
 SessionStatus = Literal["finished", "unfinished", "running", "refused", "excluded", "withdrawn", "unreadable"]
-"""Status of a session. `running`: a program is writing its log; `refused`, `excluded`: the participant did not take
+"""Status of a session. `running`: a program has its log open; `refused`, `excluded`: the participant did not take
 part, see `INELIGIBILITY_REASONS`; `withdrawn`: the data were erased, and only a note of the withdrawal is kept;
 `unreadable`: the log is missing or damaged."""
 
@@ -16,27 +16,34 @@ INELIGIBILITY_REASONS = {
     "refused": "consent was not given",
     "excluded": "a question of the exclusion list was answered with yes",
 }
-"""Why a participant did not take part, in words."""
+"""Reason, in words, for each status of a person who did not take part."""
 
 
 @dataclass(frozen=True, slots=True)
 class SessionLine:
-    """One session in a list."""
+    """A session as a line of a list."""
 
     name: str
+    """Name of the session, such as P01_001."""
     path: str
+    """Path of the session's folder."""
     subject: str
+    """Participant code."""
     protocol: str
+    """Name of the protocol."""
     begun_utc: str
-    """Time of the opening, UTC; of the last change where the session cannot be read."""
+    """Time of the opening (UTC, ISO 8601); of the withdrawal of a withdrawn session; of the last change of one that
+    cannot be read."""
     observer: str | None
     """Name of the simulated participant; None for a person."""
     answers: int
-    """Number of answers in the log."""
+    """Number of answers in the log. This and the next two: 0 for a withdrawn or unreadable session."""
     runs_done: int
+    """Number of completed runs."""
     runs: int
     """Number of runs in the plan."""
     standing: SessionStatus
+    """Status of the session."""
     remark: str = ""
     """Note for the list, such as the reason why the session cannot be read."""
 
@@ -49,40 +56,43 @@ class ProtocolLine:
     """Name or path, as `--protocol` takes it."""
     title: str
     locked: bool
+    """Whether the protocol is locked against changes."""
     equalized: bool = False
     """Whether its stimuli are accelerations, which need a model of the device."""
 
 
 @dataclass(frozen=True, slots=True)
 class HomeView:
-    """What the start screen offers."""
+    """Contents of the start screen."""
 
     data: str
+    """Path of the data folder."""
     sessions: tuple[SessionLine, ...]
     """Latest first."""
     protocols: tuple[ProtocolLine, ...]
     devices: tuple[str, ...]
+    """Names of devices, as `--device` takes them."""
     models: tuple[str, ...] = ()
-    """Files of identified models."""
+    """Paths of files of identified models."""
     qualities: tuple[tuple[str, str], ...] = ()
-    """Held-out errors of the models in a few words: (file, words)."""
+    """Held-out error of each model in words: (path, words)."""
 
-    def quality_of(self, model: str) -> str:
-        """Held-out error of a model's file in words; empty where it is not known."""
+    def describe_quality(self, model: str) -> str:
+        """Describe the held-out error of the model in this file; empty where it is not known."""
         return dict(self.qualities).get(model, "")
 
 
 @dataclass(frozen=True, slots=True)
 class Staircase:
-    """One run, as a plot needs it. Its tuples have one entry per trial that counts; levels are forces in N."""
+    """One run of a staircase, for a plot. Its tuples have one entry per trial that counts; levels are forces in N."""
 
     title: str
     levels_n: tuple[float, ...]
     correct: tuple[bool, ...]
     reversals: tuple[bool, ...]
-    """Whether the staircase turned at that trial."""
+    """Whether the staircase reversed at that trial."""
     threshold_n: float | None
-    """None where the run is not complete."""
+    """Estimated threshold; None where the run is not complete."""
     cap_n: float
     """Highest level that the protocol allows."""
 
@@ -93,10 +103,11 @@ class SessionView:
 
     line: SessionLine
     facts: tuple[tuple[str, str], ...]
-    """(what, value): participant, protocol, device, seed, dates."""
+    """(label, value): participant, protocol, device, seed, dates."""
     thresholds: tuple[tuple[str, ...], ...]
     """Rows of text, the first one the header; empty without a complete run."""
     warnings: tuple[str, ...]
+    """Sentences about problems of the session, such as a log without checksums."""
     staircases: tuple[Staircase, ...]
     events: tuple[str, ...]
     """The log in words, oldest first; the direction of an open trial is left out."""
@@ -111,21 +122,24 @@ class DiagnosisView:
     """Contents of one `diagnosis.json`."""
 
     path: str
+    """Path of the file."""
     verdict: str
+    """Result in one sentence."""
     sentences: tuple[str, ...]
     """One per named effect, with parameters and intervals."""
     rivals: tuple[str, ...]
     """Effects that explain the recordings as well, one sentence each."""
     mismatch: tuple[tuple[str, ...], ...]
-    """Where model and recording differ. This and the next two: rows of text, the first one the header."""
+    """Differences of model and recording. This and the next two: rows of text, the first one the header."""
     fit: tuple[tuple[str, ...], ...]
-    """Errors before, re-tuned and with the effects."""
+    """Errors of the given model, of the re-tuned model, and of the model with the effects."""
     remainder: tuple[tuple[str, ...], ...]
-    """Errors that the effects leave above the noise."""
+    """Errors above the noise that the effects do not explain."""
     next_experiment: str
+    """Recommended next recording, in words."""
     report: str = ""
     """Path of the report.html in the same folder; empty where there is none."""
     notes: tuple[str, ...] = ()
     """Remarks, such as how errors were measured and what was re-tuned."""
     candidates: tuple[str, ...] = ()
-    """Effects that were not confirmed, the best first, without one that the verdict already states."""
+    """Effects that were not confirmed, the best first, except those that the verdict states."""

@@ -1,17 +1,18 @@
-"""State of a form while it is filled in: position of the cursor, and the answers so far. Immutable values, no drawing.
+"""State machine of a form while it is filled in: each key, click or paste gives the next state from the previous one.
 
-Each key gives a new state from the previous one, in the order of arrival; a screen only draws the state. An answer
-therefore belongs to the question at which the cursor was when the key arrived, however fast the keys are pressed.
+States are immutable, and nothing is drawn here: `study.tui.screens.form` draws the state. Keys are applied in the order
+of arrival, so that an answer belongs to the question at which the cursor was when the key arrived, however fast the
+keys are pressed.
 """
 
 from dataclasses import dataclass, replace
 
 from study.session.views.form_views import Form, FormField, FormKind, FormReply, find_missing_fields
 
-LONGEST_TEXT = 500
-"""Largest number of characters of free text in a field; further characters are ignored."""
-CHECKED = (FormKind.CONSENT, FormKind.EXCLUSION)
-"""Forms in which changed choices are shown once more before sending, because safety depends on them."""
+MAX_TEXT_CHARACTERS = 500
+"""Largest number of characters of free text in a field; further characters are ignored. Chosen."""
+CONFIRMED_KINDS = (FormKind.CONSENT, FormKind.EXCLUSION)
+"""Kinds of forms in which changed choices must be confirmed before sending, because safety depends on them."""
 CURSOR_STEPS = {"down": 1, "up": -1, "tab": 1, "shift+tab": -1}
 """Number of fields by which each key moves the cursor."""
 
@@ -21,29 +22,30 @@ class FieldEntry:
     """Content of one field."""
 
     answer: str = ""
-    """The answer in the language shown; empty if not given."""
+    """The answer in the language shown; empty without one."""
     marked: int | None = None
-    """Index of the choice that Space would choose; None before the first move."""
+    """Index of the choice that Space or Enter would choose; None before the first move."""
     caret: int = 0
-    """Position of the cursor in free text."""
+    """Position of the caret in free text, from 0 to the number of characters."""
 
 
 @dataclass(frozen=True, slots=True)
 class FormEntry:
-    """State of a form while it is filled in; each key gives a new state, see `press`."""
+    """State of a form while it is filled in; `apply_key` gives the next state."""
 
     form: Form
     field_entries: tuple[FieldEntry, ...]
     """Content of each field, in the order of the form's fields."""
     cursor: int = 0
-    """Index of the field under the cursor; the number of fields means Continue, below the last."""
+    """Index of the field under the cursor; the number of fields stands for the button Continue below the last."""
     replaced: frozenset[int] = frozenset()
-    """Indices of fields whose choice was changed and not yet shown again for a check; only in forms of `CHECKED`."""
-    open: tuple[int, ...] = ()
+    """Indices of fields whose choice was changed and not yet shown for confirmation; only in `CONFIRMED_KINDS`."""
+    missing: tuple[int, ...] = ()
     """Indices of the fields without a valid answer at the last attempt to send the form; empty after the next
     answer."""
-    check: tuple[int, ...] = ()
-    """Indices of the fields whose changed choices must be checked before sending; empty after the next answer."""
+    unconfirmed: tuple[int, ...] = ()
+    """Indices of the fields whose changed choices are shown for confirmation, after an attempt to send the form; empty
+    after the next answer."""
     is_sent: bool = False
     """Whether the form is complete and was sent; no key changes it then."""
 
@@ -59,21 +61,22 @@ def make_blank_entry(form: Form) -> FormEntry:
 
 
 def make_reply(entry: FormEntry) -> FormReply:
-    """The reply that an entry contains: answers by key, without blanks at their ends."""
+    """Make the reply from an entry: answers by key, without blanks at their ends."""
     return FormReply(
         {
-            f.key: field_entry.answer.strip()
-            for f, field_entry in zip(entry.form.fields, entry.field_entries, strict=True)
+            field.key: field_entry.answer.strip()
+            for field, field_entry in zip(entry.form.fields, entry.field_entries, strict=True)
         }
     )
 
 
-def press(entry: FormEntry, key: str, character: str | None = None, stacked: bool = False) -> FormEntry | None:
-    """The entry after one key; None if the key has no meaning in a form. After sending no key changes anything.
+def apply_key(entry: FormEntry, key: str, character: str | None = None, stacked: bool = False) -> FormEntry | None:
+    """Apply one key: the next entry; None if the key has no function at the cursor. After sending, no key has an
+    effect.
 
-    key: name of the key in Textual (the library for screens), such as "enter", "shift+tab", "1". character: the
-    character that the key prints; None without one. stacked: the choices under the cursor are listed vertically, so Up
-    and Down move through them first.
+    key: name of the key in Textual (the terminal interface library), such as "enter", "shift+tab", "1". character: the
+    character that the key prints; None without one. stacked: whether the choices under the cursor are listed
+    vertically; Up and Down then move through them first.
     """
     if entry.is_sent:
         return entry
@@ -92,23 +95,23 @@ def press(entry: FormEntry, key: str, character: str | None = None, stacked: boo
 
 
 def move_cursor(entry: FormEntry, field_index: int) -> FormEntry:
-    """Move the cursor; it stops at the first question and at Continue."""
+    """Move the cursor to a field; indices beyond the ends give the first field or Continue."""
     return entry if entry.is_sent else replace(entry, cursor=min(max(field_index, 0), len(entry.form.fields)))
 
 
 def click_choice(entry: FormEntry, field_index: int, choice: int) -> FormEntry:
-    """The entry after a click on a choice: the cursor moves to its field, and it is chosen. field_index, choice:
-    indices of the field and of the choice, from 0."""
+    """Apply a click on a choice: the cursor moves to its field, and it is chosen. field_index, choice: from 0."""
     return entry if entry.is_sent else _choose(move_cursor(entry, field_index), choice)
 
 
 def click_continue(entry: FormEntry) -> FormEntry:
-    """The entry after a click on Continue."""
+    """Apply a click on Continue: the form is sent if it is complete and confirmed."""
     return entry if entry.is_sent else _send_form(move_cursor(entry, len(entry.form.fields)))
 
 
-def paste(entry: FormEntry, text: str) -> FormEntry:
-    """The entry after text was pasted: inserted into free text, ignored in other fields."""
+def paste_text(entry: FormEntry, text: str) -> FormEntry:
+    """Insert pasted text into a field of text or number, blanks reduced to single spaces and unprintable characters
+    removed; ignored in fields with choices and on Continue."""
     field = entry.field
     if entry.is_sent or field is None or field.choices:
         return entry
@@ -116,9 +119,9 @@ def paste(entry: FormEntry, text: str) -> FormEntry:
 
 
 def move_mark(marked: int | None, step: int, choices: int, stop_at_ends: bool = True) -> int | None:
-    """Index of the marked choice after a step of 1 or -1; from no mark to the first or the last choice. A step beyond
-    the ends leaves the mark unchanged; if `stop_at_ends` is false, it gives None, and so does a step of -1
-    without a mark."""
+    """Move the mark among the choices by a step of 1 or -1: index of the marked choice. Without a mark (None), a step
+    of 1 gives the first choice, -1 the last. A step beyond the ends leaves the mark unchanged; if `stop_at_ends` is
+    false, it gives None, as does a step of -1 without a mark."""
     if marked is None:
         return (0 if step > 0 else choices - 1) if stop_at_ends or step > 0 else None
     target = marked + step
@@ -126,8 +129,8 @@ def move_mark(marked: int | None, step: int, choices: int, stop_at_ends: bool = 
 
 
 def find_choice(choices: tuple[str, ...], character: str) -> int | None:
-    """Index of the choice that a typed character means: its number from 1, or its first letter if no other choice has
-    the same. Where choices are numbers themselves, a digit means the choice with this text. None without such a
+    """Find the choice that a typed character selects: by its number from 1, or by its first letter if no other choice
+    has the same. Where any choice is a number, a digit selects the choice with this text. None without such a
     choice."""
     if character.isdecimal():
         if any(choice.isdigit() for choice in choices):
@@ -138,7 +141,7 @@ def find_choice(choices: tuple[str, ...], character: str) -> int | None:
 
 
 def _press_choice(entry: FormEntry, field: FormField, key: str, character: str | None) -> FormEntry | None:
-    """The entry after a key in a field with choices; None if the key has no meaning there."""
+    """Apply a key in a field with choices; None if the key has no function there."""
     field_entry = entry.field_entries[entry.cursor]
     if key in ("left", "right"):
         return _change_field(
@@ -155,7 +158,7 @@ def _press_choice(entry: FormEntry, field: FormField, key: str, character: str |
 
 
 def _press_text(entry: FormEntry, key: str, character: str | None) -> FormEntry | None:
-    """The entry after a key in a field with text or a number; None if the key has no meaning there."""
+    """Apply a key in a field with text or a number; None if the key has no function there."""
     text, caret = entry.field_entries[entry.cursor].answer, entry.field_entries[entry.cursor].caret
     match key:
         case "enter":
@@ -172,19 +175,18 @@ def _press_text(entry: FormEntry, key: str, character: str | None) -> FormEntry 
 
 
 def _insert_text(entry: FormEntry, characters: str) -> FormEntry:
-    """Insert characters at the caret, up to `LONGEST_TEXT` in the field."""
+    """Insert characters at the caret, up to `MAX_TEXT_CHARACTERS` in the field."""
     text, caret = entry.field_entries[entry.cursor].answer, entry.field_entries[entry.cursor].caret
-    fitting = characters[: LONGEST_TEXT - len(text)]
+    fitting = characters[: MAX_TEXT_CHARACTERS - len(text)]
     return _change_field(entry, answer=text[:caret] + fitting + text[caret:], caret=caret + len(fitting))
 
 
 def _choose(entry: FormEntry, choice: int) -> FormEntry:
-    """Choose an answer in the field under the cursor; in forms of `CHECKED`, a changed choice is noted in
-    `replaced`."""
+    """Choose an answer in the field under the cursor; in `CONFIRMED_KINDS`, a changed choice is added to `replaced`."""
     field, previous_answer = entry.form.fields[entry.cursor], entry.field_entries[entry.cursor].answer
     answer = field.choices[choice]
     chosen = _change_field(entry, answer=answer, marked=choice)
-    if previous_answer in ("", answer) or entry.form.kind not in CHECKED:
+    if previous_answer in ("", answer) or entry.form.kind not in CONFIRMED_KINDS:
         return chosen
     return replace(chosen, replaced=entry.replaced | {entry.cursor})
 
@@ -192,7 +194,8 @@ def _choose(entry: FormEntry, choice: int) -> FormEntry:
 def _change_field(
     entry: FormEntry, answer: str | None = None, marked: int | None = None, caret: int | None = None
 ) -> FormEntry:
-    """The entry with changes to the field under the cursor; None leaves a value unchanged."""
+    """Change the field under the cursor; None leaves a value unchanged. A new answer clears `missing` and
+    `unconfirmed`."""
     previous_field = entry.field_entries[entry.cursor]
     updated_field = FieldEntry(
         previous_field.answer if answer is None else answer,
@@ -204,19 +207,19 @@ def _change_field(
     return replace(
         entry,
         field_entries=field_entries,
-        open=() if is_answer_changed else entry.open,
-        check=() if is_answer_changed else entry.check,
+        missing=() if is_answer_changed else entry.missing,
+        unconfirmed=() if is_answer_changed else entry.unconfirmed,
     )
 
 
 def _send_form(entry: FormEntry) -> FormEntry:
-    """Send the form. Where answers are missing, or changed choices are not checked, it is not sent, and the cursor
-    moves to the first such field."""
+    """Send the form, unless answers are missing or changed choices are unconfirmed; the cursor then moves to the first
+    such field. Another attempt to send confirms the changed choices."""
     missing_fields = find_missing_fields(entry.form, make_reply(entry))
     if missing_fields:
         field_indices = tuple(entry.form.fields.index(field) for field in missing_fields)
-        return replace(entry, cursor=field_indices[0], open=field_indices, check=())
+        return replace(entry, cursor=field_indices[0], missing=field_indices, unconfirmed=())
     if entry.replaced:
         field_indices = tuple(sorted(entry.replaced))
-        return replace(entry, cursor=field_indices[0], open=(), check=field_indices, replaced=frozenset())
+        return replace(entry, cursor=field_indices[0], missing=(), unconfirmed=field_indices, replaced=frozenset())
     return replace(entry, is_sent=True)

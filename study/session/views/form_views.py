@@ -1,8 +1,9 @@
-"""Forms that are filled in during a session in addition to the trials: consent, exclusion criteria, questionnaires,
-set-up, state of the handle. Plain values without any drawing, for every kind of screen.
+"""Forms of a session as data classes (consent, exclusion criteria, questionnaires, set-up, state of the handle), and
+the validation and encoding of their answers.
 
 Texts are shown in the participant's language; answers are logged as codes that are the same in every language, so that
-studies in several languages can be analysed together (`code_answers`).
+studies in several languages can be analysed together (`encode_answers`). `forms` makes the forms from a protocol;
+`form_entry` and the screens fill them in.
 """
 
 import re
@@ -14,13 +15,13 @@ class FormKind(Enum):
     """Kinds of forms, each shown at its own point of a sitting."""
 
     CONSENT = "consent"
-    """Informed consent."""
+    """Informed consent to take part."""
     EXCLUSION = "exclusion"
     """Questions on the exclusion criteria."""
     QUESTIONNAIRE = "questionnaire"
     """Questions to the participant before the trials."""
     SETUP = "setup"
-    """Facts on the experimental set-up."""
+    """Questions to the experimenter about the set-up."""
     DEBRIEF = "debrief"
     """Questions to the participant after the trials."""
     HANDLE = "handle"
@@ -49,9 +50,9 @@ class FormField:
     needed: bool = True
     """Whether an answer is required; otherwise it may be empty."""
     codes: tuple[str, ...] = ()
-    """Code that is logged for each of the choices; empty: the choices themselves are logged."""
+    """Logged code of each choice, in the order of `choices`; empty: the choices are logged."""
     limits: Limits | None = None
-    """Limits of the number; None for a choice or free text."""
+    """Limits of a number; None for a choice or free text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,20 +70,20 @@ class Form:
 
 @dataclass(frozen=True, slots=True)
 class FormReply:
-    """Answers to a form as they were given, in the language shown; `code_answers` converts them for the log."""
+    """Answers to a form in the language shown; `encode_answers` converts them for the log."""
 
     answers: dict[str, str]
-    """Answers by the keys of their fields."""
+    """Answer by the key of its field; a missing key means no answer."""
 
 
 def find_missing_fields(form: Form, reply: FormReply) -> tuple[FormField, ...]:
-    """Fields of the form without a valid answer in the reply."""
+    """Find the fields of the form without a valid answer in the reply, in their order."""
     return tuple(field for field in form.fields if not has_answer(field, reply.answers.get(field.key, "").strip()))
 
 
 def has_answer(field: FormField, answer: str) -> bool:
-    """Whether an answer, as shown, is valid: one of the choices, a number within the limits, or any text; an empty one
-    is valid only where no answer is required."""
+    """Whether an answer in the language shown is valid: one of the choices, a number within the limits, or any text. An
+    empty answer is valid only where none is required."""
     if not answer:
         return not field.needed
     if field.choices:
@@ -101,14 +102,14 @@ def parse_number(answer: str) -> float | None:
     )
 
 
-def code_answers(form: Form, reply: FormReply) -> dict[str, str]:
-    """The answers as they are logged, the same in every language: choices as their codes, numbers with a decimal point,
-    missing answers as empty text."""
-    coded_answers = {}
+def encode_answers(form: Form, reply: FormReply) -> dict[str, str]:
+    """Encode the answers for the log, the same in every language: choices as their codes, numbers with a decimal point
+    and 10 significant digits, missing answers as empty text."""
+    encoded_answers = {}
     for field in form.fields:
         answer = reply.answers.get(field.key, "").strip()
         number = parse_number(answer) if field.limits is not None else None
         if field.codes and answer in field.choices:
             answer = field.codes[field.choices.index(answer)]
-        coded_answers[field.key] = answer if number is None else f"{number:.10g}"
-    return coded_answers
+        encoded_answers[field.key] = answer if number is None else f"{number:.10g}"
+    return encoded_answers

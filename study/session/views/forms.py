@@ -11,7 +11,7 @@ from protocols.definition.preparation import ConsentSettings, SetupSettings
 from protocols.definition.probes import ProbeSettings
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.views.form_views import Form, FormField, FormKind, FormReply, Limits, code_answers
+from study.session.views.form_views import Form, FormField, FormKind, FormReply, Limits, encode_answers
 
 YES_NO = ("yes", "no")
 """Codes of the two answers as they are logged; the text that is shown depends on the language."""
@@ -69,7 +69,7 @@ def make_form(protocol: StudyProtocol, kind: FormKind) -> Form | None:
 
 def judge_form(protocol: StudyProtocol, form: Form, reply: FormReply) -> FormOutcome:
     """Whether the form is passed, and which of its answers are logged."""
-    answers = code_answers(form, reply)
+    answers = encode_answers(form, reply)
     match form.kind:
         case FormKind.CONSENT:
             has_consented = all(answer == "yes" for answer in answers.values())
@@ -89,7 +89,7 @@ def judge_form(protocol: StudyProtocol, form: Form, reply: FormReply) -> FormOut
 def make_confirmation(form: Form, reply: FormReply, words: Words = ENGLISH_WORDS) -> Form:
     """Form that asks to confirm a refused consent or an exclusion before it becomes final, with the questions
     concerned."""
-    is_consent, answers = form.kind is FormKind.CONSENT, code_answers(form, reply)
+    is_consent, answers = form.kind is FormKind.CONSENT, encode_answers(form, reply)
     texts = [
         words.fill("quoted", {"text": field.label})
         for field in form.fields
@@ -107,7 +107,7 @@ def make_confirmation(form: Form, reply: FormReply, words: Words = ENGLISH_WORDS
 
 def is_confirmed(confirmation: Form, reply: FormReply) -> bool:
     """Whether the answers were confirmed; otherwise the form is filled in again."""
-    return code_answers(confirmation, reply)["right"] == "yes"
+    return encode_answers(confirmation, reply)["right"] == "yes"
 
 
 def _make_yes_no_field(key: str, label: str, words: Words) -> FormField:

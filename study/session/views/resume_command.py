@@ -1,11 +1,12 @@
-"""Command line that continues an unfinished session, for messages at the end of a sitting."""
+"""Command line that resumes an unfinished session, for the messages at the end of a sitting and the start screen."""
 
 SIMULATED_DEVICE = "simulated"
-"""Name of the simulated device, which `hapteq resume` opens without the option --device. A copy of
-`study.devices.opening.SIMULATED`, which this package and the screens must not import."""
+"""Name of the simulated device, which `hapteq resume` opens without the option --device. Equal to
+`study.devices.opening.SIMULATED`, which this package and the screens must not import, because they load no drivers."""
 
 
 def format_resume_command(session_path: str, device_name: str) -> str:
-    """Format the command. session_path: of the session's folder; device_name: as `open_device` takes it."""
+    """Format the command `hapteq resume`. session_path: of the session's folder; device_name: as `open_device` takes
+    it."""
     option = "" if device_name == SIMULATED_DEVICE else f" --device {device_name}"
     return f"hapteq resume {session_path}{option}"

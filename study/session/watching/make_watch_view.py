@@ -17,7 +17,7 @@ from study.session.watching.followed_trials import (
     make_run_line,
     next_level_n,
 )
-from study.session.watching.live import Live
+from study.session.watching.live_state import Live
 from study.session.watching.watch_alarms import Situation, find_alarms
 from study.session.watching.watch_view import RUNNING_STATUSES, DriftRecord, Exposure, SittingStatus, WatchView
 

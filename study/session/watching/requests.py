@@ -1,13 +1,14 @@
-"""Requests to a running session, from another terminal, from a key, or from the program itself.
+"""Requests to a running session (stop, pause, note), from another terminal, from a key, or from the program itself.
 
-Plain values: the request inbox (`study.store.sessions.request_inbox`) carries them, and the session obeys.
+These are plain values; `study.store.sessions.request_inbox` transfers those of other programs as files, and
+`study.workflows.trial.session_supervisor` executes them.
 """
 
 from dataclasses import dataclass
 from typing import Literal
 
 RequestSource = Literal["participant", "experimenter", "program"]
-"""Origin of a request; `program`: a finding of the session itself."""
+"""Origin of a request; `program`: the session's own program, such as an alarm of the supervisor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,6 +16,7 @@ class StopAsked:
     """Request to stop: the force is switched off at once and the sitting ends; the session can be resumed."""
 
     who: RequestSource
+    """Origin of the request."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +24,7 @@ class PauseAsked:
     """Request to pause: the force ends at once; the present trial is void and is presented again."""
 
     who: RequestSource
+    """Origin of the request."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +32,7 @@ class NoteAsked:
     """Request to write a note into the log."""
 
     who: RequestSource
+    """Author of the note."""
     text: str
     adverse: bool = False
     """Whether the note reports an adverse event of the participant, such as pain, numbness or fright."""

@@ -11,7 +11,7 @@ from protocols.trial import Phase, Trial, TrialStatus
 from study.session.facts.log_time import Moment, compute_elapsed_s, compute_wall_clock_s
 from study.session.facts.void_reasons import TOO_LITTLE_MOTION, is_computer_busy
 from study.session.watching.followed_session import FollowedSession
-from study.session.watching.live import Live
+from study.session.watching.live_state import Live
 from study.session.watching.watch_view import RUNNING_STATUSES, Alarm, DriftRecord, Exposure, SittingStatus
 
 LIVE_TIMEOUT_S = 3.0

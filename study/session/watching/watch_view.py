@@ -9,7 +9,7 @@ amplitudes, stated as force (N).
 from dataclasses import dataclass
 from typing import Literal
 
-from study.session.watching.live import Live
+from study.session.watching.live_state import Live
 
 SittingStatus = Literal["running", "paused", "resting", "not running", "finished", "stopped", "refused", "excluded"]
 """Status of a session. `stopped`: the sitting was ended; `not running`: the program ended without logging the end. Both

@@ -1,6 +1,6 @@
-"""Errors of files that cannot be read, used or written, each with advice to the user.
+"""Errors for files that cannot be read, used or written, each with cause and remedy.
 
-They are shown to the user without further text, so that each states what happened and what to do.
+They are shown to the user without further text. Raised by all readers and writers of files in `study`.
 """
 
 import csv
@@ -15,34 +15,33 @@ from pathlib import Path
 from study.errors import StudyError
 from study.regular_file import RefusedFileError
 
-CHECKED = "Correct it, or make it again; `hapteq validate` checks it."
-"""Advice for a file whose content is wrong."""
+VALIDATE_ADVICE = "Correct it, or make it again; `hapteq validate` checks it."
+"""Remedy for a file whose content is invalid."""
 
-
-DAMAGED = (
+DAMAGE_ERRORS = (
     OSError, ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RuntimeError, EOFError, MemoryError,
     AssertionError, SystemError, SyntaxError, csv.Error, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
     struct.error,
 )  # fmt: skip
-"""Exceptions that reading libraries raise for damaged or misnamed files."""
+"""Exceptions that libraries raise for damaged files and for files of another format."""
 
-_LONGEST_PROBLEM = 600
-"""Number of characters of a problem that are shown."""
-_MOST_PROBLEMS = 40
-"""Number of problems that are listed; the others are counted."""
+_MAX_PROBLEM_CHARACTERS = 600
+"""Largest number of characters of a problem that are shown. Chosen."""
+_MAX_LISTED_PROBLEMS = 40
+"""Largest number of problems that are listed; of further ones the number is stated. Chosen."""
 
 
 class UnusableFileError(StudyError):
     """A file was read, and its content is invalid.
 
-    `problems`: a sentence fragment for each problem, without a full stop; `sentences`: the same as whole sentences.
-    kind: what the file should be, for the title; do_now: advice.
+    kind: expected kind of the file, for the title; `problems`: a clause for each problem, without a full stop;
+    `sentences`: the same as sentences; do_now: remedy.
     """
 
-    def __init__(self, path: Path, kind: str, problems: tuple[str, ...], do_now: str = CHECKED) -> None:
+    def __init__(self, path: Path, kind: str, problems: tuple[str, ...], do_now: str = VALIDATE_ADVICE) -> None:
         self.kind = kind
         self.problems = _shorten_problems(problems)
-        self.sentences = tuple(_sentence(problem) for problem in self.problems)
+        self.sentences = tuple(_format_sentence(problem) for problem in self.problems)
         super().__init__(
             title=f"{path.name} is not a usable {kind}",
             happened=" ".join(self.sentences),
@@ -62,7 +61,7 @@ class CannotReadError(StudyError):
 
 
 class CannotWriteError(StudyError):
-    """A file could not be written. An existing file is untouched."""
+    """A file could not be written. To be raised only where an existing file of that name is unchanged."""
 
     def __init__(self, path: Path, problem: OSError) -> None:
         reason, remedy = _explain_write_failure(path, problem)
@@ -75,7 +74,7 @@ class CannotWriteError(StudyError):
 
 
 class AlreadyThereError(StudyError):
-    """A file exists under the name to be written. Existing files are overwritten on request only."""
+    """A file exists under the name to be written, and overwriting was not requested."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(
@@ -86,28 +85,44 @@ class AlreadyThereError(StudyError):
         )
 
 
-_PROSE = {"it", "its", "this", "the", "there", "line", "segment", "segments", "effect", "unknown", "column", "and"}
-"""First words of problems that get a capital letter; any other first word is a key or a name, which keeps its case."""
+_CAPITALIZED_WORDS = {
+    "it",
+    "its",
+    "this",
+    "the",
+    "there",
+    "line",
+    "segment",
+    "segments",
+    "effect",
+    "unknown",
+    "column",
+    "and",
+}
+"""First words of problems that are capitalized; any other first word is a key or a name, which keeps its case."""
 
 
 def _shorten_problems(problems: tuple[str, ...]) -> tuple[str, ...]:
-    """The problems, limited in number and length: a damaged file may have a million problems or a name of a million
-    letters."""
-    unlisted = len(problems) - _MOST_PROBLEMS
+    """Limit the problems in number and length: a damaged file may have a million problems or a name of a million
+    letters. Of omitted problems the number is added."""
+    unlisted = len(problems) - _MAX_LISTED_PROBLEMS
     remainder = (f"and {unlisted} more problems",) if unlisted > 0 else ()
-    shortened = (text if len(text) <= _LONGEST_PROBLEM else f"{text[:_LONGEST_PROBLEM]}…" for text in problems)
-    return (*islice(shortened, _MOST_PROBLEMS), *remainder)
+    shortened = (
+        text if len(text) <= _MAX_PROBLEM_CHARACTERS else f"{text[:_MAX_PROBLEM_CHARACTERS]}…" for text in problems
+    )
+    return (*islice(shortened, _MAX_LISTED_PROBLEMS), *remainder)
 
 
-def _sentence(problem: str) -> str:
-    """The problem as a sentence, with capital letter and full stop; a key or name at its beginning keeps its case."""
-    capital = problem[:1].upper() if problem.partition(" ")[0] in _PROSE else problem[:1]
+def _format_sentence(problem: str) -> str:
+    """Format a problem as a sentence with capital letter and full stop; a key or name at its beginning keeps its
+    case."""
+    capital = problem[:1].upper() if problem.partition(" ")[0] in _CAPITALIZED_WORDS else problem[:1]
     return capital + problem[1:].rstrip(".") + "."
 
 
-def _explain_read_failure(path: Path, problem: OSError | UnicodeDecodeError) -> str:
-    """Reason in words, without a full stop."""
-    match problem:
+def _explain_read_failure(path: Path, error: OSError | UnicodeDecodeError) -> str:
+    """Explain in words why a file cannot be read, without a full stop."""
+    match error:
         case FileNotFoundError():
             return f"There is no file {path}"
         case IsADirectoryError():
@@ -115,15 +130,15 @@ def _explain_read_failure(path: Path, problem: OSError | UnicodeDecodeError) -> 
         case PermissionError():
             return f"You have no right to read {path}"
         case UnicodeDecodeError():
-            return f"It is neither HDF5 nor text in UTF-8 (byte {problem.start})"
+            return f"It is neither HDF5 nor text in UTF-8 (byte {error.start})"
         case RefusedFileError():
-            return problem.words[:1].upper() + problem.words[1:]
-    return f"The system says: {problem.strerror or problem}"
+            return error.reason[:1].upper() + error.reason[1:]
+    return f"The system says: {error.strerror or error}"
 
 
-def _explain_write_failure(path: Path, problem: OSError) -> tuple[str, str]:
-    """Reason in words, without a full stop, and advice."""
-    match problem.errno:
+def _explain_write_failure(path: Path, error: OSError) -> tuple[str, str]:
+    """Explain in words why a file cannot be written, without a full stop, and give a remedy."""
+    match error.errno:
         case errno.ENOSPC | errno.EDQUOT:
             return "The disk is full", "Make room and do it again."
         case errno.EFBIG:
@@ -136,4 +151,4 @@ def _explain_write_failure(path: Path, problem: OSError) -> tuple[str, str]:
             return f"{path} is there, and is no folder", "Choose another name for the folder."
         case errno.EISDIR:
             return f"{path} is a folder", "Choose a name for a file."
-    return f"The system says: {problem.strerror or problem}", "Choose another folder, or correct this and try again."
+    return f"The system says: {error.strerror or error}", "Choose another folder, or correct this and try again."

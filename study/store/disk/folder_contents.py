@@ -1,6 +1,8 @@
-"""Contents of a folder as values, to be sent to or from another process that may not share a disk.
+"""Read the files of a folder into memory, and write them to another folder: transfer between processes without a
+common disk.
 
-Used where work on many folders is distributed over processes (evaluations, rehearsals of a study).
+Called where work on many folders is distributed over processes: `study.evaluation.bank.ask_engine`,
+`study.evaluation.real.real_recordings`, `study.workflows.session.rehearse_study`.
 """
 
 from collections.abc import Mapping
@@ -9,12 +11,14 @@ from pathlib import Path
 from study.store.disk.file_errors import CannotReadError, CannotWriteError
 from study.store.disk.privacy import make_folder, write_private
 
-Files = dict[str, bytes]
+FileContents = dict[str, bytes]
 """Content of each file, by its path relative to the folder, with forward slashes."""
 
 
-def read_files(folder: Path) -> Files:
-    """All regular files below the folder; a link to a regular file is read as that file. Raises CannotReadError."""
+def read_files(folder: Path) -> FileContents:
+    """Read all files below the folder; empty for a folder that is empty or missing. Links to files are followed, links
+    to folders are not; subfolders without read permission are skipped. Raises CannotReadError where a file cannot be
+    read."""
     try:
         paths = sorted(path for path in folder.rglob("*") if path.is_file())
         return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
@@ -22,8 +26,8 @@ def read_files(folder: Path) -> Files:
         raise CannotReadError(folder, problem) from problem
 
 
-def read_file(path: Path) -> Files:
-    """The content of a single file, under its name without folders. Raises CannotReadError."""
+def read_file(path: Path) -> FileContents:
+    """Read a single file; its key is its name without folders. Raises CannotReadError where it cannot be read."""
     try:
         return {path.name: path.read_bytes()}
     except OSError as problem:
@@ -31,8 +35,9 @@ def read_file(path: Path) -> Files:
 
 
 def write_files(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write the files below the folder, and replace existing ones; missing folders are made. The paths are not checked:
-    they must come from a trusted sender. Raises CannotWriteError."""
+    """Write the files below the folder, new ones with mode 600, replacing the content of existing ones; missing folders
+    are created. The keys are not checked (`..` leaves the folder): they must come from a trusted sender. Raises
+    CannotWriteError where a file cannot be written; those before it remain."""
     try:
         for name, content in files.items():
             make_folder((folder / name).parent)

@@ -1,7 +1,8 @@
-"""Checks of the structure of an HDF5 file before its contents are read.
+"""Check the structure of an HDF5 file before its datasets are read, as protection against hostile or damaged files.
 
-A file from another person may refer to other files on this computer, or declare contents that exceed the memory when
-they are unpacked; both are refused (`declared_size` states the limit).
+A file from another person may refer to other files on this computer (external links, external storage, virtual
+datasets), or declare datasets that exceed the memory when they are decompressed; both are refused. `declared_size`
+states the size limit. Called by `hdf5_file` for every HDF5 file, and by `study.importing.arrays.npz_hdf5_arrays`.
 """
 
 import math
@@ -11,36 +12,38 @@ from typing import Any
 
 import h5py
 
-from study.store.disk.declared_size import PLAIN_BYTES, DeclaredSizeError, SizeLimit
+from study.store.disk.declared_size import MIN_LIMIT_BYTES, DeclaredSizeError, SizeLimit
 
-MOST_OBJECTS = 100_000
-"""Largest number of groups and datasets of a file; bounds time and memory of the checks."""
-_COMPRESSIONS = (h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SZIP, h5py.h5z.FILTER_LZF)
-"""Filters that decompress: their output may be larger than the data on the disk."""
-_OBJECT_BYTES = 1024
-"""Upper estimate of the size of a Python object for a variable-length text, a reference or a table row."""
-_DEFLATE_FACTOR = 1032
-"""Largest compression ratio of deflate (zlib): 2 bits for 258 bytes."""
+MAX_OBJECTS = 100_000
+"""Largest accepted number of groups and datasets in a file. Chosen: bounds time and memory of the checks."""
+_COMPRESSION_FILTERS = (h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SZIP, h5py.h5z.FILTER_LZF)
+"""HDF5 filters that compress, so that data in memory exceed those on the disk. At most one per dataset is accepted."""
+_PYTHON_OBJECT_BYTES = 1024
+"""Size (bytes) that is assumed for an element read as a Python object: a variable-length text, a reference or a row of
+a table. Chosen as an upper estimate for short texts."""
+_MAX_DEFLATE_RATIO = 1032
+"""Largest compression ratio of deflate (RFC 1951): a match of 258 bytes may be coded in 2 bits."""
 
 
 def check_contents(file: Any) -> None:
-    """Check that an open file refers to no other file and declares no oversized contents. Raises ValueError with a
-    sentence fragment for external data, DeclaredSizeError (a ValueError) for oversized datasets."""
+    """Check all datasets of an open file (`h5py.File`). Raises ValueError where a dataset or link lies in another file,
+    a dataset is compressed more than once, or the file has more than `MAX_OBJECTS` objects; DeclaredSizeError, a
+    ValueError, where the declared sizes exceed the limit. The messages are sentence fragments."""
     limit = SizeLimit(file.id.get_filesize())
-    for name, dataset in datasets_in(file):
+    for name, dataset in iterate_datasets(file):
         _check_dataset(name, dataset, limit)
 
 
-def datasets_in(file: Any) -> Iterator[tuple[str, Any]]:
-    """Every dataset once, with its path. Raises ValueError for links to other files, and for more than `MOST_OBJECTS`
-    objects; symbolic links within the file are skipped.
+def iterate_datasets(file: Any) -> Iterator[tuple[str, Any]]:
+    """Yield (path, dataset) for every dataset below an `h5py.File` or group, each once. Soft links are skipped. Raises
+    ValueError at a link to another file, and after `MAX_OBJECTS` objects.
 
-    h5py's own visitors do not report external links, and fail on damaged ones.
+    Replaces `h5py.Group.visititems`, which does not report external links and fails on damaged ones.
     """
     visited: set[int] = set()
-    waiting = [("", file)]
-    while waiting:
-        path, group = waiting.pop()
+    pending_groups = [("", file)]
+    while pending_groups:
+        path, group = pending_groups.pop()
         for key in sorted(group, reverse=True):
             name = f"{path}{key}"
             link = group.get(key, getlink=True)
@@ -50,52 +53,55 @@ def datasets_in(file: Any) -> Iterator[tuple[str, Any]]:
             if entry is None or (address := h5py.h5o.get_info(entry.id).addr) in visited:
                 continue
             visited.add(address)
-            if len(visited) > MOST_OBJECTS:
-                raise ValueError(f"it holds more than {MOST_OBJECTS} objects")
+            if len(visited) > MAX_OBJECTS:
+                raise ValueError(f"it holds more than {MAX_OBJECTS} objects")
             if isinstance(entry, h5py.Dataset):
                 yield name, entry
             elif isinstance(entry, h5py.Group):
-                waiting.append((f"{name}/", entry))
+                pending_groups.append((f"{name}/", entry))
 
 
 def _check_dataset(name: str, dataset: Any, limit: SizeLimit) -> None:
-    """Raise ValueError where the dataset lies in other files or is compressed more than once, DeclaredSizeError where
-    it is too large."""
+    """Raise ValueError where the samples lie in other files or are compressed more than once, DeclaredSizeError where
+    the dataset exceeds the rest of the limit, or a chunk exceeds it alone. limit: is reduced by the dataset's size."""
     properties = dataset.id.get_create_plist()
     if properties.get_layout() == h5py.h5d.VIRTUAL or properties.get_external_count():
         raise ValueError(f"the samples of {name} lie in other files; copy them into this one")
     if dataset.shape is None:  # an empty dataset (HDF5 null dataspace)
         return
-    filters = [properties.get_filter(number)[0] for number in range(properties.get_nfilters())]
-    if sum(code in _COMPRESSIONS for code in filters) > 1:
+    filters = [properties.get_filter(index)[0] for index in range(properties.get_nfilters())]
+    if sum(filter_code in _COMPRESSION_FILTERS for filter_code in filters) > 1:
         raise ValueError(f"{name} is compressed more than once; save it compressed once, or not at all")
-    in_python = dataset.dtype.hasobject or dataset.dtype.names is not None
-    entry_bytes = _OBJECT_BYTES if in_python else max(8, dataset.dtype.itemsize)  # read as float64
-    limit.add_size(name, math.prod(dataset.shape) * entry_bytes)
+    holds_python_objects = dataset.dtype.hasobject or dataset.dtype.names is not None
+    # Numbers are read as float64 (8 bytes).
+    element_bytes = _PYTHON_OBJECT_BYTES if holds_python_objects else max(8, dataset.dtype.itemsize)
+    limit.add_size(name, math.prod(dataset.shape) * element_bytes)
     if dataset.chunks is not None:
-        chunk_bytes = math.prod(dataset.chunks) * entry_bytes
-        if chunk_bytes > limit.most_bytes:
+        chunk_bytes = math.prod(dataset.chunks) * element_bytes
+        if chunk_bytes > limit.limit_bytes:
             raise DeclaredSizeError(f"{name} is stored in pieces of {chunk_bytes} bytes; save it in smaller ones")
-        if h5py.h5z.FILTER_DEFLATE in filters and dataset.id.get_storage_size() * _DEFLATE_FACTOR > PLAIN_BYTES:
-            _check_pieces(name, dataset, chunk_bytes)
+        if h5py.h5z.FILTER_DEFLATE in filters and dataset.id.get_storage_size() * _MAX_DEFLATE_RATIO > MIN_LIMIT_BYTES:
+            _check_chunks(name, dataset, chunk_bytes)
 
 
-def _check_pieces(name: str, dataset: Any, chunk_bytes: int) -> None:
-    """Raise DeclaredSizeError where a compressed chunk unpacks to at least twice its declared size. HDF5 decompresses a
-    chunk completely, independent of its declared size; chunks that may become large are therefore decompressed here,
-    up to that limit."""
+def _check_chunks(name: str, dataset: Any, chunk_bytes: int) -> None:
+    """Raise DeclaredSizeError where a chunk of a deflated dataset decompresses to at least twice `chunk_bytes`, its
+    declared size. The HDF5 library decompresses a chunk completely, independent of its declared size; chunks that may
+    exceed `MIN_LIMIT_BYTES` are therefore decompressed here first, up to twice the declared size."""
 
-    large: list[tuple[int, ...]] = []
+    large_chunk_offsets: list[tuple[int, ...]] = []
 
-    def look(stored: Any) -> None:
-        if stored.size * _DEFLATE_FACTOR > PLAIN_BYTES:
-            large.append(stored.chunk_offset)
+    def collect_large_chunk(chunk_info: Any) -> None:
+        if chunk_info.size * _MAX_DEFLATE_RATIO > MIN_LIMIT_BYTES:
+            large_chunk_offsets.append(chunk_info.chunk_offset)
 
-    dataset.id.chunk_iter(look)
-    for offset in large:
+    dataset.id.chunk_iter(collect_large_chunk)
+    for chunk_offset in large_chunk_offsets:
         try:
-            unpacked = zlib.decompressobj().decompress(dataset.id.read_direct_chunk(offset)[1], 2 * chunk_bytes)
+            decompressed = zlib.decompressobj().decompress(
+                dataset.id.read_direct_chunk(chunk_offset)[1], 2 * chunk_bytes
+            )
         except zlib.error:
-            continue  # damaged: reading the data reports it
-        if len(unpacked) >= 2 * chunk_bytes:
+            continue  # damaged: the error is reported when the dataset is read
+        if len(decompressed) >= 2 * chunk_bytes:
             raise DeclaredSizeError(f"a piece of {name} unpacks to more than the {chunk_bytes} bytes of its size")

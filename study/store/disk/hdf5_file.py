@@ -1,8 +1,10 @@
-"""Reads and writes HDF5 files: format, version and contents are checked when opened; files are written atomically.
+"""Read and write HDF5 files: checksum, contents, format and version are checked in this order when a file is opened;
+files are written atomically.
 
-A sealed file begins with a user block (bytes that the HDF5 library ignores) of text: the SHA-256 checksum and the size
-of all bytes after it. The checksum is verified before the HDF5 library opens the file, because the library may hang on
-a damaged file.
+A sealed file begins with a user block (bytes that the HDF5 library ignores), which states the SHA-256 checksum and the
+size of all bytes after it. The checksum is verified before the HDF5 library opens the file, because the library may
+hang on a damaged file. Called by the readers and writers of HDF5 formats in `study.store.formats` (recordings, models,
+calibrations), by `study.importing`, and by commands that recognise a file by its content.
 """
 
 import hashlib
@@ -18,34 +20,36 @@ import numpy as np
 from equalizer.signals.signal import FloatArray
 from study.regular_file import open_regular
 from study.store.disk.atomic_write import write_atomically
-from study.store.disk.file_errors import DAMAGED, CannotReadError, UnusableFileError
+from study.store.disk.file_errors import DAMAGE_ERRORS, CannotReadError, UnusableFileError
 from study.store.disk.hdf5_attributes import AttributeProblemError, read_numbers_attribute, read_text_attribute
 from study.store.disk.hdf5_contents import check_contents
 
 Value = TypeVar("Value")
+"""Type of a value that is read from a file."""
 
-SEAL = b"hapteq sha256 "
-"""First bytes of a sealed file; the digest in hexadecimal and the size in bytes follow as text."""
-SEAL_BYTES = 512
-"""Length of the user block: the smallest that HDF5 allows."""
-SIGNATURE = b"\x89HDF\r\n\x1a\n"
+SEAL_PREFIX = b"hapteq sha256 "
+"""First bytes of a sealed file. The hexadecimal SHA-256 digest and the size in bytes follow, as ASCII text."""
+USER_BLOCK_BYTES = 512
+"""Length of the user block of a sealed file (bytes): the smallest that HDF5 allows."""
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 """Signature of HDF5: the first bytes of a file without a user block."""
-BROKEN_SEAL = (
+BROKEN_SEAL_PROBLEM = (
     "its content does not fit the check sum at its beginning: it was damaged, cut off, or changed by another program "
     "since it was written"
 )
-"""Message for a file whose content does not agree with its seal."""
+"""Problem of a file whose content differs from its seal: a sentence fragment for `UnusableFileError`."""
 
 
 class Problems:
-    """Collects all problems of a file, so that they can be reported and corrected together."""
+    """Collector of the problems of a file (sentence fragments), so that a reader can report all of them in one
+    error."""
 
     def __init__(self) -> None:
         self.messages: list[str] = []
         """Messages, in the order of reading."""
 
     def attempt(self, read: Callable[[], Value], default: Value) -> Value:
-        """The result of `read`; a ValueError is recorded as a problem and gives `default`."""
+        """Return the result of `read`; where it raises ValueError, record the message and return `default`."""
         try:
             return read()
         except ValueError as error:
@@ -54,12 +58,14 @@ class Problems:
 
 
 def is_hdf5(path: Path) -> bool:
-    """Whether the path is an HDF5 file, by its content; False where no file exists."""
+    """Whether the path is a regular file with an HDF5 signature; False where it is missing."""
     return path.is_file() and bool(h5py.is_hdf5(path))
 
 
 def read_format(path: Path) -> str:
-    """The format attribute of an HDF5 file; empty if there is none. Raises CannotReadError, UnusableFileError."""
+    """Read the attribute `format` of an HDF5 file; empty if it is missing or no text. Raises CannotReadError where the
+    file cannot be read, UnusableFileError where it is no valid HDF5, its seal is broken, or `check_contents` refuses
+    it."""
     with open_any_hdf5(path, "HDF5 file") as file:
         try:
             return read_text_attribute(file, "format", "")
@@ -69,9 +75,10 @@ def read_format(path: Path) -> str:
 
 @contextmanager
 def open_hdf5(path: Path, kind: str, format_name: str, version: int, *, sealed: bool = False) -> Iterator[Any]:
-    """The open file after its format and version are checked. kind: name of such files in messages. sealed: files of
-    this format are written with a seal, though a file of another program may have no user block. Raises
-    CannotReadError, UnusableFileError."""
+    """Open a file for reading, and check its seal, contents, format and version. kind: name of such files in messages.
+    sealed: hapteq writes this format with a seal; a file without a user block, of another program, is accepted all the
+    same. Raises CannotReadError where the file cannot be read, UnusableFileError where a check fails, and instead of a
+    `DAMAGE_ERRORS` exception within the context."""
     with open_any_hdf5(path, kind, sealed=sealed) as file:
         try:
             stored_format = read_text_attribute(file, "format")
@@ -86,57 +93,65 @@ def open_hdf5(path: Path, kind: str, format_name: str, version: int, *, sealed: 
         yield file
 
 
-def read_float_dataset(file: Any, name: str, shape: str) -> FloatArray:
-    """Read a dataset of floating-point numbers. shape: in words, as in "(samples, channels)"; the number of dimensions
-    is checked. Raises ValueError with a sentence fragment."""
+def read_float_dataset(file: Any, name: str, shape_text: str) -> FloatArray:
+    """Read a dataset of float32 or float64 numbers as float64. shape_text: names of the dimensions for messages, as in
+    "(samples, channels)"; their number is checked. Raises ValueError, with a sentence fragment, where the dataset is
+    missing or has another type or number of dimensions."""
     dataset = file.get(name)
     if not isinstance(dataset, h5py.Dataset):
         raise ValueError(f"the dataset '{name}' is missing")
     if dataset.dtype.kind != "f":
         raise ValueError(f"{name} is of type {dataset.dtype}; it must be float32 or float64")
-    if dataset.ndim != shape.count(",") + 1:
-        raise ValueError(f"{name} has shape {dataset.shape}; it must be {shape}")
+    if dataset.ndim != shape_text.count(",") + 1:
+        raise ValueError(f"{name} has shape {dataset.shape}; it must be {shape_text}")
     return np.asarray(dataset[()], dtype=np.float64)
 
 
 def write_hdf5(path: Path, fill: Callable[[Any], None], *, overwrite: bool, sealed: bool = False) -> None:
-    """Write a file atomically. `fill` writes into a file in memory first, because the HDF5 library would leave a
-    damaged file on a full disk. Raises AlreadyThereError, CannotWriteError."""
+    """Write an HDF5 file atomically. fill: writes the contents into the `h5py.File` that it is called with. That file
+    is in memory, because on a full disk the HDF5 library would leave a damaged file. sealed: add the seal. Raises
+    AlreadyThereError where the file exists unless `overwrite`, CannotWriteError where it cannot be written."""
     buffer = io.BytesIO()
-    with h5py.File(buffer, "w", userblock_size=SEAL_BYTES if sealed else 0) as file:
+    with h5py.File(buffer, "w", userblock_size=USER_BLOCK_BYTES if sealed else 0) as file:
         fill(file)
     content = buffer.getvalue()
     write_atomically(path, add_seal(content) if sealed else content, overwrite=overwrite)
 
 
 def add_seal(content: bytes) -> bytes:
-    """The bytes of an HDF5 file with a user block of `SEAL_BYTES`, with the seal (SHA-256 of all bytes after the block)
-    written into the block."""
-    body = content[SEAL_BYTES:]
+    """Write the seal into the user block of an HDF5 file. content: all bytes of the file, whose user block has
+    `USER_BLOCK_BYTES`; the content of the block is replaced."""
+    body = content[USER_BLOCK_BYTES:]
     return _make_seal(hashlib.sha256(body).hexdigest(), len(body)) + body
 
 
 def _make_seal(digest: str, size: int) -> bytes:
-    """The user block of a sealed file: digest and size as text, filled with zeros to `SEAL_BYTES`."""
-    return (SEAL + f"{digest} {size} bytes follow\n".encode("ascii")).ljust(SEAL_BYTES, b"\0")
+    """Make the user block of a sealed file: digest and size (bytes) as text, filled with zeros to
+    `USER_BLOCK_BYTES`."""
+    return (SEAL_PREFIX + f"{digest} {size} bytes follow\n".encode("ascii")).ljust(USER_BLOCK_BYTES, b"\0")
 
 
 def _check_seal(path: Path, kind: str, sealed: bool) -> None:
-    """Raises UnusableFileError where the content differs from the seal, or where a format that is written with a seal
-    has a user block without one; OSError where the file cannot be read."""
+    """Raise UnusableFileError where the content differs from the seal, or, if `sealed`, where a user block has no valid
+    seal; OSError where the file cannot be read. Any other file without a seal is accepted."""
     with open_regular(path) as file:
-        start = file.read(SEAL_BYTES)
-        if start.startswith(SEAL):
-            is_damaged = _make_seal(hashlib.file_digest(file, "sha256").hexdigest(), file.tell() - SEAL_BYTES) != start
-        else:  # HDF5 that begins later in the file has a user block: its seal is damaged
-            is_damaged = sealed and not start.startswith(SIGNATURE) and is_hdf5(path)
+        user_block = file.read(USER_BLOCK_BYTES)
+        if user_block.startswith(SEAL_PREFIX):
+            is_damaged = (
+                _make_seal(hashlib.file_digest(file, "sha256").hexdigest(), file.tell() - USER_BLOCK_BYTES)
+                != user_block
+            )
+        else:  # HDF5 whose signature comes later has a user block, whose seal is therefore damaged
+            is_damaged = sealed and not user_block.startswith(HDF5_SIGNATURE) and is_hdf5(path)
     if is_damaged:
-        raise UnusableFileError(path, kind, (BROKEN_SEAL,))
+        raise UnusableFileError(path, kind, (BROKEN_SEAL_PROBLEM,))
 
 
 @contextmanager
 def open_any_hdf5(path: Path, kind: str, *, sealed: bool = False) -> Iterator[Any]:
-    """The open file of any format after its contents are checked. Raises CannotReadError, UnusableFileError."""
+    """Open a file of any format for reading, and check its seal and contents. Warnings of NumPy are off in the context.
+    Raises CannotReadError where the file cannot be read, UnusableFileError where a check fails, and instead of a
+    `DAMAGE_ERRORS` exception within the context."""
     try:
         _check_seal(path, kind, sealed)
     except OSError as problem:
@@ -148,8 +163,8 @@ def open_any_hdf5(path: Path, kind: str, *, sealed: bool = False) -> Iterator[An
             except ValueError as problem:
                 raise UnusableFileError(path, kind, (str(problem),)) from problem
             yield file
-    except DAMAGED as problem:
-        # h5py raises all of these for damaged files; problems found above are already UnusableFileErrors.
+    except DAMAGE_ERRORS as problem:
+        # h5py raises all of these for damaged files; an UnusableFileError from above is none of them and passes.
         raise UnusableFileError(
             path, kind, (f"it is not HDF5 that can be read, or it is cut off ({problem})",)
         ) from problem

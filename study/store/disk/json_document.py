@@ -1,6 +1,7 @@
-"""JSON documents of hapteq: objects with `format`, `version` and, for results, `provenance`; written atomically.
+"""Read and write the JSON documents of hapteq: objects with `format`, `version` and, for results, `provenance`.
 
-All JSON formats of `study.store.formats` use these functions. Numbers are finite (`strict_json`).
+Documents are written atomically; numbers are finite (`strict_json`). Called by the JSON formats of
+`study.store.formats` and `study.store.sessions`, and by workflows and evaluations that write results.
 """
 
 import json
@@ -8,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from study.regular_file import DOCUMENT_BYTES
+from study.regular_file import MAX_DOCUMENT_BYTES
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.provenance import Provenance
 from study.store.disk.strict_json import load_json
@@ -24,12 +25,14 @@ def write_json(
     *,
     overwrite: bool = False,
 ) -> None:
-    """Write a document. payload: plain values for JSON, in addition to format, version and provenance.
+    """Write a document. payload: JSON values, in addition to format, version and provenance; a key of the same name
+    replaces format or version.
 
-    Raises ValueError for NaN and infinity, which JSON does not have (write null), AlreadyThereError, CannotWriteError.
+    Raises ValueError for NaN and infinity, which JSON does not have (write null), AlreadyThereError where the file
+    exists unless `overwrite`, CannotWriteError where it cannot be written.
     """
-    origin = {} if provenance is None else {"provenance": provenance.as_dict()}
-    document = {"format": format_name, "version": version, **payload, **origin}
+    provenance_entry = {} if provenance is None else {"provenance": provenance.as_dict()}
+    document = {"format": format_name, "version": version, **payload, **provenance_entry}
     try:
         text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
     except ValueError as error:
@@ -38,33 +41,36 @@ def write_json(
 
 
 def read_json(path: Path, format_name: str, version: int) -> dict[str, Any]:
-    """Read a document: its content without format and version, provenance included.
+    """Read a document: its content without format and version, but with its provenance.
 
-    Raises CannotReadError, and UnusableFileError for another format or version.
+    Raises CannotReadError where the file cannot be read, UnusableFileError where it is no JSON object or has another
+    format or version.
     """
-    document = parse_json(path, read_text(path, DOCUMENT_BYTES), format_name)
+    document = parse_json(path, read_text(path, MAX_DOCUMENT_BYTES), format_name)
     stored_format, stored_version = document.pop("format", None), document.pop("version", None)
     if stored_format != format_name:
         raise UnusableFileError(
-            path, format_name, (f"its format is {_value_text(stored_format)}, not '{format_name}'",)
+            path, format_name, (f"its format is {_describe_value(stored_format)}, not '{format_name}'",)
         )
     if stored_version != version or isinstance(stored_version, bool):
-        wrong = f"its version is {_value_text(stored_version)}; this program reads version {version}"
-        raise UnusableFileError(path, format_name, (wrong,))
+        reason = f"its version is {_describe_value(stored_version)}; this program reads version {version}"
+        raise UnusableFileError(path, format_name, (reason,))
     return document
 
 
 def parse_json(path: Path, text: str, kind: str) -> dict[str, Any]:
-    """Parse text as a JSON object. kind: what messages call the document. Raises UnusableFileError."""
+    """Parse text as a JSON object. path: of the file, for messages; kind: name of such files in messages. Raises
+    UnusableFileError where it is no valid JSON (`load_json`) or no object."""
     try:
         document = load_json(text)
     except ValueError as error:
         raise UnusableFileError(path, kind, (f"this is not JSON: {error}",)) from error
     if not isinstance(document, dict):
-        wrong = f"it holds a {type(document).__name__}; a hapteq document is an object with format and version"
-        raise UnusableFileError(path, kind, (wrong,))
+        reason = f"it holds a {type(document).__name__}; a hapteq document is an object with format and version"
+        raise UnusableFileError(path, kind, (reason,))
     return document
 
 
-def _value_text(value: Any) -> str:
+def _describe_value(value: Any) -> str:
+    """A value for a message; "missing" for None."""
     return "missing" if value is None else repr(value)

@@ -1,6 +1,7 @@
-"""Description of an entry of a file format, from which the tables of docs/formats.md are made.
+"""Description of an entry of a file format, for the tables of docs/formats.md.
 
-The module of each format lists its entries in a constant `LAYOUT`.
+The module of each format in `study.store.formats` lists its entries in a constant `LAYOUT`, from which
+`study.workflows.files.format_docs` makes the tables.
 """
 
 from dataclasses import dataclass
@@ -8,11 +9,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """An entry of a file format: name, type and meaning."""
+    """An entry of a file format: a dataset, an attribute, or a field of a table. All texts are Markdown."""
 
     name: str
-    holds: str
-    """Type and shape."""
+    """Name in the file."""
+    type_and_shape: str
+    """Type of the values, and the shape of an array, as in "(n, m) float32 or float64"."""
     meaning: str
     """Meaning and unit."""
     required: bool = True

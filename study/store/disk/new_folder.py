@@ -1,7 +1,8 @@
-"""Result folders that appear complete or not at all.
+"""Create a result folder atomically: it appears complete or not at all, and is never mixed with existing files.
 
-The results are written into a hidden temporary folder beside the final place, which is synced and renamed at the end.
-Results are never mixed with existing files.
+The results are written into a hidden temporary folder in the same parent folder, which is synced to disk and renamed at
+the end. Called by commands that write a folder of results (diagnosis, export, played contacts, rehearsed sessions,
+answers of evaluations).
 """
 
 import errno
@@ -19,8 +20,8 @@ from study.store.disk.privacy import make_folder
 
 
 def require_new_folder(folder: Path) -> None:
-    """Raise StudyError unless `folder` is new or an empty folder, and its parent exists and is writable (otherwise
-    CannotWriteError, a StudyError)."""
+    """Check that results can be written to `folder`. Raises StudyError where it exists and is not an empty folder, or
+    where its parent does not exist; CannotWriteError, a StudyError, where the parent is not writable."""
     try:
         is_empty, exists, has_parent = (
             folder.is_dir() and not any(folder.iterdir()),
@@ -51,23 +52,24 @@ def require_new_folder(folder: Path) -> None:
 
 
 @contextmanager
-def new_folder(folder: Path) -> Iterator[Path]:
-    """A temporary folder that is renamed to `folder` at the end; on an exception it is removed. Raises StudyError as
-    `require_new_folder`, and CannotWriteError."""
+def create_new_folder(folder: Path) -> Iterator[Path]:
+    """Yield a temporary folder for the results, which is renamed to `folder` at the end of the context; after an
+    exception it is removed. Raises StudyError as `require_new_folder` does, at the beginning and before renaming, and
+    CannotWriteError where a folder cannot be created or renamed."""
     require_new_folder(folder)
-    part = folder.absolute().with_name(f".{folder.absolute().name}.{secrets.token_hex(4)}.part")
+    temporary_folder = folder.absolute().with_name(f".{folder.absolute().name}.{secrets.token_hex(4)}.part")
     try:
-        make_folder(part)
+        make_folder(temporary_folder)
     except OSError as problem:
         raise CannotWriteError(folder, problem) from problem
     try:
-        yield part
+        yield temporary_folder
         require_new_folder(folder)
         try:
-            sync_folder(part)
-            part.rename(folder.absolute())
+            sync_folder(temporary_folder)
+            temporary_folder.rename(folder.absolute())
             sync_folder(folder.absolute().parent)
         except OSError as problem:
             raise CannotWriteError(folder, problem) from problem
     finally:
-        shutil.rmtree(part, ignore_errors=True)
+        shutil.rmtree(temporary_folder, ignore_errors=True)

@@ -1,6 +1,8 @@
-"""Strict parsing of JSON: NaN, infinity, duplicate keys, lone surrogates, deep nesting and huge numbers are refused.
+"""Parse JSON strictly: NaN, infinity, duplicate keys, lone surrogates, deep nesting and huge numbers are refused.
 
-The JSON module of Python accepts most of them; they would fail later, in other code or in other programs.
+The JSON module of Python accepts most of them; they would fail later, in other code or in other programs. Called by the
+readers of JSON files (`json_document`, `live_file`, `request_inbox`), of JSON texts in files of other formats, and of
+imported JSON data.
 """
 
 import json
@@ -8,19 +10,20 @@ import math
 from typing import Any
 
 MAX_DEPTH = 64
-"""Largest depth of nesting of a document, well below the recursion limit of Python."""
-_LONGEST_NUMBER = 40
-"""Largest number of digits of a whole number; a seed of 128 bits has up to 39."""
+"""Largest depth of a value; the document itself has depth 0. Chosen, far below the recursion limit of Python, 1000."""
+_MAX_DIGITS = 40
+"""Largest number of decimal digits of an integer, without sign; a seed of 128 bits has up to 39."""
 
 
 def load_json(text: str | bytes, *, with_nan: bool = False) -> Any:
-    """Parse JSON. with_nan: NaN and infinity are accepted. Raises only ValueError, with a sentence fragment."""
+    """Parse a JSON document. with_nan: accept NaN, Infinity and -Infinity. Raises ValueError, with a sentence fragment,
+    for invalid JSON, bytes that are no Unicode text, and everything that the module refuses; no other exception."""
     try:
         document = json.loads(
             text,
-            parse_constant=None if with_nan else _refuse,
+            parse_constant=None if with_nan else _refuse_constant,
             parse_float=_parse_finite,
-            parse_int=_parse_whole,
+            parse_int=_parse_integer,
             object_pairs_hook=_refuse_duplicate_keys,
         )
     except RecursionError:
@@ -30,16 +33,17 @@ def load_json(text: str | bytes, *, with_nan: bool = False) -> Any:
 
 
 def _check_document(document: Any) -> None:
-    """Raise ValueError for nesting deeper than `MAX_DEPTH` and for texts with lone surrogates. Without recursion."""
-    waiting = [(document, 0)]
-    while waiting:
-        value, depth = waiting.pop()
+    """Raise ValueError for a value deeper than `MAX_DEPTH` and for a text or key with a lone surrogate. Iterative, so
+    that deep nesting cannot exceed the recursion limit."""
+    pending = [(document, 0)]
+    while pending:
+        value, depth = pending.pop()
         if depth > MAX_DEPTH:
             raise ValueError(f"it is nested more than {MAX_DEPTH} levels deep")
         if isinstance(value, dict):
-            waiting += ((member, depth + 1) for entry in value.items() for member in entry)
+            pending += ((member, depth + 1) for entry in value.items() for member in entry)
         elif isinstance(value, list):
-            waiting += ((member, depth + 1) for member in value)
+            pending += ((member, depth + 1) for member in value)
         elif isinstance(value, str):
             try:
                 value.encode()
@@ -48,7 +52,8 @@ def _check_document(document: Any) -> None:
 
 
 def _refuse_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """An object as a dictionary. Raises ValueError for a duplicate key, of which Python would keep the last value."""
+    """Make the dictionary of a JSON object. Raises ValueError for a duplicate key, of which Python would keep the last
+    value."""
     record = dict(pairs)
     if len(record) < len(pairs):
         names = [name for name, _ in pairs]
@@ -56,21 +61,22 @@ def _refuse_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return record
 
 
-def _refuse(constant: str) -> None:
-    """Raise ValueError for NaN, Infinity and -Infinity."""
+def _refuse_constant(constant: str) -> None:
+    """Raise ValueError; the JSON module calls this for NaN, Infinity and -Infinity."""
     raise ValueError(f"JSON has no {constant}; write null")
 
 
 def _parse_finite(digits: str) -> float:
-    """A finite number. Raises ValueError for one beyond the range of floats, which Python reads as infinity."""
+    """Parse a number with fraction or exponent. Raises ValueError where it exceeds the range of float64, which Python
+    would read as infinity."""
     number = float(digits)
     if not math.isfinite(number):
         raise ValueError(f"the number {digits[:30]} is larger than any that is read")
     return number
 
 
-def _parse_whole(digits: str) -> int:
-    """A whole number. Raises ValueError for more than `_LONGEST_NUMBER` digits."""
-    if len(digits) > _LONGEST_NUMBER + digits.startswith("-"):
-        raise ValueError(f"a whole number in it has {len(digits)} digits; up to {_LONGEST_NUMBER} are read")
+def _parse_integer(digits: str) -> int:
+    """Parse an integer. Raises ValueError for more than `_MAX_DIGITS` digits."""
+    if len(digits) > _MAX_DIGITS + digits.startswith("-"):
+        raise ValueError(f"a whole number in it has {len(digits)} digits; up to {_MAX_DIGITS} are read")
     return int(digits)

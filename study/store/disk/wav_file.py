@@ -1,4 +1,4 @@
-"""WAV files of 16-bit samples, one channel."""
+"""Write WAV audio files: mono, 16-bit PCM. Called by `study.workflows.session.write_masking_noise`."""
 
 import io
 import wave
@@ -11,7 +11,8 @@ from study.store.disk.atomic_write import write_atomically
 
 
 def write_wav(path: Path, samples: NDArray[np.int16], sample_rate_hz: int) -> None:
-    """Write samples as a WAV file. samples: (n,). Raises AlreadyThereError, CannotWriteError."""
+    """Write samples, (n,), as a WAV file, atomically. Raises AlreadyThereError where the file exists,
+    CannotWriteError where it cannot be written."""
     content = io.BytesIO()
     with wave.open(content, "wb") as file:
         file.setnchannels(1)

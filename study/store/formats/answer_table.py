@@ -1,7 +1,7 @@
-"""Table of the answers to a protocol's questionnaires, for exported data.
+"""Table of the answers to a protocol's questionnaires, for exported data: a row per session, a column per question.
 
-A row for each session and a column for each question that the protocol asks before or after the trials. The exports
-`psych_ds` and `bids_behaviour` describe the columns by the text of the questions.
+`study.workflows.results.export_study` makes the table; the exports `tidy_csv`, `psych_ds`, `bids_behaviour` and
+`trials_mat` write it, and describe the columns by the text of the questions.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,12 +12,12 @@ from protocols.definition.study_protocol import StudyProtocol
 from study.store.disk.csv_rows import format_csv_line
 
 FORM_NAMES = {"before": "questionnaire", "debrief": "debrief"}
-"""Name of the form in the log for each table of questions in a protocol ([[before]], [[debrief]])."""
+"""Name of a form in the session log, by the protocol's table of its questions ([[before]], [[debrief]])."""
 
 
 @dataclass(frozen=True, slots=True)
 class FilledForm:
-    """A form that a participant filled in, as it was logged."""
+    """A filled form as logged: one event of the session log."""
 
     subject: str
     """Code of the participant."""
@@ -26,7 +26,7 @@ class FilledForm:
     form: str
     """Name of the form, as in `FORM_NAMES`."""
     answers: Mapping[str, str]
-    """Logged answers by the keys of the questions."""
+    """Logged answer by the key of the question."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +34,9 @@ class AnswerColumn:
     """A question of the protocol as a column of the table."""
 
     table: str
-    """The protocol's table of questions: before or debrief."""
+    """The protocol's table with this question: a key of `FORM_NAMES`."""
     question: Question
+    """The question as the protocol defines it."""
 
     @property
     def name(self) -> str:
@@ -44,19 +45,19 @@ class AnswerColumn:
 
     @property
     def description(self) -> str:
-        """The question and the meaning of its coded answers, as a single line."""
+        """Text of the question, and the meaning of its coded answers in parentheses, as a single line."""
         question, meaning = self.question, "; ".join(f"{code}: {level}" for code, level in self.levels.items())
         return f"{' '.join(question.question.split())}{f' ({meaning})' if meaning else ''}"
 
     @property
     def levels(self) -> dict[str, str]:
-        """Meaning of each coded value, for a scale of its two ends only. Values whose code equals the text of the
-        choice are left out; empty for numbers and free text."""
+        """Meaning of each coded value. Rating scale: of its first and last step only. Choices: a choice whose code is
+        its own text is left out. Empty for numbers and free text."""
         question = self.question
         if question.ends:
             return {question.steps[0]: question.ends[0], question.steps[-1]: question.ends[1]}
-        by_code = dict(zip(question.codes, question.choices, strict=False))
-        return {code: choice for code, choice in by_code.items() if code != choice}
+        choices_by_code = dict(zip(question.codes, question.choices, strict=False))
+        return {code: choice for code, choice in choices_by_code.items() if code != choice}
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +66,7 @@ class AnswerTable:
 
     columns: tuple[AnswerColumn, ...] = ()
     rows: tuple[tuple[str, str, tuple[str, ...]], ...] = ()
-    """Subject, session, and an answer for each column, empty where none was given."""
+    """Per row: subject, session, and the answer of each column; empty text for a missing answer."""
 
     @property
     def header(self) -> tuple[str, ...]:
@@ -78,11 +79,11 @@ class AnswerTable:
         return "".join(format_csv_line(line) + "\n" for line in lines)
 
 
-def answer_table(protocol: StudyProtocol, forms: Sequence[FilledForm], free_text: bool) -> AnswerTable:
-    """The table of all sessions with a filled form; empty where the protocol asks nothing.
+def make_answer_table(protocol: StudyProtocol, forms: Sequence[FilledForm], free_text: bool) -> AnswerTable:
+    """Make the table of all sessions with a filled form. Without a column to show, it has no rows either.
 
-    free_text: include answers in the participants' own words, which may be about their health or name a person. Where a
-    form was filled in twice, the later answer counts.
+    free_text: include free-text answers, which may contain health data or names of persons. forms: in the order of
+    logging; of two answers to the same question in a session, the later one counts.
     """
     question_tables = {"before": protocol.before, "debrief": protocol.debrief}
     columns = tuple(
@@ -91,12 +92,13 @@ def answer_table(protocol: StudyProtocol, forms: Sequence[FilledForm], free_text
         for question in questions
         if free_text or not question.is_free_text
     )
-    by_question = {(form.subject, form.session, form.form, key): answer
+    answers_by_question = {(form.subject, form.session, form.form, key): answer
             for form in forms for key, answer in form.answers.items()}  # fmt: skip
     sessions = dict.fromkeys((form.subject, form.session) for form in forms if form.form in FORM_NAMES.values())
     rows = tuple(
         (subject, session, tuple(
-            by_question.get((subject, session, FORM_NAMES[column.table], column.question.key), "") for column in columns
+            answers_by_question.get((subject, session, FORM_NAMES[column.table], column.question.key), "")
+            for column in columns
         ))
         for subject, session in sessions
     )  # fmt: skip

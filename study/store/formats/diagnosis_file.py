@@ -1,6 +1,7 @@
 """Result of a diagnosis of missing physics, `diagnosis.json`: the format `hapteq-diagnosis`, version 1.
 
-This module reads and writes the file; `analysis.diagnosis.document` defines its content and checks it.
+This module reads and writes the file; `analysis.diagnosis.document` defines and checks its content. Called by the
+diagnosis (`study.workflows.diagnosis`), by its views and `hapteq validate`, and by the evaluations of the diagnosis.
 """
 
 from pathlib import Path
@@ -23,7 +24,8 @@ DIAGNOSIS_NAME, MODEL_NAME, PAGE_NAME = "diagnosis.json", "improved.toml", "repo
 
 
 def read_diagnosis(path: Path) -> Diagnosis:
-    """Read a diagnosis, without its provenance. Raises CannotReadError, and UnusableFileError with all problems."""
+    """Read a diagnosis, without its provenance. Raises CannotReadError where the file cannot be read, UnusableFileError
+    where it has another format or version, or with all problems of its content."""
     document: dict[str, Any] = read_json(path, FORMAT, VERSION)
     document.pop("provenance", None)
     try:
@@ -33,5 +35,6 @@ def read_diagnosis(path: Path) -> Diagnosis:
 
 
 def write_diagnosis(path: Path, diagnosis: Diagnosis, provenance: Provenance | None = None) -> None:
-    """Write a diagnosis. Raises AlreadyThereError, CannotWriteError."""
+    """Write a diagnosis. Raises AlreadyThereError where the file exists, CannotWriteError where it cannot be
+    written."""
     write_json(path, FORMAT, VERSION, diagnosis_to_json(diagnosis), provenance)

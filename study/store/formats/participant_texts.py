@@ -14,9 +14,9 @@ from protocols.definition.problem import Problem
 from protocols.document.dumping import dump_protocol
 from protocols.document.loading import Protocol, ProtocolError, load_protocol, protocol_from_values
 from protocols.wording.english import ENGLISH, LANGUAGES
-from protocols.wording.in_language import (
+from protocols.wording.translation import (
     find_language,
-    find_own_words,
+    find_own_texts,
     find_table_problems,
     list_languages,
     translate_protocol,
@@ -66,9 +66,9 @@ def load_in_language(text: str, source: str, folder: Path | None) -> tuple[Proto
         values = tomllib.loads(text)
     except (ValueError, RecursionError):
         return load_protocol(text, source), text  # raises ProtocolError with the cause
-    language, own_texts = find_language(values), find_own_words(values)
+    language, own_texts = find_language(values), find_own_texts(values)
     if problems := find_table_problems(own_texts, require_all=False):
-        raise ProtocolError(source, tuple(problem.below("text.words") for problem in problems))
+        raise ProtocolError(source, tuple(problem.prefix_key("text.words") for problem in problems))
     if language == "en" or own_texts.keys() >= ENGLISH.keys():
         return load_protocol(text, source), text
     try:

@@ -17,7 +17,7 @@ from protocols.document.loading import Protocol, ProtocolError
 from protocols.document.lock import LockError, ProtocolLock, check_lock, lock_from_json, lock_to_json, make_lock
 from study.errors import StudyError, WrongUseError
 from study.local_clock import convert_to_machine_zone
-from study.regular_file import DOCUMENT_BYTES
+from study.regular_file import MAX_DOCUMENT_BYTES
 from study.session.views.local_time import format_time_in_zone
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.text_file import read_text, read_toml_text, write_text
@@ -142,7 +142,7 @@ def _read_lock(path: Path, protocol: Protocol) -> ProtocolLock | None:
     LockedProtocolChangedError where the protocol differs."""
     if not os.path.lexists(path):  # a dangling link is an unreadable lock, not a missing one
         return None
-    text = read_text(path, DOCUMENT_BYTES)
+    text = read_text(path, MAX_DOCUMENT_BYTES)
     try:
         lock = lock_from_json(text)
     except LockError as error:

@@ -1,6 +1,8 @@
-"""Answer of the diagnosis to a real recording, `answer.json`: the format `hapteq-real-answer`, version 1.
+"""Result of the diagnosis of a real recording in the evaluation, `answer.json`: the format `hapteq-real-answer`,
+version 1.
 
-This module reads and writes the file; `analysis.diagnosis.real_answer.real_answer` defines its content and checks it.
+This module reads and writes the file; `analysis.diagnosis.real_answer.real_answer` defines and checks its content.
+Called by `study.evaluation.real` and `hapteq validate`.
 """
 
 from pathlib import Path
@@ -20,21 +22,21 @@ from study.store.disk.provenance import Provenance
 
 
 def read_real_answer(path: Path) -> RealAnswer:
-    """Read an answer, without its provenance. Raises CannotReadError, UnusableFileError."""
-    return read_answer_and_origin(path)[0]
+    """Read an answer, without its provenance. Raises as `read_answer_and_provenance`."""
+    return read_answer_and_provenance(path)[0]
 
 
-def read_answer_and_origin(path: Path) -> tuple[RealAnswer, dict[str, Any]]:
-    """Read an answer and its provenance (an empty dictionary where the file has none). Raises CannotReadError, and
-    UnusableFileError with all problems."""
+def read_answer_and_provenance(path: Path) -> tuple[RealAnswer, dict[str, Any]]:
+    """Read an answer and its provenance (empty where the file has none). Raises CannotReadError where the file cannot
+    be read, UnusableFileError where it has another format or version, or with all problems of its content."""
     document: dict[str, Any] = read_json(path, FORMAT, VERSION)
-    origin = document.pop("provenance", None)
+    provenance = document.pop("provenance", None)
     try:
-        return real_answer_from_json(document), origin if isinstance(origin, dict) else {}
+        return real_answer_from_json(document), provenance if isinstance(provenance, dict) else {}
     except RealAnswerError as error:
         raise UnusableFileError(path, "answer to a real recording", error.problems) from error
 
 
 def write_real_answer(path: Path, answer: RealAnswer, provenance: Provenance | None = None) -> None:
-    """Write an answer. Raises AlreadyThereError, CannotWriteError."""
+    """Write an answer. Raises AlreadyThereError where the file exists, CannotWriteError where it cannot be written."""
     write_json(path, FORMAT, VERSION, real_answer_to_json(answer), provenance)

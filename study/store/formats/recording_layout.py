@@ -1,7 +1,7 @@
 """Layout of the file of a recording: the format `hapteq-recording`, version 1 (HDF5).
 
-The constants are the tables of docs/formats.md; `recording_file` reads and writes the file. Sample k is taken at time
-t_k; all datasets have the same rate and number n of samples.
+`recording_file` reads and writes the file; `study.workflows.files.format_docs` makes tables of docs/formats.md from the
+constants. Sample k is taken at time t_k; all datasets have the same rate and number n of samples.
 """
 
 from equalizer.signals.recording import SEGMENT_KINDS, Hold
@@ -9,6 +9,7 @@ from equalizer.signals.units import UNSTATED
 from study.store.disk.layout import Entry
 
 FORMAT, VERSION = "hapteq-recording", 1
+"""Name and version of the format, written into every file."""
 KIND = "recording"
 """Name of this kind of file in messages."""
 
@@ -58,7 +59,8 @@ LAYOUT = (
         False,
     ),
 )
-"""Contents of the file, as docs/formats.md lists them."""
+"""Attributes, datasets and groups of the file. Dimensions: n samples, m commands, p responses, d positions, q
+conditions."""
 SIGNAL_ATTRIBUTES = (
     Entry("quantity", "attribute, text or list", "one for all channels, or one per channel"),
     Entry(
@@ -70,7 +72,7 @@ SIGNAL_ATTRIBUTES = (
         "one name per column; a single text lists the names (`fx, fy, fz`), or is numbered",
     ),
 )
-"""Attributes of each dataset of samples."""
+"""Attributes of each dataset of samples; not of `time_s`."""
 SEGMENT_FIELDS = (
     Entry("start", "whole number", "first sample"),
     Entry("stop", "whole number", "the sample after the last"),

@@ -1,7 +1,9 @@
 """Record of iterative learning control on a device, `*.repeats.json`: the format `hapteq-repeats`, version 1.
 
-It is stored beside the table of forces that was found, and contains the errors of each play and the trajectory, model
-and device for which the forces were found, so that a later run continues from the forces only for the same ones.
+It is stored in the folder of the table of forces that was found, and contains the error of each play, and the
+trajectory, model and device for which the forces were found. A later run continues from these forces only for the same
+trajectory and model. Called by `study.workflows.equalizer` (`repeat_results`, `repeat_trajectory`, `repeat_playback`)
+and `hapteq validate`.
 """
 
 from dataclasses import asdict, dataclass
@@ -14,6 +16,7 @@ from study.store.disk.json_document import read_json, write_json
 from study.store.disk.provenance import Provenance
 
 FORMAT, VERSION = "hapteq-repeats", 1
+"""Name and version of the format, written into every document."""
 SUFFIX = ".repeats.json"
 """Suffix of the document, in place of that of the table of forces."""
 KIND = "document of repeats"
@@ -22,11 +25,11 @@ KIND = "document of repeats"
 
 @dataclass(frozen=True, slots=True)
 class Repeats:
-    """Content of the document. Errors are root mean squares in the band, relative to the wanted signal (1 = 100 %). A
-    play is one repetition of the whole trajectory; between two plays the forces are corrected."""
+    """Content of the document. Errors are root mean squares in the band, relative to the reference trajectory (1 = 100
+    %). A play is one repetition of the whole trajectory; between two plays the forces are corrected."""
 
     trajectory_sha256: str
-    """SHA-256 of the wanted samples and their rate."""
+    """SHA-256 of the samples of the reference trajectory and their rate."""
     model_sha256: str
     """SHA-256 of the model file, or of all model files together."""
     forces_sha256: str
@@ -34,42 +37,44 @@ class Repeats:
     device: str
     """Name of the device."""
     place_m: tuple[float, float, float]
-    """Place of the handle in the workspace."""
+    """Position of the handle in device coordinates at which the trajectory is played (m)."""
     band_hz: tuple[float, float]
-    """Band in which errors are computed and corrected."""
+    """Lowest and highest frequency at which errors are computed and corrected (Hz)."""
     errors: tuple[float, ...]
     """Measured errors, noise included, play by play; the first is that of the initial forces."""
     kept: int
     """Index (from 0) of the play whose forces are in the table."""
     noise_floor: float
-    """Error due to the sensor's noise alone."""
+    """Error that the sensor noise alone causes."""
     gains: tuple[float, ...]
     """Learning gain beta of each correction, before the limits of force and slew rate."""
     fitted: tuple[float, ...]
-    """Factor by which cap and slew limit reduced each correction; 1: not reduced."""
+    """Factor by which the limits of force and slew rate reduced each correction; 1: not reduced."""
     verdict: str
-    """Why the iteration ended, as the name of a verdict in lower case."""
+    """Why the iteration ended: name of a `Verdict` of `equalizer.tracking.learning.iteration`, in lower case."""
     remark: str
-    """Sentence on the corrections that cap and slew limit reduced; empty where they reduced none."""
+    """Sentence on the corrections that these limits reduced; empty where they reduced none."""
     interrupted: bool
     """Whether the run was interrupted before its end."""
 
 
-REPEATS: TypeAdapter[Repeats] = TypeAdapter(Repeats)
-"""Validates the types of a document."""
+REPEATS_VALIDATOR: TypeAdapter[Repeats] = TypeAdapter(Repeats)
+"""Validates the types of a document, and gives its JSON schema."""
 
 
-def repeats_path(forces: Path) -> Path:
-    """Path of the document beside a table of forces."""
-    return forces.with_suffix(SUFFIX)
+def get_repeats_path(forces_path: Path) -> Path:
+    """Path of the document that belongs to a table of forces: `NAME.repeats.json` for `NAME.csv`."""
+    return forces_path.with_suffix(SUFFIX)
 
 
 def read_repeats(path: Path) -> Repeats:
-    """Read the document, without its provenance. Raises CannotReadError, and UnusableFileError with all problems."""
+    """Read the document, without its provenance. Raises CannotReadError where the file cannot be read,
+    UnusableFileError where it has another format or version, with all wrong types, or where `kept` is no index of
+    `errors`."""
     document = read_json(path, FORMAT, VERSION)
     document.pop("provenance", None)
     try:
-        repeats = REPEATS.validate_python(document)
+        repeats = REPEATS_VALIDATOR.validate_python(document)
     except ValidationError as error:
         problems = tuple(f"{'.'.join(map(str, issue['loc']))}: {issue['msg']}" for issue in error.errors())
         raise UnusableFileError(path, KIND, problems) from error
@@ -79,5 +84,6 @@ def read_repeats(path: Path) -> Repeats:
 
 
 def write_repeats(path: Path, repeats: Repeats, provenance: Provenance | None = None) -> None:
-    """Write the document. Raises AlreadyThereError, CannotWriteError."""
+    """Write the document. Raises AlreadyThereError where the file exists, CannotWriteError where it cannot be
+    written."""
     write_json(path, FORMAT, VERSION, asdict(repeats), provenance)

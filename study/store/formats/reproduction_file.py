@@ -1,7 +1,7 @@
-"""Read and write `reproduction.json`: published figures and their reproduction (format `hapteq-reproduction`).
+"""Read and write `reproduction.json`: published results and their reproduction (format `hapteq-reproduction`).
 
-The content is defined and checked in `analysis.evaluation.reproduction.document`; this module adds the file, with
-format, version and provenance.
+`analysis.evaluation.reproduction.document` defines and checks the content; this module adds the file, with format,
+version and provenance. Called by `study.evaluation.reproduction.write_reproduction` and `hapteq validate`.
 """
 
 from pathlib import Path
@@ -20,12 +20,12 @@ from study.store.disk.json_document import read_json, write_json
 from study.store.disk.provenance import Provenance
 
 REPRODUCTION_NAME = "reproduction.json"
-"""Name of the file."""
+"""Name of the file in the folder of an evaluation."""
 
 
 def read_reproduction(path: Path) -> Reproduction:
-    """Read the document, without its provenance. Raises CannotReadError where the file cannot be read, and
-    UnusableFileError for another format or version, or content that is not a reproduction."""
+    """Read the document, without its provenance. Raises CannotReadError where the file cannot be read,
+    UnusableFileError where it has another format or version, or with all problems of its content."""
     document: dict[str, Any] = read_json(path, FORMAT, VERSION)
     document.pop("provenance", None)
     try:
@@ -35,5 +35,5 @@ def read_reproduction(path: Path) -> Reproduction:
 
 
 def write_reproduction(path: Path, reproduction: Reproduction, provenance: Provenance | None = None) -> None:
-    """Write the document, replacing an existing one. Raises CannotWriteError."""
+    """Write the document, replacing an existing one. Raises CannotWriteError where it cannot be written."""
     write_json(path, FORMAT, VERSION, reproduction_to_json(reproduction), provenance, overwrite=True)

@@ -1,18 +1,19 @@
 """Read and write trajectories as CSV files: desired accelerations (m/s²) or commanded forces (N) over time (s).
 
-`equalizer.tracking.feedforward.trajectory` defines the tables and parses them; this module adds the file access.
+`equalizer.tracking.feedforward.trajectory` defines and parses the tables; this module adds the file access. Called by
+the workflows that compute, export or play trajectories (`study.workflows.equalizer`), and by `hapteq validate`.
 """
 
 from pathlib import Path
 
-from equalizer.tracking.feedforward.trajectory import TableError, Trajectory, parse_trajectory, trajectory_csv
+from equalizer.tracking.feedforward.trajectory import TableError, Trajectory, format_trajectory_csv, parse_trajectory
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.text_file import read_text, write_text
 
 
 def read_trajectory(path: Path) -> Trajectory:
-    """Read a table; its header determines its kind (`TABLE_KINDS`). Raises CannotReadError, and UnusableFileError for
-    text that is not such a table."""
+    """Read a table; its header determines whether it holds accelerations or forces (`TABLE_KINDS`). Raises
+    CannotReadError where the file cannot be read as text, UnusableFileError where the text is no such table."""
     try:
         return parse_trajectory(read_text(path))
     except TableError as error:
@@ -20,6 +21,6 @@ def read_trajectory(path: Path) -> Trajectory:
 
 
 def write_trajectory(path: Path, trajectory: Trajectory) -> None:
-    """Write the table of the trajectory's kind. Raises AlreadyThereError for an existing file, CannotWriteError, and
-    TableError for missing samples."""
-    write_text(path, trajectory_csv(trajectory), overwrite=False)
+    """Write the table of the trajectory's kind. Raises TableError for NaN or infinite samples, AlreadyThereError where
+    the file exists, CannotWriteError where it cannot be written."""
+    write_text(path, format_trajectory_csv(trajectory), overwrite=False)

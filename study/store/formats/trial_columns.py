@@ -1,6 +1,7 @@
 """Data dictionary of exported trials: meaning and unit of each column of `trials.csv`, one row per presentation.
 
-The dictionary is exported with the table, so that a reader needs no other document.
+The exports `tidy_csv`, `psych_ds`, `bids_behaviour` and `trials_mat` write it with the table, so that a reader needs no
+other document.
 """
 
 TRIAL_COLUMNS: dict[str, tuple[str, str]] = {
@@ -49,4 +50,5 @@ TRIAL_COLUMNS: dict[str, tuple[str, str]] = {
     "garbled_bytes": ("Bytes from the accelerometer that belonged to no whole packet", ""),
     "acceleration_missing": ("Share of the packets, or of the recorded ticks, without an acceleration", ""),
 }
-"""(meaning, unit) by column; the unit is empty for a quantity without one. The keys are the fields of `Trial`."""
+"""(meaning, unit) by column; the unit is empty for a quantity without one. The keys are the fields of
+`protocols.trial.Trial`."""

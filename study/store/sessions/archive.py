@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from study.errors import StudyError, WrongUseError
-from study.session.views.participant_codes import ALLOWED, is_code
+from study.session.views.participant_codes import CODE_RULE, is_code
 from study.store.disk.atomic_write import sync_folder
 from study.store.disk.privacy import PRIVATE_FOLDER, close_data_folder, make_folder
 from study.store.sessions.event_log import LOG_NAME
@@ -92,7 +92,7 @@ def check_subject(code: str) -> str:
     if not is_code(code):
         raise WrongUseError(
             "This is no participant code",
-            f"'{code}' was given; {ALLOWED}.",
+            f"'{code}' was given; {CODE_RULE}.",
             "Use the code from your list; names, initials with dots and e-mail addresses stay off this computer.",
         )
     return code

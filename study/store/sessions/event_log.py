@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from study.errors import StudyError
-from study.regular_file import DOCUMENT_BYTES, open_regular, read_regular
-from study.session.facts.events import SESSION_FORMAT, SESSION_VERSION, Event, event_line, parse_event
-from study.session.facts.log_chain import Chain, ChainBrokenError, read_chained, write_chained
+from study.regular_file import MAX_DOCUMENT_BYTES, open_regular, read_regular
+from study.session.facts.events import SESSION_FORMAT, SESSION_VERSION, Event, encode_event, parse_event
+from study.session.facts.log_chain import Chain, ChainBrokenError, append_checksum, verify_checksum
 from study.store.disk.atomic_write import sync_folder
 from study.store.disk.privacy import PRIVATE_FILE
 
@@ -64,7 +64,7 @@ class EventLog:
         previous_size = os.fstat(self._descriptor).st_size
         if self._chain is None:
             self._chain = read_log(self._path).chain
-        extended, line = write_chained(self._chain, event_line(event).removesuffix(b"\n"))
+        extended, line = append_checksum(self._chain, encode_event(event).removesuffix(b"\n"))
         try:
             _write_all(self._descriptor, line)
             os.fsync(self._descriptor)
@@ -124,7 +124,7 @@ def read_opening(path: Path) -> Event | None:
     if not path.exists():
         return None
     with open_regular(path) as file:
-        line = file.readline(DOCUMENT_BYTES)
+        line = file.readline(MAX_DOCUMENT_BYTES)
     return _parse_next(path, Chain(), line.removesuffix(b"\n"))[1] if line.endswith(b"\n") else None
 
 
@@ -133,7 +133,7 @@ def read_valid_events(path: Path) -> tuple[Event, ...]:
     chain, events = Chain(), list[Event]()
     try:
         for line in read_regular(path).split(b"\n")[:-1]:
-            chain, event = read_chained(chain, line)
+            chain, event = verify_checksum(chain, line)
             events.append(parse_event(event))
     except (OSError, ValueError):
         pass  # The damage begins here; the caller reports it.
@@ -199,7 +199,7 @@ def _parse_next(path: Path, chain: Chain, line: bytes) -> tuple[Chain, Event]:
     """The chain after the next line, and its event. chain: of the lines before. line: without its line end. Raises
     StudyError for a line that is damaged, unknown, or of a newer version."""
     try:
-        extended, event = read_chained(chain, line)
+        extended, event = verify_checksum(chain, line)
         return extended, parse_event(event)
     except ValueError as problem:
         number = chain.lines + 1
@@ -213,7 +213,9 @@ def _parse_next(path: Path, chain: Chain, line: bytes) -> tuple[Chain, Event]:
         clause, saved_text = "is not an event that this version knows", f"The {number - 1} lines before it are whole."
         if isinstance(problem, ChainBrokenError):
             clause = f"{problem}"
-            if number > 1 and not chain.since:  # This checksum covers earlier lines without a checksum, too.
+            if (
+                number > 1 and not chain.first_checksum_line
+            ):  # This checksum covers earlier lines without a checksum, too.
                 clause, saved_text = f"{problem}, or one of the lines before it was changed", "Nothing was changed."
         raise StudyError(
             "The session log is damaged",

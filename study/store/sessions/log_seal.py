@@ -1,9 +1,12 @@
-"""Seal of the log of a closed session: a file `seal.json` with the length and hash of the log, next to it.
+"""Seal of the log of a closed session: a file `seal.json` with the length and hash of the log, in the same folder.
 
-The hash chain of the log alone cannot show that lines are missing at the end, or that a log was rewritten with its
-chain; the seal shows both. A seal is never rewritten: a note that is added after closing gets a further seal
+The hash chain of the log alone (`log_chain`) cannot show that lines are missing at the end, or that a log was rewritten
+with its chain; the seal shows both. A seal is never rewritten: a note that is added after closing gets a further seal
 (`seal-2.json`, ...). Each seal covers the log from its beginning to the length at which the seal was written. There is
-no key: a seal does not reveal that log and seal were replaced together.
+no key: the replacement of both log and seal is not detected.
+
+`study.workflows.session.run_session`, `session_results` and `take_note` write seals;
+`study.workflows.results.fold_session` checks them whenever a session is read.
 """
 
 import hashlib
@@ -18,55 +21,57 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from study.errors import StudyError
 from study.session.facts.fact_types import Count, Sha256
-from study.session.facts.log_chain import DIGITS, Chain, ChainBrokenError, read_chained
+from study.session.facts.log_chain import CHECKSUM_DIGITS, Chain, ChainBrokenError, verify_checksum
 from study.store.disk.file_errors import AlreadyThereError, UnusableFileError
 from study.store.disk.json_document import read_json, write_json
 from study.store.sessions.event_log import LOG_NAME, LogContents, read_log
 
 SEAL_NAME = "seal.json"
-"""Name of the first seal's file; later seals are seal-2.json, seal-3.json and so on."""
+"""Name of the first seal's file; later seals are named seal-2.json, seal-3.json and so on."""
 SEAL_FORMAT, SEAL_VERSION = "hapteq-seal", 1
 """Name and version of the file format, written into every seal."""
-_NAME = re.compile(r"seal(-(?P<number>\d{1,6}))?\.json", re.ASCII)
-"""Pattern of the file name of any seal."""
+_SEAL_NAME_PATTERN = re.compile(r"seal(-(?P<number>\d{1,6}))?\.json", re.ASCII)
+"""Pattern of the file name of a seal; `number` is missing in the name of the first."""
 
 
 @dataclass(frozen=True, slots=True)
 class Seal:
-    """Length and hash of the log when the seal was written."""
+    """Length and hash of the log when the seal was written. The fields are the keys of the file."""
 
     session: str
     """Name of the session's folder."""
     lines: Count
+    """Number of lines of the log."""
     bytes: Count
-    head: Annotated[str, Field(pattern=f"^[0-9a-f]{{{DIGITS}}}$")]
-    """Checksum of the last line: the head of the hash chain."""
+    """Length of these lines in bytes, line ends included."""
+    head: Annotated[str, Field(pattern=f"^[0-9a-f]{{{CHECKSUM_DIGITS}}}$")]
+    """Head of the hash chain: the checksum of the last line, hexadecimal."""
     sha256: Sha256
-    """SHA-256 of the first `bytes` bytes of `events.jsonl`."""
+    """SHA-256 of the first `bytes` bytes of `events.jsonl`, hexadecimal."""
 
 
-SEAL: TypeAdapter[Seal] = TypeAdapter(Seal)
-"""Validator and JSON schema of a seal."""
+SEAL_VALIDATOR: TypeAdapter[Seal] = TypeAdapter(Seal)
+"""Validates the fields of a seal, and gives the JSON schema of docs/formats.md."""
 
 
 def find_seals(folder: Path) -> dict[int, Path]:
-    """Files of the seals in a session's folder by number, in the order of writing."""
-    matches = ((_NAME.fullmatch(path.name), path) for path in folder.glob("seal*.json"))
+    """Find the seals in a session's folder: paths by number (from 1), in ascending order."""
+    matches = ((_SEAL_NAME_PATTERN.fullmatch(path.name), path) for path in folder.glob("seal*.json"))
     return dict(sorted((int(match["number"] or 1), path) for match, path in matches if match))
 
 
-def write_seal(folder: Path, contents: LogContents) -> bool:
-    """Write a seal to the disk, unless a seal covers the whole log already: then returns False. contents: log of a
-    closed session, with checksums. Raises StudyError where an existing seal does not match the log, or on a disk
-    error."""
-    if check_seals(folder, contents) == contents.chain.lines:
+def write_seal(folder: Path, log_contents: LogContents) -> bool:
+    """Write the next seal, and return True; return False where a seal covers the whole log already. log_contents: of a
+    closed session, with checksums. Raises StudyError where an existing seal is unreadable or does not match the log, or
+    where the seal cannot be written."""
+    if check_seals(folder, log_contents) == log_contents.chain.lines:
         return False
     seal = Seal(
         session=folder.name,
-        lines=contents.chain.lines,
-        bytes=len(contents.complete_lines),
-        head=contents.chain.head,
-        sha256=hashlib.sha256(contents.complete_lines).hexdigest(),
+        lines=log_contents.chain.lines,
+        bytes=len(log_contents.complete_lines),
+        head=log_contents.chain.head,
+        sha256=hashlib.sha256(log_contents.complete_lines).hexdigest(),
     )
     number = max(find_seals(folder), default=0) + 1
     path = folder / (SEAL_NAME if number == 1 else f"seal-{number}.json")
@@ -76,63 +81,66 @@ def write_seal(folder: Path, contents: LogContents) -> bool:
 
 
 def seal_log(log: Path) -> None:
-    """Seal the log of a session that was just closed. Never raises StudyError: if the seal cannot be written now,
-    `hapteq resume` and `hapteq analyze` write it later and report it."""
+    """Seal the log of a session that was just closed. Never raises StudyError: a seal that cannot be written now is
+    written when the results of the session are written (`hapteq resume`, `hapteq analyze`)."""
     with suppress(StudyError):
         write_seal(log.parent, read_log(log))
 
 
 def read_seal(path: Path) -> Seal:
-    """Read and validate a seal. Raises CannotReadError, and UnusableFileError for an invalid one."""
+    """Read and validate a seal. Raises CannotReadError where the file cannot be read, UnusableFileError where its
+    format, version or a field is invalid."""
     document = read_json(path, SEAL_FORMAT, SEAL_VERSION)
     try:
-        return SEAL.validate_json(json.dumps(document), strict=True)
+        return SEAL_VALIDATOR.validate_json(json.dumps(document), strict=True)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        field_path = ".".join(map(str, first["loc"])) or "the document"
-        raise UnusableFileError(path, "seal of a session log", (f"{field_path}: {first['msg']}",)) from error
+        first_error = error.errors(include_url=False)[0]
+        field_path = ".".join(map(str, first_error["loc"])) or "the document"
+        raise UnusableFileError(path, "seal of a session log", (f"{field_path}: {first_error['msg']}",)) from error
 
 
-def check_seals(folder: Path, contents: LogContents) -> int:
-    """Number of lines of the log that seals cover; 0 without a seal. Raises StudyError if a seal is unreadable or does
-    not match the log."""
-    sealed = 0
+def check_seals(folder: Path, log_contents: LogContents) -> int:
+    """Check the log against all its seals, and return the number of lines that they cover; 0 without a seal. Raises
+    StudyError where a seal is unreadable or does not match the log, or the log is shorter than a seal states."""
+    sealed_lines = 0
     for path in find_seals(folder).values():
         try:
             seal = read_seal(path)
         except StudyError as problem:
-            raise _contradiction_error(folder, contents, f"{path.name} cannot be used: {problem.happened}") from problem
-        if len(contents.complete_lines) < seal.bytes:
+            raise _make_contradiction_error(
+                folder, log_contents, f"{path.name} cannot be used: {problem.happened}"
+            ) from problem
+        if len(log_contents.complete_lines) < seal.bytes:
             raise StudyError(
                 "The end of this session's log is missing",
-                f"{folder.name} was closed with {seal.lines} lines in {LOG_NAME}, and {contents.chain.lines} whole "
+                f"{folder.name} was closed with {seal.lines} lines in {LOG_NAME}, and {log_contents.chain.lines} whole "
                 "ones are there.",
                 f"Restore {LOG_NAME} from a copy.",
                 saved="Nothing was changed.",
             )
-        if not _is_sealed_prefix(folder, seal, contents.complete_lines[: seal.bytes]):
-            raise _contradiction_error(folder, contents, f"{path.name} does not match {LOG_NAME}.")
-        sealed = max(sealed, seal.lines)
-    return sealed
+        if not _is_sealed_prefix(folder, seal, log_contents.complete_lines[: seal.bytes]):
+            raise _make_contradiction_error(folder, log_contents, f"{path.name} does not match {LOG_NAME}.")
+        sealed_lines = max(sealed_lines, seal.lines)
+    return sealed_lines
 
 
-def is_sealed(folder: Path, content: bytes) -> bool:
-    """Whether there is a seal, and every line matches its checksum; events are not parsed. content: of the log.
-
-    Raises StudyError if a seal is unreadable or does not match the log.
+def is_sealed(folder: Path, log_bytes: bytes) -> bool:
+    """Whether there is a seal, all lines are complete, and none contradicts the hash chain; events are not parsed.
+    log_bytes: content of the log. Raises StudyError as `check_seals`.
     """
-    *lines, incomplete = content.split(b"\n")
+    *lines, incomplete = log_bytes.split(b"\n")
     chain = Chain()
     try:
         for line in lines:
-            chain, _ = read_chained(chain, line)
+            chain, _ = verify_checksum(chain, line)
     except ChainBrokenError:
         return False
-    return not incomplete and check_seals(folder, LogContents((), "", 0, chain, content)) > 0
+    return not incomplete and check_seals(folder, LogContents((), "", 0, chain, log_bytes)) > 0
 
 
 def _is_sealed_prefix(folder: Path, seal: Seal, prefix: bytes) -> bool:
-    """Whether the beginning of a log is what a seal states: session, hash, number of lines, and last checksum."""
+    """Whether the first `seal.bytes` bytes of a log agree with the seal in session, hash, number of lines and checksum
+    of the last line."""
     return (
         seal.session == folder.name
         and seal.sha256 == hashlib.sha256(prefix).hexdigest()
@@ -141,11 +149,11 @@ def _is_sealed_prefix(folder: Path, seal: Seal, prefix: bytes) -> bool:
     )
 
 
-def _contradiction_error(folder: Path, contents: LogContents, reason: str) -> StudyError:
-    """The error for a seal that does not match its log. reason: continues the sentence "In <folder>, ...". A seal
-    may be deleted only where the log's own checksums still protect it."""
+def _make_contradiction_error(folder: Path, log_contents: LogContents, reason: str) -> StudyError:
+    """Make the error for a seal that does not match its log. reason: continues the sentence "In <folder>, ...". Moving
+    the seal away is advised only for a log with checksums, which then still detect damage."""
     remedy = f"Restore {LOG_NAME} and the seal from a copy."
-    if contents.chain.since:
+    if log_contents.chain.first_checksum_line:
         remedy += (
             " The lines of the log match their own checksums: where there is no copy, move the seal out of the "
             "folder, and hapteq resume writes it again."

@@ -45,7 +45,7 @@ _counter = itertools.count()
 
 
 class RequestInbox:
-    """Folder of the requests to a session; implements `study.workflows.trial.requests_port.Requests`. Any number of
+    """Folder of the requests to a session; implements `study.workflows.trial.requests_port.RequestPort`. Any number of
     programs may send, only the session itself takes. session: the session's folder."""
 
     def __init__(self, session: Path) -> None:

@@ -14,7 +14,7 @@ from study.errors import StudyError
 from study.store.disk.json_document import read_json, write_json
 from study.store.disk.real_folder import is_real_file, is_real_folder, open_folder
 from study.store.sessions.archive import FOLDER_PATTERN, SessionFolder, locate_withdrawal_record
-from study.store.sessions.session_lock import LOCK_NAME
+from study.store.sessions.session_lock import SESSION_LOCK_NAME
 
 TOMBSTONE_FORMAT, TOMBSTONE_VERSION = "hapteq-tombstone", 1
 WITHDRAWAL_FORMAT, WITHDRAWAL_VERSION = "hapteq-withdrawal", 1
@@ -101,7 +101,7 @@ def list_remaining(folder: SessionFolder) -> tuple[str, ...]:
     the folder cannot be read."""
     try:
         with open_folder(folder.path) as place:
-            names = [name for name in place.list_names() if name not in (folder.tombstone.name, LOCK_NAME)]
+            names = [name for name in place.list_names() if name not in (folder.tombstone.name, SESSION_LOCK_NAME)]
     except OSError:
         return ()
     return tuple(f"{name}/" if is_real_folder(folder.path / name) else name for name in names)

@@ -8,7 +8,7 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
-from study.regular_file import DOCUMENT_BYTES, read_regular
+from study.regular_file import MAX_DOCUMENT_BYTES, read_regular
 from study.store.disk.atomic_write import write_atomically
 from study.store.disk.file_errors import CannotWriteError
 from study.store.disk.real_folder import is_real_file
@@ -50,7 +50,7 @@ def read_written_folders(data: Path) -> tuple[Path, ...]:
     if not is_real_file(note):
         return ()
     try:
-        lines = os.fsdecode(read_regular(note, DOCUMENT_BYTES)).split("\n")
+        lines = os.fsdecode(read_regular(note, MAX_DOCUMENT_BYTES)).split("\n")
     except OSError:
         return ()
     return tuple(Path(line.replace(LINE_BREAK, "\n")) for line in lines if line)

@@ -18,23 +18,23 @@ from textual.screen import Screen
 
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.errors import ExitCode
-from study.session.views.views import Reply as TrialReply
+from study.session.views.participant_views import Reply as TrialReply
 from study.session.watching.requests import NoteAsked, PauseAsked
 from study.tui import home_messages
 from study.tui.app import outcomes
-from study.tui.app.app_start import AppStart
 from study.tui.app.archive_screens import ArchiveScreens
 from study.tui.app.engine_line import EngineLine, EngineMessage
 from study.tui.app.load_screens import load_screens
 from study.tui.app.sitting_screens import SittingScreens
-from study.tui.departure import leave_with_the_terminal
+from study.tui.app.start_options import StartOptions
 from study.tui.engine.from_engine import Failed, Finished
 from study.tui.engine.to_engine import AskOtherSession, BeginSession, LetGo, Relay, Resume, SessionOrder, ShowSession
-from study.tui.keys.key_names import key_name
-from study.tui.keys.keys_in_order import KeysInOrder
+from study.tui.exit_handlers import install_exit_handlers
+from study.tui.keys.input_queue import InputQueue
+from study.tui.keys.key_names import format_key_name
 from study.tui.screens.outcome import Decision, Outcome, OutcomeScreen
 from study.tui.themes import NEXT_THEME, register_themes
-from study.tui.watch.watch_in_app import Watching
+from study.tui.watch.watch_controller import WatchController
 
 
 class HapteqApp(App[None]):
@@ -57,18 +57,18 @@ class HapteqApp(App[None]):
         Binding("ctrl+q", "quit", "Leave", show=False, priority=True),
     ]
 
-    def __init__(self, start: AppStart) -> None:
+    def __init__(self, start: StartOptions) -> None:
         super().__init__()
         self.outcome: Finished | Failed | None = None
         """Result of the last sitting, which the command line prints after the screen has closed."""
         self._start = start
-        self._started_from_terminal = start.first is not None
+        self._started_from_terminal = start.first_sitting is not None
         self._engine = EngineLine(self)
         self._archive = ArchiveScreens(self, self._engine.send, start)
         self._sitting: SittingScreens | None = None
         self._stop_panel: OutcomeScreen | None = None
-        self._watching = Watching(self)
-        self._keys = KeysInOrder(self, super().on_event)
+        self._watching = WatchController(self)
+        self._keys = InputQueue(self, super().on_event)
         if "TEXTUAL_ANIMATIONS" not in os.environ:
             self.animation_level = "none"
         register_themes(self)
@@ -77,12 +77,12 @@ class HapteqApp(App[None]):
         await self._keys.handle_event(event)
 
     def get_key_display(self, binding: Binding) -> str:
-        return key_name(super().get_key_display(binding))
+        return format_key_name(super().get_key_display(binding))
 
     async def on_mount(self) -> None:
-        leave_with_the_terminal(self, lambda: self._leave_app(ExitCode.INTERRUPTED))
-        if self._start.first is not None:
-            await self._begin_sitting(self._start.first)
+        install_exit_handlers(self, lambda: self._leave_app(ExitCode.INTERRUPTED))
+        if self._start.first_sitting is not None:
+            await self._begin_sitting(self._start.first_sitting)
         else:
             await self._archive.show_home()
         self.call_after_refresh(self._start_engine)
@@ -99,7 +99,7 @@ class HapteqApp(App[None]):
 
     def close_engine(self) -> None:
         """Wait until the device has released the force and the log is closed. Called after `run`."""
-        self._watching.end()
+        self._watching.end_feed()
         self._engine.close()
         if self._sitting is not None:
             self.outcome = self._engine.last_end
@@ -112,10 +112,10 @@ class HapteqApp(App[None]):
     async def _begin_sitting(self, first: BeginSession | Resume) -> None:
         """Show the first screen of a sitting, and send its command to the engine. first: the command, new or
         resumed."""
-        self._started_from_terminal = self._started_from_terminal and first is self._start.first
+        self._started_from_terminal = self._started_from_terminal and first is self._start.first_sitting
         self.outcome = self._stop_panel = None
         self._archive.clear()
-        self._sitting = SittingScreens(self, self._engine.send, self._start.keys, self._keys.forget_earlier)
+        self._sitting = SittingScreens(self, self._engine.send, self._start.keys, self._keys.discard_earlier_keys)
         await self._sitting.show_preparing()
         self._engine.send(first)
 
@@ -165,7 +165,7 @@ class HapteqApp(App[None]):
 
         panel = OutcomeScreen(outcome)
         self.push_screen(panel, act_on_decision)
-        self._keys.forget_earlier()
+        self._keys.discard_earlier_keys()
         return panel
 
     def _leave_app(self, code: ExitCode) -> None:
@@ -204,7 +204,7 @@ class HapteqApp(App[None]):
 
     def action_watch(self) -> None:
         if self._sitting is not None and self._sitting.path:
-            self._watching.open_here(self._sitting.path, lambda request: self._engine.send(Relay(request)))
+            self._watching.toggle_view(self._sitting.path, lambda request: self._engine.send(Relay(request)))
 
     def action_pause(self) -> None:
         if self._sitting is not None:
@@ -240,29 +240,31 @@ class HapteqApp(App[None]):
         if self._sitting is not None:
             self._sitting.send_trial_reply(reply)
 
-    async def on_begin_wanted(self, event: home_messages.BeginWanted) -> None:
+    async def on_begin_requested(self, event: home_messages.BeginRequested) -> None:
         if self._sitting is not None:  # Enter twice: one sitting
             return
         start = self._start = replace(self._start, device=event.device)
         order = SessionOrder(event.protocol, event.device, event.subject, start.data, start.seed, event.model)
         await self._begin_sitting(BeginSession(order))
 
-    async def on_resume_wanted(self, event: home_messages.ResumeWanted) -> None:
+    async def on_resume_requested(self, event: home_messages.ResumeRequested) -> None:
         if self._sitting is not None:
             return
         await self._begin_sitting(Resume(event.path, self._start.device, self._start.data))
 
-    async def on_home_wanted(self) -> None:
+    async def on_home_requested(self) -> None:
         await self._archive.show_home()
 
-    def on_command_wanted(self, event: home_messages.CommandWanted) -> None:
+    def on_command_requested(self, event: home_messages.CommandRequested) -> None:
         self._engine.send(event.command)
 
-    async def on_diagnose_wanted(self, event: home_messages.DiagnoseWanted) -> None:
+    async def on_diagnose_requested(self, event: home_messages.DiagnoseRequested) -> None:
         await self._archive.diagnose(event.command)
 
-    def on_watch_wanted(self, event: home_messages.WatchWanted) -> None:
-        self._watching.confirm(event.path, lambda request: self._engine.send(AskOtherSession(event.path, request)))
+    def on_watch_requested(self, event: home_messages.WatchRequested) -> None:
+        self._watching.open_after_confirmation(
+            event.path, lambda request: self._engine.send(AskOtherSession(event.path, request))
+        )
 
     def on_demo_screen_pause_wanted(self) -> None:
         self.action_pause()

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from textual.app import App
 
 from study.session.views.archive_views import DiagnosisView, SessionView
-from study.tui.app.app_start import AppStart
+from study.tui.app.start_options import StartOptions
 from study.tui.engine.from_engine import (
     CalibrationComputed,
     CalibrationStored,
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 class ArchiveScreens:
     """Shows the start screen, past sessions and diagnoses, and sends their requests to the engine."""
 
-    def __init__(self, app: App[Any], send: Callable[[ToEngine], None], start: AppStart) -> None:
+    def __init__(self, app: App[Any], send: Callable[[ToEngine], None], start: StartOptions) -> None:
         self._app = app
         self._send = send
         self._start = start

@@ -1,4 +1,4 @@
-"""Import further screens in a background thread, after the first frame is shown.
+"""Import further screens in a background thread. Called by `app.HapteqApp` after the first frame is shown.
 
 The first frame thus appears without their import time, and later screens open without a delay.
 """
@@ -7,7 +7,7 @@ import gc
 import threading
 from importlib import import_module
 
-LATER_MODULES = (
+DEFERRED_MODULES = (
     "study.tui.app.sitting_screens",
     "study.tui.screens.trial",
     "study.tui.screens.help",
@@ -21,13 +21,14 @@ LATER_MODULES = (
 
 
 def load_screens() -> None:
-    """Start the import in a daemon thread, and return at once."""
-    threading.Thread(target=_load, name="load-screens", daemon=True).start()
+    """Start the import of `DEFERRED_MODULES` in a daemon thread, and return without waiting for it."""
+    threading.Thread(target=_import_modules, name="load-screens", daemon=True).start()
 
 
-def _load() -> None:
-    for name in LATER_MODULES:
-        import_module(name)
-    # Imported modules stay in use. Without freezing, the garbage collector searched their objects again and again,
-    # which delayed the event loop by 50 ms now and then.
+def _import_modules() -> None:
+    """Import `DEFERRED_MODULES`, then exclude all present objects from garbage collection."""
+    for module_name in DEFERRED_MODULES:
+        import_module(module_name)
+    # Imported modules stay in use. Without freezing, each full garbage collection traversed their objects, which was
+    # observed to delay the event loop by 50 ms.
     gc.freeze()

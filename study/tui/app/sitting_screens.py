@@ -16,7 +16,7 @@ from textual.screen import Screen
 from textual.widgets import Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.views.views import Reply as TrialReply
+from study.session.views.participant_views import Reply as TrialReply
 from study.tui.engine.from_engine import (
     CloseRequest,
     DisplayCall,
@@ -99,7 +99,7 @@ class SittingScreens:
         keys: AnswerKeys,
         discard_earlier_keys: Callable[[], None],
     ) -> None:
-        """send: sends a message to the engine. forget_earlier: discards keys that were pressed before the call."""
+        """send: sends a message to the engine. discard_earlier_keys: discards keys pressed before the call."""
         self.path = ""
         """Folder of the session, once it is opened."""
         self.words = ENGLISH_WORDS

@@ -10,7 +10,7 @@ import math
 from functools import lru_cache
 
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.views.views import DirectionPicture
+from study.session.views.participant_views import DirectionPicture
 from study.tui.drawing.braille import Canvas
 
 END_WORD_KEYS = {

@@ -197,12 +197,12 @@ class EngineCommands:
     def _diagnose(self, command: Diagnose) -> None:
         """Diagnose recordings, with progress, and send the result."""
         # Imported here, because compilers and solvers take long to load.
-        from study.workflows.diagnosis.diagnose_at_screen import diagnose_at_screen, free_out
+        from study.workflows.diagnosis.diagnose_at_screen import choose_result_folder, diagnose_at_screen
         from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan
 
         self._link.send(DiagnosisProgress("getting ready", 0.0))
         sources = tuple(Path(source) for source in command.sources)
-        out_folder = Path(command.out) if command.out else free_out(sources[0])
+        out_folder = Path(command.out) if command.out else choose_result_folder(sources[0])
         model, clean = Path(command.model) if command.model else None, tuple(Path(path) for path in command.clean)
         plan = DiagnosePlan(sources, out_folder, model, clean=clean)
         document_path = diagnose_at_screen(plan, lambda step, share: self._link.send(DiagnosisProgress(step, share)))

@@ -11,7 +11,7 @@ from typing import Any
 
 from protocols.wording.words import Words
 from study.session.views.archive_views import DiagnosisView, HomeView, SessionView
-from study.session.views.views import HandleView
+from study.session.views.participant_views import HandleView
 
 
 class DisplayCall(Enum):

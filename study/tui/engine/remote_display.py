@@ -14,7 +14,7 @@ from protocols.trial import VoidCause
 from study.devices.clock import Clock
 from study.session.facts.void_reasons import explain_silent_screen
 from study.session.views.form_views import Form, FormReply
-from study.session.views.views import (
+from study.session.views.participant_views import (
     AfterPause,
     DemoChoice,
     DemoDone,
@@ -30,11 +30,11 @@ from study.session.views.views import (
     Unanswered,
     Welcome,
 )
-from study.session.views.views import Reply as Answer
+from study.session.views.participant_views import Reply as Answer
 from study.tui.engine.from_engine import CloseRequest, DisplayCall, Feedback, HandleUpdate, ScreenRequest, UserNotice
 from study.tui.engine.screen_link import ScreenLink
 from study.tui.engine.to_engine import Reply
-from study.workflows.checks.computer_load import load_per_processor
+from study.workflows.checks.computer_load import get_load_per_processor
 from study.workflows.trial.display import SignOfLife
 
 KEEPALIVE_INTERVAL_S = 0.04
@@ -55,11 +55,11 @@ TIMED_OUT = Unanswered("no answer within the time limit", ends_sitting=False, ca
 
 class RemoteDisplay:
     """The display port over a pipe; the docstrings of `Display` apply. Any method raises KeyboardInterrupt if the
-    screen process has ended. get_load: returns the load average per processor (see `load_per_processor`), None if
+    screen process has ended. get_load: returns the load average per processor (see `get_load_per_processor`), None if
     unknown."""
 
     def __init__(
-        self, link: ScreenLink, clock: Clock, get_load: Callable[[], float | None] = load_per_processor
+        self, link: ScreenLink, clock: Clock, get_load: Callable[[], float | None] = get_load_per_processor
     ) -> None:
         self._link = link
         self._clock = clock

@@ -1,1 +1,1 @@
-"""Keys: `key_presses` (which events are presses) -> `keys_in_order` (serialised handling); names and answer keys."""
+"""Keys: `key_presses` (which events are presses) -> `input_queue` (serialised handling); names and answer keys."""

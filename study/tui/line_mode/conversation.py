@@ -75,7 +75,7 @@ class Conversation:
 
     def discard_early_lines(self) -> None:
         """Drop lines that were typed before the question; lines of a pipe are kept."""
-        self._lines.forget()
+        self._lines.discard_early_lines()
 
     def wait(self, sign_of_life: SignOfLife, until_s: float = float("inf")) -> Line | WaitOver:
         """Wait for the next line; return it, or why none came. until_s: end of the wait on the session's clock (s). If
@@ -111,7 +111,7 @@ class Conversation:
     def poll_line(self) -> Line | None:
         """Read a line that was typed already, without waiting; None without one. Always None for a pipe, whose lines
         are meant for later questions. Raises KeyboardInterrupt at the end of the input."""
-        if not self._lines.interactive:
+        if not self._lines.is_interactive:
             return None
         try:
             text = self._lines.read(0.0)

@@ -1,6 +1,7 @@
-"""Read lines from a terminal or a pipe with a timeout, so that a waiting program can keep the device alive.
+"""Read lines from a terminal or a pipe with a timeout, so that the waiting program can serve the device's watchdog.
 
-The file descriptor is read directly (`select`, `os.read`), because buffered input of Python knows no timeout.
+The file descriptor is read directly (`select`, `os.read`), because Python's buffered input has no timeout. Called by
+the line mode (`conversation`, `plain_display`) and `study.cli.conduct`.
 """
 
 import os
@@ -9,17 +10,19 @@ import sys
 
 
 class LineInput:
-    """Reads lines from a file descriptor; by default from standard input. `interactive`: whether it is a terminal."""
+    """Reader of lines from a file descriptor, with a buffer for incomplete lines. `is_interactive`: whether the input
+    is a terminal."""
 
     def __init__(self, descriptor: int | None = None) -> None:
+        """descriptor: file descriptor of a terminal or pipe; None: standard input."""
         self._descriptor = sys.stdin.fileno() if descriptor is None else descriptor
-        self._pending = b""
-        self._at_end = False
-        self.interactive = os.isatty(self._descriptor)
+        self._buffer = b""
+        self._has_reached_end = False
+        self.is_interactive = os.isatty(self._descriptor)
 
     def read(self, timeout_s: float) -> str | None:
-        """The next line, decoded as UTF-8, without surrounding blanks; None if no whole line comes within `timeout_s`
-        (s). Raises EOFError at the end of the input."""
+        """Read the next line, decoded as UTF-8, without surrounding blanks. None if nothing arrives within `timeout_s`
+        (s), or if what arrives first is an incomplete line. Raises EOFError at the end of the input."""
         line = self._take_line()
         if line is not None:
             return line
@@ -28,44 +31,44 @@ class LineInput:
             return None
         if self._read_available():
             return self._take_line()
-        if not self._line_is_left():
+        if not self._has_line_left():
             raise EOFError
-        self._pending += b"\n"
+        self._buffer += b"\n"
         return self._take_line()
 
     def has_ended(self) -> bool:
-        """Whether the input has ended and no line is left. Does not wait, and consumes no line."""
-        while b"\n" not in self._pending and not self._at_end:
+        """Whether the input has ended and all lines were returned. Does not wait, and consumes no line."""
+        while b"\n" not in self._buffer and not self._has_reached_end:
             if not select.select([self._descriptor], [], [], 0.0)[0]:
                 return False
             self._read_available()
-        return not self._line_is_left()
+        return not self._has_line_left()
 
-    def forget(self) -> None:
-        """Drop lines that were typed at a terminal before now. Lines of a pipe are kept."""
-        if not self.interactive:
+    def discard_early_lines(self) -> None:
+        """Discard what was typed at a terminal before this call. Lines of a pipe are kept."""
+        if not self.is_interactive:
             return
         import termios
 
         termios.tcflush(self._descriptor, termios.TCIFLUSH)
-        self._pending = b""
+        self._buffer = b""
 
     def _read_available(self) -> bool:
-        """Read the available bytes into the buffer. False at the end of the input."""
+        """Read up to 4096 available bytes into the buffer. Returns False at the end of the input."""
         data = os.read(self._descriptor, 4096)
-        self._at_end = not data
-        self._pending += data
-        return not self._at_end
+        self._has_reached_end = not data
+        self._buffer += data
+        return not self._has_reached_end
 
-    def _line_is_left(self) -> bool:
-        """Whether a line is left at the end of the input. The last one of a pipe needs no line end, as for other
-        programs; what a person typed without Enter is no line."""
-        return b"\n" in self._pending or (self._pending != b"" and not self.interactive)
+    def _has_line_left(self) -> bool:
+        """Whether the buffer holds a line at the end of the input. The last line of a pipe needs no line end; text
+        typed at a terminal without Enter is no line."""
+        return b"\n" in self._buffer or (self._buffer != b"" and not self.is_interactive)
 
     def _take_line(self) -> str | None:
-        """Remove the first whole line from the buffer; None if there is none."""
-        line, newline, remainder = self._pending.partition(b"\n")
+        """Remove the first complete line from the buffer and return it; None if there is none."""
+        line, newline, remainder = self._buffer.partition(b"\n")
         if not newline:
             return None
-        self._pending = remainder
+        self._buffer = remainder
         return line.decode("utf-8", errors="replace").strip()

@@ -3,7 +3,15 @@
 from collections.abc import Callable
 
 from protocols.wording.words import Words
-from study.session.views.views import DemoChoice, DemoDone, DemoMenu, HandleView, PlayDemo, PlayingNotice, Unanswered
+from study.session.views.participant_views import (
+    DemoChoice,
+    DemoDone,
+    DemoMenu,
+    HandleView,
+    PlayDemo,
+    PlayingNotice,
+    Unanswered,
+)
 from study.tui.drawing.direction_picture import describe_direction_ends
 from study.tui.keys.answer_keys import AnswerKeys
 from study.tui.line_mode.conversation import POLL_INTERVAL_S, Conversation, WaitOver

@@ -10,7 +10,7 @@ from typing import TextIO
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.devices.clock import Clock
 from study.session.views.form_views import Form, FormReply
-from study.session.views.views import (
+from study.session.views.participant_views import (
     AfterPause,
     DemoChoice,
     DemoMenu,

@@ -1,9 +1,9 @@
 """Line mode: forms, one question after another, and the device check. Called by `PlainDisplay`."""
 
 from protocols.wording.words import Words
-from study.session.views.form_entry import CHECKED
+from study.session.views.form_entry import CONFIRMED_KINDS
 from study.session.views.form_views import Form, FormField, FormReply, has_answer
-from study.session.views.views import DeviceReport
+from study.session.views.participant_views import DeviceReport
 from study.tui.line_mode.conversation import Conversation, Line, quote_line, remove_control_characters
 from study.tui.trial_words import describe_form_origin, describe_number_limits
 
@@ -12,7 +12,7 @@ BACK = "b"
 
 
 def ask_form(form: Form, conversation: Conversation) -> FormReply:
-    """Ask all fields of a form, one after another; `b` returns to the previous field. In the forms of `CHECKED`
+    """Ask all fields of a form, one after another; `b` returns to the previous field. In the forms of `CONFIRMED_KINDS`
     (consent, exclusion), changed answers must be confirmed. Raises KeyboardInterrupt when the participant leaves."""
     conversation.discard_early_lines()
     words = conversation.words
@@ -30,7 +30,7 @@ def ask_form(form: Form, conversation: Conversation) -> FormReply:
         if answer is None:
             index = max(0, index - 1)
             continue
-        is_changed = is_changed or (form.kind in CHECKED and answers.get(field.key, answer) != answer)
+        is_changed = is_changed or (form.kind in CONFIRMED_KINDS and answers.get(field.key, answer) != answer)
         answers[field.key] = answer
         index += 1
 

@@ -6,7 +6,7 @@ No stimulus is played meanwhile. Called by `PlainDisplay`.
 from collections.abc import Callable
 
 from protocols.wording.words import Words
-from study.session.views.views import AfterPause, PauseNotice, RestNotice
+from study.session.views.participant_views import AfterPause, PauseNotice, RestNotice
 from study.session.watching.requests import NoteAsked
 from study.tui.line_mode.conversation import POLL_INTERVAL_S, Conversation, Line, WaitOver, remove_control_characters
 from study.tui.trial_words import describe_progress

@@ -5,7 +5,7 @@ Called by `PlainDisplay` (`plain_display`).
 
 from protocols.trial import VoidCause
 from protocols.wording.words import Words
-from study.session.views.views import (
+from study.session.views.participant_views import (
     Answered,
     DirectionPicture,
     PracticeResult,
@@ -18,7 +18,7 @@ from study.session.views.views import (
 from study.tui.drawing.direction_picture import describe_direction, draw_directions
 from study.tui.keys.answer_keys import AnswerKeys
 from study.tui.line_mode.conversation import Conversation, Line, WaitOver, quote_line
-from study.tui.trial_replies import PAUSE, REPEAT, repeat_words
+from study.tui.trial_replies import PAUSE, REPEAT, format_repeat_text
 from study.tui.trial_words import describe_plan, format_heading
 from study.workflows.trial.display import SignOfLife
 
@@ -78,7 +78,7 @@ def ask_question(question: Question, conversation: Conversation, keys: AnswerKey
             if question.repeats_left == 0:
                 conversation.say(f"{words['no_repeats']} {words.fill('line_type', key_names)}")
                 continue
-            conversation.say(repeat_words(question.repeats_left, words))
+            conversation.say(format_repeat_text(question.repeats_left, words))
         if reply is not None:
             return reply
         if line.word == "?":

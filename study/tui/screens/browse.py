@@ -1,4 +1,5 @@
-"""File dialog that opens a session or a diagnosis from any folder, also outside the data folder."""
+"""File dialog that opens a session or a diagnosis from any folder, also outside the data folder. Opened by the start
+screen (`home`)."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -13,11 +14,12 @@ from textual.widgets import DirectoryTree, Footer, Input, Static
 
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.engine.to_engine import ShowDiagnosis, ShowSession
-from study.tui.home_messages import CommandWanted
+from study.tui.home_messages import CommandRequested
 from study.tui.screens.help import HelpScreen
 
-LOG, DIAGNOSIS = "events.jsonl", "diagnosis.json"
-"""Names of the files that can be opened: the log of a session, and the document of a diagnosis."""
+LOG_NAME, DIAGNOSIS_NAME = "events.jsonl", "diagnosis.json"
+"""Names of the files to open: the log of a session (`event_log.LOG_NAME`), and the document of a diagnosis
+(`diagnosis_file.DIAGNOSIS_NAME`); the screens import no storage modules."""
 
 HELP = """\
 # Open
@@ -32,20 +34,20 @@ In a terminal: `hapteq show PATH`.
 
 
 class HapteqFiles(DirectoryTree):
-    """Tree of folders that lists only event logs of sessions and documents of diagnoses; hidden files are left out."""
+    """Tree of folders that shows only folders, session logs and documents of diagnoses, by name; hidden ones are left
+    out."""
 
     def filter_paths(self, paths: Iterable[Path]) -> Iterable[Path]:
-        return [path for path in paths if not path.name.startswith(".") and (_is_ours(path) or path.is_dir())]
+        return [path for path in paths if not path.name.startswith(".") and (_is_openable(path) or path.is_dir())]
 
 
-def _is_ours(path: Path) -> bool:
-    """Whether the name is that of a session's log or of a diagnosis."""
-    return path.name == LOG or (path.suffix == ".json" and "diagnosis" in path.name)
+def _is_openable(path: Path) -> bool:
+    """Whether the name is that of a session log, or of a JSON file with "diagnosis" in its name."""
+    return path.name == LOG_NAME or (path.suffix == ".json" and "diagnosis" in path.name)
 
 
 class BrowseScreen(ModalScreen[None]):
-    """A field for a path and a tree of folders: Enter opens a session or a diagnosis, Esc returns. folder: where the
-    tree begins; the current folder if it does not exist."""
+    """Dialog with a field for a path and a tree of folders: Enter opens a session or a diagnosis, Esc closes it."""
 
     HELP = HELP
     CSS = """
@@ -58,31 +60,33 @@ class BrowseScreen(ModalScreen[None]):
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("escape", "leave", "Back", key_display="Esc"),
-        Binding("f1", "help", "Help"),  # the application's own keys do not reach through a modal screen
+        Binding("f1", "help", "Help"),  # a modal screen hides the bindings of the application
     ]
 
     def __init__(self, folder: str) -> None:
+        """folder: root of the tree; the current folder if it is no folder."""
         super().__init__()
         self._folder = Path(folder) if Path(folder).is_dir() else Path()
 
     def compose(self) -> ComposeResult:
-        with Vertical() as box:
-            box.border_title = "Open a session or a diagnosis"
+        with Vertical() as dialog:
+            dialog.border_title = "Open a session or a diagnosis"
             yield Input(str(self._folder.absolute()), compact=True, id="path")
             yield HapteqFiles(self._folder.absolute(), id="tree")
             yield Static("", id="message", markup=False)
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        self._show_message(f"{LOG}: a session. {DIAGNOSIS}: a diagnosis.")
+        self._show_message(f"{LOG_NAME}: a session. {DIAGNOSIS_NAME}: a diagnosis.")
         self.query_one(HapteqFiles).focus()
 
     @on(Input.Submitted, "#path")
     def _go_to_path(self, event: Input.Submitted) -> None:
-        """Open a typed session folder or file; show any other folder in the tree."""
+        """Open a typed session folder or file; make any other folder the root of the tree; report a path without
+        either."""
         path = Path(event.value).expanduser()
-        if path.is_dir() and (path / LOG).exists():
-            self._open_path(path / LOG)
+        if path.is_dir() and (path / LOG_NAME).exists():
+            self._open_path(path / LOG_NAME)
         elif path.is_dir():
             tree = self.query_one(HapteqFiles)
             tree.path = path
@@ -94,6 +98,7 @@ class BrowseScreen(ModalScreen[None]):
 
     @on(DirectoryTree.FileSelected)
     def _open_selected(self, event: DirectoryTree.FileSelected) -> None:
+        """Open the file selected in the tree."""
         self._open_path(event.path)
 
     def action_help(self) -> None:
@@ -103,10 +108,11 @@ class BrowseScreen(ModalScreen[None]):
         dismiss_screen(self, None)
 
     def _open_path(self, path: Path) -> None:
-        """Ask the engine to read the session of a log, or any other file as a diagnosis, and close the dialog."""
-        command = ShowSession(str(path.parent)) if path.name == LOG else ShowDiagnosis(str(path))
-        self.app.post_message(CommandWanted(command))
+        """Request to show the session of a log, or any other file as a diagnosis, and close the dialog."""
+        command = ShowSession(str(path.parent)) if path.name == LOG_NAME else ShowDiagnosis(str(path))
+        self.app.post_message(CommandRequested(command))
         dismiss_screen(self, None)
 
     def _show_message(self, text: str) -> None:
+        """Show a message below the tree, in place of the previous one."""
         self.query_one("#message", Static).update(text)

@@ -2,7 +2,7 @@
 
 The view shows levels and which answers were right; a participant who has seen these is no longer a naive observer.
 Therefore the session's name must be typed: a single key that is pressed by mistake does not open the view. Called by
-`study.tui.watch.watch_in_app`.
+`study.tui.watch.watch_controller`.
 """
 
 from __future__ import annotations

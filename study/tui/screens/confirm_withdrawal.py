@@ -1,6 +1,7 @@
-"""Confirmation of a withdrawal of consent during a sitting: all data of the participant would be erased.
+"""Confirmation of a withdrawal of consent during a sitting, which erases all data of the participant.
 
-A word must be typed, in the language of the protocol, so that no single key erases data.
+A word must be typed, in the language of the protocol, so that no single key erases data. Opened by the pause screen
+(`pause`).
 """
 
 from typing import ClassVar
@@ -19,8 +20,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class ConfirmWithdrawal(TranslatedScreen[bool], ModalScreen[bool]):
-    """Dialog that asks the participant for the word. Enter compares the typed text with it, without regard to case, and
-    returns True if they are equal; Esc returns False, and nothing is erased."""
+    """Dialog that asks the participant to type the word. Enter returns True if the typed text equals it, without regard
+    to case and surrounding blanks, and otherwise asks again; Esc returns False. The caller erases the data."""
 
     PAGE = "help_withdraw"
     DEFAULT_CSS = """
@@ -45,6 +46,7 @@ class ConfirmWithdrawal(TranslatedScreen[bool], ModalScreen[bool]):
 
     @on(Input.Submitted)
     def _check_input(self, event: Input.Submitted) -> None:
+        """Return True if the word was typed; otherwise state the expected word."""
         word = self.words["withdraw_word"]
         if event.value.strip().casefold() == word.casefold():
             dismiss_screen(self, True)

@@ -14,7 +14,7 @@ from textual.message import Message
 from textual.widgets import Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.views.views import DemoChoice, DemoDone, DemoMenu, PlayDemo
+from study.session.views.participant_views import DemoChoice, DemoDone, DemoMenu, PlayDemo
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.translated_screen import TranslatedScreen

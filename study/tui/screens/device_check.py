@@ -7,7 +7,7 @@ from textual.binding import Binding, BindingType
 from textual.widgets import Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.views.views import DeviceFinding, DeviceReport
+from study.session.views.participant_views import DeviceFinding, DeviceReport
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.translated_screen import TranslatedScreen
 from study.tui.widgets.card import Sheet

@@ -1,6 +1,7 @@
 """Form for the input of a diagnosis: recordings or a session, and the model of the device to compare with.
 
-The form checks only that the named paths exist; the engine runs the diagnosis (`Diagnose`).
+The form checks only that the entered paths exist, and posts `DiagnoseRequested`; the engine process runs the diagnosis.
+Opened by the start screen (`home`) and the screen of a session (`session`).
 """
 
 import shlex
@@ -16,7 +17,7 @@ from textual.widgets import Footer, Input, Label, Static
 
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.engine.to_engine import Diagnose
-from study.tui.home_messages import DiagnoseWanted
+from study.tui.home_messages import DiagnoseRequested
 from study.tui.screens.help import HelpScreen
 
 HELP = """\
@@ -43,12 +44,12 @@ FIELDS = (
     ("clean", "In order", "recordings of it when nothing was missing; may stay empty"),
     ("out", "Results", "a new folder; empty: next to the recording"),
 )
-"""Key, title and hint of each field."""
+"""Name, label and placeholder of each field, from top to bottom."""
 
 
 class DiagnoseForm(ModalScreen[None]):
-    """Asks for the recordings, the model, the reference recordings and the results folder of a diagnosis. F5 or Enter
-    checks the paths and posts the request, Esc goes back."""
+    """Dialog for the recordings, the model, the reference recordings and the folder of the results of a diagnosis. F5
+    or Enter checks the paths and posts the request, Esc closes it."""
 
     HELP = HELP
     CSS = """
@@ -64,22 +65,22 @@ class DiagnoseForm(ModalScreen[None]):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("f5", "begin", "Diagnose", priority=True),
         Binding("escape", "leave", "Back", key_display="Esc"),
-        Binding("f1", "help", "Help"),  # a modal screen hides the application's own keys
+        Binding("f1", "help", "Help"),  # a modal screen hides the bindings of the application
     ]
 
     def __init__(self, source: str = "") -> None:
-        """source: recording or session with which the form is filled in; empty = none."""
+        """source: path of a recording or session that the form enters as recording; empty: none."""
         super().__init__()
         self._source = source
 
     def compose(self) -> ComposeResult:
-        with Vertical() as box:
-            box.border_title = "Diagnose: what does a model lack?"
-            for name, title, hint in FIELDS:
+        with Vertical() as dialog:
+            dialog.border_title = "Diagnose: what does a model lack?"
+            for field, label, hint in FIELDS:
                 with Horizontal(classes="field"):
-                    yield Label(title)
-                    first = shlex.quote(self._source) if name == "sources" and self._source else ""
-                    yield Input(first, placeholder=hint, compact=True, id=name)
+                    yield Label(label)
+                    initial_text = shlex.quote(self._source) if field == "sources" and self._source else ""
+                    yield Input(initial_text, placeholder=hint, compact=True, id=field)
             yield Static("", id="message", markup=False)
         yield Footer(show_command_palette=False)
 
@@ -88,22 +89,29 @@ class DiagnoseForm(ModalScreen[None]):
 
     @on(Input.Submitted)
     def action_begin(self) -> None:
-        """Check the paths; post the request, or show what is wrong and move to that field."""
+        """Check the paths; post the request and close the form, or show the first problem and focus its field. That the
+        folder of the results is new is checked by the diagnosis."""
         paths_by_field: dict[str, tuple[str, ...]] = {}
         for field in ("sources", "clean"):
             try:
                 paths_by_field[field] = tuple(
-                    str(Path(word).expanduser()) for word in shlex.split(self._text_of(field))
+                    str(Path(word).expanduser()) for word in shlex.split(self._read_field(field))
                 )
             except ValueError:
                 self._show_message("A quotation mark is open.", field)
                 return
         sources = paths_by_field["sources"]
         model, out_folder = (
-            str(Path(text).expanduser()) if (text := self._text_of(name)) else "" for name in ("model", "out")
+            str(Path(text).expanduser()) if (text := self._read_field(name)) else "" for name in ("model", "out")
         )
         missing = next(
-            ((f, path) for f, paths in paths_by_field.items() for path in paths if not Path(path).exists()), None
+            (
+                (field_name, path)
+                for field_name, paths in paths_by_field.items()
+                for path in paths
+                if not Path(path).exists()
+            ),
+            None,
         )
         if not sources:
             self._show_message("Name a recording, or the folder of a session.", "sources")
@@ -112,7 +120,7 @@ class DiagnoseForm(ModalScreen[None]):
         elif model and not Path(model).is_file():
             self._show_message(f"There is no file {model}.", "model")
         elif self.is_active:
-            self.app.post_message(DiagnoseWanted(Diagnose(sources, model, out_folder, paths_by_field["clean"])))
+            self.app.post_message(DiagnoseRequested(Diagnose(sources, model, out_folder, paths_by_field["clean"])))
             dismiss_screen(self, None)
 
     def action_help(self) -> None:
@@ -121,9 +129,11 @@ class DiagnoseForm(ModalScreen[None]):
     def action_leave(self) -> None:
         dismiss_screen(self, None)
 
-    def _text_of(self, name: str) -> str:
-        return self.query_one(f"#{name}", Input).value.strip()
+    def _read_field(self, field: str) -> str:
+        """The text of a field, without surrounding blanks."""
+        return self.query_one(f"#{field}", Input).value.strip()
 
     def _show_message(self, text: str, field: str) -> None:
+        """Show a problem, and focus the field that it concerns."""
         self.query_one("#message", Static).update(text)
         self.query_one(f"#{field}", Input).focus()

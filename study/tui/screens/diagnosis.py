@@ -1,7 +1,8 @@
 """Screen of a finished diagnosis: which physics a model of the device lacks.
 
 It shows the verdict, the identified effects, alternative explanations (candidates and rivals), the recording that is
-recommended next, and tables of errors before and after the effects are added. All texts come from `DiagnosisView`.
+recommended next, and tables of errors before and after the effects are added. The contents come from `DiagnosisView`.
+Opened by `study.tui.app.archive_screens`.
 """
 
 from typing import ClassVar
@@ -15,7 +16,7 @@ from textual.screen import Screen
 from textual.widgets import Footer, Static
 
 from study.session.views.archive_views import DiagnosisView
-from study.tui.home_messages import HomeWanted
+from study.tui.home_messages import HomeRequested
 from study.tui.screens.session import open_report
 from study.tui.widgets.text_table import TextTable
 
@@ -41,8 +42,8 @@ In a terminal: `hapteq show diagnosis.json`.
 
 
 class DiagnosisScreen(Screen[None]):
-    """A diagnosis on one page, in two columns if the terminal has at least 120 columns: sentences, then tables. o opens
-    the report in the browser, if there is one; Esc returns to the start screen."""
+    """Page of a diagnosis: sentences, then tables; side by side in a terminal of at least 120 characters. The key o
+    opens the report in the browser, if there is one; Esc returns to the start screen."""
 
     HELP = HELP
     CSS = """
@@ -84,27 +85,28 @@ class DiagnosisScreen(Screen[None]):
                         "Next", tuple(view.next_experiment.splitlines()), "No further recording is suggested."
                     )
                 with Container(classes="half"):
-                    yield from _table("Fit (errors; smaller is better)", view.fit, "No fit is reported.")
+                    yield from _compose_table("Fit (errors; smaller is better)", view.fit, "No fit is reported.")
                     yield Static("\n".join(view.notes), classes="muted", markup=False)
-                    yield from _table("Mismatch", view.mismatch, "None beyond what repeats allow.")
-                    yield from _table("What remains", view.remainder, "Nothing beyond what repeats allow.")
+                    yield from _compose_table("Mismatch", view.mismatch, "None beyond what repeats allow.")
+                    yield from _compose_table("What remains", view.remainder, "Nothing beyond what repeats allow.")
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
         self.query_one("#page").focus()
 
     def action_back(self) -> None:
-        self.post_message(HomeWanted())
+        self.post_message(HomeRequested())
 
     def action_open_report(self) -> None:
         open_report(self.app, self._view.report)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Disable the key o where the diagnosis has no report."""
         return action != "open_report" or bool(self._view.report)
 
 
 def _compose_section(title: str, sentences: tuple[str, ...], empty_text: str) -> ComposeResult:
-    """A title and its sentences as a list. empty_text: text without sentences."""
+    """Yield a title and its sentences as a bulleted list, or `empty_text` where there are no sentences."""
     yield Static(title, classes="title", markup=False)
     bullets = Table.grid(padding=(0, 1, 0, 0))
     for sentence in sentences or (empty_text,):
@@ -112,8 +114,8 @@ def _compose_section(title: str, sentences: tuple[str, ...], empty_text: str) ->
     yield Static(bullets)
 
 
-def _table(title: str, rows: tuple[tuple[str, ...], ...], empty_text: str) -> ComposeResult:
-    """A title and its table, of which the first row is the header. empty_text: text without further rows."""
+def _compose_table(title: str, rows: tuple[tuple[str, ...], ...], empty_text: str) -> ComposeResult:
+    """Yield a title and its table, whose first row is the header, or `empty_text` where there are no other rows."""
     yield Static(title, classes="title", markup=False)
     if len(rows) < 2:
         yield Static(empty_text, markup=False)

@@ -18,13 +18,13 @@ from textual.widgets import Button, Footer
 from protocols.wording.words import ENGLISH_WORDS, Words
 from study.session.views.form_entry import (
     FormEntry,
+    apply_key,
     click_choice,
     click_continue,
     make_blank_entry,
     make_reply,
     move_cursor,
-    paste,
-    press,
+    paste_text,
 )
 from study.session.views.form_views import Form, FormReply, find_missing_fields
 from study.tui.dismiss_screen import dismiss_screen
@@ -121,7 +121,7 @@ class FormScreen(TranslatedScreen[FormReply]):
 
     def on_key(self, event: Key) -> None:
         """Apply a key to the form."""
-        is_handled = self._apply(press(self._entry, event.key, event.character, self.stacked))
+        is_handled = self._apply(apply_key(self._entry, event.key, event.character, self.stacked))
         # Otherwise the binding of a footer key would act on it, later than on the keys that follow.
         if is_handled or event.key in FOOTER_KEYS:
             event.stop()
@@ -130,11 +130,11 @@ class FormScreen(TranslatedScreen[FormReply]):
     def on_paste(self, event: Paste) -> None:
         """Insert pasted text."""
         event.stop()
-        self._apply(paste(self._entry, event.text))
+        self._apply(paste_text(self._entry, event.text))
 
     def action_press(self, key: str, place: str) -> None:
         """Apply the key of a footer entry. place: kind of field where the entry applies."""
-        self._apply(press(self._entry, key, key if len(key) == 1 else None, self.stacked))
+        self._apply(apply_key(self._entry, key, key if len(key) == 1 else None, self.stacked))
 
     def action_scroll(self, pages: int) -> None:
         """Scroll by pages; negative: up."""
@@ -150,7 +150,7 @@ class FormScreen(TranslatedScreen[FormReply]):
         field_kind = "continue" if field is None else "choice" if field.choices else "text"
         key_names = ("left", "right") if key == "left" else (str(key),)
         stacked = self.is_mounted and self.stacked
-        next_entries = [press(self._entry, name, name if len(name) == 1 else None, stacked) for name in key_names]
+        next_entries = [apply_key(self._entry, name, name if len(name) == 1 else None, stacked) for name in key_names]
         return place in ("", field_kind) and any(next_entry not in (None, self._entry) for next_entry in next_entries)
 
     def _forward_event(self, event: Event) -> None:
@@ -224,19 +224,19 @@ class FormScreen(TranslatedScreen[FormReply]):
 
 def _compose_message(entry: FormEntry, all_answered: bool, words: Words) -> str:
     """The line below the form: the first missing answer, or changed answers to be checked, or that it is complete."""
-    if entry.open:
-        remaining, field = len(entry.open) - 1, entry.form.fields[entry.open[0]]
+    if entry.missing:
+        remaining, field = len(entry.missing) - 1, entry.form.fields[entry.missing[0]]
         question_text = (
             _quote_label(field.label, words) if field.limits is None else describe_number_limits(field.limits, words)
         )
-        request = words.fill("form_please", {"number": entry.open[0] + 1, "question": question_text})
+        request = words.fill("form_please", {"number": entry.missing[0] + 1, "question": question_text})
         return f"{request} {words.fill_count('form_more', remaining)}" if remaining else request
-    if entry.check:
+    if entry.unconfirmed:
         changes = ", ".join(
             words.fill(
                 "form_change", {"number": index + 1, "answer": _quote_label(entry.field_entries[index].answer, words)}
             )
-            for index in entry.check
+            for index in entry.unconfirmed
         )
         return words.fill("form_changed", {"changes": changes})
     return words["form_done"] if all_answered else ""

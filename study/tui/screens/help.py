@@ -1,4 +1,5 @@
-"""Help on any screen, as a dialog above it. The text comes from that screen's attribute `HELP`."""
+"""Help on a screen, as a dialog above it. The applications and modal screens open it for the key F1, with the text of
+the screen's attribute `HELP`."""
 
 from typing import ClassVar
 
@@ -14,8 +15,7 @@ from study.tui.translated_screen import TranslatedScreen
 
 
 class HelpScreen(TranslatedScreen[None], ModalScreen[None]):
-    """Shows a help text in Markdown; Esc, F1, q or ? returns to the screen below. words: language of title and
-    footer."""
+    """Dialog with a help text; Esc, F1, q or ? closes it."""
 
     CSS = """
     HelpScreen { align: center middle; }
@@ -27,14 +27,15 @@ class HelpScreen(TranslatedScreen[None], ModalScreen[None]):
     BINDINGS: ClassVar[list[BindingType]] = [Binding("escape,f1,q,question_mark", "leave", "Back", key_display="Esc")]
 
     def __init__(self, text: str, words: Words = ENGLISH_WORDS) -> None:
+        """text: help text in Markdown. words: texts of title and footer in the language of the participant."""
         super().__init__(words)
         self._text = text
 
     def compose(self) -> ComposeResult:
-        from textual.widgets import Markdown  # a slow import, which the first frame does not need
+        from textual.widgets import Markdown  # imported here, because it is slow and the first frame does not need it
 
-        with VerticalScroll() as box:
-            box.border_title = self.words["help_title"]
+        with VerticalScroll() as dialog:
+            dialog.border_title = self.words["help_title"]
             yield Markdown(self._text)
         yield Footer()
 

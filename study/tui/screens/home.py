@@ -13,7 +13,7 @@ from textual.screen import Screen
 from textual.widgets import Footer, Input, Static
 
 from study.session.views.archive_views import HomeView
-from study.tui.home_messages import HomeWanted
+from study.tui.home_messages import HomeRequested
 from study.tui.screens.browse import BrowseScreen
 from study.tui.screens.diagnose_form import DiagnoseForm
 from study.tui.screens.sensor import SensorScreen
@@ -196,4 +196,4 @@ class HomeScreen(Screen[None]):
 
     def action_look_again(self) -> None:
         self.query_one("#detail", Static).update(LOOKING)
-        self.post_message(HomeWanted())
+        self.post_message(HomeRequested())

@@ -8,7 +8,7 @@ from textual.containers import Horizontal
 from textual.widgets import Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.views.views import Welcome
+from study.session.views.participant_views import Welcome
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
 from study.tui.translated_screen import TranslatedScreen

@@ -20,7 +20,7 @@ from study.tui.widgets.card import Card
 from study.tui.widgets.choice_row import ChoiceRow
 from study.tui.widgets.literal_text import LiteralText
 
-MOST_CHARACTERS = 500
+MAX_NOTE_CHARACTERS = 500
 """Maximum length of a note: a few sentences, so that a line of the log stays readable."""
 WRITERS: tuple[RequestSource, ...] = ("participant", "experimenter")
 """Writers among whom the dialog lets the user choose, in this order."""
@@ -50,19 +50,19 @@ class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | Non
         self, adverse: bool = False, writer: RequestSource = "participant", words: Words = ENGLISH_WORDS
     ) -> None:
         super().__init__(words)
-        self._adverse = adverse
+        self._is_adverse = adverse
         self._writer = writer
 
     def compose(self) -> ComposeResult:
         words = self.words
-        with Card(words["note_title_happened" if self._adverse else "note_title"]):
-            yield LiteralText(words["note_happened" if self._adverse else "note_what"])
+        with Card(words["note_title_happened" if self._is_adverse else "note_title"]):
+            yield LiteralText(words["note_happened" if self._is_adverse else "note_what"])
             yield TextArea(soft_wrap=True, tab_behavior="focus")
             yield LiteralText(words["note_who"])
             writers = tuple(words[f"note_{writer}"] for writer in WRITERS)
             yield ChoiceRow(writers, WRITERS.index(self._writer) if self._writer in WRITERS else None, id="who")
             yield LiteralText(words["note_adverse"])
-            yield ChoiceRow((words["no"], words["yes"]), int(self._adverse), id="adverse")
+            yield ChoiceRow((words["no"], words["yes"]), int(self._is_adverse), id="adverse")
             yield Button(words["note_button"], variant="primary", compact=True)
             yield LiteralText(id="message")
         yield Footer(show_command_palette=False)
@@ -79,8 +79,8 @@ class NoteScreen(TranslatedScreen[NoteAsked | None], ModalScreen[NoteAsked | Non
         writer = self.query_one("#who", ChoiceRow).chosen
         if not text:
             self._refuse(self.words["note_empty"])
-        elif len(text) > MOST_CHARACTERS:
-            self._refuse(self.words.fill("note_long", {"most": MOST_CHARACTERS, "count": len(text)}))
+        elif len(text) > MAX_NOTE_CHARACTERS:
+            self._refuse(self.words.fill("note_long", {"most": MAX_NOTE_CHARACTERS, "count": len(text)}))
         elif writer is None:
             self._refuse(self.words["note_no_writer"])
         else:

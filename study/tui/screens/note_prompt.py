@@ -1,4 +1,5 @@
-"""One line for the log, typed while the session continues."""
+"""Prompt for a note of the experimenter for the session log, typed while the session continues. Opened by the
+experimenter's view (`study.tui.watch.watch_screen`)."""
 
 from collections.abc import Callable
 from typing import ClassVar
@@ -11,13 +12,13 @@ from textual.widgets import Input, Label
 
 from study.tui.dismiss_screen import dismiss_screen
 
-MOST_CHARACTERS = 500
-"""Longest note, as on the note's own screen."""
+MAX_NOTE_CHARACTERS = 500
+"""Longest note (characters). Chosen; the same as in `note`."""
 
 
 class NotePrompt(ModalScreen[str | None]):
-    """Entry of one line for a note of the experimenter: Enter writes it, Esc leaves, F8 stops the session. Returns the
-    text; None where it is empty or was left."""
+    """Dialog with an input line at the bottom: Enter returns the text, Esc cancels, F8 stops the session. Returns None
+    if the text is empty or the entry was cancelled."""
 
     CSS = """
     NotePrompt { align: center bottom; }
@@ -32,20 +33,20 @@ class NotePrompt(ModalScreen[str | None]):
     ]
 
     def __init__(self, adverse: bool, stop: Callable[[], None]) -> None:
-        """adverse: whether an adverse event is noted. stop: stops the session."""
+        """adverse: whether the note reports an adverse event. stop: called for F8, to stop the session."""
         super().__init__()
-        self._adverse = adverse
+        self._is_adverse = adverse
         self._stop = stop
 
     def compose(self) -> ComposeResult:
-        with Vertical() as box:
-            box.border_title = "Adverse event" if self._adverse else "Note"
+        with Vertical() as dialog:
+            dialog.border_title = "Adverse event" if self._is_adverse else "Note"
             yield Label(
                 "What happened to the participant (pain, numbness, a fright)?"
-                if self._adverse
+                if self._is_adverse
                 else "What is to be noted? No names: the log is kept with the data."
             )
-            yield Input(max_length=MOST_CHARACTERS, placeholder="one sentence")
+            yield Input(max_length=MAX_NOTE_CHARACTERS, placeholder="one sentence")
             yield Label("Enter writes it into the log, Escape leaves, F8 stops the session.")
 
     def on_input_submitted(self, event: Input.Submitted) -> None:

@@ -14,7 +14,7 @@ from textual.widgets import Footer, OptionList
 from textual.widgets.option_list import Option
 
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.views.views import AfterPause, PauseNotice
+from study.session.views.participant_views import AfterPause, PauseNotice
 from study.session.watching.requests import NoteAsked
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.screens.confirm_withdrawal import ConfirmWithdrawal

@@ -8,7 +8,7 @@ from textual.containers import Horizontal
 from textual.widgets import Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.views.views import PlayingNotice, Unanswered
+from study.session.views.participant_views import PlayingNotice, Unanswered
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.translated_screen import TranslatedScreen
 from study.tui.trial_replies import LEAVING, PAUSE

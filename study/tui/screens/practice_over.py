@@ -1,4 +1,5 @@
-"""Screen after a short practice run: number of correct answers, and whether the criterion of the practice was met."""
+"""Screen after a practice run: number of correct answers, and whether the criterion of the practice was met. Opened by
+`study.tui.app.sitting_screens`."""
 
 from typing import ClassVar
 
@@ -7,7 +8,7 @@ from textual.binding import Binding, BindingType
 from textual.widgets import Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.views.views import PracticeResult
+from study.session.views.participant_views import PracticeResult
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.translated_screen import TranslatedScreen
 from study.tui.widgets.card import Card
@@ -15,7 +16,7 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class PracticeOverScreen(TranslatedScreen[None]):
-    """Shows how many of the last answers were right, and whether that is enough; Enter closes it. Returns nothing."""
+    """Shows how many of the last answers were correct, and whether that meets the criterion; Enter closes it."""
 
     PAGE = "help_practice"
     DEFAULT_CSS = "PracticeOverScreen { align: center middle; }"

@@ -12,7 +12,7 @@ from textual.binding import Binding, BindingType
 from textual.widgets import Digits, Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.views.views import RestNotice
+from study.session.views.participant_views import RestNotice
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.translated_screen import TranslatedScreen
 from study.tui.trial_words import describe_progress

@@ -16,7 +16,7 @@ from textual.widgets import Footer, Input, Label, Static
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.engine.from_engine import CalibrationComputed, CalibrationStored, PlacementRequest
 from study.tui.engine.to_engine import CalibrateSensor, KeepSensor, LetGo, Reply
-from study.tui.home_messages import CommandWanted
+from study.tui.home_messages import CommandRequested
 
 HELP = """\
 # The accelerometer in six positions
@@ -126,16 +126,16 @@ class SensorScreen(Screen[None]):
             self.query_one("#seen", Static).update("")
             self._lock(True)
             self._show_line("The port is opened…")
-            self.post_message(CommandWanted(CalibrateSensor(port, int(baud))))
+            self.post_message(CommandRequested(CalibrateSensor(port, int(baud))))
 
     def action_go_on(self) -> None:
         """Enter: confirm the position, else have the result written, else begin from a field."""
         if self._waits_for is not None:
             self._note(f"{self._waits_for.position}: listening, leave it at rest…")
-            self.post_message(CommandWanted(Reply(self._waits_for.number, True)))
+            self.post_message(CommandRequested(Reply(self._waits_for.number, True)))
             self._waits_for = None
         elif self._table:
-            self.post_message(CommandWanted(KeepSensor(self._table)))
+            self.post_message(CommandRequested(KeepSensor(self._table)))
             self._table = ""
             self._show_line("It is written…")
         elif isinstance(self.focused, Input):
@@ -144,7 +144,7 @@ class SensorScreen(Screen[None]):
     def action_leave(self) -> None:
         """Close the screen, and stop a running calibration."""
         if self._under_way:
-            self.post_message(CommandWanted(LetGo()))
+            self.post_message(CommandRequested(LetGo()))
         dismiss_screen(self, None)
 
     @on(Input.Changed)

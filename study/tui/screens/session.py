@@ -18,7 +18,7 @@ from textual.widgets import Footer, Static, TabbedContent, TabPane
 from study.session.views.archive_views import SessionView
 from study.tui.drawing.staircase_drawing import LEGEND
 from study.tui.engine.to_engine import Analyze, Withdraw
-from study.tui.home_messages import CommandWanted, HomeWanted, ResumeWanted, WatchWanted
+from study.tui.home_messages import CommandRequested, HomeRequested, ResumeRequested, WatchRequested
 from study.tui.screens.diagnose_form import DiagnoseForm
 from study.tui.screens.withdraw_prompt import WithdrawPrompt
 from study.tui.session_status import STYLES, describe_session, format_status
@@ -131,17 +131,17 @@ class SessionScreen(Screen[None]):
                 scrollable.focus()
 
     def action_back(self) -> None:
-        self.post_message(HomeWanted())
+        self.post_message(HomeRequested())
 
     def action_resume(self) -> None:
-        self.post_message(ResumeWanted(self._view.line.path))
+        self.post_message(ResumeRequested(self._view.line.path))
 
     def action_watch(self) -> None:
-        self.post_message(WatchWanted(self._view.line.path))
+        self.post_message(WatchRequested(self._view.line.path))
 
     def action_analyze(self) -> None:
         self.notify("Analyzing. The report is refreshed when it is done.")
-        self.post_message(CommandWanted(Analyze(self._view.line.path)))
+        self.post_message(CommandRequested(Analyze(self._view.line.path)))
 
     def action_diagnose(self) -> None:
         self.app.push_screen(DiagnoseForm(self._view.line.path))
@@ -152,7 +152,7 @@ class SessionScreen(Screen[None]):
     def action_withdraw(self) -> None:
         def act_on_decision(erase: bool | None) -> None:
             if erase:
-                self.post_message(CommandWanted(Withdraw(self._view.line.path)))
+                self.post_message(CommandRequested(Withdraw(self._view.line.path)))
 
         self.app.push_screen(WithdrawPrompt(self._view.line.subject), act_on_decision)
 

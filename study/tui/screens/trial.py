@@ -17,11 +17,11 @@ from textual.timer import Timer
 from textual.widgets import Footer
 
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.views.views import Answered, Question, Reply, Task, Unanswered
+from study.session.views.participant_views import Answered, Question, Reply, Task, Unanswered
 from study.tui.keys.answer_keys import DIGITS, AnswerKeys
-from study.tui.keys.key_presses import KeyPresses, arrival_s
+from study.tui.keys.key_presses import KeyPressDetector, get_arrival_time_s
 from study.tui.translated_screen import TranslatedScreen
-from study.tui.trial_replies import LEAVING, PAUSE, REPEAT, TIME_OVER, repeat_words
+from study.tui.trial_replies import LEAVING, PAUSE, REPEAT, TIME_OVER, format_repeat_text
 from study.tui.trial_words import choose_run_text, format_heading
 from study.tui.widgets.direction_panel import DirectionPanel, Mark
 from study.tui.widgets.literal_text import LiteralText
@@ -75,7 +75,7 @@ class TrialScreen(TranslatedScreen[None]):
     def __init__(self, keys: AnswerKeys = DIGITS, words: Words = ENGLISH_WORDS) -> None:
         super().__init__(words)
         self._keys = keys
-        self._presses = KeyPresses()
+        self._presses = KeyPressDetector()
         self._question: Question | None = None
         self._repeats_left: int | None = None
         self._armed_s: float | None = None
@@ -149,7 +149,7 @@ class TrialScreen(TranslatedScreen[None]):
 
     def on_key(self, event: Key) -> None:
         """Take an answer, or explain why a key has no effect."""
-        arrival_time_s = arrival_s(event)
+        arrival_time_s = get_arrival_time_s(event)
         answer = self._keys.parse_answer(event.character or event.key)
         if answer is not None:
             event.stop()
@@ -201,7 +201,9 @@ class TrialScreen(TranslatedScreen[None]):
         self.post_message(self.Replied(reply))
         self._stop_time_limit()
         self._show_message(
-            self.words[REPLY_TEXTS[reply]] if reply in REPLY_TEXTS else repeat_words(self._repeats_left, self.words)
+            self.words[REPLY_TEXTS[reply]]
+            if reply in REPLY_TEXTS
+            else format_repeat_text(self._repeats_left, self.words)
         )
 
     def _end_at_time_limit(self) -> None:

@@ -1,7 +1,7 @@
-"""Help texts of the experimenter's view (`study.tui.watch`): its keys, and the meaning of what its panels show."""
+"""Help texts of the experimenter's view (`study.tui.watch.watch_screen`): its keys, and the meaning of its panels."""
 
-GUIDE = "You only watch: S stops, p pauses, n notes. Directions show after the answer."
-"""The most important keys, as a single line of the view."""
+KEY_GUIDE = "You only watch: S stops, p pauses, n notes. Directions show after the answer."
+"""The most important keys, as one line of the view."""
 
 HELP = """\
 # Watching a session
@@ -27,4 +27,4 @@ what the handle did along the direction, *off* across it. ↺ marks a reversal, 
 
 The direction of a trial stays hidden until its answer is in, so that you cannot give it away.
 """
-"""The help page, in Markdown."""
+"""Help page of the view, in Markdown."""

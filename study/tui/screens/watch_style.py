@@ -1,8 +1,8 @@
-"""Style sheet of the experimenter's view: two columns in a narrow terminal, three in a wide terminal.
+"""Style sheet of the experimenter's view (`study.tui.watch.watch_screen`): two columns in a narrow terminal, three in a
+wide one.
 
 The classes `-narrow` and `-wide` depend on the width of the terminal. The key for details sets the class `details`,
-which shows the third column, in a narrow terminal in place of the other two; in a wide terminal, where it is shown
-already, `details` hides it.
+which in a narrow terminal shows the third column in place of the other two, and in a wide terminal hides it.
 """
 
 STYLE = """

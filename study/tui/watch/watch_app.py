@@ -1,6 +1,7 @@
-"""Application of `hapteq watch`: the experimenter's view of a running session in a second terminal.
+"""Application of `hapteq watch` (`study.cli.watch`): the experimenter's view of a running session in a second terminal.
 
-The view itself is `watch_screen.WatchScreen`; this application adds themes, key handling and its end.
+The view itself is `watch_screen.WatchScreen`; this application adds themes, the queue of user input, and the exit on
+signals.
 """
 
 from __future__ import annotations
@@ -14,17 +15,17 @@ from textual.binding import Binding, BindingType
 from textual.events import Event
 
 from study.session.watching.requests import Request
-from study.tui.departure import leave_with_the_terminal
-from study.tui.keys.key_names import key_name
-from study.tui.keys.keys_in_order import KeysInOrder
+from study.tui.exit_handlers import install_exit_handlers
+from study.tui.keys.input_queue import InputQueue
+from study.tui.keys.key_names import format_key_name
 from study.tui.themes import DARK, NEXT_THEME, register_themes
 from study.tui.watch.watch_screen import WatchScreen
 from study.tui.watch.watch_source import WatchSource
 
 
 class WatchApp(App[None]):
-    """Shows the experimenter's view until it is left. The key t changes the theme; all other keys belong to the
-    screen."""
+    """Application with the experimenter's view as its only screen. The key t changes the theme; the screen handles all
+    other keys."""
 
     TITLE = "hapteq watch"
     BINDINGS: ClassVar[list[BindingType]] = [Binding("t", "next_theme", "Theme", show=False)]
@@ -32,17 +33,17 @@ class WatchApp(App[None]):
     def __init__(
         self,
         source: WatchSource,
-        ask: Callable[[Request], object],
+        send_request: Callable[[Request], object],
         theme: str = DARK.name,
         clock_s: Callable[[], float] = time.monotonic,
     ) -> None:
-        """source: provides the views. ask: passes a request on to the session; raises StudyError where that fails.
-        theme: name of the first theme. clock_s: monotonic time (s), for the repetition of alarms."""
+        """source: provides the views of the session. send_request: sends a request to the session; raises StudyError
+        where that fails. theme: name of the first theme. clock_s: monotonic time (s), for the repetition of alarms."""
         super().__init__()
         self._source = source
-        self._ask = ask
+        self._send_request = send_request
         self._clock_s = clock_s
-        self._keys = KeysInOrder(self, super().on_event)
+        self._keys = InputQueue(self, super().on_event)
         self.animation_level = "none"
         register_themes(self, theme)
 
@@ -50,11 +51,11 @@ class WatchApp(App[None]):
         await self._keys.handle_event(event)
 
     def get_key_display(self, binding: Binding) -> str:
-        return key_name(super().get_key_display(binding))
+        return format_key_name(super().get_key_display(binding))
 
     def on_mount(self) -> None:
-        leave_with_the_terminal(self, self.exit)
-        self.push_screen(WatchScreen(self._source, self._ask, self._clock_s))
+        install_exit_handlers(self, self.exit)
+        self.push_screen(WatchScreen(self._source, self._send_request, self._clock_s))
 
     def on_watch_screen_left(self) -> None:
         self.exit()

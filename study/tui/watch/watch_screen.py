@@ -1,6 +1,6 @@
 """Screen of `hapteq watch`: the experimenter's view of a running session, without the direction of the open trial.
 
-It reads the session's files; it can request a stop or a pause, and add notes. Shown by `watch_app` and `watch_in_app`.
+It reads the session's files; it can request a stop or a pause, and add notes. Shown by `watch_app`, `watch_controller`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from study.errors import StudyError
 from study.session.watching.requests import NoteAsked, PauseAsked, Request, StopAsked
 from study.session.watching.watch_view import RUNNING_STATUSES, Alarm, WatchView
 from study.tui.screens.note_prompt import NotePrompt
-from study.tui.screens.watch_help import GUIDE, HELP
+from study.tui.screens.watch_help import HELP, KEY_GUIDE
 from study.tui.screens.watch_style import STYLE
 from study.tui.watch import watch_panels
 from study.tui.watch.level_history import LevelHistory
@@ -143,7 +143,7 @@ class WatchScreen(Screen[None]):
 
     def compose(self) -> ComposeResult:
         yield Static(id="standing")
-        yield Static(GUIDE, id="guide")
+        yield Static(KEY_GUIDE, id="guide")
         yield Static(id="alarms")
         with Horizontal():
             with Vertical(id="left"):
@@ -208,7 +208,7 @@ class WatchScreen(Screen[None]):
             self.app.bell()
         self._show_alarms()
         if now_s - self._message_shown_s > MESSAGE_DURATION_S:
-            self._update_guide(GUIDE, reply=False)
+            self._update_guide(KEY_GUIDE, reply=False)
 
     def _filter_session_alarms(self) -> tuple[Alarm, ...]:
         """Alarms of the view, except for an end that was requested here."""

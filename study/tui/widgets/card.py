@@ -1,11 +1,11 @@
-"""Containers for text with lines of a readable width: a framed card for short text, a scrolling sheet for long
-text."""
+"""Containers of the participant's screens (`study.tui.screens`), with lines of readable width: a framed card for short
+text, a scrolling sheet for long text."""
 
 from textual.containers import Vertical, VerticalScroll
 
 
 class Card(Vertical):
-    """A framed box with a title, as high as its content. The screen's alignment places it."""
+    """Framed box with a title, as high as its content, at most as the screen. The screen's `align` style places it."""
 
     DEFAULT_CSS = """
     Card {
@@ -22,7 +22,7 @@ class Card(Vertical):
 
 
 class Sheet(VerticalScroll):
-    """A column that scrolls, for text that is longer than the screen."""
+    """Column that scrolls vertically, for text that is longer than the screen."""
 
     DEFAULT_CSS = """
     Sheet {

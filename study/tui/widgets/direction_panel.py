@@ -15,7 +15,7 @@ from textual.strip import Strip
 from textual.widget import Widget
 
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.views.views import DirectionPicture
+from study.session.views.participant_views import DirectionPicture
 from study.tui.drawing.direction_picture import describe_direction, draw_large_direction
 from study.tui.drawing.number_picture import large_number
 

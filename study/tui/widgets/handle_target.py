@@ -12,7 +12,7 @@ from textual.reactive import reactive
 from textual.strip import Strip
 from textual.widget import Widget
 
-from study.session.views.views import HandleView
+from study.session.views.participant_views import HandleView
 from study.tui.drawing.braille import Canvas
 
 

@@ -1,4 +1,5 @@
-"""Scrolling view of many lines of text: only visible lines are drawn, and long lines are wrapped between words."""
+"""Scrolling view of many lines of text: only visible lines are drawn, and long lines are wrapped between words. Used by
+the screen of a session (`study.tui.screens.session`) for its log."""
 
 import re
 import textwrap
@@ -9,12 +10,12 @@ from textual.scroll_view import ScrollView
 from textual.strip import Strip
 
 _LINE_HEAD = re.compile(r".{1,16}?\s{2,}")
-"""A time or name at the start of a line, followed by two spaces or more: continuation lines are indented by its
-length."""
+"""Label at the start of a line, such as a time: 1 to 16 characters and at least two blanks. Continuation lines are
+indented by its length."""
 
 
 class LongText(ScrollView, can_focus=True):
-    """Lines of text, wrapped at the width of the widget and drawn as they scroll into view; arrow and page keys
+    """Widget for lines of text, wrapped at its width and drawn when they scroll into view; arrow and page keys
     scroll."""
 
     DEFAULT_CSS = "LongText { background: $background; }"
@@ -22,35 +23,36 @@ class LongText(ScrollView, can_focus=True):
     def __init__(self, lines: tuple[str, ...], *, id: str | None = None) -> None:
         super().__init__(id=id)
         self._lines = lines
-        self._wrapped: list[str] = []
+        self._wrapped_lines: list[str] = []
         self._width = 0
 
     def show(self, lines: tuple[str, ...]) -> None:
-        """Replace the lines."""
+        """Show these lines in place of the previous ones."""
         self._lines, self._width = lines, 0
-        self._wrap(self.scrollable_content_region.width)
+        self._wrap_lines(self.scrollable_content_region.width)
 
     def on_resize(self) -> None:
-        self._wrap(self.scrollable_content_region.width)
+        self._wrap_lines(self.scrollable_content_region.width)
 
     def render_line(self, y: int) -> Strip:
         index = y + self.scroll_offset.y
-        text = self._wrapped[index] if index < len(self._wrapped) else ""
+        text = self._wrapped_lines[index] if index < len(self._wrapped_lines) else ""
         width = self.scrollable_content_region.width
         return Strip([Segment(text, self.rich_style)]).adjust_cell_length(width, self.rich_style)
 
-    def _wrap(self, width: int) -> None:
-        """Wrap all lines to `width` cells, unless they are wrapped to it already."""
+    def _wrap_lines(self, width: int) -> None:
+        """Wrap all lines to `width` characters and redraw, unless they are wrapped to this width already or it is 0."""
         if width <= 0 or width == self._width:
             return
         self._width = width
-        self._wrapped = [part for line in self._lines for part in _parts(line, width)]
-        self.virtual_size = Size(width, len(self._wrapped))
+        self._wrapped_lines = [wrapped_line for line in self._lines for wrapped_line in _wrap_line(line, width)]
+        self.virtual_size = Size(width, len(self._wrapped_lines))
         self.refresh()
 
 
-def _parts(line: str, width: int) -> list[str]:
-    """A line wrapped to `width` characters, continuation lines indented; not indented by half the width or more."""
+def _wrap_line(line: str, width: int) -> list[str]:
+    """Wrap a line to `width` characters. Continuation lines are indented by the label, if it is shorter than half the
+    width."""
     if len(line) <= width:
         return [line]
     head = _LINE_HEAD.match(line)

@@ -14,17 +14,17 @@ from textual.content import Content
 from textual.widgets import Button, Input, Label, Select, Static
 
 from study.session.views.archive_views import HomeView, SessionLine
-from study.session.views.participant_codes import code_problem, is_code, suggest_code
+from study.session.views.participant_codes import explain_invalid_code, is_code, suggest_code
 from study.session.views.printable import replace_unprintable
 from study.session.views.resume_command import SIMULATED_DEVICE
-from study.tui.home_messages import BeginWanted
+from study.tui.home_messages import BeginRequested
 
 PLACEHOLDER_OPTIONS = [("…", "")]
 """Entry of a list whose choices are not known yet; the list is disabled."""
 
 
 class NewSessionForm(Vertical):
-    """Fields of a new session. F5 or the button posts `BeginWanted` if all fields are valid; otherwise a line below
+    """Fields of a new session. F5 or the button posts `BeginRequested` if all fields are valid; otherwise a line below
     names the problem, and the field of the code or of the protocol gets the focus."""
 
     DEFAULT_CSS = """
@@ -79,17 +79,17 @@ class NewSessionForm(Vertical):
     @on(Input.Submitted, "#code")
     @on(Button.Pressed, "#begin")
     def _submit(self) -> None:
-        """Post `BeginWanted`, or show the problem and focus its field."""
+        """Post `BeginRequested`, or show the problem and focus its field."""
         if self._home is None or self.query_one("#begin", Button).disabled:
             return
         code = self._code
-        problem = code_problem(code) or self._find_withdrawal_problem(code)
+        problem = explain_invalid_code(code) or self._find_withdrawal_problem(code)
         if problem or self._model_problem:
             self._show_about(problem or self._model_problem, "-problem")
             self.query_one("#code" if problem else "#protocol").focus()
             return
         model = self._read_selected("#model") if self._is_equalized else ""
-        self.post_message(BeginWanted(code, self._read_selected("#protocol"), self._read_selected("#device"), model))
+        self.post_message(BeginRequested(code, self._read_selected("#protocol"), self._read_selected("#device"), model))
 
     @on(Input.Changed, "#code")
     @on(Select.Changed)
@@ -100,7 +100,7 @@ class NewSessionForm(Vertical):
         code = self._code
         self.set_class(self._is_equalized, "-equalized")
         if code and not is_code(code):
-            self._show_about(code_problem(code), "-problem")
+            self._show_about(explain_invalid_code(code), "-problem")
         elif problem := self._find_withdrawal_problem(code):
             self._show_about(problem, "-problem")
         elif self._model_problem:
@@ -187,7 +187,7 @@ def _format_device_option(name: str) -> str:
 
 def _format_model_option(path: str, home: HomeView) -> str:
     """Format a model in the list: its file name, and its quality where that is known."""
-    quality = home.quality_of(path)
+    quality = home.describe_quality(path)
     return f"{_extract_file_name(path)} ({quality})" if quality else _extract_file_name(path)
 
 

@@ -1,4 +1,5 @@
-"""Widget above a trial: one line with the position in the session, a progress bar and the estimated minutes left."""
+"""Progress line of the trial screen (`study.tui.screens.trial`): position in the session, progress bar and minutes
+left."""
 
 from rich.segment import Segment
 from rich.style import Style
@@ -7,36 +8,35 @@ from textual.strip import Strip
 from textual.widget import Widget
 
 from protocols.wording.words import ENGLISH_WORDS, Words
-from study.session.views.views import Progress
+from study.session.views.participant_views import Progress
 
 DONE, REMAINING = "━", "─"
-"""Characters of the bar: done, and still to do."""
+"""Characters of the bar, for the part that is done and the part that remains."""
 
 
 class SessionBar(Widget):
-    """One line: run and trial on the left; on the right the bar, the share of the session that is done, and the minutes
-    left."""
+    """Widget of one line. Left: run and trial. Right: progress bar, percentage done, and estimated minutes left."""
 
     DEFAULT_CSS = """
     SessionBar { height: 1; padding: 0 1; background: $panel; color: $foreground; }
     """
 
     heading: reactive[str] = reactive("")
-    """Run and trial, in words."""
+    """Text on the left: run and trial."""
     progress: reactive[Progress | None] = reactive[Progress | None](None)
-    """Share done and minutes left; None shows no bar."""
+    """Share of the session that is done, and minutes left; None: nothing is shown on the right."""
 
     def __init__(self, words: Words = ENGLISH_WORDS) -> None:
-        """words: texts of the participant's language."""
+        """words: texts in the language of the participant."""
         super().__init__()
         self._words = words
 
     def render_line(self, y: int) -> Strip:
-        """The line as Textual draws it. The heading is cut only where the shortest bar, 8 columns, leaves no room."""
+        """Draw the line. The heading is cut only where the shortest bar, 8 characters, leaves too little room."""
         width = self.size.width
-        # The bar has at most 40 columns or a quarter of the width; it shrinks to 8, so that the words are not cut off.
-        room = width - len(self.heading) - 1 - len(self._progress_text(0))
-        right_text = self._progress_text(max(8, min(40, width // 4, room)))
+        # The bar has at most 40 characters and a quarter of the width. It shrinks to 8, so that the heading is not cut.
+        available_width = width - len(self.heading) - 1 - len(self._format_progress(0))
+        right_text = self._format_progress(max(8, min(40, width // 4, available_width)))
         left_text = self.heading[: max(0, width - len(right_text) - 1)]
         gap = " " * (width - len(left_text) - len(right_text))
         style = self.rich_style
@@ -44,11 +44,14 @@ class SessionBar(Widget):
             0, width
         )
 
-    def _progress_text(self, bar: int) -> str:
-        """The bar, `bar` columns wide, the share and the minutes left; empty without progress."""
+    def _format_progress(self, bar_width: int) -> str:
+        """Format the bar (`bar_width` characters), the percentage and the minutes left; empty where `progress` is None.
+        The minutes are left out where they are unknown."""
         if self.progress is None:
             return ""
-        done = min(bar, round(self.progress.share_done * bar))
-        minutes = self.progress.minutes_left
-        minutes_text = "" if minutes is None else f"  {self._words.fill('bar_left', {'minutes': minutes})}"
-        return f"{DONE * done}{REMAINING * (bar - done)} {self.progress.share_done:4.0%}{minutes_text}"
+        done_width = min(bar_width, round(self.progress.share_done * bar_width))
+        minutes_left = self.progress.minutes_left
+        minutes_text = "" if minutes_left is None else f"  {self._words.fill('bar_left', {'minutes': minutes_left})}"
+        return (
+            f"{DONE * done_width}{REMAINING * (bar_width - done_width)} {self.progress.share_done:4.0%}{minutes_text}"
+        )

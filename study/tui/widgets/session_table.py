@@ -18,7 +18,7 @@ from study.local_clock import convert_to_machine_zone
 from study.session.views.archive_views import SessionLine
 from study.session.views.local_time import format_times_in_zone
 from study.tui.engine.to_engine import ShowSession
-from study.tui.home_messages import CommandWanted, ResumeWanted, WatchWanted
+from study.tui.home_messages import CommandRequested, ResumeRequested, WatchRequested
 from study.tui.session_status import STYLES, format_status
 
 _NAME_TITLE, _STATUS_TITLE, _START_TITLE, _RUNS_TITLE, _ANSWERS_TITLE, _PROTOCOL_TITLE = (
@@ -137,17 +137,17 @@ class SessionTable(DataTable[Content | str]):
     def on_data_table_row_selected(self) -> None:
         """Ask for the session under the cursor to be shown."""
         if self._selected_line is not None:
-            self.post_message(CommandWanted(ShowSession(self._selected_line.path)))
+            self.post_message(CommandRequested(ShowSession(self._selected_line.path)))
 
     def action_resume(self) -> None:
         """Ask for the session under the cursor to be resumed."""
         if self._selected_line is not None:
-            self.post_message(ResumeWanted(self._selected_line.path))
+            self.post_message(ResumeRequested(self._selected_line.path))
 
     def action_watch(self) -> None:
         """Ask for the session under the cursor to be watched."""
         if self._selected_line is not None:
-            self.post_message(WatchWanted(self._selected_line.path))
+            self.post_message(WatchRequested(self._selected_line.path))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """The footer shows only actions that apply to the session under the cursor."""

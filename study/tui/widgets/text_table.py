@@ -1,4 +1,5 @@
-"""Read-only table as text: bold header, aligned columns, as wide as its content; the container must scroll."""
+"""Table widget as text: bold header, aligned columns, as wide as its content; the container must scroll. Used by the
+screens `diagnosis` and `session`."""
 
 from textual.content import Content
 from textual.widgets import Static
@@ -7,10 +8,11 @@ from study.tui.text_rows import Rows, align_rows
 
 
 class TextTable(Static):
-    """A table of text. rows: the first is the header; no rows give an empty line."""
+    """Static table."""
 
     DEFAULT_CSS = "TextTable { width: auto; height: auto; }"
 
     def __init__(self, rows: Rows, *, id: str | None = None) -> None:
+        """rows: rows of cells, of which the first is the header; without rows, an empty line is shown."""
         header, *body = align_rows(rows) or ("",)
         super().__init__(Content("\n").join([Content.styled(header, "bold"), *map(Content, body)]), id=id)

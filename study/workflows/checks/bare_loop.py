@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from study.session.views.views import DeviceFinding
+from study.session.views.participant_views import DeviceFinding
 
 SOURCE = Path(__file__).with_name("bare_loop.c")
 """Source of the C loop."""

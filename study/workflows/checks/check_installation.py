@@ -19,7 +19,7 @@ from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
 import study
-from study.session.views.views import DeviceFinding
+from study.session.views.participant_views import DeviceFinding
 from study.store.disk.privacy import format_privacy_warning
 
 HAPTEQ = "hapteq"

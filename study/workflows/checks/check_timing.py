@@ -18,13 +18,13 @@ from study.devices.opening import check_loop_priority, open_telemetry
 from study.session.stimulus.held_stimulus import HeldStimulus
 from study.session.stimulus.timing_verdict import (
     Lateness,
-    judge_late,
+    judge_late_ticks,
     judge_lateness,
     judge_load,
-    judge_missed,
+    judge_missed_ticks,
     measure_lateness,
 )
-from study.session.views.views import DeviceFinding
+from study.session.views.participant_views import DeviceFinding
 
 ZERO_FORCE_PERIOD_S = 0.1
 """Length of the period of zero forces that is repeated (s)."""
@@ -143,10 +143,10 @@ def _judge_timing(
 ) -> tuple[DeviceFinding, ...]:
     """Judge loop, missed and late ticks, lateness, and that no force was commanded."""
     simulated, late_ticks = device.info.simulated, health.late_ticks + health.missed_ticks
-    late_finding = judge_late(late_ticks, 1000 * health.latest_s, health.ticks, load_per_processor)
+    late_finding = judge_late_ticks(late_ticks, 1000 * health.latest_s, health.ticks, load_per_processor)
     return (
         _judge_loop(seconds, health),
-        judge_missed(health.missed_ticks, health.ticks, simulated, load_per_processor),
+        judge_missed_ticks(health.missed_ticks, health.ticks, simulated, load_per_processor),
         *(() if simulated else (late_finding,)),
         judge_lateness(lateness, simulated),
         DeviceFinding("Force", f"{health.peak_command_n:g} N commanded", fine=health.peak_command_n == 0.0),

@@ -1,11 +1,15 @@
-"""Load average of this computer, one of the checks before a sitting: a busy computer delays the device's loop."""
+"""Load average of this computer: a busy computer delays the control loop of the device.
+
+Called by the checks before a sitting (`prepare_sitting`, `examine_setup`), and by `study.tui.engine.remote_display` to
+explain a screen that does not respond.
+"""
 
 import os
 
 
-def load_per_processor() -> float | None:
-    """Load average of the last minute divided by the number of processors that this program may use: 1 = all are busy.
-    None where the system states no load average."""
+def get_load_per_processor() -> float | None:
+    """Load average of the last minute divided by the number of processors that this program may use; 1: all are busy.
+    None where the system has no load average (Windows)."""
     try:
         load = os.getloadavg()[0]
     except (AttributeError, OSError):  # Windows has no load average

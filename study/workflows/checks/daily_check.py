@@ -20,7 +20,7 @@ from study.devices.opening import find_accepted_baseline, get_device_folder, nee
 from study.errors import DeviceError, StudyError, WrongUseError
 from study.local_clock import convert_to_machine_zone
 from study.session.views.local_time import format_time_in_zone, split_time_in_zone
-from study.session.views.views import DeviceFinding
+from study.session.views.participant_views import DeviceFinding
 from study.store.disk.provenance import compute_sha256
 from study.store.formats.daily_check_file import DailyCheck, read_daily_check, write_daily_check
 from study.store.formats.protocol_files import read_recording_protocol

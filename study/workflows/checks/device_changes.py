@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from analysis.wording import format_signed
-from study.session.views.views import DeviceFinding
+from study.session.views.participant_views import DeviceFinding
 
 if TYPE_CHECKING:
     from analysis.device_change.compare_devices import Change

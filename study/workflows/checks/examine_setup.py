@@ -16,15 +16,15 @@ from study.devices.opening import accept_device, examine_device, get_limit_test_
 from study.errors import DeviceError, ExitCode, WrongUseError
 from study.session.stimulus.timing_verdict import judge_load
 from study.session.views.handle_notice import format_limit_test_notice
-from study.session.views.views import DeviceFinding, DeviceReport
+from study.session.views.participant_views import DeviceFinding, DeviceReport
 from study.store.formats.protocol_files import read_study_protocol
 from study.workflows.checks.bare_loop import compare_with_bare_loop, run_bare_loop_in_parallel
 from study.workflows.checks.check_device import check_device
 from study.workflows.checks.check_installation import Terminal, check_installation
 from study.workflows.checks.check_timing import Timing, check_timing
-from study.workflows.checks.computer_load import load_per_processor
+from study.workflows.checks.computer_load import get_load_per_processor
 from study.workflows.checks.daily_check import MotionCallbacks, record_baseline
-from study.workflows.device_settings import device_settings
+from study.workflows.device_settings import make_device_settings
 
 PROTOCOL_NAME = "direction_threshold"
 """Protocol whose safety limits and settings the device is opened with."""
@@ -104,7 +104,7 @@ def _examine_device(
 
 def _measure_timing(device: Device, clock: Clock, duration_s: float, on_progress: Callable[[float], None]) -> Timing:
     """Measure the timing for `duration_s` (s), and compare it with a bare loop that runs at the same time."""
-    load, is_simulated = load_per_processor(), device.info.simulated
+    load, is_simulated = get_load_per_processor(), device.info.simulated
     with run_bare_loop_in_parallel(
         duration_s, device.info.sample_rate_hz, raised_priority=not is_simulated
     ) as bare_loop_run:
@@ -113,7 +113,7 @@ def _measure_timing(device: Device, clock: Clock, duration_s: float, on_progress
     late_ticks, ticks = timing.health.late_ticks + timing.health.missed_ticks, timing.health.ticks
     if is_simulated:
         ticks = round(duration_s * device.info.sample_rate_hz)
-        late_ticks = round(timing.lateness.missing_a_tick * ticks)
+        late_ticks = round(timing.lateness.missed_fraction * ticks)
     comparison = compare_with_bare_loop(late_ticks, ticks, bare_loop_run)
     return replace(timing, findings=(*timing.findings, comparison, judge_load(load)))
 
@@ -121,7 +121,7 @@ def _measure_timing(device: Device, clock: Clock, duration_s: float, on_progress
 def _make_settings(name: str, timing_s: float) -> DeviceSettings:
     """Settings of a study without the centring spring, because nothing may move during the timing; without a hand on a
     real device. timing_s: duration (s) that a hold must permit."""
-    settings = device_settings(read_study_protocol(PROTOCOL_NAME).protocol)
+    settings = make_device_settings(read_study_protocol(PROTOCOL_NAME).protocol)
     longest_hold_s = max(settings.limits.longest_hold_s, timing_s + HOLD_MARGIN_S)
     limits = replace(settings.limits, longest_hold_s=longest_hold_s)
     free_settings = replace(settings, limits=limits, spring_frequency_hz=0.0, spring_damping_n_s_per_m=0.0)

@@ -1,4 +1,7 @@
-"""Diagnosis that is started from a screen of the application: it can be stopped, and finds an unused folder name."""
+"""Run a diagnosis that was started from a screen of the application, and choose the folder of its results.
+
+Called by the engine process (`study.tui.engine.engine_commands`).
+"""
 
 from collections.abc import Callable
 from itertools import count
@@ -10,8 +13,9 @@ from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, diagnose
 
 
 def diagnose_at_screen(plan: DiagnosePlan, on_progress: Callable[[str, float], None]) -> Path:
-    """Run a diagnosis and return the path of its diagnosis.json. on_progress: called with the step and the share done,
-    0 to 1. Raises StudyError; UserInterruptError if it was stopped. Nothing is written then."""
+    """Run a diagnosis, and return the path of its diagnosis.json. on_progress: called with the name of the step and the
+    share done, 0 to 1. Raises StudyError where the diagnosis fails, and UserInterruptError where the user stopped it;
+    no results are written then."""
     try:
         return diagnose_recordings(plan, on_progress).out / DIAGNOSIS_NAME
     except KeyboardInterrupt as stopped:
@@ -23,9 +27,9 @@ def diagnose_at_screen(plan: DiagnosePlan, on_progress: Callable[[str, float], N
         ) from stopped
 
 
-def free_out(source: Path) -> Path:
-    """Unused path for the result folder: `diagnosis` in the folder of a session, or NAME-diagnosis next to the
-    recording NAME.h5; numbered from 2 where it exists."""
+def choose_result_folder(source: Path) -> Path:
+    """Choose an unused path for the folder of the results: `diagnosis` in the folder of a session, or NAME-diagnosis
+    next to the recording NAME.h5; with -2, -3, ... appended where it exists."""
     folder, name = (source, "diagnosis") if source.is_dir() else (source.parent, f"{source.stem}-diagnosis")
     numbered_paths = (folder / (name if number == 1 else f"{name}-{number}") for number in count(1))
     return next(path for path in numbered_paths if not path.exists())

@@ -27,7 +27,7 @@ from equalizer.plant.linear_simulation import compute_driven_axes
 from equalizer.plant.mechanical_model import MechanicalModel, suggest_word
 from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
-from study.store.disk.new_folder import new_folder, require_new_folder
+from study.store.disk.new_folder import create_new_folder, require_new_folder
 from study.workflows.crash_guard import make_crash_guard
 from study.workflows.diagnosis.diagnosis_input import (
     DiagnosisInput,
@@ -181,7 +181,7 @@ def write_answer(answer: Answer, on_progress: Progress) -> DiagnosedRecordings:
         from study.store.sessions.written_elsewhere import note_written_folder
 
         note_written_folder(session, plan.out)
-    with new_folder(plan.out) as folder:
+    with create_new_folder(plan.out) as folder:
         findings = write_diagnosis_into(folder, answer.findings, answer.parents)
     on_progress("done", 1.0)
     return DiagnosedRecordings(findings, plan.out)

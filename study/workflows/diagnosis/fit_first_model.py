@@ -19,7 +19,7 @@ from study.errors import StudyError, WrongUseError
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.workflows.diagnosis.diagnosis_input import read_input
-from study.workflows.free_name import require_free
+from study.workflows.output_paths import require_new_outputs
 
 ERROR_TITLE = "The model was not made"
 """Title of each error message of this command."""
@@ -51,7 +51,7 @@ def fit_first_model(plan: FirstModelPlan, on_progress: Callable[[float], None]) 
     """Fit a model and write it. `on_progress(share)`, 0 to 1. Raises StudyError for a folder, for recordings with an
     added weight, and where no structure fits; nothing is written then."""
     requested_kind = _parse_structure(plan.structure)
-    require_free(plan.out, title=ERROR_TITLE, kind="models")
+    require_new_outputs(plan.out, title=ERROR_TITLE, kind="models")
     if folders := [path for path in plan.recordings if path.is_dir()]:
         raise StudyError(
             ERROR_TITLE, f"{folders[0]} is a folder, and a model is fitted to recordings.",

@@ -19,7 +19,7 @@ from study.store.formats.diagnosis_file import DIAGNOSIS_NAME, MODEL_NAME, PAGE_
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.workflows.crash_guard import make_crash_guard
 from study.workflows.forked_map import map_forked
-from study.workflows.picture_files import DrawnPicture, draw_picture, write_drawn
+from study.workflows.picture_files import DrawnPicture, draw_picture, write_drawn_pictures
 
 
 def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Path]) -> Findings:
@@ -35,7 +35,7 @@ def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Pat
         drawn_picture for part_pictures in guard.run_parts(map_forked, parts) for drawn_picture in part_pictures
     ]
     findings = replace(findings, remarks=(*guard.sentences, *findings.remarks))
-    write_drawn(folder / "figures", drawn_pictures)
+    write_drawn_pictures(folder / "figures", drawn_pictures)
     page = render_diagnosis_report(
         findings,
         [drawn_picture.picture for drawn_picture in drawn_pictures],

@@ -34,7 +34,7 @@ from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.protocol_files import read_recording_protocol
 from study.store.formats.recording_file import read_recording
 from study.workflows.diagnosis.twin_calibration import check_same_device, describe_calibration, make_inertia_effects
-from study.workflows.free_name import require_free
+from study.workflows.output_paths import require_new_outputs
 from study.workflows.recording.record_device import RecordingPlan, record_device
 
 TITLE = "The model was not made"
@@ -146,7 +146,7 @@ def _fit_models(
 
 def check_output_and_band(plan: TwinPlan) -> None:
     """Check the output path and the band, before anything moves. Raises StudyError."""
-    require_free(plan.out, title=TITLE, kind="models", saved="Nothing moved and nothing was written.")
+    require_new_outputs(plan.out, title=TITLE, kind="models", saved="Nothing moved and nothing was written.")
     low_hz, high_hz = plan.band_hz
     if not (math.isfinite(low_hz) and math.isfinite(high_hz) and 0 < low_hz < high_hz):
         raise WrongUseError(

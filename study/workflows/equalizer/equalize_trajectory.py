@@ -23,7 +23,7 @@ from study.errors import StudyError, WrongUseError
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.playback_models import PlaybackModels, Vector, compute_peak_gain, read_playback_models
-from study.workflows.free_name import require_free
+from study.workflows.output_paths import require_new_outputs
 
 MAX_ACCELERATION_MPS2 = 1e4
 """Largest accepted acceleration (m/s^2), a thousand times gravity: larger values indicate a wrong unit in the table."""
@@ -113,7 +113,7 @@ def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
 
 def check_free(out_path: Path, *further_paths: Path) -> None:
     """Check that no output path exists, before any work. Raises StudyError."""
-    require_free(out_path, *further_paths, title="The forces were not computed", kind="tables")
+    require_new_outputs(out_path, *further_paths, title="The forces were not computed", kind="tables")
 
 
 def _read_reference(path: Path) -> Trajectory:

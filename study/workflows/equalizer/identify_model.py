@@ -36,7 +36,7 @@ from study.workflows.equalizer.recordings_without_effects import (
     list_removable_effects,
     remove_effects,
 )
-from study.workflows.free_name import require_free
+from study.workflows.output_paths import require_new_outputs
 
 SAME_PLACE_TOLERANCE_M = 0.001
 """Largest difference (m) per coordinate of handle positions that count as the same place: a model is valid at a single
@@ -145,7 +145,7 @@ def _assess_quality(
 
 def check_free(out_path: Path) -> None:
     """Check, before any work, that the output file does not exist and its folder does. Raises StudyError."""
-    require_free(out_path, title="The model was not made", kind="models")
+    require_new_outputs(out_path, title="The model was not made", kind="models")
 
 
 def _make_settings(plan: IdentifyPlan) -> IdentificationSettings:

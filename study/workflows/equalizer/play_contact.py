@@ -29,7 +29,7 @@ from study.errors import DeviceError, StudyError, UserInterruptError, WrongUseEr
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S
 from study.session.views.handle_notice import BeforeMoving, refuse_unannounced
 from study.store.disk.json_document import write_json
-from study.store.disk.new_folder import new_folder, require_new_folder
+from study.store.disk.new_folder import create_new_folder, require_new_folder
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.play_forces import (
@@ -242,7 +242,7 @@ def _write_play(play: ContactPlay, models: PlaybackModels) -> None:
     from study.workflows.picture_files import write_pictures
 
     rate_hz = play.sample_rate_hz
-    with new_folder(play.plan.out) as folder:
+    with create_new_folder(play.plan.out) as folder:
         for name, samples, table_kind in (
             ("forces.csv", play.equalized.forces, FORCES),
             ("wanted.csv", play.reference, TRAJECTORY),

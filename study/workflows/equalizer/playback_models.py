@@ -15,7 +15,7 @@ import numpy as np
 from analysis.wording import format_sentence, typeset
 from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_quality import ModelQuality, find_worst_quality
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 from equalizer.tracking.bands.narrow_and_wide_models import TwoModels
 from equalizer.tracking.feedforward.trajectory import FORCES, TRAJECTORY
 from equalizer.tracking.workspace.feedforward_at_place import select_used_models
@@ -225,7 +225,7 @@ def compute_peak_gain(model: IdentifiedModel) -> float:
     """Largest magnitude of the response of an output to an input in the band (m/s² per N), over `GAIN_FREQUENCY_COUNT`
     frequencies; NaN or infinity where the response overflows."""
     with np.errstate(over="ignore", invalid="ignore"):
-        return float(np.abs(model_response(model, np.geomspace(*model.band_hz, GAIN_FREQUENCY_COUNT))).max())
+        return float(np.abs(compute_model_response(model, np.geomspace(*model.band_hz, GAIN_FREQUENCY_COUNT))).max())
 
 
 def _are_at_same_place(models: tuple[IdentifiedModel, ...]) -> bool:

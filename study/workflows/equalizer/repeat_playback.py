@@ -25,7 +25,7 @@ from study.devices.opening import needs_real_time, open_device
 from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S
 from study.session.views.handle_notice import BeforeMoving, refuse_unannounced
-from study.store.formats.repeats_file import repeats_path
+from study.store.formats.repeats_file import get_repeats_path
 from study.workflows.equalizer.play_forces import (
     announce_motion,
     play_forces,
@@ -83,7 +83,7 @@ def _check(plan: RepeatPlan) -> None:
         )
     if plan.repeats < 1:
         raise not_repeated(f"{plan.repeats} repeats were requested.", "Give 1 or more to --repeat.")
-    for path in () if plan.out is None else (plan.out, repeats_path(plan.out)):
+    for path in () if plan.out is None else (plan.out, get_repeats_path(plan.out)):
         if path.exists():
             raise not_repeated(f"{path} exists already, and results are never overwritten.", "Choose another --out.")
     if plan.out is not None and not plan.out.absolute().parent.is_dir():

@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from equalizer.signals.signal import FloatArray, Signal
-from equalizer.tracking.feedforward.trajectory import FORCES, Trajectory, trajectory_csv
+from equalizer.tracking.feedforward.trajectory import FORCES, Trajectory, format_trajectory_csv
 from equalizer.tracking.feedforward.virtual_spring import NO_SPRING, VirtualSpring
 from equalizer.tracking.learning.iteration import IterationState, Verdict
 from equalizer.tracking.learning.model_inverse import InverseOfLength
 from study.devices.device import DeviceSettings, PlaybackResult
 from study.errors import StudyError
 from study.store.disk.provenance import gather_provenance
-from study.store.formats.repeats_file import Repeats, read_repeats, repeats_path, write_repeats
+from study.store.formats.repeats_file import Repeats, get_repeats_path, read_repeats, write_repeats
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 
 
@@ -105,7 +105,7 @@ def write_best_forces(plan: RepeatPlan, state: IterationState, interrupted: bool
     repeats = Repeats(
         trajectory_sha256=hash_trajectory(plan.reference),
         model_sha256=plan.model_sha256,
-        forces_sha256=_hash_text(trajectory_csv(table)),
+        forces_sha256=_hash_text(format_trajectory_csv(table)),
         device=plan.device,
         place_m=plan.settings.place_m,
         band_hz=plan.band_hz,
@@ -118,22 +118,22 @@ def write_best_forces(plan: RepeatPlan, state: IterationState, interrupted: bool
         remark=state.remark,
         interrupted=interrupted,
     )
-    write_repeats(repeats_path(plan.out), repeats, gather_provenance(seeds={"device": plan.seed}))
+    write_repeats(get_repeats_path(plan.out), repeats, gather_provenance(seeds={"device": plan.seed}))
 
 
 def read_earlier_forces(forces: Path, reference: Trajectory, model_sha256: str) -> FloatArray:
     """(N, 3), N: forces that an earlier run found for the same trajectory and model. Raises StudyError if one of them
     differs, or the table was changed."""
-    document, table = read_repeats(repeats_path(forces)), read_trajectory(forces)
+    document, table = read_repeats(get_repeats_path(forces)), read_trajectory(forces)
     matches_by_subject = {
         "another trajectory": document.trajectory_sha256 == hash_trajectory(reference),
         "another model": document.model_sha256 == model_sha256,
-        "a table of forces that was changed since": document.forces_sha256 == _hash_text(trajectory_csv(table)),
+        "a table of forces that was changed since": document.forces_sha256 == _hash_text(format_trajectory_csv(table)),
     }
     if differing_subjects := [subject for subject, matches in matches_by_subject.items() if not matches]:
         raise StudyError(
             "The repeats cannot continue from the earlier forces",
-            f"{repeats_path(forces).name} belongs to {' and '.join(differing_subjects)}.",
+            f"{get_repeats_path(forces).name} belongs to {' and '.join(differing_subjects)}.",
             "Leave it out to begin with the model's own forces.",
             saved="Nothing moved.",
         )

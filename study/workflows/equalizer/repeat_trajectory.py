@@ -21,7 +21,7 @@ from equalizer.tracking.learning.model_inverse import compensate_spring
 from equalizer.tracking.workspace.convergence_at_place import convergence_at
 from equalizer.tracking.workspace.feedforward_at_place import make_inverse_at
 from study.session.views.handle_notice import BeforeMoving, refuse_unannounced
-from study.store.formats.repeats_file import repeats_path
+from study.store.formats.repeats_file import get_repeats_path
 from study.workflows.equalizer.equalize_trajectory import (
     EqualizedTrajectory,
     EqualizePlan,
@@ -78,7 +78,7 @@ def repeat_trajectory(
     Raises StudyError: before anything moves where an output exists or where cap, models or convergence test do not
     allow repeats; later where the device fails or the user interrupts.
     """
-    check_free(plan.out, repeats_path(plan.out))
+    check_free(plan.out, get_repeats_path(plan.out))
     equalized = solve_trajectory(plan)
     _require_repeatable(equalized.models)
     if equalized.feedforward.loss is not None:
@@ -115,7 +115,7 @@ def summarise_repeats(result: RepeatedTrajectory) -> dict[str, Any]:
     return {
         **summarise_equalization(result.equalized),
         "peak_n": _compute_peak_n(repeated),
-        "repeats": str(repeats_path(result.equalized.plan.out)),
+        "repeats": str(get_repeats_path(result.equalized.plan.out)),
         "errors": list(repeated.errors),
         "noise_floor": repeated.noise_floor,
         "kept": repeated.best_play,

@@ -13,7 +13,10 @@ from analysis.reports.identification_report import (
     render_identification_report,
 )
 from equalizer.identification.frequency_response.coupling_onset import find_coupling_onset
-from equalizer.identification.frequency_response.frequency_bands import PUBLISHED_DIRECTION_LIMIT_HZ, frequency_bands
+from equalizer.identification.frequency_response.frequency_bands import (
+    PUBLISHED_DIRECTION_LIMIT_HZ,
+    compute_frequency_bands,
+)
 from equalizer.identification.frequency_response.resonances import find_resonances
 from equalizer.identification.state_space.order_report import OrderReport, compare_orders
 from equalizer.identification.state_space.refusals import IdentificationRefused
@@ -53,7 +56,7 @@ def collect_findings(device: IdentifiedDevice, on_progress: Callable[[float], No
         model=device.model,
         resonances=find_resonances(device.estimate),
         onset=onset,
-        bands=frequency_bands(onset.frequency_hz, lowest_hz=lowest_hz, highest_hz=highest_hz),
+        bands=compute_frequency_bands(onset.frequency_hz, lowest_hz=lowest_hz, highest_hz=highest_hz),
         direction_limit_hz=PUBLISHED_DIRECTION_LIMIT_HZ,
         order=_compare_lower_orders(device, on_progress),
         results=format_summary(device),

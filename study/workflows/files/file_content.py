@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from study.regular_file import DOCUMENT_BYTES
+from study.regular_file import MAX_DOCUMENT_BYTES
 from study.store.disk.file_errors import CannotReadError, UnusableFileError
 from study.store.disk.hdf5_file import is_hdf5, read_format
 from study.store.disk.strict_json import load_json
-from study.store.disk.text_file import TOML_BYTES, read_text, too_long_key
+from study.store.disk.text_file import MAX_TOML_BYTES, find_long_key, read_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,16 +64,16 @@ def open_content(path: Path) -> FileContent:
 
 
 def _parse_json(text: str) -> Any:
-    """Parse a JSON document; None if the text is longer than `DOCUMENT_BYTES` or not JSON."""
+    """Parse a JSON document; None if the text is longer than `MAX_DOCUMENT_BYTES` or not JSON."""
     try:
-        return load_json(text) if len(text) <= DOCUMENT_BYTES else None
+        return load_json(text) if len(text) <= MAX_DOCUMENT_BYTES else None
     except ValueError:
         return None
 
 
 def _parse_toml(text: str) -> dict[str, Any] | None:
     """Parse a TOML document; None if it is not TOML, or if text or a key is too long: parsing would take minutes."""
-    if len(text) > TOML_BYTES or too_long_key(text):
+    if len(text) > MAX_TOML_BYTES or find_long_key(text):
         return None
     try:
         return tomllib.loads(text)

@@ -24,7 +24,7 @@ from protocols.document.schema import make_protocol_schema
 from protocols.trial import Trial
 from study.session.facts import log_chain
 from study.session.facts.events import EVENTS
-from study.session.watching.live import Live
+from study.session.watching.live_state import Live
 from study.store.disk.csv_rows import describe_type, list_columns
 from study.store.disk.layout import Entry
 from study.store.disk.text_file import write_text
@@ -43,7 +43,7 @@ def make_event_schema() -> dict[str, Any]:
     schema = EVENTS.json_schema()
     for event in schema["$defs"].values():
         if "event" in event.get("properties", {}):
-            event["properties"]["chain"] = {"type": "string", "pattern": f"^[0-9a-f]{{{log_chain.DIGITS}}}$"}
+            event["properties"]["chain"] = {"type": "string", "pattern": f"^[0-9a-f]{{{log_chain.CHECKSUM_DIGITS}}}$"}
     return schema
 
 
@@ -88,7 +88,9 @@ SCHEMAS: tuple[Schema, ...] = (
     Schema(
         "seal.json",
         "`seal.json`, next to the log of a closed session",
-        lambda: make_document_schema(log_seal.SEAL.json_schema(), log_seal.SEAL_FORMAT, log_seal.SEAL_VERSION),
+        lambda: make_document_schema(
+            log_seal.SEAL_VALIDATOR.json_schema(), log_seal.SEAL_FORMAT, log_seal.SEAL_VERSION
+        ),
     ),
     Schema("recording_protocol.json", "recording protocols, read from TOML", lambda: make_protocol_schema("recording")),
     Schema(
@@ -104,7 +106,9 @@ SCHEMAS: tuple[Schema, ...] = (
     Schema(
         "repeats.json",
         f"`*{repeats_file.SUFFIX}`, {format_text.REPEATS}",
-        lambda: make_document_schema(repeats_file.REPEATS.json_schema(), repeats_file.FORMAT, repeats_file.VERSION),
+        lambda: make_document_schema(
+            repeats_file.REPEATS_VALIDATOR.json_schema(), repeats_file.FORMAT, repeats_file.VERSION
+        ),
     ),
     Schema(
         "reproduction.json",
@@ -226,7 +230,9 @@ def _format_csv_tables() -> Iterable[str]:
 
 def _format_layout(entries: Iterable[Entry]) -> str:
     """Markdown table of the entries of a file."""
-    rows = [(f"`{entry.name}`", entry.holds, entry.meaning, "yes" if entry.required else "no") for entry in entries]
+    rows = [
+        (f"`{entry.name}`", entry.type_and_shape, entry.meaning, "yes" if entry.required else "no") for entry in entries
+    ]
     return _format_markdown_table(("name", "holds", "meaning", "required"), rows)
 
 

@@ -103,10 +103,11 @@ SESSION_LOG = (
     "One JSON object per line. Lines are appended and never changed. Each line is an event of the schema "
     "`session_event.json`. Times are ISO 8601 with date and UTC offset, durations are in seconds, and file names are "
     "relative to the session's folder.",
-    f"**Hash chain.** A line ends with the field `chain`: the first {log_chain.DIGITS} hexadecimal digits of a "
-    "SHA-256. The hashed bytes are the checksum of the previous line, a line feed, and the line without this field, "
-    "without the comma before it and without the line end. For the first line the previous checksum is "
-    f"{log_chain.DIGITS} zeros. Lines of older versions have no `chain`, but are hashed too. If such a log is "
+    "**Hash chain.** A line ends with the field `chain`: the first "
+    f"{log_chain.CHECKSUM_DIGITS} hexadecimal digits of a SHA-256. The hashed bytes are the checksum of the previous "
+    "line, a line feed, and the line without this field, without the comma before it and without the line end. For the "
+    "first line the previous checksum is "
+    f"{log_chain.CHECKSUM_DIGITS} zeros. Lines of older versions have no `chain`, but are hashed too. If such a log is "
     "continued, its first checksum therefore covers the lines before it.",
     "**Seal.** When a session is closed, `seal.json` is written once. It contains the session's name, the number of "
     "lines and of bytes, the last checksum, and the SHA-256 of these bytes. It distinguishes a log whose end was cut "

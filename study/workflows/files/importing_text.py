@@ -1,22 +1,22 @@
-"""Prose of docs/importing.md: how recordings of other programs are imported, in Markdown.
+"""Prose of docs/importing.md, in Markdown: how recordings of other programs are imported.
 
-`importing_docs` puts the text together with the tables of keys, functions and shipped maps. Limits of size come from
-the constants of the code that reads a file, so that page and code agree.
+`importing_docs` joins the text with the tables of keys, functions and shipped maps. The limits of size are inserted
+from the constants of the code that reads the files, so that page and code agree.
 """
 
 from equalizer.signals.resampling import PASSBAND
 from equalizer.signals.units import ALLOWED
-from study.importing.arrays.csv_arrays import MOST_ROWS
+from study.importing.arrays.csv_arrays import MAX_ROWS
 from study.importing.expressions.budget import (
     COMPUTED_NUMBERS,
     COMPUTED_PER_NUMBER,
     HELD_NUMBERS,
     HELD_PER_NUMBER,
     MAX_EXPRESSION_DEPTH,
-    MAX_HELD,
+    MAX_HELD_NUMBERS,
 )
-from study.regular_file import TABLE_BYTES
-from study.store.disk.declared_size import FACTOR, MOST_BYTES, PLAIN_BYTES
+from study.regular_file import MAX_TABLE_BYTES
+from study.store.disk.declared_size import MAX_EXPANSION, MAX_LIMIT_BYTES, MIN_LIMIT_BYTES
 
 EXAMPLE = """\
 device = "one axis of our rig"
@@ -85,7 +85,7 @@ kind = "noise"
 start_s = 1.0
 role = "test"
 """
-"""The page's example of a map."""
+"""Example of an import map (TOML)."""
 
 _COMMANDS = """\
 # Importing recordings of others
@@ -239,18 +239,18 @@ EXPRESSIONS = (
     "`rate_hz` the rate. Other syntax is refused: an expression cannot run code.",
     "Limits for all expressions of an import together, definitions included: "
     f"{HELD_NUMBERS:.0e} numbers at once, plus {HELD_PER_NUMBER} for each number in the files (at most "
-    f"{MAX_HELD:.0e}); {COMPUTED_NUMBERS:.0e} computed numbers, plus {COMPUTED_PER_NUMBER} for each number in the "
-    f"files; {MAX_EXPRESSION_DEPTH} levels of nesting. Expressions beyond these limits are refused, by name.",
+    f"{MAX_HELD_NUMBERS:.0e}); {COMPUTED_NUMBERS:.0e} computed numbers, plus {COMPUTED_PER_NUMBER} for each number in "
+    f"the files; {MAX_EXPRESSION_DEPTH} levels of nesting. Expressions beyond these limits are refused, by name.",
 )
 """Paragraphs on expressions, above the table of functions."""
 
 NOT_READ = (
     "* **Special files.** Only regular files are read: no pipes, devices or folders.\n"
     "* **Size.** The declared size of a file's contents is checked against its size on disk before memory is "
-    f"allocated. It may be {PLAIN_BYTES // 2**20} MiB for any file, and for larger contents {FACTOR} times the bytes "
-    f"on disk, at most {MOST_BYTES // 2**30} GiB (an hour of nine channels at 10 kHz is 2.6 GB). If a file is refused "
-    "for this reason, compress it less or cut the recording. Tables may have "
-    f"{TABLE_BYTES // 2**20} MiB and {MOST_ROWS:.0e} rows.\n"
+    f"allocated. It may be {MIN_LIMIT_BYTES // 2**20} MiB for any file, and for larger contents {MAX_EXPANSION} times "
+    f"the bytes on disk, at most {MAX_LIMIT_BYTES // 2**30} GiB (an hour of nine channels at 10 kHz is 2.6 GB). If a "
+    "file is refused for this reason, compress it less or cut the recording. Tables may have "
+    f"{MAX_TABLE_BYTES // 2**20} MiB and {MAX_ROWS:.0e} rows.\n"
     "* **HDF5.** No external storage, no virtual datasets, no links to other files.\n"
     "* **NPY and NPZ.** Versions 1.0 and 2.0, stored or deflated; no Python objects.\n"
     "* **MAT.** Versions 5 to 7.3 (Matlab's -v6, -v7, -v7.3). Texts, sparse matrices, objects (timeseries, tables) and "

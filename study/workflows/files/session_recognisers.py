@@ -7,13 +7,13 @@ SHA-256 in the log, and the tables are compared with what the log gives.
 from dataclasses import MISSING, fields
 from pathlib import Path
 
-from protocols.document.lock import FORMAT as LOCK_FORMAT
+from protocols.document.lock import LOCK_FORMAT as LOCK_FORMAT
 from protocols.document.lock import LockError, lock_from_json
 from study.errors import StudyError
 from study.local_clock import convert_to_machine_zone
 from study.session.facts.events import SESSION_FORMAT, TrialMeasured
 from study.session.views.local_time import format_time_in_zone
-from study.session.watching.live import Live
+from study.session.watching.live_state import Live
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.json_document import read_json
 from study.store.disk.provenance import compute_sha256
@@ -154,7 +154,7 @@ def _describe(folded_session: FoldedSession) -> str:
     ).rstrip(".")
     sealed = f", sealed to line {folded_session.sealed_lines}" if folded_session.sealed_lines else ""
     kind = f"session {state.opened.session} of {participant}, {state.protocol.name}, {state.answers} answers, {end}"
-    return f"{kind}; log {folded_session.log_contents.chain.in_words()}{sealed}{steps}"
+    return f"{kind}; log {folded_session.log_contents.chain.describe()}{sealed}{steps}"
 
 
 SESSION_RECOGNISERS = (recognise_session, recognise_document, recognise_lock)

@@ -12,12 +12,12 @@ import numpy as np
 
 from analysis.look.driven_band import find_silent_segments
 from study.errors import StudyError
-from study.importing.arrays.arrays import FOREIGN, HDF5, RECORDS, TABLES
-from study.regular_file import DOCUMENT_BYTES
+from study.importing.arrays.read_arrays import FOREIGN_ENDINGS, HDF5_ENDINGS, JSON_ENDINGS, TABLE_ENDINGS
+from study.regular_file import MAX_DOCUMENT_BYTES
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.privacy import format_privacy_warning
 from study.store.disk.strict_json import load_json
-from study.store.disk.text_file import TOML_BYTES, too_long_key
+from study.store.disk.text_file import MAX_TOML_BYTES, find_long_key
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.archive import FOLDER_PATTERN
 from study.workflows.files.file_content import FileContent, open_content
@@ -91,7 +91,7 @@ def _validate(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
         return Validation(path, "unreadable", (error.happened,))
     kind, problem = _describe_unknown(content)
     unknown_validation = Validation(path, kind, (problem[0].upper() + problem[1:] + ".",))
-    may_be_foreign = path.is_file() and path.suffix.lower() in (*FOREIGN, *HDF5)
+    may_be_foreign = path.is_file() and path.suffix.lower() in (*FOREIGN_ENDINGS, *HDF5_ENDINGS)
     if not may_be_foreign or content.hdf5_format or content.json_format:
         return unknown_validation
     return _validate_foreign(path, kind, unknown_validation.problems)
@@ -101,7 +101,7 @@ def _is_foreign(path: Path) -> bool:
     """Whether a file exists whose extension belongs to recordings of other programs, and to no file of hapteq."""
     extension = path.suffix.lower()
     try:
-        return extension in FOREIGN and extension not in (*TABLES, *RECORDS) and path.is_file()
+        return extension in FOREIGN_ENDINGS and extension not in (*TABLE_ENDINGS, *JSON_ENDINGS) and path.is_file()
     except OSError:  # not a possible file name
         return False
 
@@ -143,7 +143,7 @@ def _describe_unknown(content: FileContent) -> tuple[str, str]:
 def _explain_json(content: FileContent) -> str:
     """Why a JSON document is not recognised."""
     try:
-        load_json((content.text or "")[: DOCUMENT_BYTES + 1])
+        load_json((content.text or "")[: MAX_DOCUMENT_BYTES + 1])
     except ValueError as error:
         return f"this is not JSON: {error}"
     if content.json_format is None:
@@ -154,9 +154,9 @@ def _explain_json(content: FileContent) -> str:
 def _explain_toml(content: FileContent) -> str:
     """Why a TOML file is not recognised."""
     text = content.text or ""
-    if len(text) > TOML_BYTES:
-        return f"it has {len(text)} characters; up to {TOML_BYTES} are read"
-    if problem := too_long_key(text):
+    if len(text) > MAX_TOML_BYTES:
+        return f"it has {len(text)} characters; up to {MAX_TOML_BYTES} are read"
+    if problem := find_long_key(text):
         return problem
     try:
         tomllib.loads(text)

@@ -33,7 +33,7 @@ from study.devices.opening import open_linkage
 from study.errors import DeviceError, WrongUseError
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.calibration_file import write_calibration
-from study.workflows.free_name import require_free
+from study.workflows.output_paths import require_new_outputs
 
 if TYPE_CHECKING:
     from study.devices.opening import LinkageSource
@@ -76,7 +76,7 @@ def calibrate_linkage(plan: CalibrationPlan, on_progress: Callable[[float], None
     """Read, check, complete and write the calibration. Nothing moves: the device's library computes Jacobian, inertia
     and gravity. on_progress: called with the fraction of the positions that were read. Raises StudyError; nothing is
     written then."""
-    require_free(plan.out, title=ERROR_TITLE, kind="calibrations", saved=NOTHING_DONE)
+    require_new_outputs(plan.out, title=ERROR_TITLE, kind="calibrations", saved=NOTHING_DONE)
     if not (
         DIFFERENCE_STEP_M < plan.radius_m <= MAX_GRID_SIZE_M and DIFFERENCE_STEP_M < plan.depth_m <= MAX_GRID_SIZE_M
     ):

@@ -15,7 +15,7 @@ from typing import Any
 from equalizer.signals.joining import join, signals_left_out
 from equalizer.signals.recording import Recording
 from study.errors import WrongUseError
-from study.importing.arrays.arrays import Arrays
+from study.importing.arrays.read_arrays import Arrays
 from study.importing.build_recording import build_recording
 from study.importing.header_map import describe_header_choices, find_header_problems, make_header_map, read_without_map
 from study.importing.map_format.import_map import ImportMap
@@ -31,7 +31,7 @@ from study.store.disk.hdf5_file import is_hdf5, read_format
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.recording_file import read_recording, write_recording
 from study.store.formats.recording_layout import FORMAT
-from study.workflows.free_name import require_free
+from study.workflows.output_paths import require_new_outputs
 
 Progress = Callable[[float], None]
 """Called with the share of the work that is done, 0 to 1."""
@@ -62,7 +62,7 @@ class Imported:
 
 def check_free(out_path: Path) -> None:
     """Raise StudyError if `out_path` exists already, or its folder does not."""
-    require_free(out_path, title="Nothing was imported", kind="recordings")
+    require_new_outputs(out_path, title="Nothing was imported", kind="recordings")
 
 
 def import_recording(plan: ImportPlan, on_progress: Progress = lambda share: None) -> Imported:

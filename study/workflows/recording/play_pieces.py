@@ -1,7 +1,8 @@
-"""Play the pieces of a recording one after another, for `record_device`.
+"""Play the pieces of a recording on a device one after another. Called by `record_device`.
 
-A piece is played again with a lower amplitude where the sensor or the force reached its limit. Each play of a piece is
-a take; the last take is kept."""
+A piece is a sinusoid, a sweep or a multisine realisation; each play of a piece is a take. Where the sensor or the force
+reached its limit, the piece is played again with a lower amplitude; the last take is kept.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,12 +13,12 @@ from study.devices.device import Device, Fault, Health
 from study.errors import DeviceError
 from study.session.stimulus.recording_pieces import RecordingPiece, make_pieces
 
-AMPLITUDE_FACTOR = 0.7
-"""Factor of the amplitude at each further take (3 dB): 0.17 after five. A choice, not a derived value."""
+AMPLITUDE_REDUCTION = 0.7
+"""Factor of the amplitude from a take to the next (-3 dB): 0.17 after five. Chosen."""
 
-MOST_TAKES = 6
-"""Largest number of takes of a piece: a sensor that clips at 0.17 of the amplitude is faulty or configured for another
-device."""
+MAX_TAKES = 6
+"""Largest number of takes of a piece. Chosen: a sensor that clips at 0.17 of the amplitude is faulty, or configured for
+another device."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,35 +26,39 @@ class RecordedTake:
     """The kept take of a piece; unless `is_clipped(health)`, nothing was at its limit."""
 
     piece: RecordingPiece
+    """The piece as finally played, with its amplitude."""
     requested_n: float
     """Amplitude that the protocol requests (N)."""
     tries: int
     """Number of takes, the kept one included."""
     sensor_clipped_before: int
-    """Clipped samples of the accelerometer in the discarded takes."""
+    """Ticks with an accelerometer channel at its limit, in the discarded takes."""
     total_clipped_before: int
-    """Ticks at the cap of the total force, or of the spring's, in the discarded takes."""
+    """Ticks at the cap of the total force plus ticks at that of the spring and damper, in the discarded takes."""
     recording: Recording
+    """Recording of this take."""
     health: Health
+    """Counters of the device during this take."""
 
     @property
     def played_n(self) -> float:
-        """Amplitude as finally played (N); below `requested_n` where something clipped before."""
+        """Amplitude as finally played (N); below `requested_n` where an earlier take was clipped."""
         return self.piece.segment.amplitude
 
 
 def is_clipped(health: Health) -> bool:
-    """Whether something was at its limit, so that the take does not show the device alone."""
+    """Whether the accelerometer, the total force, or the force of spring and damper reached its limit in a take."""
     return bool(health.sensor_clipped or health.total_clipped or health.feedback_clipped)
 
 
 def play_pieces(
-    protocol: RecordingProtocol, device: Device, takes: list[RecordedTake], on_progress: Callable[[float], None]
+    protocol: RecordingProtocol, device: Device, kept_takes: list[RecordedTake], on_progress: Callable[[float], None]
 ) -> None:
-    """Play the whole protocol, appending the kept take of each piece to `takes`. `on_progress(seconds)` steps back
-    where a piece is repeated. A lowered amplitude is kept for later repetitions of the same segment.
+    """Play the whole protocol, and append the kept take of each piece to `kept_takes`. A lowered amplitude is also used
+    for later repetitions of the same segment and frequency.
 
-    Raises `DeviceError` when the device stops.
+    on_progress: called with the seconds played, repeated takes not counted; decreases where a piece is repeated. Raises
+    DeviceError where the device stopped; `kept_takes` then has the pieces before.
     """
     total_s = 0.0
     amplitude_shares: dict[tuple[int, float | None], float] = {}
@@ -68,7 +73,7 @@ def play_pieces(
             lambda share: on_progress(started_s + share * piece_s),  # noqa: B023
         )
         amplitude_shares[segment_key] = take.played_n / take.requested_n
-        takes.append(take)
+        kept_takes.append(take)
         total_s += piece_s
         on_progress(total_s)
 
@@ -78,37 +83,39 @@ def _repeat_until_unclipped(
     device: Device,
     piece: RecordingPiece,
     amplitude_share: float,
-    on_share: Callable[[float], None],
+    on_progress: Callable[[float], None],
 ) -> RecordedTake:
-    """The first take in which nothing was at its limit, or the last take. amplitude_share: amplitude of the first take
-    relative to the requested amplitude."""
+    """Play a piece with decreasing amplitude until a take is not clipped (`is_clipped`), and return the last take. It
+    may be clipped after `MAX_TAKES` takes, at the protocol's least amplitude, or where the protocol does not lower the
+    amplitude. amplitude_share: amplitude of the first take relative to the requested one; on_progress: called with the
+    share of the take that is played, 0 to 1."""
     requested_n = piece.segment.amplitude
     least_n = min(protocol.least_amplitude_n, requested_n)
     amplitude_n, sensor_clipped, total_clipped = amplitude_share * requested_n, 0, 0
-    for tries in range(1, MOST_TAKES + 1):
+    for tries in range(1, MAX_TAKES + 1):
         scaled_piece = piece if amplitude_n == requested_n else piece.scale_to(amplitude_n)
-        recording, health = _play_take(device, scaled_piece, on_share)
-        is_last = tries == MOST_TAKES or amplitude_n <= least_n or not protocol.lower_on_clip
+        recording, health = _play_take(device, scaled_piece, on_progress)
+        is_last = tries == MAX_TAKES or amplitude_n <= least_n or not protocol.lower_on_clip
         if is_last or not is_clipped(health):
             break
         sensor_clipped += health.sensor_clipped
         total_clipped += health.total_clipped + health.feedback_clipped
-        amplitude_n = max(AMPLITUDE_FACTOR * amplitude_n, least_n)
+        amplitude_n = max(AMPLITUDE_REDUCTION * amplitude_n, least_n)
     return RecordedTake(scaled_piece, requested_n, tries, sensor_clipped, total_clipped, recording, health)
 
 
-def _play_take(device: Device, piece: RecordingPiece, on_share: Callable[[float], None]) -> tuple[Recording, Health]:
-    """Play a piece once. Raises DeviceError where the device stopped."""
-    play_result = device.play(piece.commands, on_share)
+def _play_take(device: Device, piece: RecordingPiece, on_progress: Callable[[float], None]) -> tuple[Recording, Health]:
+    """Play a piece once. Raises DeviceError, with the fault, where the device stopped or returned no recording."""
+    play_result = device.play(piece.commands, on_progress)
     if play_result.recording is None or play_result.health.fault is not Fault.NONE:
         raise DeviceError(
             "The device let go",
-            f"While recording along {describe_direction(piece)}: {play_result.health.fault.value}.",
+            f"While recording along {describe_piece_direction(piece)}: {play_result.health.fault.value}.",
             "Check the device and record again.",
         )
     return play_result.recording, play_result.health
 
 
-def describe_direction(piece: RecordingPiece) -> str:
-    """The direction of a piece for a sentence: an axis, or "all axes"."""
+def describe_piece_direction(piece: RecordingPiece) -> str:
+    """Describe the direction of a piece in a sentence: an axis, a test direction, or "all axes"."""
     return "all axes" if piece.direction_name == "all" else piece.direction_name

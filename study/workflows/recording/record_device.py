@@ -22,7 +22,7 @@ from study.session.stimulus.recording_pieces import make_pieces
 from study.session.views.handle_notice import BeforeMoving, format_recording_notice, refuse_unannounced
 from study.store.disk.provenance import gather_provenance
 from study.store.formats.recording_file import write_recording
-from study.workflows.free_name import require_free
+from study.workflows.output_paths import require_new_outputs
 from study.workflows.recording.play_pieces import RecordedTake, play_pieces
 from study.workflows.recording.recording_metadata import describe_segment, describe_spring, list_warnings
 
@@ -103,7 +103,7 @@ def record_on_device(
 
 def require_free_output(out_path: Path) -> None:
     """Raise StudyError if a file of this name exists, or its folder does not."""
-    require_free(out_path, title="The recording was not started", kind="recordings", saved="Nothing moved.")
+    require_new_outputs(out_path, title="The recording was not started", kind="recordings", saved="Nothing moved.")
 
 
 def _make_interrupted_error(plan: RecordingPlan, take_count: int) -> UserInterruptError:

@@ -1,4 +1,5 @@
-"""Metadata of a recording: parameters of the feedback, and facts and warnings about each played piece (a take)."""
+"""Metadata of a recording that `record_device` stores: parameters of the feedback, and facts about each played piece (a
+take). Also the warnings about each piece for the experimenter."""
 
 import math
 from dataclasses import asdict
@@ -6,12 +7,12 @@ from typing import Any
 
 from protocols.definition.apparatus import SpringSettings
 from study.session.facts.sensor_facts import SensorFacts
-from study.workflows.recording.play_pieces import RecordedTake, describe_direction
+from study.workflows.recording.play_pieces import RecordedTake, describe_piece_direction
 
 
 def describe_spring(spring: SpringSettings, effective_mass_kg: float) -> dict[str, Any]:
-    """Parameters of the virtual spring: command = excitation - k (position - place) - b velocity, in N, with the
-    stiffness k = m (2 pi f0)² from natural frequency f0 and effective mass m, and the damping b."""
+    """Describe the virtual spring as JSON values: command = excitation - k (position - place) - b velocity, in N, with
+    the stiffness k = m (2 pi f0)² from natural frequency f0 and effective mass m, and the damping b."""
     return {
         "kind": "virtual spring about the place",
         "natural_frequency_hz": spring.natural_frequency_hz,
@@ -22,7 +23,8 @@ def describe_spring(spring: SpringSettings, effective_mass_kg: float) -> dict[st
 
 
 def describe_segment(take: RecordedTake) -> dict[str, Any]:
-    """Metadata of one played piece. Clipped values are counted in ticks; amplitudes in N."""
+    """Describe one played piece as JSON values. Clipping is counted in ticks; amplitudes are in N. `number` counts the
+    segments of the protocol from 1, `tries` the takes."""
     piece = take.piece
     return {
         "number": piece.number,
@@ -41,7 +43,8 @@ def describe_segment(take: RecordedTake) -> dict[str, Any]:
 
 
 def list_warnings(take: RecordedTake) -> list[str]:
-    """Sentences for the experimenter on lowered amplitude, clipping, missed ticks, lost packets and the slew limit."""
+    """List warnings for the experimenter, as sentences: lowered amplitude, clipping of the accelerometer, the spring
+    and the force, missed ticks, lost packets, slew limit. Empty without any of these."""
     health, description = take.health, _describe_piece(take)
     warnings = []
     if take.played_n < take.requested_n:
@@ -64,20 +67,21 @@ def list_warnings(take: RecordedTake) -> list[str]:
 
 
 def _describe_lost_packets(sensor: SensorFacts, description: str) -> str:
-    """Sentence on lost packets of the accelerometer. description: the piece in words."""
+    """Format the warning about lost packets of the accelerometer. description: the piece in words."""
     packets = f"{sensor.lost} of {sensor.lost + sensor.packets} packets of the accelerometer were lost"
     return f"{packets} ({description}); at {sensor.unplaced_ticks} of {sensor.ticks} ticks its acceleration is NaN."
 
 
 def _describe_piece(take: RecordedTake) -> str:
-    """The piece in words: its frequency, or the kind of its excitation, and its direction."""
+    """Describe the piece in words: its frequency, or the kind of its excitation, and its direction."""
     piece = take.piece
     kind = f"{piece.frequency_hz:g} Hz" if piece.frequency_hz else piece.segment.kind
-    return f"{kind} along {describe_direction(piece)}"
+    return f"{kind} along {describe_piece_direction(piece)}"
 
 
 def _describe_reduction(take: RecordedTake) -> str:
-    """Sentence on an amplitude that was lowered, here or in an earlier repetition of the same segment ("as before")."""
+    """Format the warning about a lowered amplitude. Its cause is clipping in a discarded take of this piece, or of an
+    earlier repetition of the same segment ("as before")."""
     causes = []
     if take.sensor_clipped_before:
         causes.append(f"the accelerometer clipped in {take.sensor_clipped_before} samples")

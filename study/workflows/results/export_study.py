@@ -17,10 +17,10 @@ from protocols.document.loading import ProtocolError, load_protocol
 from protocols.trial import Trial
 from study.errors import StudyError
 from study.store.disk.file_errors import UnusableFileError
-from study.store.disk.new_folder import new_folder, require_new_folder
+from study.store.disk.new_folder import create_new_folder, require_new_folder
 from study.store.disk.provenance import gather_provenance
 from study.store.formats import tidy_csv
-from study.store.formats.answer_table import answer_table
+from study.store.formats.answer_table import make_answer_table
 from study.store.formats.bids_behaviour import write_bids
 from study.store.formats.psych_ds import (
     DESCRIPTION_NAME,
@@ -68,8 +68,8 @@ def export_study(
     """Write the dataset atomically into the new folder `out_folder`. collected: the sessions of `data` that belong
     together. free_text: include answers that participants wrote in their own words. Raises StudyError."""
     require_new_folder(out_folder)
-    facts, answers = _gather_metadata(collected), answer_table(collected.protocol, collected.forms, free_text)
-    with new_folder(out_folder) as folder:
+    facts, answers = _gather_metadata(collected), make_answer_table(collected.protocol, collected.forms, free_text)
+    with create_new_folder(out_folder) as folder:
         files = WRITERS[form](
             folder, collected.protocol.name, collected.trials, dump_protocol(collected.protocol), facts, answers
         )

@@ -1,8 +1,8 @@
-"""Reads a session: applies the events of its log in order (a fold) and so rebuilds the session's state.
+"""Read a session: compute its state from the events of its log, applied in order (a fold, as in event sourcing).
 
-Every line is checked against its checksum, every level against the rules of the protocol. Nothing on disk is changed.
-All readers of sessions start here, so that damage is always detected.
-"""
+Every line is checked against its checksum, every presentation against the rules of the protocol, and the log against
+its seals and, for an open session, the stored results. Nothing on disk is changed. All workflows that read a session
+call `fold_session`, so that damage is always detected."""
 
 from dataclasses import dataclass
 
@@ -11,8 +11,8 @@ from protocols.document.hashing import protocol_hash
 from protocols.document.loading import ProtocolError, load_protocol
 from study.errors import StudyError
 from study.session.facts.events import SessionOpened
-from study.session.state.draw_check import LogContradiction
 from study.session.state.fold import apply_event
+from study.session.state.presentation_check import LogContradiction
 from study.session.state.state import SessionState, begin_session
 from study.store.sessions.archive import SessionFolder, SessionWithdrawnError
 from study.store.sessions.event_log import LogContents, read_log
@@ -25,20 +25,23 @@ class FoldedSession:
     """A session read from its log: its state and the log's content."""
 
     state: SessionState
+    """State after the last event."""
     log_contents: LogContents
+    """Events and bytes of the log."""
     sealed_lines: int
     """Number of lines of the log that a seal covers; 0 without a seal."""
 
     @property
     def seal_due(self) -> bool:
-        """Whether the session is closed, but the program ended before the seal was written. A log without checksums is
-        never sealed, because its content cannot be verified."""
-        return self.state.closed and bool(self.log_contents.chain.since) and not self.sealed_lines
+        """Whether a seal must be written: the session is closed, its log has checksums, and no seal exists. A log
+        without checksums is never sealed, because its content cannot be verified."""
+        return self.state.closed and bool(self.log_contents.chain.first_checksum_line) and not self.sealed_lines
 
 
 def fold_session(folder: SessionFolder) -> FoldedSession:
-    """Read a session without changing it. Raises StudyError where the log is damaged, belongs to another session or
-    contradicts the rules, and for a withdrawn session."""
+    """Read a session without changing it. Raises StudyError where the log cannot be read, is damaged or incomplete,
+    belongs to another session, or contradicts the rules, the seals or the stored results; SessionWithdrawnError, a
+    StudyError, for a withdrawn session."""
     if folder.withdrawn:
         raise SessionWithdrawnError(folder)
     log_contents = read_log(folder.log)
@@ -56,16 +59,16 @@ def fold_session(folder: SessionFolder) -> FoldedSession:
             "Give the folder its own name back, or take the copy away.",
             saved="Nothing was changed.",
         )
-    number = 1
+    line_number = 1
     try:
         state = begin_session(session_opened, load_logged_protocol(session_opened, folder))
         for event in log_contents.events[1:]:
-            number += 1
+            line_number += 1
             state = apply_event(state, event)
     except (LogContradiction, ArithmeticError) as problem:
         raise StudyError(
             "The session log contradicts the rules",
-            f"Line {number} of {folder.name}: {problem}.",
+            f"Line {line_number} of {folder.name}: {problem}.",
             "If the log was edited, restore it from a copy; if not, use the hapteq that began it (first line).",
             saved="Nothing was changed; every answer is still in the log.",
         ) from problem
@@ -76,8 +79,8 @@ def fold_session(folder: SessionFolder) -> FoldedSession:
 
 
 def _require_complete_log(state: SessionState, folder: SessionFolder) -> None:
-    """Raise StudyError where the stored results cover more than the log, whose end was lost. Such a log otherwise looks
-    like that of an interrupted session."""
+    """Raise StudyError where the stored results of an open session cover more presentations than the log, or a closed
+    session: the end of the log was lost. Otherwise the log would look like that of an interrupted session."""
     is_closed, presentations = read_closed_and_presentations(read_summary(folder.path))
     if is_closed or presentations > len(state.trials):
         covered = "a finished session" if is_closed else f"{presentations} presentations"
@@ -91,8 +94,8 @@ def _require_complete_log(state: SessionState, folder: SessionFolder) -> None:
 
 
 def load_logged_protocol(session_opened: SessionOpened, folder: SessionFolder) -> StudyProtocol:
-    """The protocol stored in a log. Raises StudyError if it cannot be read, is not of a study, or does not match its
-    hash."""
+    """Parse the protocol stored in a log. Raises StudyError where it cannot be parsed, is no study protocol, or does
+    not match its hash."""
     try:
         protocol = load_protocol(session_opened.protocol_text, f"the log of {folder.name}")
     except ProtocolError as problem:

@@ -1,6 +1,6 @@
-"""Result of an analysis and the path of its report, as a value for screen and command line.
+"""Result of an analysis and the path of its report, which `analyze_data` returns to the screens and the command line.
 
-Separate from `analyze_data`, so that importing this value does not load statistics and plots.
+A separate module, so that its import loads no statistics and plots.
 """
 
 from dataclasses import dataclass
@@ -16,6 +16,7 @@ class WrittenAnalysis:
     """Thresholds of an analysis, and the path of the report that was written."""
 
     thresholds: "tuple[Threshold, ...]"
+    """Result of each run of the analysed sessions."""
     table: tuple[str, ...]
     """Group means (N) by frequency, as lines of text."""
     warnings: tuple[str, ...]

@@ -13,7 +13,7 @@ from study.session.state.state import SessionState
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.live_file import write_live
 from study.store.sessions.request_inbox import RequestInbox
-from study.workflows.device_settings import device_settings
+from study.workflows.device_settings import make_device_settings
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.equalize_stimuli import (
     SessionEqualizer,
@@ -31,7 +31,7 @@ from study.workflows.session.resume_session import resume_session
 from study.workflows.session.run_session import run_session
 from study.workflows.trial.display import Display, Hand
 from study.workflows.trial.masking import open_masking_sound
-from study.workflows.trial.requests_port import ManyRequests, QueuedRequests, Requests
+from study.workflows.trial.requests_port import CombinedRequests, QueuedRequests, RequestPort
 from study.workflows.trial.session_supervisor import SessionSupervisor
 from study.workflows.trial.sitting import (
     Pulse,
@@ -54,7 +54,7 @@ class Participant:
     display: Display
     hand: Hand
     clock: Clock
-    requests: Requests = field(default_factory=QueuedRequests)
+    requests: RequestPort = field(default_factory=QueuedRequests)
     """Requests from within this program: notes typed at the display, a stop from another screen."""
     on_session_opened: Callable[[SessionFolder, Device], None] = _ignore_opened
     """Called once with the session, now locked, and the device, which may be stopped from any thread."""
@@ -81,7 +81,7 @@ class ConductedSitting:
 def conduct_new(plan: SessionPlan, device_name: str, participant: Participant) -> ConductedSitting:
     """Open the device, then a new session, and run it."""
     check_model_for_protocol(plan.protocol, plan.model)
-    settings = device_settings(plan.protocol)
+    settings = make_device_settings(plan.protocol)
     with (
         _pulses(participant.clock) as pulse,
         open_masking_sound(plan.protocol.masking, participant.clock, plan.observer) as sound,
@@ -98,7 +98,7 @@ def conduct_resumed(folder: SessionFolder, device_name: str, participant: Partic
     state = fold_session(folder).state
     if state.opened.equalized is not None:
         load_equalizer()
-    settings = device_settings(state.protocol)
+    settings = make_device_settings(state.protocol)
     with (
         _pulses(participant.clock) as pulse,
         open_masking_sound(state.protocol.masking, participant.clock, state.opened.observer) as sound,
@@ -152,12 +152,12 @@ def _run(
     """Run the session. known_steps: clock steps before this sitting; only new ones are reported."""
     folder, protocol, device = opened_session.folder, opened_session.state.protocol, equipment.device
     participant.on_session_opened(folder, device)
-    place_m = device_settings(protocol).place_m
+    place_m = make_device_settings(protocol).place_m
     inbox = RequestInbox(folder.path)
     supervisor = SessionSupervisor(
         device,
         participant.clock,
-        ManyRequests(participant.requests, inbox),
+        CombinedRequests(participant.requests, inbox),
         publish=lambda live: write_live(folder.path, live),
         buttons=protocol.trial.device_buttons,
         place_m=place_m,

@@ -9,7 +9,7 @@ from dataclasses import replace
 from study.devices.device import Fault
 from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.facts.void_reasons import TOO_BUSY
-from study.session.views.count_text import answers_are
+from study.session.views.count_text import format_answer_count
 from study.session.views.resume_command import format_resume_command
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.session_lock import hold_session_lock
@@ -78,7 +78,7 @@ def _make_unfinished_error(sitting: ConductedSitting) -> StudyError:
         f"The sitting ended: {sitting.end_reason}."
         f"{f' {sitting.fault_text[0].upper()}{sitting.fault_text[1:]}.' if sitting.fault_text else ''}",
         f"{advice}Continue with: {format_resume_command(str(sitting.folder.path), sitting.device_name)}",
-        saved=f"{answers_are(sitting.state.answers)} on disk.",
+        saved=f"{format_answer_count(sitting.state.answers)} on disk.",
     )
 
 

@@ -225,14 +225,16 @@ def _check_axes(model: IdentifiedModel, path: Path) -> None:
 def _check_predicted_response(model: IdentifiedModel, protocol: StudyProtocol, path: Path) -> None:
     """Raise StudyError where the predicted acceleration G H w differs from w by more than `LARGEST_RESPONSE_ERROR` at a
     frequency of the protocol. w: unit vector of a direction; G: response of the model; H: its regularised inverse."""
-    from equalizer.plant.model_response import model_response
+    from equalizer.plant.model_response import compute_model_response
     from equalizer.tracking.feedforward.periodic_inverse import compute_regularised_inverse
 
     frequency_hz = np.array(protocol.all_frequencies_hz)
     unit_vectors = np.stack([compute_direction_vector(protocol.directions, direction) for direction in (1, 2)], axis=1)
     with np.errstate(all="ignore"):
         predicted = (
-            model_response(model, frequency_hz) @ compute_regularised_inverse(model, frequency_hz) @ unit_vectors
+            compute_model_response(model, frequency_hz)
+            @ compute_regularised_inverse(model, frequency_hz)
+            @ unit_vectors
         )
         errors = np.linalg.norm(predicted - unit_vectors, axis=1).max(axis=1)
     unreachable = [

@@ -16,14 +16,14 @@ from protocols.document.hashing import protocol_hash
 from study.devices.clock import Clock
 from study.devices.device import DeviceInfo
 from study.session.facts.events import SESSION_FORMAT, SESSION_VERSION, DeviceFacts, SessionOpened
-from study.session.state.rules import LATEST
+from study.session.state.rules import LATEST_RULES
 from study.session.state.state import SessionState, begin_session
 from study.store.disk.provenance import list_versions
 from study.store.sessions.archive import SessionFolder, create_session_folder
 from study.store.sessions.event_log import EventLog
 from study.store.sessions.session_lock import hold_session_lock
 from study.workflows.session.equalize_stimuli import SessionEqualizer, copy_model
-from study.workflows.session.other_sessions import dose_before
+from study.workflows.session.other_session_dose import compute_other_session_dose
 from study.workflows.session.participant_number import find_participant_number
 
 
@@ -94,8 +94,8 @@ def open_session(
         versions=list_versions(),
         equalized=session_equalizer.facts,
         monotonic_s=clock.now_s(),
-        dose_elsewhere=dose_before(folder, plan.observer, device.simulated, utc),
-        rules=LATEST,
+        dose_elsewhere=compute_other_session_dose(folder, plan.observer, device.simulated, utc),
+        rules=LATEST_RULES,
     )
     with hold_session_lock(folder.path):
         copy_model(session_equalizer, folder)

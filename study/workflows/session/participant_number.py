@@ -12,7 +12,7 @@ from pathlib import Path
 from study.errors import StudyError
 from study.regular_file import read_regular
 from study.session.facts.events import PlaceTaken, SessionOpened, parse_event
-from study.session.facts.log_chain import Chain, read_chained
+from study.session.facts.log_chain import Chain, verify_checksum
 from study.session.state.rules import is_place_assigned_later
 from study.session.state.state import SessionState
 from study.store.sessions.archive import SessionFolder, list_session_folders
@@ -99,7 +99,7 @@ def _read_place(folder: SessionFolder, session_opened: SessionOpened) -> int | N
         for line in read_regular(folder.log).split(b"\n")[:-1]:
             if TRIAL_PRESENTED in line:
                 return session_opened.participant_number
-            chain, event = read_chained(chain, line)
+            chain, event = verify_checksum(chain, line)
             if PLACE_TAKEN in line and isinstance(place := parse_event(event), PlaceTaken):
                 return place.participant_number
     except OSError:

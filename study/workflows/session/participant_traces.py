@@ -19,7 +19,7 @@ from study.regular_file import open_regular, read_regular
 from study.store.disk.real_folder import is_real_file, is_real_folder
 from study.store.formats.thresholds_file import DETECTION_NAME, THRESHOLDS_NAME
 from study.store.sessions.archive import FOLDER_PATTERN, TOMBSTONE_NAME, SessionFolder
-from study.store.sessions.session_lock import LOCK_NAME
+from study.store.sessions.session_lock import SESSION_LOCK_NAME
 from study.store.sessions.withdrawal_files import read_tombstone
 from study.store.sessions.written_elsewhere import WRITTEN_ELSEWHERE
 from study.workflows.results.analysis_files import ANALYSIS_NAME, analysis_outputs
@@ -95,7 +95,7 @@ def _is_emptied_session(path: Path) -> bool:
     if not is_real_folder(path):
         return False
     names = {entry.name for entry in path.iterdir() if UNFINISHED_PATTERN.fullmatch(entry.name) is None}
-    return names <= {LOCK_NAME, TOMBSTONE_NAME}
+    return names <= {SESSION_LOCK_NAME, TOMBSTONE_NAME}
 
 
 def is_subject_in_analysis(folder: Path, subject: str) -> bool | None:

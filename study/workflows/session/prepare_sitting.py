@@ -13,11 +13,11 @@ from study.session.state.state import SessionState
 from study.session.views.archive_views import INELIGIBILITY_REASONS
 from study.session.views.form_views import Form, FormKind
 from study.session.views.forms import is_confirmed, judge_form, make_confirmation, make_words
-from study.session.views.views import DeviceFinding
+from study.session.views.participant_views import DeviceFinding
 from study.session.watching.requests import NoteAsked
 from study.workflows.checks.check_device import check_device
 from study.workflows.checks.check_timing import check_computer
-from study.workflows.checks.computer_load import load_per_processor
+from study.workflows.checks.computer_load import get_load_per_processor
 from study.workflows.checks.daily_check import judge_last_check
 from study.workflows.trial.sitting import Sitting, log_and_apply, write_notes
 
@@ -93,7 +93,7 @@ def _check_device(state: SessionState, sitting: Sitting) -> SessionState:
     safety = state.protocol.safety
     report = check_device(device, clock, sitting.place_m, safety.total_cap_n, safety)
     # In virtual time the load of the computer has no effect.
-    load = None if clock.virtual else load_per_processor()
+    load = None if clock.virtual else get_load_per_processor()
     computer = check_computer(clock, device.info.sample_rate_hz, device.info.simulated, load)
     daily = () if device.info.simulated else (judge_last_check(device.info, state.protocol.setup.daily_check_needed),)
     report = replace(report, findings=(*report.findings, *computer, *daily))

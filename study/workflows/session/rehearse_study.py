@@ -12,12 +12,12 @@ from tempfile import TemporaryDirectory
 
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.clock import VirtualClock
-from study.errors import StudyError, resumable
+from study.errors import StudyError, convert_interrupts
 from study.participants.observer import Observer
-from study.participants.observers import find_observer
-from study.participants.population import KINDS, make_member
-from study.store.disk.folder_contents import Files, read_file, read_files, write_files
-from study.store.disk.new_folder import new_folder
+from study.participants.observer_catalogue import find_observer
+from study.participants.population import MEMBER_KINDS, make_member
+from study.store.disk.folder_contents import FileContents, read_file, read_files, write_files
+from study.store.disk.new_folder import create_new_folder
 from study.store.disk.privacy import make_folder
 from study.store.disk.provenance import compute_sha256
 from study.store.sessions.archive import SessionFolder, list_session_folders
@@ -26,8 +26,8 @@ from study.workflows.results.session_results import finish_tables, write_tables
 from study.workflows.run_on_executor import run_tasks
 from study.workflows.session.conduct_session import ConductedSitting, conduct_new, conduct_resumed
 from study.workflows.session.open_session import SessionPlan
-from study.workflows.session.simulated_participant import create_participant
-from study.workflows.worker_processes import worker_processes
+from study.workflows.session.simulated_participant import make_observer_participant
+from study.workflows.worker_processes import open_worker_processes
 
 DEVICE = "simulated"
 """Device of every rehearsal."""
@@ -49,7 +49,8 @@ class Rehearsal:
     model: Path | None = None
     """Identified model that equalizes the stimuli."""
     observer: str = "person"
-    """A kind of population (`study.participants.population.KINDS`), or the name of an observer for all participants."""
+    """A kind of population (`study.participants.population.MEMBER_KINDS`), or the name of an observer for all
+    participants."""
     locked: bool = False
     """Whether the protocol was locked before the rehearsal began."""
 
@@ -57,7 +58,7 @@ class Rehearsal:
 def make_rehearsed_observer(rehearsal: Rehearsal, number: int) -> Observer:
     """The observer of participant `number` (from 0). Raises StudyError for an unknown name."""
     kind = rehearsal.observer.replace("-", "_")
-    if kind in KINDS:
+    if kind in MEMBER_KINDS:
         return make_member(kind, number + 1, rehearsal.seed)
     return find_observer(kind, rehearsal.seed)
 
@@ -73,12 +74,12 @@ def rehearse_study(rehearsal: Rehearsal, workers: int | Executor, on_finished: C
     """
     _require_same_rehearsal(rehearsal)
     saved_text = "begun so far" if isinstance(workers, int) else "finished so far"
-    with resumable("The rehearsal is not finished.", f"All sessions {saved_text} are in {rehearsal.data}."):
+    with convert_interrupts("The rehearsal is not finished.", f"All sessions {saved_text} are in {rehearsal.data}."):
         if isinstance(workers, Executor):
             _rehearse_on_executor(rehearsal, workers, on_finished)
             return
         tasks = ((number, (rehearsal, number)) for number in range(rehearsal.subjects))
-        with worker_processes(workers) as pool:
+        with open_worker_processes(workers) as pool:
             for finished_count, _ in enumerate(run_tasks(pool, _rehearse_sitting, tasks), start=1):
                 on_finished(finished_count)
 
@@ -101,8 +102,8 @@ def _rehearse_on_executor(rehearsal: Rehearsal, executor: Executor, on_finished:
     )
     for finished_count, (_, (session, files, end_reason)) in enumerate(results, start=len(begun_numbers) + 1):
         make_folder(rehearsal.data, private=True)
-        with new_folder(rehearsal.data / session) as create_session_folder:
-            write_files(create_session_folder, files)
+        with create_new_folder(rehearsal.data / session) as session_folder:
+            write_files(session_folder, files)
         _require_finished(session, end_reason)
         on_finished(finished_count)
 
@@ -144,12 +145,12 @@ def _rehearse_sitting(rehearsal: Rehearsal, number: int) -> None:
         return
     else:
         clock = VirtualClock.resume_at(folded_session.state.sitting.last.utc)
-        conducted = conduct_resumed(begun_session, DEVICE, create_participant(observer, seed, clock))
+        conducted = conduct_resumed(begun_session, DEVICE, make_observer_participant(observer, seed, clock))
     write_tables(conducted.folder)
     _require_finished(conducted.folder.name, conducted.end_reason)
 
 
-def play_on_worker(rehearsal: Rehearsal, model: Files, number: int) -> tuple[str, Files, str]:
+def play_on_worker(rehearsal: Rehearsal, model: FileContents, number: int) -> tuple[str, FileContents, str]:
     """Run a new session in a temporary folder of a worker. model: content of the model's file, by name. Returns the
     name of the session, its files, and why it ended early (empty if it finished)."""
     with TemporaryDirectory() as temporary_folder:
@@ -174,7 +175,7 @@ def _play_new_session(rehearsal: Rehearsal, number: int) -> ConductedSitting:
         participant_number=number,
         model=rehearsal.model,
     )
-    return conduct_new(plan, DEVICE, create_participant(observer, seed, VirtualClock()))
+    return conduct_new(plan, DEVICE, make_observer_participant(observer, seed, VirtualClock()))
 
 
 def _require_finished(session: str, end_reason: str) -> None:

@@ -27,7 +27,7 @@ from study.session.state.fold import apply_event
 from study.session.state.state import SessionState
 from study.session.stimulus.delivered import measure_delivered
 from study.session.stimulus.stimulus import compute_vector_at_angle
-from study.session.views.count_text import answers_are
+from study.session.views.count_text import format_answer_count
 from study.store.disk.privacy import close_data_folder, close_to_others
 from study.store.disk.provenance import list_versions
 from study.store.sessions.archive import SessionFolder
@@ -39,10 +39,10 @@ from study.store.sessions.trial_recordings import find_trial_recording, recordin
 from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import write_tables
 from study.workflows.session.open_session import OpenedSession, collect_device_facts
-from study.workflows.session.other_sessions import dose_before
+from study.workflows.session.other_session_dose import compute_other_session_dose
 from study.workflows.session.prepare_sitting import does_not_take_part
 from study.workflows.trial.judge_trial import Judgement, judge_trial
-from study.workflows.trial.trial_facts import restore_health
+from study.workflows.trial.trial_events import restore_health
 
 RECORDING_LOST = "its recording was lost when the program ended"
 """Remark on a trial that counts without one, or reason why it is void."""
@@ -73,7 +73,7 @@ def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> I
                 device=collect_device_facts(device),
                 versions=list_versions(),
                 mended=folded_session.log_contents.torn,
-                dose_elsewhere=dose_before(folder, observer, device.simulated, utc),
+                dose_elsewhere=compute_other_session_dose(folder, observer, device.simulated, utc),
                 monotonic_s=clock.now_s(),
             )
             log.append(resumed)
@@ -117,7 +117,7 @@ def make_finished_error(state: SessionState, folder: SessionFolder) -> StudyErro
         "This session is finished",
         f"{folder.name} has all its runs.",
         f"Look at its results: hapteq analyze {folder.path}",
-        saved=f"{answers_are(state.answers)} on disk.",
+        saved=f"{format_answer_count(state.answers)} on disk.",
     )
 
 

@@ -18,9 +18,9 @@ from study.session.state.probe_state import Probe, Reference
 from study.session.state.progress import estimate_progress
 from study.session.state.state import SessionState, is_felt_by_person
 from study.session.views.archive_views import INELIGIBILITY_REASONS
-from study.session.views.count_text import answers_are
+from study.session.views.count_text import format_answer_count
+from study.session.views.participant_views import Goodbye, PracticeResult, RestNotice, Welcome, make_direction_picture
 from study.session.views.resume_command import format_resume_command
-from study.session.views.views import Goodbye, PracticeResult, RestNotice, Welcome, make_direction_picture
 from study.store.sessions.log_seal import seal_log
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.participant_number import assign_place
@@ -117,7 +117,7 @@ def _close_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> Ses
             )
         )
     resume_advice = f"Continue with: {format_resume_command(str(sitting.folder.path), sitting.device_name)}"
-    saved = f"{answers_are(state.answers)} on disk."
+    saved = f"{format_answer_count(state.answers)} on disk."
     if is_force_left:
         raise DeviceError(
             "The force may still be on", Fault.FORCE_LEFT.sentence, resume_advice, saved
@@ -130,7 +130,7 @@ def _add_resume_advice(error: StudyError, sitting: Sitting) -> StudyError:
     with contextlib.suppress(StudyError):
         state = fold_session(sitting.folder).state
         if not state.is_finally_ineligible:
-            error.saved = f"{answers_are(state.answers)} on disk."
+            error.saved = f"{format_answer_count(state.answers)} on disk."
             resume_command = format_resume_command(str(sitting.folder.path), sitting.device_name)
             error.do_now = f"{error.do_now} Then continue with: {resume_command}"
     return error

@@ -12,7 +12,7 @@ from study.devices.clock import Clock
 from study.participants.observer import Observer, PerceivedStimulus
 from study.session.state.due_trial import PresentTrial
 from study.session.views.form_views import Form, FormField, FormReply
-from study.session.views.views import (
+from study.session.views.participant_views import (
     AfterPause,
     Answered,
     DemoChoice,

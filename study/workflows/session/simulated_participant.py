@@ -1,7 +1,7 @@
-"""A simulated participant for a sitting: an observer model as display and hand, with a clock.
+"""Make a simulated participant of a sitting: an observer model that implements the ports for display and hand.
 
-An observer that depends on the delivered acceleration (`DeliveredFeeler`) also gets a sense of touch, which reads the
-accelerometer of the device.
+An observer that depends on the delivered acceleration (`DeliveredFeeler`) also gets a `SimulatedTouch`, which measures
+that acceleration. Called by `simulate_session`, `rehearse_study` and `study.cli.conduct`.
 """
 
 from collections.abc import Callable
@@ -9,8 +9,8 @@ from collections.abc import Callable
 from study.devices.clock import Clock
 from study.participants.delivered_feeler import DeliveredFeeler
 from study.participants.observer import Observer
-from study.participants.observers import find_observer
-from study.session.views.views import Question
+from study.participants.observer_catalogue import find_observer
+from study.session.views.participant_views import Question
 from study.workflows.session.conduct_session import Participant
 from study.workflows.session.simulated_display import SimulatedDisplay
 from study.workflows.session.simulated_touch import SimulatedTouch
@@ -19,15 +19,16 @@ from study.workflows.session.simulated_touch import SimulatedTouch
 def make_simulated_participant(
     name: str, seed: int, clock: Clock, on_question: Callable[[Question], None] | None = None
 ) -> Participant:
-    """The participant with this observer's name, as used on the command line and in the log. Raises StudyError for an
-    unknown name."""
-    return create_participant(find_observer(name, seed), seed, clock, on_question)
+    """Make the participant for an observer's name, as used on the command line and in the log. seed, on_question: as
+    for `make_observer_participant`. Raises StudyError for an unknown name."""
+    return make_observer_participant(find_observer(name, seed), seed, clock, on_question)
 
 
-def create_participant(
+def make_observer_participant(
     observer: Observer, seed: int, clock: Clock, on_question: Callable[[Question], None] | None = None
 ) -> Participant:
-    """The participant with this observer. seed: of the session; on_question: called with each question."""
+    """Make the participant for an observer. seed: of the session, for the observer's random draws. on_question: called
+    with each question before it is answered."""
     if not isinstance(observer, DeliveredFeeler):
         display = SimulatedDisplay(observer, seed, clock, on_question)
         return Participant(display=display, hand=display, clock=clock)

@@ -16,7 +16,7 @@ from study.errors import StudyError, WrongUseError
 from study.store.disk.real_folder import OpenedFolder, is_real_file, is_real_folder, open_folder
 from study.store.sessions.archive import FOLDER_PATTERN, TOMBSTONE_NAME, SessionFolder, locate_withdrawal_record
 from study.store.sessions.event_log import LOG_NAME, hold_log_lock
-from study.store.sessions.session_lock import LOCK_NAME, hold_session_lock
+from study.store.sessions.session_lock import SESSION_LOCK_NAME, hold_session_lock
 from study.store.sessions.withdrawal_files import WithdrawalIntent, read_intent, write_intent, write_tombstone
 from study.store.sessions.written_elsewhere import read_written_folders
 from study.workflows.session.participant_number import read_begun_participant
@@ -119,7 +119,7 @@ def _lock_for_erasing(folder: SessionFolder, locks: ExitStack) -> None:
     StudyError if the session is running."""
     if not is_real_folder(folder.path):
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), folder.name)
-    lock = folder.path / LOCK_NAME
+    lock = folder.path / SESSION_LOCK_NAME
     if lock.is_symlink():
         lock.unlink()
     locks.enter_context(hold_session_lock(folder.path))
@@ -132,7 +132,7 @@ def _erase_session(data: OpenedFolder, folder: SessionFolder) -> None:
     to the disk."""
     with open_folder(data, folder.name) as session_folder:
         for name in session_folder.list_names():
-            if name not in (TOMBSTONE_NAME, LOCK_NAME, LOG_NAME):
+            if name not in (TOMBSTONE_NAME, SESSION_LOCK_NAME, LOG_NAME):
                 session_folder.erase(name)
         session_folder.sync()
         session_folder.erase(LOG_NAME)

@@ -1,4 +1,5 @@
-"""Masking noise as a WAV file, to be played during a sitting so that the participant cannot hear the device.
+"""Write masking noise as a WAV file (`hapteq noise`), to be played during a sitting so that the participant cannot hear
+the device.
 
 The samples are those of `equalizer.signals.masking_noise`: pink noise between two corner frequencies that can be
 repeated without a discontinuity.
@@ -15,7 +16,7 @@ from study.store.disk.wav_file import write_wav
 SAMPLE_RATE_HZ = 44_100
 """Sample rate of the file (Hz): that of audio CDs."""
 
-HOW_TO_USE = (
+PLAYBACK_INSTRUCTIONS = (
     "Play it in a loop, without a gap, from before the demonstration until after the last trial: it repeats without "
     "a seam.",
     "Set the level with the device playing its loudest stimulus and your hand off the handle: raise it until you can "
@@ -28,20 +29,23 @@ HOW_TO_USE = (
 
 @dataclass(frozen=True, slots=True)
 class NoisePlan:
-    """Length, band (Hz) and seed of masking noise."""
+    """Length, band and seed of masking noise."""
 
     minutes: float
     """Length in minutes, rounded to whole seconds."""
     low_hz: float
+    """Lower corner frequency (Hz)."""
     high_hz: float
+    """Upper corner frequency (Hz), at most half of `SAMPLE_RATE_HZ`."""
     seed: int
+    """Seed of the random phases."""
 
 
 def write_masking_noise(path: Path, plan: NoisePlan) -> None:
     """Write the noise as a WAV file: mono, 16 bit, about 5 MB per minute.
 
-    Raises WrongUseError for another file type or for a length or band that gives no noise, AlreadyThereError,
-    CannotWriteError.
+    Raises WrongUseError where the suffix is not .wav or length or band give no noise, AlreadyThereError where the file
+    exists, CannotWriteError where it cannot be written.
     """
     if path.suffix.lower() != ".wav":
         raise WrongUseError(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from study.devices.device import Fault
 from study.session.state.state import SessionState
-from study.session.views.views import Unanswered
+from study.session.views.participant_views import Unanswered
 
 if TYPE_CHECKING:
     from study.workflows.trial.sitting import Sitting

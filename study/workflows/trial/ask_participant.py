@@ -14,7 +14,7 @@ from study.session.state.due_trial import PresentTrial
 from study.session.state.state import SessionState
 from study.session.stimulus.held_stimulus import HeldStimulus
 from study.session.stimulus.stimulus import compute_direction_vector, make_held_stimulus
-from study.session.views.views import Answered, PlayingNotice, Question, Reply, Unanswered
+from study.session.views.participant_views import Answered, PlayingNotice, Question, Reply, Unanswered
 from study.workflows.trial.sitting import Pulse, Sitting, release_device
 
 

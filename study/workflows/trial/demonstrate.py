@@ -8,7 +8,14 @@ from study.session.facts.level_scale import convert_level_to_amplitude
 from study.session.state.due_trial import has_swapped_labels
 from study.session.state.state import SessionState, is_felt_by_person
 from study.session.stimulus.stimulus import compute_direction_angle_deg, compute_direction_vector, make_held_stimulus
-from study.session.views.views import DemoDone, DemoMenu, PlayDemo, PlayingNotice, Unanswered, make_direction_picture
+from study.session.views.participant_views import (
+    DemoDone,
+    DemoMenu,
+    PlayDemo,
+    PlayingNotice,
+    Unanswered,
+    make_direction_picture,
+)
 from study.workflows.trial.after_trial import AfterTrial, check_end_request, find_leaving_reason, make_early_end_result
 from study.workflows.trial.sitting import Sitting, log_and_apply
 

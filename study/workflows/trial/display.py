@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol
 
 from study.session.views.form_views import Form, FormReply
-from study.session.views.views import (
+from study.session.views.participant_views import (
     AfterPause,
     DemoChoice,
     DemoMenu,

@@ -1,8 +1,9 @@
 """Masking noise during a sitting, so that the participant cannot hear the device.
 
-The noise starts before the first trial, is silent in pauses, and is logged. A trial counts only with noise: it is
-checked before every trial and at every answer. The sound is a loop of pink noise (`make_masking_noise`) from a seed, so
-that another session can use the same sound.
+Order: `conduct_session` opens the sound output; `run_session` starts the noise, checks it before every trial, and stops
+it in pauses and at the end; `present_trial` checks it at every answer. Every start, stop and failure is logged; a trial
+without noise is void. The sound is a loop of pink noise (`make_masking_noise`) from the protocol's seed, so that
+other sessions use the same sound.
 """
 
 import contextlib
@@ -22,45 +23,48 @@ from study.workflows.trial.sitting import Sitting, SoundOutput, log_and_apply
 SAMPLE_RATE_HZ = 44_100
 """Sample rate of the noise (Hz), a standard rate of sound cards."""
 LOOP_S = 60
-"""Length of the loop (s): too long for a listener to recognise the repetition."""
+"""Length of the loop (s). Chosen so long that a listener does not recognise the repetition."""
 
 
 @contextlib.contextmanager
 def open_masking_sound(settings: MaskingSettings, clock: Clock, observer: str | None) -> Iterator[SoundOutput | None]:
-    """Sound output with the masking noise, not yet playing, closed at the end of the context. None where the protocol
-    plays none, or without a person (a simulated participant, virtual time). Raises `DeviceError` without an output."""
+    """Open the sound output with the masking noise, not yet playing; it is closed at the end of the context. Yields
+    None where the protocol plays no noise, for a simulated participant (`observer` is its name) and in virtual time.
+    Raises DeviceError where there is no sound output."""
     if not settings.play or clock.virtual or observer is not None:
         yield None
         return
     samples = make_masking_noise(LOOP_S, settings.low_hz, settings.high_hz, settings.seed, SAMPLE_RATE_HZ)
-    attenuated = np.rint(samples * 10 ** (settings.level_db / 20)).astype(np.int16)
-    with contextlib.closing(make_masking_sound(attenuated, SAMPLE_RATE_HZ)) as sound:
+    attenuated_samples = np.rint(samples * 10 ** (settings.level_db / 20)).astype(np.int16)
+    with contextlib.closing(make_masking_sound(attenuated_samples, SAMPLE_RATE_HZ)) as sound:
         yield sound
 
 
 def start_masking(state: SessionState, sitting: Sitting) -> SessionState:
-    """Start the masking noise and log that it plays. Raises `DeviceError`. No effect without a sound output."""
+    """Start the masking noise, log it, and return the new state. Without a sound output the state is unchanged. Raises
+    DeviceError where the noise cannot be played."""
     if sitting.masking_noise is None:
         return state
     sitting.masking_noise.start()
-    return _log(state, sitting, sitting.masking_noise, playing=True)
+    return _log_masking(state, sitting, sitting.masking_noise, playing=True)
 
 
 def check_masking(state: SessionState, sitting: Sitting) -> SessionState:
-    """Check before a trial that the noise is playing. Raises `DeviceError` if it is not, after logging the failure."""
+    """Check that the noise is playing; the returned state is unchanged. Raises DeviceError where it is not, after
+    logging the failure. Without a sound output nothing is checked."""
     if sitting.masking_noise is None:
         return state
     try:
         sitting.masking_noise.check()
     except DeviceError as error:
-        _log(state, sitting, sitting.masking_noise, playing=False, trouble=error.happened)
+        _log_masking(state, sitting, sitting.masking_noise, playing=False, trouble=error.happened)
         raise
     return state
 
 
 def was_masked(sitting: Sitting) -> bool:
-    """Whether the noise was still playing at the answer; True where none is required. A failure is logged before the
-    next trial (`check_masking`)."""
+    """Whether the noise was still playing at the answer; True without a sound output. A failure is not logged here, but
+    by `check_masking` before the next trial."""
     if sitting.masking_noise is None:
         return True
     try:
@@ -71,14 +75,17 @@ def was_masked(sitting: Sitting) -> bool:
 
 
 def stop_masking(state: SessionState, sitting: Sitting) -> SessionState:
-    """Stop the masking noise and log it. The state is unchanged if there was nothing to stop."""
+    """Stop the masking noise, log it, and return the new state; the state is unchanged where no noise was playing."""
     if sitting.masking_noise is None or not sitting.masking_noise.stop():
         return state
-    return _log(state, sitting, sitting.masking_noise, playing=False)
+    return _log_masking(state, sitting, sitting.masking_noise, playing=False)
 
 
-def _log(state: SessionState, sitting: Sitting, sound: SoundOutput, playing: bool, trouble: str = "") -> SessionState:
-    """Log whether the noise plays, with its settings. trouble: why it does not; empty if it was stopped as planned."""
+def _log_masking(
+    state: SessionState, sitting: Sitting, sound: SoundOutput, playing: bool, trouble: str = ""
+) -> SessionState:
+    """Log whether the noise plays, with its settings, and return the new state. trouble: why it does not play; empty
+    where it plays or was stopped as planned."""
     settings = state.protocol.masking
     fact = MaskingPlayed(
         utc=sitting.clock.utc(),

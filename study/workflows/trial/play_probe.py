@@ -19,7 +19,7 @@ from study.session.state.state import SessionState
 from study.session.stimulus.probe_stimulus import HELD_S, make_probe_stimulus, make_reference_commands
 from study.session.views.form_views import FormKind
 from study.session.views.forms import judge_form, make_form, make_take_handle_form, make_words
-from study.session.views.views import PlayingNotice, Unanswered
+from study.session.views.participant_views import PlayingNotice, Unanswered
 from study.store.disk.provenance import list_versions
 from study.store.sessions.trial_recordings import probe_name, save_trial_recording
 from study.workflows.trial.after_trial import AfterTrial, check_end_request, find_leaving_reason, make_early_end_result

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from protocols.definition.apparatus import Plane
-from protocols.definition.exposure import GateSettings
+from protocols.definition.session_settings import GateSettings
 from protocols.trial import Phase, VoidCause
 from study.devices.device import Fault, PlaybackResult
 from study.session.facts.events import AnswerGiven, OnsetPulsed
@@ -20,14 +20,14 @@ from study.session.state.progress import estimate_progress
 from study.session.state.state import SessionState, count_repeats_left
 from study.session.stimulus.delivered import has_hardly_moved, measure_delivered
 from study.session.stimulus.stimulus import PLANE_AXES, compute_direction_vector
-from study.session.views.views import HandleView, Question, Task, Unanswered, make_direction_picture
+from study.session.views.participant_views import HandleView, Question, Task, Unanswered, make_direction_picture
 from study.workflows.trial.after_trial import AfterTrial, find_leaving_reason, make_early_end_result
 from study.workflows.trial.ask_participant import StimulusReply, ask_participant
 from study.workflows.trial.judge_trial import get_void_cause, judge_trial
 from study.workflows.trial.masking import was_masked
 from study.workflows.trial.sitting import Pulse, Sitting, log_and_apply, release_device
-from study.workflows.trial.trial_facts import (
-    Outcome,
+from study.workflows.trial.trial_events import (
+    TrialOutcome,
     make_answer_health,
     make_presented_event,
     make_void_event,
@@ -190,7 +190,7 @@ def _log_answered_trial(
     device_kg = sitting.device.info.effective_mass_kg
     if measured is not None and has_hardly_moved(measured, vector, due_trial.frequency_hz, friction_n, device_kg):
         verdict = replace(verdict, flags=(*verdict.flags, TOO_LITTLE_MOTION))
-    outcome = Outcome(play_result, values, verdict.flags, vector, verdict.measured)
+    outcome = TrialOutcome(play_result, values, verdict.flags, vector, verdict.measured)
     state = log_and_apply(state, record_measured_trial(due_trial, outcome, state, sitting), sitting)
     return AfterTrial(state, correct, end_reason=end_reason, fault=fault)
 

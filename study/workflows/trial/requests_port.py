@@ -1,4 +1,8 @@
-"""The port of requests from viewers and second screens to a running session."""
+"""Port of requests (stop, pause, note) to a running session, from the screens of the program or from other programs.
+
+`session_supervisor` takes the requests. Implementations: `QueuedRequests` within the program,
+`study.store.sessions.request_inbox.RequestInbox` from other programs; `conduct_session` combines them.
+"""
 
 from queue import Empty, SimpleQueue
 from typing import Protocol
@@ -6,22 +10,23 @@ from typing import Protocol
 from study.session.watching.requests import Request
 
 
-class Requests(Protocol):
-    """Interface of a source of requests to a running session."""
+class RequestPort(Protocol):
+    """Source of requests to a running session."""
 
     def take(self) -> tuple[Request, ...]:
-        """New requests since the last call, oldest first. Fast: called about twenty times a second. Never raises."""
+        """Return the new requests since the last call, oldest first. Must be fast, because it is called about twenty
+        times a second, and must not raise."""
         ...
 
 
 class QueuedRequests:
-    """Requests from within the program: `send` may be called from any thread."""
+    """Queue of requests from within the program."""
 
     def __init__(self) -> None:
         self._queue: SimpleQueue[Request] = SimpleQueue()
 
     def send(self, request: Request) -> None:
-        """Put a request into the queue. From any thread."""
+        """Add a request to the queue. May be called from any thread."""
         self._queue.put(request)
 
     def take(self) -> tuple[Request, ...]:
@@ -33,12 +38,12 @@ class QueuedRequests:
                 return tuple(requests)
 
 
-class ManyRequests:
-    """Combines several sources of requests."""
+class CombinedRequests:
+    """Combination of several sources of requests."""
 
-    def __init__(self, *sources: Requests) -> None:
+    def __init__(self, *sources: RequestPort) -> None:
         self._sources = sources
 
     def take(self) -> tuple[Request, ...]:
-        """In the order of the sources, not by age."""
+        """Return the new requests of all sources, in the order of the sources and not by age."""
         return tuple(request for source in self._sources for request in source.take())

@@ -8,10 +8,10 @@ from collections.abc import Callable
 
 from study.devices.clock import Clock
 from study.devices.device import Device, Fault, Look
-from study.session.views.views import Answered, Reply, Unanswered
-from study.session.watching.live import Activity, Live
+from study.session.views.participant_views import Answered, Reply, Unanswered
+from study.session.watching.live_state import Activity, Live
 from study.session.watching.requests import NoteAsked, PauseAsked, RequestSource, StopAsked
-from study.workflows.trial.requests_port import Requests
+from study.workflows.trial.requests_port import RequestPort
 
 LIVE_INTERVAL_S = 0.25
 """Interval (s) at which the live state is published: often enough for a viewer, with little load on the disk."""
@@ -28,7 +28,7 @@ class SessionSupervisor:
         self,
         device: Device,
         clock: Clock,
-        requests: Requests,
+        requests: RequestPort,
         publish: Callable[[Live], None],
         buttons: tuple[int, ...] = (),
         place_m: tuple[float, float, float] = (0.0, 0.0, 0.0),

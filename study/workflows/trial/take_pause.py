@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from study.session.facts.events import PauseTaken
 from study.session.state.state import SessionState
-from study.session.views.views import AfterPause, PauseNotice
+from study.session.views.participant_views import AfterPause, PauseNotice
 from study.workflows.trial.sitting import Sitting, log_and_apply, write_notes
 
 

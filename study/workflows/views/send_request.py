@@ -8,7 +8,7 @@ from study.devices.clock import Clock
 from study.errors import StudyError
 from study.session.watching.requests import NoteAsked, Request, StopAsked
 from study.store.sessions.archive import SessionFolder
-from study.store.sessions.log_writer import is_log_locked
+from study.store.sessions.log_lock import is_log_locked
 from study.store.sessions.request_inbox import RequestInbox
 
 RECEIVE_TIMEOUT_S = 3.0

@@ -103,7 +103,7 @@ def _describe_log(folded_session: FoldedSession) -> str:
     """Number of lines of the log, and the evidence that it is unchanged: checksums and seals."""
     length_text = f"{folded_session.log_contents.chain.lines} lines"
     seal_text = f", sealed to line {folded_session.sealed_lines}" if folded_session.sealed_lines else ""
-    return f"{length_text}, {folded_session.log_contents.chain.in_words()}{seal_text}"
+    return f"{length_text}, {folded_session.log_contents.chain.describe()}{seal_text}"
 
 
 def _list_form_answers(folded_session: FoldedSession) -> tuple[tuple[str, str], ...]:

@@ -18,8 +18,8 @@ from study.session.state.state import SessionState
 from study.session.views.archive_views import SessionLine
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import read_opening
+from study.store.sessions.log_lock import is_log_locked
 from study.store.sessions.log_seal import find_seals, is_sealed
-from study.store.sessions.log_writer import is_log_locked
 from study.store.sessions.session_summary import SUMMARY_NAME
 from study.store.sessions.withdrawal_files import describe_unfinished, read_intent, read_tombstone
 from study.workflows.results.fold_session import fold_session

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from study.regular_file import TABLE_BYTES, open_regular
+from study.regular_file import MAX_TABLE_BYTES, open_regular
 from study.workflows.views.lsl_outlets import make_unreadable_log_error
 
 POLL_INTERVAL_S = 0.02
@@ -79,10 +79,10 @@ class LogFollower:
 
     def read_new_lines(self) -> list[bytes]:
         """Read the new complete lines; an incomplete last line is returned once it is complete. Raises OSError, and
-        ValueError where the log became shorter or grew by more than `TABLE_BYTES`."""
+        ValueError where the log became shorter or grew by more than `MAX_TABLE_BYTES`."""
         with open_regular(self._log) as file:
             new_byte_count = os.fstat(file.fileno()).st_size - self._offset
-            if not 0 <= new_byte_count <= TABLE_BYTES:
+            if not 0 <= new_byte_count <= MAX_TABLE_BYTES:
                 raise ValueError(
                     "it became shorter" if new_byte_count < 0 else f"it grew by {new_byte_count} bytes at once"
                 )

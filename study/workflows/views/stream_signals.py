@@ -1,7 +1,8 @@
-"""Streams of the signals of a running session's device over the lab streaming layer (LSL): force, acceleration, motion
-and status of the loop at every tick, in addition to the session's markers.
+"""Stream the signals of a running session's device over the lab streaming layer (LSL): force, acceleration, motion and
+status of the control loop at every tick, in addition to the session's markers.
 
-They are read from the loop's telemetry ring by a separate program, so that streaming never delays the loop.
+A separate program (`hapteq stream`) reads them from the telemetry ring buffer of the loop, so that streaming never
+delays the loop. `stream_session` calls `SignalStreams.push` repeatedly.
 """
 
 from collections.abc import Callable
@@ -19,74 +20,83 @@ from study.workflows.views.lsl_outlets import SignalOutlet, StreamDescription
 if TYPE_CHECKING:
     from study.devices.telemetry import TelemetryReader
 
-LOOK_EVERY = 10
-"""Calls of `push` between two checks whether the session uses another ring, as a resumed session does."""
+CALLS_PER_RING_CHECK = 10
+"""Number of calls of `push` per check whether the session uses another ring buffer, as after resuming. Chosen."""
 
 
-def _three(name: str) -> tuple[str, str, str]:
-    """Channel names of the components of a vector."""
+def _name_components(name: str) -> tuple[str, str, str]:
+    """Names of the three components of a vector: NAME_x, NAME_y, NAME_z."""
     return (f"{name}_x", f"{name}_y", f"{name}_z")
 
 
 STREAMS = (
-    StreamDescription("hapteq force", "Force", (*_three("commanded"), *_three("applied")), ("N",) * 6),
-    StreamDescription("hapteq acceleration", "Acceleration", _three("acceleration"), ("m/s^2",) * 3),
-    StreamDescription("hapteq motion", "Motion", (*_three("position"), *_three("velocity")), ("m",) * 3 + ("m/s",) * 3),
+    StreamDescription(
+        "hapteq force", "Force", (*_name_components("commanded"), *_name_components("applied")), ("N",) * 6
+    ),
+    StreamDescription("hapteq acceleration", "Acceleration", _name_components("acceleration"), ("m/s^2",) * 3),
+    StreamDescription(
+        "hapteq motion",
+        "Motion",
+        (*_name_components("position"), *_name_components("velocity")),
+        ("m",) * 3 + ("m/s",) * 3,
+    ),
     StreamDescription("hapteq loop", "Status", ("tick", "phase", "fault", "missed_ticks"), ("",) * 4),
 )
-"""Name, kind, channels and units of each stream, in the order in which `_push_new_rows` sends the signals."""
+"""Name, content type, channels and units of each stream, in the order in which `_push_new_rows` sends the signals."""
 
 
 class SignalStreams:
-    """Sends the telemetry of a session's device to LSL outlets. folder: of the session. open_outlet(stream, rate_hz):
-    called for each stream when a ring is found for the first time."""
+    """Sender of the telemetry of a session's device to LSL outlets."""
 
     def __init__(self, folder: Path, open_outlet: Callable[[StreamDescription, float], SignalOutlet]) -> None:
+        """folder: of the session. open_outlet: makes the outlet of a stream with this sample rate (Hz); called for each
+        stream when the first ring buffer is opened."""
         self._folder = folder
         self._open_outlet = open_outlet
-        self._path, self._calls = "", 0
+        self._ring_path, self._call_count = "", 0
         self._reader: TelemetryReader | None = None
         self._outlets: tuple[SignalOutlet, ...] = ()
-        self.sent = 0
+        self.sent_ticks = 0
         """Number of ticks sent so far."""
 
     def push(self, offset_s: float) -> int:
-        """Send the ticks since the last call. offset_s: LSL's clock minus the session's, s. Returns the number of ticks
-        that were overwritten in the ring before they could be read."""
-        lost = self._push_new_rows(offset_s)
-        if self._calls % LOOK_EVERY == 0:
+        """Send the ticks since the last call. offset_s: LSL's clock minus the session's monotonic clock (s). Returns
+        the number of ticks that were overwritten in the ring buffer before they could be read."""
+        lost_ticks = self._push_new_rows(offset_s)
+        if self._call_count % CALLS_PER_RING_CHECK == 0:
             self._switch_ring()
-        self._calls += 1
-        return lost
+        self._call_count += 1
+        return lost_ticks
 
     def _switch_ring(self) -> None:
-        """Change to the session's present ring, and open the outlets when a ring is found for the first time."""
+        """Open the session's present ring buffer if it is another one, and the outlets for the first."""
         live = read_live(self._folder)
-        if live is None or live.telemetry == self._path:
+        if live is None or live.telemetry == self._ring_path:
             return
         try:
             self._reader = open_telemetry(live.telemetry) if live.telemetry else None
-            self._path = live.telemetry
-        except StudyError:  # this sitting has ended, or its ring cannot be opened yet: the next check tries again
-            self._reader, self._path = None, ""
+            self._ring_path = live.telemetry
+        except StudyError:  # the sitting has ended, or its ring cannot be opened yet: the next check tries again
+            self._reader, self._ring_path = None, ""
         if self._reader is not None and not self._outlets:
             self._outlets = tuple(self._open_outlet(stream, self._reader.rate_hz) for stream in STREAMS)
 
     def _push_new_rows(self, offset_s: float) -> int:
-        """Send the rows that the ring has gained; returns the number of rows that were lost."""
+        """Send the rows (ticks) written into the ring buffer since the last call. Returns the number of rows lost
+        since."""
         if self._reader is None:
             return 0
         lost_before = self._reader.lost
-        read = self._reader.read()
-        if len(read):
-            status: FloatArray = np.stack([read.tick, read.phase, read.fault, read.missed], axis=1)
+        rows = self._reader.read()
+        if len(rows):
+            status: FloatArray = np.stack([rows.tick, rows.phase, rows.fault, rows.missed], axis=1)
             signals = (
-                np.hstack([read.commanded_n, read.applied_n]),
-                read.acceleration_mps2,
-                np.hstack([read.position_m, read.velocity_m_per_s]),
+                np.hstack([rows.commanded_n, rows.applied_n]),
+                rows.acceleration_mps2,
+                np.hstack([rows.position_m, rows.velocity_m_per_s]),
                 status,
             )
             for outlet, samples in zip(self._outlets, signals, strict=True):
-                outlet.push(samples, read.time_s + offset_s)
-            self.sent += len(read)
+                outlet.push(samples, rows.time_s + offset_s)
+            self.sent_ticks += len(rows)
         return self._reader.lost - lost_before

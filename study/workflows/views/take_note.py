@@ -1,7 +1,7 @@
-"""Write an experimenter's or participant's note into the log of a session.
+"""Write an experimenter's or participant's note into the log of a session (`hapteq note`).
 
-A log has a single writer. While a session runs, its own program is that writer, and the note is sent to it; otherwise
-the note is appended directly, under the session's lock.
+A log has a single writer. While a session runs, its program is that writer, and the note is sent to it as a request;
+otherwise the note is appended directly, with the session's lock held.
 """
 
 from study.devices.clock import Clock
@@ -11,18 +11,20 @@ from study.session.watching.requests import NoteAsked
 from study.store.disk.provenance import replace_invalid_bytes
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog, remove_incomplete_line
+from study.store.sessions.log_lock import is_log_locked
 from study.store.sessions.log_seal import seal_log
-from study.store.sessions.log_writer import is_log_locked
 from study.store.sessions.session_lock import hold_session_lock
 from study.workflows.results.fold_session import fold_session
 from study.workflows.views.send_request import send_request
 
 
 def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
-    """Write a note. Returns whether the log holds it or the running session received it; False = waiting in the inbox.
+    """Write a note. Returns True if it was appended to the log or the running session received it, False if it waits in
+    the inbox of the running session.
 
-    An incomplete last line of the log is removed first, and a closed session is sealed again. Raises StudyError for an
-    empty text or one that is not UTF-8, and where the log cannot be read or written.
+    Before it is appended, an incomplete last line of the log is removed; afterwards a closed session is sealed again.
+    Raises StudyError for an empty text or one that is not UTF-8, where the log cannot be read or written, and where
+    another program holds the session's lock.
     """
     if not note.text.strip():
         raise StudyError("There is nothing to note", "The text is empty.", "Give a sentence.")
@@ -42,7 +44,7 @@ def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
             log_contents = folded_session.log_contents
             if log_contents.torn:
                 remove_incomplete_line(folder.log, log_contents)
-                log.append(_of_the_program(f"a torn last line was cut off: {log_contents.torn}", clock))
+                log.append(_make_program_note(f"a torn last line was cut off: {log_contents.torn}", clock))
             log.append(NoteTaken(utc=clock.utc(), who=note.who, text=note.text, adverse=note.adverse))
             if folded_session.state.closed:
                 seal_log(folder.log)
@@ -51,6 +53,6 @@ def take_note(folder: SessionFolder, note: NoteAsked, clock: Clock) -> bool:
     return True
 
 
-def _of_the_program(text: str, clock: Clock) -> NoteTaken:
-    """A note by the program itself about a removed last line, as `hapteq resume` would log it."""
+def _make_program_note(text: str, clock: Clock) -> NoteTaken:
+    """Make a note of the program, as `hapteq resume` logs it for a removed last line."""
     return NoteTaken(utc=clock.utc(), who="program", text=text)

@@ -80,7 +80,10 @@ def _list_log_remarks(folder: SessionFolder, folded_session: FoldedSession) -> t
             "A crash left the last line of the log incomplete; it is removed when the session is resumed.",
         ),
         (due_files, f"Missing or not as the log gives it: {due_files}. hapteq resume writes it."),
-        (not folded_session.log_contents.chain.since, "The log contains no checksums: an older version wrote it."),
+        (
+            not folded_session.log_contents.chain.first_checksum_line,
+            "The log contains no checksums: an older version wrote it.",
+        ),
     )
     return tuple(text for applies, text in remarks if applies)
 

@@ -9,22 +9,22 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from study.errors import StudyError
-from study.regular_file import TABLE_BYTES, open_regular
+from study.regular_file import MAX_TABLE_BYTES, open_regular
 from study.session.facts.events import SessionOpened, parse_event
-from study.session.facts.log_chain import Chain, ChainBrokenError, read_chained
+from study.session.facts.log_chain import Chain, ChainBrokenError, verify_checksum
 from study.session.facts.log_time import compute_wall_clock_s
-from study.session.state.draw_check import LogContradiction
+from study.session.state.presentation_check import LogContradiction
 from study.session.watching.followed_session import FollowedSession, begin_watching
 from study.session.watching.followed_session import apply_followed_event as after
-from study.session.watching.live import Live
+from study.session.watching.live_state import Live
 from study.session.watching.make_watch_view import LiveInfo, make_watch_view
 from study.session.watching.requests import Request
 from study.session.watching.watch_alarms import LIVE_TIMEOUT_S
 from study.session.watching.watch_view import DriftRecord, WatchView
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.live_file import read_live
+from study.store.sessions.log_lock import is_log_locked
 from study.store.sessions.log_seal import find_seals, read_seal
-from study.store.sessions.log_writer import is_log_locked
 from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.results.fold_session import load_logged_protocol
 
@@ -93,7 +93,7 @@ class Follower:
             with open_regular(self._folder.log) as file:
                 self._begin_again_if_rewritten(file)
                 file.seek(self._read_bytes)
-                new_bytes = file.read(TABLE_BYTES)
+                new_bytes = file.read(MAX_TABLE_BYTES)
         except OSError as problem:
             self._problem, self._missing = f"{problem.strerror or problem}.", isinstance(problem, FileNotFoundError)
             if self._watched is None and not self._missing:
@@ -130,7 +130,7 @@ class Follower:
         """Apply one line of the log; returns its problem as a clause, empty if there is none. Raises StudyError for an
         invalid first line."""
         try:
-            chain, content = read_chained(self._chain, line.removesuffix(b"\n"))
+            chain, content = verify_checksum(self._chain, line.removesuffix(b"\n"))
             event = parse_event(content)
         except ValueError as problem:
             if self._watched is None:

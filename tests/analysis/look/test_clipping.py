@@ -60,8 +60,8 @@ def test_a_clipped_sensor_is_wrong_and_a_limited_command_is_reported(make_record
     samples = make_signals()["noise"]
     found = check_clipping(list_channels(make_recording(np.clip(samples, -1, 1), np.clip(samples, -2, 9))))
     assert [(check.level, check.name) for check in found] == [("notice", "clipping"), ("wrong", "clipping")]
-    assert found[0].seen.startswith("command 'f1' is cut off at 1 N and −1 N: ")
-    assert found[1].seen.startswith("response 'a1' is cut off at −2 m/s^2: ")
+    assert found[0].finding.startswith("command 'f1' is cut off at 1 N and −1 N: ")
+    assert found[1].finding.startswith("response 'a1' is cut off at −2 m/s^2: ")
 
 
 def test_a_binary_command_is_meant_so(make_recording):

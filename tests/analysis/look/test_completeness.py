@@ -17,7 +17,7 @@ def test_missing_samples_are_counted(make_recording, draw_noise):
     response[[100, 101, 102, 400]] = np.nan
     (check,) = check_missing_samples(list_channels(make_recording(draw_noise(2), response)), 1000.0)
     assert check.level == "notice"
-    assert check.seen == ("response 'a1' lacks 4 of 1000 samples, the first at 0.1 s; the longest gap is 3 samples.")
+    assert check.finding == ("response 'a1' lacks 4 of 1000 samples, the first at 0.1 s; the longest gap is 3 samples.")
 
 
 def test_many_missing_samples_are_wrong_and_none_are_fine(make_recording, draw_noise):
@@ -31,7 +31,7 @@ def test_a_constant_response_is_wrong_and_a_constant_command_is_reported(make_re
     found = check_constant_channels(
         list_channels(make_recording(np.column_stack([draw_noise(1), np.zeros(N)]), np.full(N, 2.5)))
     )
-    assert [(check.level, check.seen) for check in found] == [
+    assert [(check.level, check.finding) for check in found] == [
         ("notice", "command 'f2' is 0 N throughout."), ("wrong", "response 'a1' is 2.5 m/s^2 throughout."),
     ]  # fmt: skip
     assert check_constant_channels(list_channels(make_recording(draw_noise(1), draw_noise(2))))[0].level == "fine"
@@ -44,7 +44,7 @@ def test_a_copy_of_a_channel_is_found(make_recording, draw_noise, factor, words)
     response = np.column_stack([draw_noise(1), factor * draw_noise(1) + 3.0 * (factor != 1.0)])
     (check,) = check_copied_channels(list_channels(make_recording(draw_noise(2), response)))
     assert check.level == "wrong"
-    assert words in check.seen
+    assert words in check.finding
 
 
 def test_a_copy_in_single_precision_is_found_and_a_noisy_sensor_is_not(make_recording, draw_noise):

@@ -48,7 +48,7 @@ def test_a_command_that_rests_is_not_driven_and_said(make_recording, make_noise)
     bands, _, _ = analyse_drive(found)
     assert [band.command for band in bands] == ["f1"]
     checks = check_driven_axes(found, bands)
-    assert (checks[0].level, checks[0].seen) == ("notice", "command 'f2' is not driven.")
+    assert (checks[0].level, checks[0].finding) == ("notice", "command 'f2' is not driven.")
 
 
 @pytest.mark.parametrize("noise_share", [0.0, 0.2, 0.5])

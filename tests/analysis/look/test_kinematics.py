@@ -51,7 +51,7 @@ def test_a_speed_is_compared_with_the_derivative_of_its_position(make_recording,
 def test_a_factor_of_two_units_is_named(make_recording, motion, factor, words):
     force, place, _, acceleration = motion
     (check,) = check_kinematics(find_pairs(make_recording(force, factor * acceleration, position=place)), RATE_HZ)
-    assert words in check.do
+    assert words in check.advice
 
 
 def test_a_late_speed_is_reported_in_milliseconds(make_recording, motion):
@@ -59,7 +59,7 @@ def test_a_late_speed_is_reported_in_milliseconds(make_recording, motion):
     late = (delay(speed, 2.0), "velocity", "m/s")
     (check,) = check_kinematics(find_pairs(make_recording(force, late, position=place)), RATE_HZ)
     assert check.level == "notice"
-    assert "2 ms (2 samples) later" in check.seen
+    assert "2 ms (2 samples) later" in check.finding
 
 
 @pytest.mark.slow
@@ -95,13 +95,13 @@ def test_a_measured_force_that_is_late_is_found(make_recording, motion):
     force, *_ = motion
     (check,) = find_lags(make_recording(force, (0.8 * delay(force, 4.0), "force", "N")))
     assert check.level == "notice"
-    assert check.seen == "response 'a1' is 0.8 times command 'f1', 4 ms (4 samples) later."
+    assert check.finding == "response 'a1' is 0.8 times command 'f1', 4 ms (4 samples) later."
 
 
 def test_a_force_behind_a_resonance_is_no_second_view_of_the_command(make_recording, motion):
     force, place, *_ = motion
     (check,) = find_lags(make_recording(force, (800 * place, "force", "N")))
-    assert (check.level, "No two channels measure the same quantity" in check.seen) == ("fine", True)
+    assert (check.level, "No two channels measure the same quantity" in check.finding) == ("fine", True)
 
 
 @pytest.mark.parametrize(
@@ -118,4 +118,4 @@ def test_what_is_later_and_smaller_is_no_wrong_unit(factor, lag, level, words):
     pair = KinematicPair("position x", "acceleration ax", 2, GainAndLag(factor, 0.1, lag, 0.9))
     (check,) = check_kinematics([pair], 1000.0)
     assert check.level == level
-    assert words in check.do
+    assert words in check.advice

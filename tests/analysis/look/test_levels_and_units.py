@@ -29,7 +29,7 @@ def test_an_answer_that_falls_behind_is_reported_by_how_much(make_recording, two
     answer = np.concatenate([two_levels[:10_000], 0.5 * two_levels[10_000:]])
     (check,) = check_levels(make_recording(two_levels, answer, segments=TWO))
     assert check.level == "notice"
-    assert "changes by −50 %" in check.seen
+    assert "changes by −50 %" in check.finding
 
 
 def test_one_level_says_nothing(make_recording, two_levels):
@@ -67,8 +67,8 @@ def test_offsets_are_reported_and_gravity_is_known(make_recording, make_noise):
         list_channels(make_recording(make_noise() - make_noise().mean() + 2.0, 9.81 + make_noise(seed=2)))
     )
     assert [check.level for check in found] == ["notice", "fine"]
-    assert "The mean of command 'f1' is 2 N (" in found[0].seen
-    assert "gravity" in found[1].seen
+    assert "The mean of command 'f1' is 2 N (" in found[0].finding
+    assert "gravity" in found[1].finding
     assert check_offsets(list_channels(make_recording(make_noise(), make_noise(seed=2))))[0].level == "fine"
 
 
@@ -77,9 +77,9 @@ def test_the_step_of_a_converter_is_found(make_recording, make_noise, steps, lev
     step = 1.0 / steps
     (check,) = check_resolution(list_channels(make_recording(make_noise(), np.round(make_noise(seed=2) / step) * step)))
     assert check.level == level
-    assert f"has a resolution of {step:.3g} m/s^2" in check.seen
+    assert f"has a resolution of {step:.3g} m/s^2" in check.finding
 
 
 def test_an_analog_channel_has_no_step(make_recording, make_noise):
     (check,) = check_resolution(list_channels(make_recording(make_noise(), make_noise(seed=2))))
-    assert (check.level, check.seen) == ("fine", "No sensor is limited by the resolution of its converter.")
+    assert (check.level, check.finding) == ("fine", "No sensor is limited by the resolution of its converter.")

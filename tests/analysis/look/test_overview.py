@@ -10,7 +10,7 @@ from equalizer.signals.recording import Recording, Segment
 def test_an_intact_recording_has_no_findings(clean_recording):
     found = make_overview("sound", clean_recording)
     assert not [check for check in found.checks if check.level == "wrong"]
-    assert [check.seen for check in found.checks if check.level == "notice"] == [
+    assert [check.finding for check in found.checks if check.level == "notice"] == [
         "Nothing repeats, so noise cannot be distinguished from errors of a model."
     ]
     assert [(band.command, round(band.low_hz)) for band in found.bands] == [("f1", 0)]
@@ -38,4 +38,4 @@ def test_a_recording_of_any_length_can_be_looked_at(make_recording, n, fill):
     found = make_overview("short", make_recording(samples, samples[::-1], position=samples, segments=segments))
     assert isinstance(found.recording, Recording)
     assert len(found.summaries) == 6
-    assert all(check.seen.endswith(".") for check in found.checks)
+    assert all(check.finding.endswith(".") for check in found.checks)

@@ -64,7 +64,7 @@ def test_declared_periods_are_taken_and_checked(make_recording):
     wrong = make_recording(command, command, segments=(Segment(0, 4000, "noise", period=480),))
     (check, *_) = check_repeats(wrong, find_repeats(wrong, [(0, 4000)]))
     assert check.level == "wrong"
-    assert "Segment 1 states a period of 480 samples, but its command differs by" in check.seen
+    assert "Segment 1 states a period of 480 samples, but its command differs by" in check.finding
 
 
 def test_a_feedback_does_not_hide_that_the_excitation_repeats(make_recording):
@@ -77,4 +77,4 @@ def test_where_nothing_repeats_that_is_reported(make_recording):
     command = np.random.default_rng(1).standard_normal(3000)
     found = make_recording(command, command)
     (check,) = check_repeats(found, find_repeats(found, [(0, 3000)]))
-    assert (check.level, "Nothing repeats" in check.seen) == ("notice", True)
+    assert (check.level, "Nothing repeats" in check.finding) == ("notice", True)

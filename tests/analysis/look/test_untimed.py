@@ -29,7 +29,7 @@ def report_texts(meta) -> list[str]:
     found = make_overview("rig", make_untimed_recording(meta))
     pictures = make_look_pictures(found, 1)
     texts = [text.get_text() for each in pictures for text in each.figure.findobj(Text)]
-    checks = [f"{check.seen} {check.do}" for check in found.checks if check.name != CLOCK]
+    checks = [f"{check.finding} {check.advice}" for check in found.checks if check.name != CLOCK]
     return [summarise_overview(found), *checks, *texts, *(f"{each.caption} {each.alternative}" for each in pictures)]
 
 

@@ -11,7 +11,7 @@ from analysis.psychophysics.detection import (
 from analysis.psychophysics.runs import InconsistentTrialsError
 from analysis.psychophysics.threshold_table import tabulate_thresholds
 from analysis.psychophysics.thresholds import compute_thresholds
-from protocols.definition.exposure import DetectionSettings
+from protocols.definition.session_settings import DetectionSettings
 from protocols.procedure.run_rules import make_staircase_rule
 from protocols.trial import Phase
 

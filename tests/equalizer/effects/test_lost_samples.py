@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from equalizer.effects.catalogue import EFFECTS
-from equalizer.effects.simulation.reading_kernel import repeat_where
+from equalizer.effects.simulation.logger_kernel import repeat_lost_samples
 from equalizer.effects.simulation.simulator import Measurement, simulate_mechanism
 
 EFFECT = EFFECTS["lost_samples"]
@@ -22,14 +22,14 @@ def lossy(bench, command, fraction: float, seed: int):
     seen = bench.measured(model, (), command, seed)
     generator = np.random.default_rng(100 + seed)
     read = np.empty_like(seen.played.response)
-    repeat_where(seen.played.response.copy(), generator.random(len(read)) < fraction, read)
+    repeat_lost_samples(seen.played.response.copy(), generator.random(len(read)) < fraction, read)
     seen.response[:] = read + bench.NOISE_MPS2 * generator.standard_normal(read.shape)
     return model, seen
 
 
 def test_a_lost_sample_shows_what_was_read_before_it():
     samples, read = np.arange(6.0)[:, None], np.empty((6, 1))
-    repeat_where(samples, np.array([False, True, False, True, True, False]), read)
+    repeat_lost_samples(samples, np.array([False, True, False, True, True, False]), read)
     assert read[:, 0].tolist() == [0, 0, 2, 2, 2, 5]
 
 
@@ -56,7 +56,7 @@ def test_a_position_of_the_same_logger_is_lost_with_the_response(bench, command,
     noise, rng = np.full(3, bench.NOISE_MPS2), np.random.default_rng(9)
     lost, position = np.random.default_rng(104).random(len(command)) < 0.02, seen.played.position.copy()
     if same_logger:
-        repeat_where(seen.played.position.copy(), lost, position)
+        repeat_lost_samples(seen.played.position.copy(), lost, position)
     measured = position + bench.NOISE_M * rng.standard_normal(position.shape)
     placed = bench.placed("lost_samples", {"fraction": 0.02}, *ALL)
     given = simulate_mechanism(model, command, 1000.0, placed, measurement=Measurement(seen.response, noise, measured))

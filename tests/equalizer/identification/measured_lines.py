@@ -3,7 +3,7 @@
 import numpy as np
 
 from equalizer.identification.frequency_response.frequency_response import FrequencyResponse
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 
 AXES = ("x", "y", "z")
 
@@ -56,7 +56,7 @@ def small_plant(plants):
 def errors_of(model, plant, frequency_hz) -> tuple[float, float]:
     """Root mean square over that of the truth, and the worst line's own."""
     truth = plant.response(frequency_hz)
-    error = np.linalg.norm(model_response(model, frequency_hz) - truth, axis=(1, 2))
+    error = np.linalg.norm(compute_model_response(model, frequency_hz) - truth, axis=(1, 2))
     size = np.linalg.norm(truth, axis=(1, 2))
     return float(np.sqrt((error**2).sum() / (size**2).sum())), float((error / size).max())
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 
 from protocols.definition.declared_analysis import AnalysisSettings
-from protocols.definition.exposure import CatchSettings, DetectionSettings
 from protocols.definition.participant_text import TextSettings
 from protocols.definition.preparation import MaskingSettings, PracticeSettings
 from protocols.definition.probes import ProbeSettings
+from protocols.definition.session_settings import CatchSettings, DetectionSettings
 from protocols.document.hashing import TABLES_SINCE, protocol_hash
 from protocols.document.loading import ProtocolError, load_protocol
 from protocols.procedure.practice import (

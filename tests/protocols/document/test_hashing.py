@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from protocols.document.dumping import dump_protocol, protocol_values
+from protocols.document.dumping import dump_protocol, protocol_to_values
 from protocols.document.hashing import protocol_hash
 from protocols.document.loading import load_protocol, protocol_from_values
 
@@ -21,7 +21,7 @@ def shipped(request):
 
 def test_a_protocol_survives_text_and_values(shipped):
     assert load_protocol(dump_protocol(shipped), "again") == shipped
-    assert protocol_from_values(protocol_values(shipped), "again") == shipped
+    assert protocol_from_values(protocol_to_values(shipped), "again") == shipped
     assert protocol_hash(load_protocol(dump_protocol(shipped), "again")) == protocol_hash(shipped)
 
 

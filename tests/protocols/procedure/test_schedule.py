@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from protocols.definition.exposure import CatchSettings, DetectionSettings
 from protocols.definition.preparation import PracticeSettings
+from protocols.definition.session_settings import CatchSettings, DetectionSettings
 from protocols.definition.study_protocol import ScheduleSettings
 from protocols.procedure.schedule import (
     Draw,

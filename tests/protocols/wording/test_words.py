@@ -8,10 +8,10 @@ import pytest
 from protocols.document.dumping import dump_protocol
 from protocols.document.hashing import protocol_hash
 from protocols.document.loading import ProtocolError, load_protocol, protocol_from_values
-from protocols.wording.english import ENGLISH, LANGUAGES, placeholders
+from protocols.wording.english import ENGLISH, LANGUAGES, list_placeholders
 from protocols.wording.english_facts import FACTS
-from protocols.wording.english_forms import PROTOCOLS
-from protocols.wording.in_language import find_table_problems, translate_protocol
+from protocols.wording.english_forms import PROTOCOL_TEXTS
+from protocols.wording.translation import find_table_problems, translate_protocol
 from protocols.wording.words import ENGLISH_WORDS, Words
 
 TRANSLATED = tuple(code for code in LANGUAGES if code != "en")
@@ -92,7 +92,7 @@ def test_a_text_whose_braces_do_not_fit_is_shown_in_english():
 
 
 def test_all_braces_of_the_english_texts_are_names():
-    assert [key for key, text in ENGLISH.items() if placeholders(text) is None] == []
+    assert [key for key, text in ENGLISH.items() if list_placeholders(text) is None] == []
     assert ENGLISH_WORDS.fill_count("runs_left", 1) == "1 run is left."
     assert ENGLISH_WORDS.fill_count("runs_left", 0) == "0 runs are left."
 
@@ -103,7 +103,7 @@ def test_every_sentence_of_a_shipped_study_is_in_the_tables(name):
     sentences = {protocol.title, protocol.setup.grip, *protocol.consent.statements, *protocol.consent.exclusions}
     for question in protocol.debrief:
         sentences |= {question.question, *question.choices}
-    assert sentences <= set(PROTOCOLS.values())
+    assert sentences <= set(PROTOCOL_TEXTS.values())
 
 
 @pytest.mark.parametrize("code", TRANSLATED)
@@ -115,7 +115,7 @@ def test_a_study_in_another_language_is_the_same_study(name, code):
         protocol_from_values(translate_protocol(values, table_of(code), code), name),
     )
     assert protocol_hash(english) != protocol_hash(other)
-    assert not {other.title, *other.consent.statements, *other.consent.exclusions} & set(PROTOCOLS.values())
+    assert not {other.title, *other.consent.statements, *other.consent.exclusions} & set(PROTOCOL_TEXTS.values())
     for asked, told in zip(english.debrief, other.debrief, strict=True):
         assert (told.key, told.codes) == (asked.key, asked.choices)
         assert told.question != asked.question

@@ -18,7 +18,7 @@ from study.devices.force_dimension import findings
 from study.devices.force_dimension.usb import UsbDevice
 from study.errors import ExitCode
 from study.session.stimulus.timing_verdict import judge_lateness, judge_load, measure_lateness
-from study.session.views.views import DeviceFinding, DeviceReport
+from study.session.views.participant_views import DeviceFinding, DeviceReport
 from study.workflows.checks import daily_check, examine_setup
 from study.workflows.checks.check_timing import Timing
 from study.workflows.checks.examine_setup import Examination

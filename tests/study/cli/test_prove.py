@@ -5,7 +5,7 @@ import json
 import pytest
 
 from study.cli.main import main
-from study.evaluation.bank.proof_folder import ANSWER
+from study.evaluation.bank.proof_folder import ANSWER_FILE
 
 SEED, CASES = 51_401, 1
 
@@ -68,7 +68,7 @@ def changed(path):
 
 SPOILED = {
     "a torn bank.json": (lambda bank: torn(bank / "bank.json"), "bank.json"),
-    "a torn answer": (lambda bank: torn(next(bank.glob(f"open/*/{ANSWER}"))), ANSWER),
+    "a torn answer": (lambda bank: torn(next(bank.glob(f"open/*/{ANSWER_FILE}"))), ANSWER_FILE),
     "a changed label": (lambda bank: changed(next(bank.glob("sealed/*.json"))), "A seal is broken"),
     "seals that are none": (lambda bank: torn(bank / "labels.sha256"), "A seal is broken"),
     "a torn document": (lambda bank: torn(bank / "proof.json"), "proof.json"),

@@ -7,10 +7,10 @@ import select
 
 import pytest
 
-from study.cli.motion_notice import announce
+from study.cli.motion_notice import announce_motion
 from study.cli.progress import show_late_bar
 from study.errors import StudyError, WrongUseError
-from study.session.views.views import DeviceReport
+from study.session.views.participant_views import DeviceReport
 from study.workflows.checks import examine_setup
 from study.workflows.checks.examine_setup import Examination
 
@@ -30,10 +30,10 @@ def test_without_a_terminal_it_moves_only_where_no_hand_is_said_to_be_there(
 ):
     monkeypatch.setattr("sys.stdin", io.StringIO(""))
     if moves:
-        announce(NOTICE, hands_off, held)
+        announce_motion(NOTICE, hands_off, held)
     else:
         with pytest.raises(WrongUseError, match="in a terminal") as refusal:
-            announce(NOTICE, hands_off, held)
+            announce_motion(NOTICE, hands_off, held)
         assert refusal.value.saved == "Nothing moved."
         assert ("--hands-off" in refusal.value.do_now) is not held
     said = capsys.readouterr()
@@ -111,7 +111,7 @@ def test_a_recording_into_a_hand_is_not_one_with_hands_off(tmp_path):
 def test_at_a_terminal_enter_has_to_be_pressed(monkeypatch, capsys):
     keys = ATerminal("\nnot read")
     monkeypatch.setattr("sys.stdin", keys)
-    announce(NOTICE, hands_off=True)
+    announce_motion(NOTICE, hands_off=True)
     assert capsys.readouterr().err == f"{NOTICE}\nPress Enter to begin. "
     assert keys.read() == "not read"
 
@@ -119,7 +119,7 @@ def test_at_a_terminal_enter_has_to_be_pressed(monkeypatch, capsys):
 def test_a_terminal_that_is_closed_is_no_yes(monkeypatch):
     monkeypatch.setattr("sys.stdin", ATerminal(""))
     with pytest.raises(KeyboardInterrupt):
-        announce(NOTICE, hands_off=False)
+        announce_motion(NOTICE, hands_off=False)
 
 
 def test_a_late_bar_draws_nothing_before_there_is_progress(monkeypatch):

@@ -19,7 +19,7 @@ def streams(monkeypatch):
         monkeypatch.setattr("sys.stderr", stderr)
         monkeypatch.setenv("TERM", term)
         monkeypatch.delenv("TEXTUAL_DRIVER", raising=False)
-        return screen.has_keys(), screen.has_screen()
+        return screen.has_keyboard(), screen.has_screen()
 
     return set_up
 

@@ -98,7 +98,7 @@ def test_a_wrong_protocol_names_file_key_and_what_is_allowed(run, small_file, tm
 
 
 def test_leaving_is_not_finishing(run, small_file, tmp_path, monkeypatch):
-    from study.session.views.views import Unanswered
+    from study.session.views.participant_views import Unanswered
 
     leave = Unanswered("the participant left", ends_sitting=True)
     monkeypatch.setattr("study.workflows.session.simulated_display.SimulatedDisplay.ask", lambda *_: leave)
@@ -119,11 +119,11 @@ def test_a_simulated_participant_does_not_take_a_persons_code(run, small_file, t
 
 
 def test_the_help_names_every_observer(run):
-    from study.participants.observers import OBSERVERS
+    from study.participants.observer_catalogue import OBSERVER_DESCRIPTIONS
 
     _, out, _ = run("study", "--help")
     said = "".join(out.split())
-    assert all(name in said for name in OBSERVERS)
+    assert all(name in said for name in OBSERVER_DESCRIPTIONS)
 
 
 @pytest.mark.slow

@@ -32,7 +32,7 @@ def data(tmp_path_factory, small_text):
 @pytest.fixture
 def said(data, capsys, monkeypatch):
     def call(command: str, width: int | None) -> str:
-        monkeypatch.setattr(f"study.cli.{command}.columns", lambda: width)
+        monkeypatch.setattr(f"study.cli.{command}.read_terminal_width", lambda: width)
         capsys.readouterr()
         assert main([part.format(data=data) for part in COMMANDS[command]]) == 0
         return capsys.readouterr().out
@@ -59,10 +59,10 @@ def test_the_offset_stands_in_the_header_alone(said):
 
 
 def test_a_terminal_says_how_wide_it_is_and_a_pipe_does_not(monkeypatch):
-    from study.cli.screen import columns
+    from study.cli.screen import read_terminal_width
 
     monkeypatch.setattr("shutil.get_terminal_size", lambda: shutil.os.terminal_size((93, 20)))
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
-    assert columns() == 93
+    assert read_terminal_width() == 93
     monkeypatch.setattr("sys.stdout.isatty", lambda: False, raising=False)
-    assert columns() is None
+    assert read_terminal_width() is None

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from study.errors import WrongUseError
-from study.evaluation.bank.proof_folder import ANSWER, RECORDING
+from study.evaluation.bank.proof_folder import ANSWER_FILE, RECORDING_FILE
 from study.evaluation.bank.prove import prove
 from study.evaluation.bank.seal_cases import BankPlan
 from study.evaluation.bank.sealed_bank import BankOptions
@@ -25,7 +25,7 @@ def without_times(text):
 
 
 def answers(path):
-    return {str(each.relative_to(path)): without_times(each.read_text()) for each in path.rglob(ANSWER)}
+    return {str(each.relative_to(path)): without_times(each.read_text()) for each in path.rglob(ANSWER_FILE)}
 
 
 @pytest.mark.slow
@@ -35,7 +35,7 @@ def test_a_bank_is_answered_on_a_cluster_as_it_is_here(local, kill_a_worker, tmp
     plan = BankPlan(51_404, cases, brief=True)
     here = prove(tmp_path / "here", plan, BankOptions(keep=True), lambda *_: None)
     shutil.copytree(tmp_path / "here", tmp_path / "there")
-    for path in (tmp_path / "there" / "open").glob(f"*/{ANSWER}"):
+    for path in (tmp_path / "there" / "open").glob(f"*/{ANSWER_FILE}"):
         path.unlink()
     steps = []
 
@@ -51,7 +51,7 @@ def test_a_bank_is_answered_on_a_cluster_as_it_is_here(local, kill_a_worker, tmp
     assert answers(tmp_path / "there" / "open") == answers(tmp_path / "here" / "open")
     assert [each.verdict for each in there.outcomes] == [each.verdict for each in here.outcomes]
     assert "failed" not in {each.verdict for each in there.outcomes}
-    assert not list((tmp_path / "there" / "open").glob(f"*/{RECORDING}"))  # answered, and not to be kept
+    assert not list((tmp_path / "there" / "open").glob(f"*/{RECORDING_FILE}"))  # answered, and not to be kept
 
 
 @pytest.fixture
@@ -80,9 +80,9 @@ def test_real_recordings_are_answered_on_a_cluster_as_they_are_here(folder, loca
     with open_cluster_workers(local.scheduler_address, one_thread=True) as pool:
         there = diagnose_folder(plan, on_progress, executor=pool)
         assert kill_a_worker.killed
-        kept = {path: path.stat().st_mtime_ns for path in plan.out.rglob(ANSWER)}
+        kept = {path: path.stat().st_mtime_ns for path in plan.out.rglob(ANSWER_FILE)}
         diagnose_folder(plan, lambda *_: None, executor=pool)
-    assert {path: path.stat().st_mtime_ns for path in plan.out.rglob(ANSWER)} == kept
+    assert {path: path.stat().st_mtime_ns for path in plan.out.rglob(ANSWER_FILE)} == kept
     assert answers(plan.out) == answers(tmp_path / "here")
     assert [each.verdict for each in there.results.answers] == [each.verdict for each in here.results.answers]
     assert sorted(path.relative_to(plan.out) for path in plan.out.rglob("*")) == sorted(

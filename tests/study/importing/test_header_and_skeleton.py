@@ -3,7 +3,7 @@ import time
 import numpy as np
 import pytest
 
-from study.importing.arrays.arrays import Arrays, read_arrays
+from study.importing.arrays.read_arrays import Arrays, read_arrays
 from study.importing.build_recording import build_recording
 from study.importing.header_map import describe_header_choices, find_header_problems, make_header_map
 from study.importing.map_format.import_map import CsvMap

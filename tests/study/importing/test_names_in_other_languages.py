@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from study.importing.arrays.arrays import Arrays
+from study.importing.arrays.read_arrays import Arrays
 from study.importing.header_map import find_header_problems, make_header_map
 from study.importing.map_format.signal_words import parse_signal_name
 from study.importing.map_skeleton import make_map_skeleton

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from study.importing.arrays.arrays import read_arrays
+from study.importing.arrays.read_arrays import read_arrays
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import MapNeededError
 from study.workflows.recording.import_recording import read_foreign

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from study.importing.arrays.arrays import read_arrays
+from study.importing.arrays.read_arrays import read_arrays
 from study.importing.build_recording import build_recording
 from study.importing.header_map import find_header_problems
 from study.importing.map_format.import_map import CsvMap

@@ -7,7 +7,7 @@ import pytest
 from protocols.trial import Phase
 from study.participants.delivered_feeler import DeliveredFeeler
 from study.participants.observer import PerceivedStimulus
-from study.participants.observers import find_observer
+from study.participants.observer_catalogue import find_observer
 from study.participants.population import TYPICAL_THRESHOLDS_N, draw_person, make_member
 from study.session.stimulus.delivered import Delivered
 

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.psychophysics.repeated_trials import repeat_warning
+from analysis.psychophysics.repeated_trials import format_repeat_warning
 from analysis.psychophysics.study_warnings import list_study_warnings
 from analysis.psychophysics.threshold_table import tabulate_thresholds
 from analysis.psychophysics.thresholds import compute_thresholds
 from protocols.procedure.staircase import begin_staircase, is_finished, level_n
 from protocols.trial import Phase, TrialStatus, VoidCause
 from study.participants.observer import PerceivedStimulus
-from study.participants.observers import find_observer
+from study.participants.observer_catalogue import find_observer
 from study.participants.population import make_member
 from tests.analysis.conftest import PUBLISHED, TEMPLATE, play_trial
 
@@ -55,7 +55,7 @@ def warnings_of(observer, seed, protocol, company):
     trials = [*mine, *company]
     rows = compute_thresholds(trials, PUBLISHED)
     said = list_study_warnings(trials, rows, tabulate_thresholds(rows, HZ), protocol)
-    return " ".join(sentence for sentence in (*said, repeat_warning(mine)) if "P01" in sentence)
+    return " ".join(sentence for sentence in (*said, format_repeat_warning(mine)) if "P01" in sentence)
 
 
 def people(kind, count):

@@ -11,9 +11,9 @@ from protocols.document.loading import load_protocol
 from protocols.procedure.schedule import draw_trial, schedule_runs
 from protocols.procedure.staircase import begin_staircase, is_finished, level_n, step, to_newton
 from protocols.trial import Phase
-from study.participants.detection import TYPICAL_DETECTION_N
+from study.participants.detection_thresholds import TYPICAL_DETECTION_N
 from study.participants.observer import Observer, PerceivedStimulus
-from study.participants.observers import find_observer
+from study.participants.observer_catalogue import find_observer
 from study.participants.population import draw_population
 
 FREQUENCIES = (5.0, 15.0, 25.0, 35.0, 45.0)

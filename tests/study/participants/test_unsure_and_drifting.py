@@ -9,8 +9,8 @@ import pytest
 from protocols.trial import Phase
 from study.participants.direction_feeler import DirectionFeeler
 from study.participants.observer import PerceivedStimulus
-from study.participants.observers import find_observer
-from study.participants.population import KINDS, make_member
+from study.participants.observer_catalogue import find_observer
+from study.participants.population import MEMBER_KINDS, make_member
 from study.participants.unsure_repeater import UnsureRepeater
 
 N = 3000
@@ -77,7 +77,7 @@ def test_who_goes_by_strength_is_thrown_off_by_a_roved_level(rove_db, expected):
     assert right == pytest.approx(expected, abs=four_errors(0.5))
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", MEMBER_KINDS)
 def test_a_member_can_be_made_again_from_its_name(kind):
     assert find_observer(f"{kind}_2_seed_9", 0) == make_member(kind, 2, 9)
     assert make_member(kind, 2, 9).name == f"{kind}_2_seed_9"

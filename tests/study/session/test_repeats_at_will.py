@@ -10,15 +10,15 @@ from statistics import NormalDist, fmean
 import numpy as np
 import pytest
 
-from analysis.psychophysics.repeated_trials import repeat_warning
+from analysis.psychophysics.repeated_trials import format_repeat_warning
 from analysis.psychophysics.runs import recompute_runs
 from analysis.psychophysics.thresholds import compute_run_threshold
 from protocols.trial import Phase, TrialStatus, VoidCause
 from study.participants.psychometric_curve import WeibullCurve
 from study.session.facts.events import AnswerGiven, TrialMeasured, TrialSpoiled
-from study.session.state.draw_check import LogContradiction
 from study.session.state.fold import apply_event
 from study.session.state.machine import find_next_action
+from study.session.state.presentation_check import LogContradiction
 from study.session.state.state import begin_session, count_repeats_left
 from study.store.formats.protocol_files import read_study_protocol
 
@@ -102,11 +102,11 @@ def test_pausing_when_unsure_cannot_be_refused_and_is_flagged_in_every_run(facts
 
 def test_the_warning_names_person_run_and_rate(facts, protocol):
     trials = run_of(facts, protocol, 3, 2, VoidCause.ASKED, UNSURE)
-    warning = repeat_warning(trials)
+    warning = format_repeat_warning(trials)
     share = f"3 of {len(trials)} presentations ({300 / len(trials):.1f} %)"
     assert f"P01 {share} and P01 at 25 Hz (P01_001) {share}" in warning
     assert "at least 3, and at least 2 % of them" in warning
-    assert repeat_warning(run_of(facts, protocol, 3, 2, VoidCause.ASKED, 0.0)) == ""
+    assert format_repeat_warning(run_of(facts, protocol, 3, 2, VoidCause.ASKED, 0.0)) == ""
 
 
 @pytest.mark.parametrize("cause", VoidCause)

@@ -8,7 +8,7 @@ import pytest
 from study.devices.rig import POSITION, TRUE_ACCELERATION
 from study.devices.simulated import layout
 from study.devices.simulated.compiled import solve_pose
-from study.devices.simulated.layout import MODES, MOUNTS
+from study.devices.simulated.layout import HANDLE_MODES, MOUNT_MODES
 from study.devices.simulated.omega3 import build_omega3
 from study.devices.simulated.parameters import Hand, HandleModes, Mount, Omega3Parameters
 
@@ -19,8 +19,8 @@ def lossless():
     return replace(
         SHIPPED,
         drives=replace(SHIPPED.drives, friction_n_m=0.0, damping_n_m_s=0.0, cable_damping_ratio=0.0),
-        mount=replace(SHIPPED.mount, damping_ratios=(0.0,) * MOUNTS),
-        handle_modes=replace(SHIPPED.handle_modes, damping_ratios=(0.0,) * MODES),
+        mount=replace(SHIPPED.mount, damping_ratios=(0.0,) * MOUNT_MODES),
+        handle_modes=replace(SHIPPED.handle_modes, damping_ratios=(0.0,) * HANDLE_MODES),
     )
 
 
@@ -30,7 +30,7 @@ def mirrored():
         SHIPPED,
         drives=replace(SHIPPED.drives, cable_n_m_per_rad=(158.0,) * 3),
         mount=replace(Mount(), masses_kg=(1e9, 1e9)),
-        handle_modes=replace(HandleModes(), masses_kg=(1e-12,) * MODES, gains=(0.0,) * MODES),
+        handle_modes=replace(HandleModes(), masses_kg=(1e-12,) * HANDLE_MODES, gains=(0.0,) * HANDLE_MODES),
         hand=Hand((0.1,) * 3, (4.0,) * 3, (120.0,) * 3),
     )
 
@@ -41,18 +41,23 @@ def energy(rig):
     angles, jacobian = np.empty(3), np.empty((3, 3))
     solve_pose(p, state[:3].copy(), angles, jacobian)
     velocity, rocking, rocking_speed = state[3:6], state[12:14], state[14:16]
-    bending, bending_speed = state[16 : 16 + MODES], state[16 + MODES : 16 + 2 * MODES]
-    bristle = state[layout.BRISTLE : layout.BRISTLE + 3]
-    normals = p[layout.MOUNT_DIRECTION :][: 3 * MOUNTS].reshape(MOUNTS, 3)
-    shapes = p[layout.MODE_DIRECTION :][: 3 * MODES].reshape(MODES, 3)
+    bending, bending_speed = state[16 : 16 + HANDLE_MODES], state[16 + HANDLE_MODES : 16 + 2 * HANDLE_MODES]
+    bristle = state[layout.BRISTLE_DEFLECTION : layout.BRISTLE_DEFLECTION + 3]
+    normals = p[layout.MOUNT_DIRECTION :][: 3 * MOUNT_MODES].reshape(MOUNT_MODES, 3)
+    shapes = p[layout.MODE_DIRECTION :][: 3 * HANDLE_MODES].reshape(HANDLE_MODES, 3)
     absolute = velocity + rocking_speed @ normals
     moving = absolute @ p[layout.PLATFORM_MASS :][:9].reshape(3, 3) @ absolute
-    moving += p[layout.MODE_MASS :][:MODES] @ (shapes @ absolute + bending_speed) ** 2
+    moving += p[layout.MODE_MASS :][:HANDLE_MODES] @ (shapes @ absolute + bending_speed) ** 2
     moving += p[layout.ARM_INERTIA] * np.sum((jacobian @ velocity) ** 2)
-    moving += p[layout.DRIVE_INERTIA] * np.sum(state[9:12] ** 2) + p[layout.MOUNT_MASS :][:MOUNTS] @ rocking_speed**2
-    bent = p[layout.CABLE :][:3] @ (state[6:9] - angles) ** 2 + p[layout.MOUNT_STIFFNESS :][:MOUNTS] @ rocking**2
-    bent += p[layout.MODE_STIFFNESS :][:MODES] @ bending**2
-    bent += p[layout.FRICTION] / p[layout.PRESLIDING] * np.sum(bristle**2)
+    moving += (
+        p[layout.DRIVE_INERTIA] * np.sum(state[9:12] ** 2) + p[layout.MOUNT_MASS :][:MOUNT_MODES] @ rocking_speed**2
+    )
+    bent = (
+        p[layout.CABLE_STIFFNESS :][:3] @ (state[6:9] - angles) ** 2
+        + p[layout.MOUNT_STIFFNESS :][:MOUNT_MODES] @ rocking**2
+    )
+    bent += p[layout.MODE_STIFFNESS :][:HANDLE_MODES] @ bending**2
+    bent += p[layout.COULOMB_FRICTION] / p[layout.PRESLIDING_RANGE] * np.sum(bristle**2)
     bent += p[layout.HAND_STIFFNESS :][:3] @ (state[:3] + rocking @ normals - p[layout.HAND_REST :][:3]) ** 2
     return 0.5 * (moving + bent)
 
@@ -142,7 +147,7 @@ def test_the_stops_catch_twice_the_strongest_push_and_let_go_again(bench, direct
 def linear_response(parameters, frequency_hz):
     """Handle acceleration (3, 3) per newton from M, C, K over (handle, motors, base, handle modes), all absolute."""
     p = parameters
-    size = 6 + MOUNTS + MODES
+    size = 6 + MOUNT_MODES + HANDLE_MODES
     mass, damping, stiffness = (np.zeros((size, size)) for _ in range(3))
 
     def add(matrix, rows, weights) -> None:
@@ -150,27 +155,32 @@ def linear_response(parameters, frequency_hz):
 
     jacobian, everything = np.empty((3, 3)), np.eye(size)
     solve_pose(p, np.zeros(3), np.empty(3), jacobian)
-    normals = p[layout.MOUNT_DIRECTION :][: 3 * MOUNTS].reshape(MOUNTS, 3)
-    shapes = p[layout.MODE_DIRECTION :][: 3 * MODES].reshape(MODES, 3)
-    handle, motors, base, modes = everything[:3], everything[3:6], everything[6 : 6 + MOUNTS], everything[6 + MOUNTS :]
+    normals = p[layout.MOUNT_DIRECTION :][: 3 * MOUNT_MODES].reshape(MOUNT_MODES, 3)
+    shapes = p[layout.MODE_DIRECTION :][: 3 * HANDLE_MODES].reshape(HANDLE_MODES, 3)
+    handle, motors, base, modes = (
+        everything[:3],
+        everything[3:6],
+        everything[6 : 6 + MOUNT_MODES],
+        everything[6 + MOUNT_MODES :],
+    )
     arms = jacobian @ (handle - normals.T @ base)
     mass += handle.T @ p[layout.PLATFORM_MASS :][:9].reshape(3, 3) @ handle
-    add(mass, modes + shapes @ handle, p[layout.MODE_MASS :][:MODES])
+    add(mass, modes + shapes @ handle, p[layout.MODE_MASS :][:HANDLE_MODES])
     add(mass, arms, np.full(3, p[layout.ARM_INERTIA]))
     add(mass, motors, np.full(3, p[layout.DRIVE_INERTIA]))
-    add(mass, base, p[layout.MOUNT_MASS :][:MOUNTS])
-    add(stiffness, motors - arms, p[layout.CABLE :][:3])
+    add(mass, base, p[layout.MOUNT_MASS :][:MOUNT_MODES])
+    add(stiffness, motors - arms, p[layout.CABLE_STIFFNESS :][:3])
     add(damping, motors - arms, p[layout.CABLE_DAMPING :][:3])
     add(damping, motors, np.full(3, p[layout.DRIVE_DAMPING]))
-    add(stiffness, base, p[layout.MOUNT_STIFFNESS :][:MOUNTS])
-    add(damping, base, p[layout.MOUNT_DAMPING :][:MOUNTS])
-    add(stiffness, modes, p[layout.MODE_STIFFNESS :][:MODES])
-    add(damping, modes, p[layout.MODE_DAMPING :][:MODES])
+    add(stiffness, base, p[layout.MOUNT_STIFFNESS :][:MOUNT_MODES])
+    add(damping, base, p[layout.MOUNT_DAMPING :][:MOUNT_MODES])
+    add(stiffness, modes, p[layout.MODE_STIFFNESS :][:HANDLE_MODES])
+    add(damping, modes, p[layout.MODE_DAMPING :][:HANDLE_MODES])
     add(stiffness, handle, p[layout.HAND_STIFFNESS :][:3])
     add(damping, handle, p[layout.HAND_DAMPING :][:3])
     s = 2j * np.pi * frequency_hz
     moved = np.linalg.solve(s**2 * mass + s * damping + stiffness, motors.T @ np.linalg.inv(jacobian).T)
-    seen = handle + shapes.T @ np.diag(p[layout.MODE_GAIN :][:MODES]) @ modes
+    seen = handle + shapes.T @ np.diag(p[layout.MODE_GAIN :][:HANDLE_MODES]) @ modes
     amplifier = 1 / (1 + s / (2 * np.pi * SHIPPED.drives.amplifier_hz))
     # Each step takes the torque of its end: half a step early.
     held = np.sinc(frequency_hz / 1000) * np.exp(-s * (layout.TICK_S - layout.STEP_S) / 2)

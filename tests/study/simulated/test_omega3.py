@@ -13,8 +13,8 @@ def masses_at(rig, place):
     jacobian, mass = np.empty((3, 3)), np.empty((5, 5))
     solve_pose(rig.parameters, np.array(place, float), np.empty(3), jacobian)
     fill_mass_matrix(rig.parameters, jacobian, mass)
-    modes = rig.parameters[layout.MODE_DIRECTION :][: 3 * layout.MODES].reshape(-1, 3)
-    weights = rig.parameters[layout.MODE_MASS :][: layout.MODES]
+    modes = rig.parameters[layout.MODE_DIRECTION :][: 3 * layout.HANDLE_MODES].reshape(-1, 3)
+    weights = rig.parameters[layout.MODE_MASS :][: layout.HANDLE_MODES]
     carried = modes.T @ np.diag(weights) @ modes
     return mass[:3, :3] + carried + rig.parameters[layout.DRIVE_INERTIA] * jacobian.T @ jacobian
 

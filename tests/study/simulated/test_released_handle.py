@@ -18,7 +18,7 @@ from study.session.stimulus.delivered import HEAVIEST_KG, has_hardly_moved, meas
 from study.session.stimulus.held_stimulus import HeldStimulus
 from study.session.stimulus.stimulus import compute_direction_vector
 from study.store.formats.protocol_files import read_study_protocol
-from study.workflows.device_settings import device_settings
+from study.workflows.device_settings import make_device_settings
 
 PROTOCOL = read_study_protocol("direction_threshold").protocol
 VECTOR = compute_direction_vector(TestDirections(), 1)
@@ -43,7 +43,7 @@ def recorded(frequency_hz: float, grips: tuple[float, float], seed: int, level_n
     wave = level_n * np.sin(2 * np.pi * frequency_hz * np.arange(200) / 1000)[:, None] * VECTOR
     loop = Signal(wave, 1000.0, "force", "N", ("fx", "fy", "fz"))
     clock = VirtualClock()
-    with contextlib.closing(SafeDevice(rig, device_settings(PROTOCOL), clock)) as device:
+    with contextlib.closing(SafeDevice(rig, make_device_settings(PROTOCOL), clock)) as device:
         device.hold(HeldStimulus(loop, 0.5, 0.05, "raised_cosine"))
         for tenth in range(30):
             if tenth == 15:

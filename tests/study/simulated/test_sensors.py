@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from study.devices.rig import ACCELERATION, POSITION, READING_SIZE, SENSOR_CLIPPED, TRUE_ACCELERATION
-from study.devices.simulated.layout import FILTERED, MOTOR
+from study.devices.simulated.layout import FILTERED_ACCELERATION, MOTOR_ANGLE
 from study.devices.simulated.omega3 import build_omega3
-from study.devices.simulated.parameters import GRAVITY_M_S2, Accelerometer
+from study.devices.simulated.parameters import GRAVITY_MPS2, Accelerometer
 
 REST = np.zeros((4000, 3))
 
@@ -36,10 +36,10 @@ def test_the_same_seed_reads_the_same_and_another_seed_does_not(bench):
 @pytest.mark.parametrize(("axis", "sign"), [(0, 1), (0, -1), (1, 1), (2, 1), (2, -1)])
 def test_three_g_with_gravity_in_it_is_the_limit_and_sets_the_flag(axis, sign):
     rig = quiet(build_omega3(1, hand=False))
-    room = 3 * GRAVITY_M_S2 - sign * GRAVITY_M_S2 * (axis == 2)
-    rig.state[FILTERED + axis] = sign * 0.95 * room
+    room = 3 * GRAVITY_MPS2 - sign * GRAVITY_MPS2 * (axis == 2)
+    rig.state[FILTERED_ACCELERATION + axis] = sign * 0.95 * room
     assert one_reading(rig)[SENSOR_CLIPPED] == 0
-    rig.state[FILTERED + axis] = sign * 1.05 * room
+    rig.state[FILTERED_ACCELERATION + axis] = sign * 1.05 * room
     reading = one_reading(rig)
     assert reading[SENSOR_CLIPPED] == 1
     assert reading[ACCELERATION][axis] == pytest.approx(sign * room, rel=0.02)
@@ -50,7 +50,7 @@ def test_the_encoders_step_and_the_step_is_below_ten_micrometres_along_a_leg():
     at_rest = one_reading(rig)[POSITION].copy()
     steps = []
     for travel in np.linspace(0, 1e-3, 2001):
-        rig.state[MOTOR] += travel - (steps[-1][0] if steps else 0.0)
+        rig.state[MOTOR_ANGLE] += travel - (steps[-1][0] if steps else 0.0)
         steps.append((travel, *(one_reading(rig)[POSITION] - at_rest)))
     places = np.unique(np.array(steps)[:, 1:], axis=0)
     assert 8 <= len(places) <= 12
@@ -68,7 +68,7 @@ def test_the_mounting_is_off_by_a_degree_or_so_and_leaks_a_percent():
     rig = quiet(build_omega3(1, hand=False))
     columns = []
     for axis in range(3):
-        rig.state[FILTERED : FILTERED + 3] = np.eye(3)[axis]
+        rig.state[FILTERED_ACCELERATION : FILTERED_ACCELERATION + 3] = np.eye(3)[axis]
         columns.append(one_reading(rig)[ACCELERATION].copy())
     leak = np.abs(np.array(columns).T - np.eye(3))
     assert np.diag(leak) == pytest.approx(np.zeros(3), abs=1e-3)

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from study.importing.arrays.arrays import read_arrays
+from study.importing.arrays.read_arrays import read_arrays
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError
-from study.store.disk.declared_size import FACTOR, MOST_BYTES, PLAIN_BYTES, SizeLimit
+from study.store.disk.declared_size import MAX_EXPANSION, MAX_LIMIT_BYTES, MIN_LIMIT_BYTES, SizeLimit
 from study.store.disk.file_errors import UnusableFileError
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.recording_file import read_recording
@@ -230,8 +230,8 @@ def test_what_scipy_writes_is_read_to_the_last_digit(tmp_path, kind, packed):
 
 def test_an_hour_of_nine_channels_at_ten_kilohertz_is_within_the_limit():
     size = 3600 * 10_000 * 9 * 8
-    SizeLimit(size // FACTOR).add_size("it", size)
-    assert PLAIN_BYTES < size < MOST_BYTES
+    SizeLimit(size // MAX_EXPANSION).add_size("it", size)
+    assert MIN_LIMIT_BYTES < size < MAX_LIMIT_BYTES
 
 
 @pytest.mark.slow
@@ -241,7 +241,7 @@ def test_memory_is_taken_for_nothing_that_is_only_declared(tmp_path, recording):
     (tmp_path / "a.npy").write_bytes(header("(536870912,)"))
     script = (
         "import resource, sys\nfrom pathlib import Path\nfrom study.workflows.files.validate import validate_file\n"
-        "from study.importing.arrays.arrays import read_arrays\n"
+        "from study.importing.arrays.read_arrays import read_arrays\n"
         "from study.importing.map_format.import_map import CsvMap\n"
         "from study.errors import StudyError\nresource.setrlimit(resource.RLIMIT_AS, (2**31, 2**31))\n"
         "print(validate_file(Path(sys.argv[1])).problems[0])\n"

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from study.importing.arrays.arrays import read_arrays
+from study.importing.arrays.read_arrays import read_arrays
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError, MapNeededError
 from study.store.disk.file_errors import UnusableFileError
 from study.store.disk.strict_json import load_json
-from study.store.disk.text_file import too_long_key
+from study.store.disk.text_file import find_long_key
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.workflows.files.validate import validate_file
 from study.workflows.recording.import_recording import read_foreign
@@ -44,10 +44,10 @@ def test_ordinary_json_is_read():
 
 @pytest.mark.parametrize("key", ["a", '"a b"', "'a'", "a-1", '"\\""'])
 def test_a_key_of_many_parts_is_named_with_its_line(key):
-    assert too_long_key("x = 1\n[" + ".".join([key] * 32) + "]\n") == ""
-    assert too_long_key("x = 1\n[" + " . ".join([key] * 33) + "]\n") == "line 2 has a key of more than 32 parts"
-    assert too_long_key('x = """\n' + ".".join([key] * 33).replace('"', "") + '"""\n') == ""
-    assert too_long_key("# " + ".".join([key] * 33)) == ""
+    assert find_long_key("x = 1\n[" + ".".join([key] * 32) + "]\n") == ""
+    assert find_long_key("x = 1\n[" + " . ".join([key] * 33) + "]\n") == "line 2 has a key of more than 32 parts"
+    assert find_long_key('x = """\n' + ".".join([key] * 33).replace('"', "") + '"""\n') == ""
+    assert find_long_key("# " + ".".join([key] * 33)) == ""
 
 
 @pytest.mark.parametrize(

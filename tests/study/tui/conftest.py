@@ -41,7 +41,7 @@ async def settled(_min_sleep_s: float = 0.0, _max_sleep_s: float = 0.0) -> None:
 
 def _at_rest(app: App) -> bool:
     keys = getattr(app, "_keys", None)
-    if app._resize_timer is not None or (keys is not None and keys.at_work):
+    if app._resize_timer is not None or (keys is not None and keys.is_settling):
         return False
     if not _waits_for_messages(app):
         return False

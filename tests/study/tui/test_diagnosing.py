@@ -9,9 +9,9 @@ import pytest
 from study.store.formats.mechanical_model_file import write_mechanical_model
 from study.store.formats.recording_file import write_recording
 from study.tui.app.app import HapteqApp
-from study.tui.app.app_start import AppStart
+from study.tui.app.start_options import StartOptions
 from study.tui.engine.to_engine import Diagnose
-from study.tui.home_messages import DiagnoseWanted
+from study.tui.home_messages import DiagnoseRequested
 
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
 
@@ -42,7 +42,7 @@ class SittingOptions:
 
 
 def run(data, story):
-    app = HapteqApp(AppStart(str(data), "simulated"))
+    app = HapteqApp(StartOptions(str(data), "simulated"))
 
     async def play():
         async with app.run_test(size=(100, 30)) as pilot:
@@ -59,7 +59,7 @@ def test_esc_stops_it_and_nothing_is_written(files):
     async def story(sitter):
         await sitter.until("HomeScreen")
         sitter.app.post_message(
-            DiagnoseWanted(Diagnose((str(files / "rec.h5"),), str(files / "one.toml"), str(files / "out")))
+            DiagnoseRequested(Diagnose((str(files / "rec.h5"),), str(files / "one.toml"), str(files / "out")))
         )
         await sitter.until("DiagnosingScreen", "e-tuning")
         await sitter.pilot.press("escape")
@@ -77,7 +77,7 @@ def test_esc_stops_it_and_nothing_is_written(files):
 def test_what_cannot_be_diagnosed_is_reported_on_a_panel(files):
     async def story(sitter):
         await sitter.until("HomeScreen")
-        sitter.app.post_message(DiagnoseWanted(Diagnose((str(files / "rec.h5"),), str(files / "three.toml"), "")))
+        sitter.app.post_message(DiagnoseRequested(Diagnose((str(files / "rec.h5"),), str(files / "three.toml"), "")))
         await sitter.until("OutcomeScreen", "Model and recording do not belong together")
         assert "DiagnosingScreen" not in [type(screen).__name__ for screen in sitter.app.screen_stack]
 

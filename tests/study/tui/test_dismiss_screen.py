@@ -8,7 +8,7 @@ from textual.events import Key
 from textual.screen import Screen
 
 import study.tui
-from study.session.views.views import DemoMenu, PlayDemo, make_direction_picture
+from study.session.views.participant_views import DemoMenu, PlayDemo, make_direction_picture
 from study.tui.dismiss_screen import dismiss_screen
 from study.tui.screens.demo import DemoScreen
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from study.session.views.views import DirectionPicture
+from study.session.views.participant_views import DirectionPicture
 from study.tui.drawing.braille import Canvas
 from study.tui.drawing.direction_picture import draw_large_direction
 from study.tui.drawing.number_picture import large_number

@@ -10,7 +10,7 @@ import pytest
 from study.devices.accelerometer.calibration import GRAVITY_MPS2, POSITIONS, UP_DIRECTIONS
 from study.devices.force_dimension.lab import read_lab
 from study.tui.app.app import HapteqApp
-from study.tui.app.app_start import AppStart
+from study.tui.app.start_options import StartOptions
 from tests.study.devices.accelerometer.pty_board import SCALE, Board
 
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late, pytest.mark.timeout(180)]
@@ -37,7 +37,7 @@ class Person:
 
 
 def run(data, story):
-    app = HapteqApp(AppStart(str(data), "simulated"))
+    app = HapteqApp(StartOptions(str(data), "simulated"))
 
     async def play():
         async with app.run_test(size=(100, 34)) as pilot:

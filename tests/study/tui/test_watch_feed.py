@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from study.session.facts.events import DeviceFacts, SessionOpened, event_line
+from study.session.facts.events import DeviceFacts, SessionOpened, encode_event
 from study.tui.engine.watch_feed import WatchFeed
 
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
@@ -31,7 +31,7 @@ def session(tmp_path, small_protocol, small_text) -> Path:
         utc, "hapteq-session", 1, "P01_001", "P01", 0, None, small_text, protocol_hash(small_protocol), False, 7,
         device, "none", {"hapteq": "0"},
     )  # fmt: skip
-    (folder / "events.jsonl").write_bytes(event_line(opened))
+    (folder / "events.jsonl").write_bytes(encode_event(opened))
     return folder
 
 

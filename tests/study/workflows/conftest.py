@@ -7,8 +7,8 @@ import pytest
 
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.clock import VirtualClock
-from study.participants.observers import find_observer
-from study.session.views.views import Answered, Reply, Unanswered
+from study.participants.observer_catalogue import find_observer
+from study.session.views.participant_views import Answered, Reply, Unanswered
 from study.store.sessions.archive import SessionFolder
 from study.workflows.session.conduct_session import ConductedSitting, Participant, conduct_new, conduct_resumed
 from study.workflows.session.open_session import SessionPlan

@@ -13,7 +13,7 @@ import pytest
 
 from study.errors import StudyError
 from study.workflows.run_on_executor import run_tasks
-from study.workflows.worker_processes import worker_processes
+from study.workflows.worker_processes import open_worker_processes
 
 
 class AtOnce(Executor):
@@ -48,7 +48,7 @@ def faults_of_arrays(rounds):
 
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other C libraries have limits of their own")
 def test_a_worker_keeps_the_memory_that_its_fits_free_and_ask_for_again():
-    with worker_processes(1) as pool:
+    with open_worker_processes(1) as pool:
         ((_, faults),) = run_tasks(pool, faults_of_arrays, [("arrays", (100,))])
     once = 6 * 2**21 / resource.getpagesize()
     assert faults < 3 * once  # a hundred times as many where each round gets its pages anew
@@ -70,7 +70,7 @@ def killed(number):
 def test_a_killed_worker_is_an_error_that_says_what_is_kept_and_what_to_do():
     came = []
     told = pytest.raises(StudyError, match=r"worker process was killed.*finished is kept.*continues where it stopped")
-    with told, worker_processes(1) as pool:
+    with told, open_worker_processes(1) as pool:
         for key, _ in run_tasks(pool, killed, ((number, (number,)) for number in range(6))):
             came.append(key)
     assert sorted(came) == [0, 1, 2]

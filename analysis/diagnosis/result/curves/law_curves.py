@@ -10,7 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.result.curves.signature_bins import bin_law_means, bin_means, compute_correlation_ratio
+from analysis.diagnosis.result.curves.signature_bins import (
+    compute_bin_means,
+    compute_correlation_ratio,
+    compute_law_bin_means,
+)
 from analysis.diagnosis.result.findings import Signature
 from equalizer.effects.discovered_law import (
     COMMAND_PREFIX,
@@ -73,8 +77,8 @@ def compute_law_signature(
     elif len(law.variables) == 1 and not has_memory(law):
         law_abscissa, law_force, visited_range = _evaluate_extrapolated(law, variable.values[used], rate_hz)
     else:
-        law_abscissa, law_force = bin_law_means(variable.values[used], force[used])
-    bin_centres, mean, spread = bin_means(variable.values, evidence.axis_force[:, axis], used, rate_hz)
+        law_abscissa, law_force = compute_law_bin_means(variable.values[used], force[used])
+    bin_centres, mean, spread = compute_bin_means(variable.values, evidence.axis_force[:, axis], used, rate_hz)
     return Signature(
         placed_effect.effect.name,
         axes[axis],

@@ -14,7 +14,11 @@ import numpy as np
 from analysis.diagnosis.errors.evidence_from_residuals import EXPECTED_FORCE_SHARE
 from analysis.diagnosis.forces.missing_force import estimate_missing_force
 from analysis.diagnosis.result.curves.law_curves import compute_law_signature
-from analysis.diagnosis.result.curves.signature_bins import bin_law_means, bin_means, compute_running_rms
+from analysis.diagnosis.result.curves.signature_bins import (
+    compute_bin_means,
+    compute_law_bin_means,
+    compute_running_rms,
+)
 from analysis.diagnosis.result.findings import Signature
 from equalizer.effects.effect import OnCommand, OnResponse, PlacedEffect, Structure
 from equalizer.effects.simulation.simulator import SimulationResult, simulate_mechanism
@@ -112,8 +116,8 @@ def _compute_motion_signature(
             (simulated.axis_position, simulated.axis_velocity),
         )
     )
-    bin_centres, mean, spread = bin_means(visited, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
-    law_abscissa, law = bin_law_means(simulated_abscissa[used], force[used, axis])
+    bin_centres, mean, spread = compute_bin_means(visited, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
+    law_abscissa, law = compute_law_bin_means(simulated_abscissa[used], force[used, axis])
     return Signature(
         placed_effect.effect.name, names.axes[axis], f"{abscissa} of {names.axes[axis]} ({unit})",
         f"missing force ({names.system.force})", bin_centres, mean, spread, law_abscissa, law,
@@ -147,8 +151,8 @@ def _compute_command_signature(evidence: Evidence, placed_effect: PlacedEffect, 
     axis = _find_strongest_site(placed_effect.sites, evidence.axis_force)
     command, used = evidence.command[:, axis], evidence.used > 0
     changed_command = placed_effect.effect.action.change(command, 1 / evidence.sample_rate_hz, placed_effect.values)
-    bin_centres, mean, spread = bin_means(command, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
-    law_abscissa, law = bin_law_means(command[used], (changed_command - command)[used])
+    bin_centres, mean, spread = compute_bin_means(command, evidence.axis_force[:, axis], used, evidence.sample_rate_hz)
+    law_abscissa, law = compute_law_bin_means(command[used], (changed_command - command)[used])
     unit = names.system.force
     return Signature(
         placed_effect.effect.name, names.axes[axis], f"command of {names.axes[axis]} ({unit})",
@@ -168,8 +172,10 @@ def _compute_reading_signature(
     projections = np.abs(change[used].T @ predictions) / np.maximum(np.sqrt(np.sum(predictions**2, axis=0)), 1e-300)
     channel, predictor = np.unravel_index(int(np.argmax(projections)), projections.shape)
     errors = (evidence.response - evidence.predicted)[:, channel]
-    bin_centres, mean, spread = bin_means(evidence.predicted[:, predictor], errors, used, evidence.sample_rate_hz)
-    law_abscissa, law = bin_law_means(predictions[:, predictor], change[used, channel])
+    bin_centres, mean, spread = compute_bin_means(
+        evidence.predicted[:, predictor], errors, used, evidence.sample_rate_hz
+    )
+    law_abscissa, law = compute_law_bin_means(predictions[:, predictor], change[used, channel])
     return Signature(
         placed_effect.effect.name, names.channels[channel], f"predicted {names.channels[predictor]} ({names.unit})",
         f"error of {names.channels[channel]} ({names.unit})", bin_centres, mean, spread, law_abscissa, law,
@@ -190,8 +196,8 @@ def _compute_time_signature(
         law_abscissa, law, _ = compute_running_rms(seconds, np.hypot(change[:, channel], evidence.noise[channel]), used)
         ordinate = f"rms {ordinate}"
     else:
-        bin_centres, mean, spread = bin_means(seconds, errors, used, rate_hz)
-        law_abscissa, law = bin_law_means(seconds[used], change[used, channel])
+        bin_centres, mean, spread = compute_bin_means(seconds, errors, used, rate_hz)
+        law_abscissa, law = compute_law_bin_means(seconds[used], change[used, channel])
     return Signature(
         placed_effect.effect.name,
         names.channels[channel],

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.diagnosis.document import Diagnosis
-from analysis.diagnosis.result.curves.signature_bins import bin_means
+from analysis.diagnosis.result.curves.signature_bins import compute_bin_means
 from analysis.diagnosis.types import Mask
 from equalizer.effects.placing import shorten_axis_name
 from equalizer.effects.starts.evidence import Evidence
@@ -217,8 +217,10 @@ def _make_view(
     missing_force, residual = missing
     used_samples = np.flatnonzero(series.used)
     drawn_samples = used_samples[:: max(len(used_samples) // SCATTER_SAMPLES, 1)]
-    bin_centres, mean, error = bin_means(abscissa, missing_force, series.used, series.rate_hz)
-    bin_residuals = np.zeros(0) if residual is None else bin_means(abscissa, residual, series.used, series.rate_hz)[1]
+    bin_centres, mean, error = compute_bin_means(abscissa, missing_force, series.used, series.rate_hz)
+    bin_residuals = (
+        np.zeros(0) if residual is None else compute_bin_means(abscissa, residual, series.used, series.rate_hz)[1]
+    )
     return StateView(
         *labels, abscissa[drawn_samples], missing_force[drawn_samples], bin_centres, mean, error, bin_residuals
     )

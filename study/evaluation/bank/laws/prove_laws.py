@@ -14,10 +14,10 @@ from typing import Any
 from analysis.evaluation.laws.law_error import compute_law_error
 from analysis.evaluation.laws.law_outcome import LawOutcome, TrueLaw
 from analysis.evaluation.laws.law_score import LawScore, compute_law_score
-from study.errors import resumable
+from study.errors import convert_interrupts
 from study.evaluation.bank.ask_engine import diagnose_and_count, is_answered
 from study.evaluation.bank.laws.seal_laws import fresh_motions_path, read_fresh_motions, seal_laws
-from study.evaluation.bank.proof_folder import RECORDING, ProofFolder, open_proof_folder
+from study.evaluation.bank.proof_folder import RECORDING_FILE, ProofFolder, open_proof_folder
 from study.evaluation.bank.seal_cases import BankPlan, read_case_names
 from study.evaluation.bank.sealed_bank import (
     BankOptions,
@@ -51,11 +51,11 @@ def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Pr
     on_progress: called with the step ("sealing" or "diagnosing"), the number of cases done and of all cases.
     """
     folder = open_proof_folder(path, plan.seed, plan.brief, LAWS)
-    with resumable("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
+    with convert_interrupts("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
         seal = seal_laws(folder, plan, options.workers, lambda done: on_progress("sealing", done, plan.cases))
         names = read_case_names(folder, range(plan.cases))
         diagnosable = [
-            name for name in names if is_answered(folder.open / name) or (folder.open / name / RECORDING).exists()
+            name for name in names if is_answered(folder.open / name) or (folder.open / name / RECORDING_FILE).exists()
         ]
         diagnose_and_count(
             folder,

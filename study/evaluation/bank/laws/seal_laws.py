@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from analysis.evaluation.laws.law_error import FreshMotion
-from study.evaluation.bank.begun_cases import begin_case, show_case
-from study.evaluation.bank.proof_folder import MODEL, RECORDING, SETTINGS, ProofFolder
+from study.evaluation.bank.begun_cases import begin_case, publish_case
+from study.evaluation.bank.proof_folder import MODEL_FILE, RECORDING_FILE, SETTINGS_FILE, ProofFolder
 from study.evaluation.bank.seal_cases import SALT_BYTES, SEARCH_CPU_S, BankPlan, seal_missing_cases
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ
 from study.evaluation.challenge.laws.draw_law import FreshTestMotion, LawCase, LawDraw, draw_law, generate_law_case
@@ -37,7 +37,7 @@ def seal_laws(folder: ProofFolder, plan: BankPlan, workers: int, on_sealed: Call
 
 def fresh_motions_path(folder: ProofFolder, number: int) -> Path:
     """Path of the sealed fresh motions of a case."""
-    return folder.label_file(number).with_suffix(".npz")
+    return folder.get_label_file(number).with_suffix(".npz")
 
 
 def read_fresh_motions(
@@ -78,14 +78,14 @@ def _seal_law(folder: ProofFolder, law_draw: LawDraw) -> None:
     """Write one case. The label is written after all other files: without a label, the case is unfinished."""
     case_folder = begin_case(folder)
     law_case = generate_law_case(law_draw, case_folder.name)
-    write_recording(case_folder / RECORDING, law_case.case.recording, precision="float32")
-    write_mechanical_model(case_folder / MODEL, law_case.case.model)
+    write_recording(case_folder / RECORDING_FILE, law_case.case.recording, precision="float32")
+    write_mechanical_model(case_folder / MODEL_FILE, law_case.case.model)
     diagnosis_settings = {"without": [], "discovery": True, "processor_s": SEARCH_CPU_S}
-    write_text(case_folder / SETTINGS, json.dumps(diagnosis_settings) + "\n")
+    write_text(case_folder / SETTINGS_FILE, json.dumps(diagnosis_settings) + "\n")
     np.savez(fresh_motions_path(folder, law_draw.number), allow_pickle=False, **_collect_arrays(law_case.fresh_motions))
     label = _make_label(folder, law_draw, law_case, case_folder)
-    write_text(folder.label_file(law_draw.number), json.dumps(label, indent=1, allow_nan=False) + "\n")
-    show_case(folder, case_folder)
+    write_text(folder.get_label_file(law_draw.number), json.dumps(label, indent=1, allow_nan=False) + "\n")
+    publish_case(folder, case_folder)
 
 
 def _collect_arrays(motions: Sequence[FreshTestMotion]) -> dict[str, Any]:
@@ -109,8 +109,8 @@ def _make_label(folder: ProofFolder, law_draw: LawDraw, law_case: LawCase, case_
         "axes": [AXES[axis] for axis in law_draw.settings.axes],
         "truth": None if law_case.truth is None else asdict(law_case.truth),
         "adds": law_case.case.detectability,
-        "recording_sha256": compute_sha256(case_folder / RECORDING),
-        "model_sha256": compute_sha256(case_folder / MODEL),
+        "recording_sha256": compute_sha256(case_folder / RECORDING_FILE),
+        "model_sha256": compute_sha256(case_folder / MODEL_FILE),
         "fresh_sha256": compute_sha256(fresh_motions_path(folder, law_draw.number)),
         "salt": secrets.token_hex(SALT_BYTES),
     }

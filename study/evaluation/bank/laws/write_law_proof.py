@@ -160,7 +160,7 @@ def _make_row(outcome: LawOutcome) -> LawRow:
         " ".join(f"{name}={value:.4g}" for name, value in numbers.items()), outcome.detectable, outcome.verdict,
         " and ".join(map(_format_law, outcome.named)), " ".join(outcome.names),
         " and ".join(map(_format_law, outcome.candidates)), outcome.structured, _round(error), _round(louder_error),
-        _round(outcome.worst_error("retuned")), _round(outcome.worst_error("after")),
+        _round(outcome.compute_worst_error("retuned")), _round(outcome.compute_worst_error("after")),
         _round(outcome.seconds), outcome.missed,
     )  # fmt: skip
 

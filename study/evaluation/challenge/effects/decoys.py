@@ -26,7 +26,7 @@ from study.evaluation.challenge.concealed_effect import (
     with_forces,
 )
 from study.evaluation.challenge.device import Device
-from study.evaluation.challenge.handle_force_kernel import DAMPING_SQUARE
+from study.evaluation.challenge.handle_force_kernel import POSITION_DAMPING
 
 CREEP_TIMES_S = (0.02, 0.2, 2.0)
 """Time constants of the creep (s), a decade apart."""
@@ -49,7 +49,7 @@ def _draw_damping(context: EffectContext) -> dict[str, float]:
 
 
 def _build_damping(device: Device, axis: int, values: Values) -> Device:
-    return with_forces(device, axis, {DAMPING_SQUARE: values["damping_per_m2"]})
+    return with_forces(device, axis, {POSITION_DAMPING: values["damping_per_m2"]})
 
 
 def _draw_switching(context: EffectContext) -> dict[str, float]:
@@ -73,7 +73,9 @@ def _draw_bending(context: EffectContext) -> dict[str, float]:
 
 
 def _build_bending(device: Device, axis: int, values: Values) -> Device:
-    return replace(device, sensor=replace(device.sensor, bend=values["bend"], play=values["play"]))
+    return replace(
+        device, sensor=replace(device.sensor, inverse_saturation=values["bend"], play_half_width_mps2=values["play"])
+    )
 
 
 def _draw_coupling(context: EffectContext) -> dict[str, float]:

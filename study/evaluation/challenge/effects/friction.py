@@ -14,7 +14,15 @@ from dataclasses import replace
 
 from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values, with_cells
 from study.evaluation.challenge.device import Device
-from study.evaluation.challenge.friction_kernel import BEND, NEGATIVE, POSITIVE, SLOPE, SPEED, STATIC_RATIO, STIFFNESS
+from study.evaluation.challenge.friction_kernel import (
+    BRISTLE_STIFFNESS,
+    LEVEL_CURVATURE,
+    LEVEL_NEGATIVE,
+    LEVEL_POSITIVE,
+    LEVEL_SLOPE,
+    STATIC_RATIO,
+    STRIBECK_SPEED,
+)
 
 STIFF_N_PER_M = 3e6
 """Stiffness of the bristle where the effect has none of its own: far stiffer than any part of a bench."""
@@ -22,7 +30,7 @@ STIFF_N_PER_M = 3e6
 
 def _with_bristle(device: Device, axis: int, cells: dict[int, float]) -> Device:
     """The device with these columns of friction on an axis; `STIFF_N_PER_M` where `cells` has no stiffness."""
-    return replace(device, friction=with_cells(device.friction, axis, {STIFFNESS: STIFF_N_PER_M} | cells))
+    return replace(device, friction=with_cells(device.friction, axis, {BRISTLE_STIFFNESS: STIFF_N_PER_M} | cells))
 
 
 def _draw_coulomb(context: EffectContext) -> dict[str, float]:
@@ -30,7 +38,7 @@ def _draw_coulomb(context: EffectContext) -> dict[str, float]:
 
 
 def _build_coulomb(device: Device, axis: int, values: Values) -> Device:
-    return _with_bristle(device, axis, {POSITIVE: values["level"], NEGATIVE: values["level"]})
+    return _with_bristle(device, axis, {LEVEL_POSITIVE: values["level"], LEVEL_NEGATIVE: values["level"]})
 
 
 def _draw_asymmetric(context: EffectContext) -> dict[str, float]:
@@ -39,7 +47,9 @@ def _draw_asymmetric(context: EffectContext) -> dict[str, float]:
 
 
 def _build_asymmetric(device: Device, axis: int, values: Values) -> Device:
-    return _with_bristle(device, axis, {POSITIVE: values["level_positive"], NEGATIVE: values["level_negative"]})
+    return _with_bristle(
+        device, axis, {LEVEL_POSITIVE: values["level_positive"], LEVEL_NEGATIVE: values["level_negative"]}
+    )
 
 
 def _draw_stribeck(context: EffectContext) -> dict[str, float]:
@@ -54,7 +64,11 @@ def _draw_stribeck(context: EffectContext) -> dict[str, float]:
 def _build_stribeck(device: Device, axis: int, values: Values) -> Device:
     level = values["coulomb"]
     ratio = values["static"] / level if level > 0.0 else 1.0
-    return _with_bristle(device, axis, {POSITIVE: level, NEGATIVE: level, STATIC_RATIO: ratio, SPEED: values["speed"]})
+    return _with_bristle(
+        device,
+        axis,
+        {LEVEL_POSITIVE: level, LEVEL_NEGATIVE: level, STATIC_RATIO: ratio, STRIBECK_SPEED: values["speed"]},
+    )
 
 
 def _draw_presliding(context: EffectContext) -> dict[str, float]:
@@ -64,7 +78,9 @@ def _draw_presliding(context: EffectContext) -> dict[str, float]:
 
 def _build_presliding(device: Device, axis: int, values: Values) -> Device:
     level = values["level"]
-    return _with_bristle(device, axis, {POSITIVE: level, NEGATIVE: level, STIFFNESS: values["stiffness"]})
+    return _with_bristle(
+        device, axis, {LEVEL_POSITIVE: level, LEVEL_NEGATIVE: level, BRISTLE_STIFFNESS: values["stiffness"]}
+    )
 
 
 def _draw_position_dependent(context: EffectContext) -> dict[str, float]:
@@ -75,7 +91,12 @@ def _draw_position_dependent(context: EffectContext) -> dict[str, float]:
 
 def _build_position_dependent(device: Device, axis: int, values: Values) -> Device:
     level = values["level"]
-    cells = {POSITIVE: level, NEGATIVE: level, SLOPE: values["slope_per_m"], BEND: values["bend_per_m2"]}
+    cells = {
+        LEVEL_POSITIVE: level,
+        LEVEL_NEGATIVE: level,
+        LEVEL_SLOPE: values["slope_per_m"],
+        LEVEL_CURVATURE: values["bend_per_m2"],
+    }
     return _with_bristle(device, axis, cells)
 
 

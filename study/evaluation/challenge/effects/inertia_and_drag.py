@@ -19,7 +19,7 @@ import numpy as np
 
 from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values, with_forces
 from study.evaluation.challenge.device import Device
-from study.evaluation.challenge.handle_force_kernel import DRAG
+from study.evaluation.challenge.handle_force_kernel import QUADRATIC_DAMPING
 
 
 def _add_to_handle(device: Device, axis: int, mass_kg: float, damping: float) -> Device:
@@ -51,7 +51,7 @@ def _draw_quadratic(context: EffectContext) -> dict[str, float]:
 
 
 def _build_quadratic(device: Device, axis: int, values: Values) -> Device:
-    return with_forces(device, axis, {DRAG: values["coefficient"]})
+    return with_forces(device, axis, {QUADRATIC_DAMPING: values["coefficient"]})
 
 
 def _draw_pose(context: EffectContext) -> dict[str, float]:

@@ -50,7 +50,9 @@ def _draw_clipping(context: EffectContext) -> dict[str, float]:
 
 def _build_clipping(device: Device, axis: int, values: Values) -> Device:
     """Clip one channel at +-limit."""
-    return _with_sensor(device, replace(device.sensor, limit=_set_channel(device.sensor.limit, axis, values["limit"])))
+    return _with_sensor(
+        device, replace(device.sensor, range_mps2=_set_channel(device.sensor.range_mps2, axis, values["limit"]))
+    )
 
 
 def _draw_misalignment(context: EffectContext) -> dict[str, float]:
@@ -85,7 +87,9 @@ def _draw_nonlinearity(context: EffectContext) -> dict[str, float]:
 
 def _build_nonlinearity(device: Device, axis: int, values: Values) -> Device:
     """Set the cubic coefficient of one channel."""
-    return _with_sensor(device, replace(device.sensor, cubic=_set_channel(device.sensor.cubic, axis, values["cubic"])))
+    return _with_sensor(
+        device, replace(device.sensor, cubic_gain=_set_channel(device.sensor.cubic_gain, axis, values["cubic"]))
+    )
 
 
 def _draw_shares(context: EffectContext) -> dict[str, float]:
@@ -108,7 +112,7 @@ def _draw_drift(context: EffectContext) -> dict[str, float]:
 
 def _build_drift(device: Device, axis: int, values: Values) -> Device:
     """Set the drift of all channels."""
-    return _with_sensor(device, replace(device.sensor, drift=values["total"] * _stack_shares(values)))
+    return _with_sensor(device, replace(device.sensor, drift_mps2=values["total"] * _stack_shares(values)))
 
 
 def _draw_quantization(context: EffectContext) -> dict[str, float]:
@@ -118,7 +122,7 @@ def _draw_quantization(context: EffectContext) -> dict[str, float]:
 
 def _build_quantization(device: Device, axis: int, values: Values) -> Device:
     """Set the quantization step of all channels."""
-    return _with_sensor(device, replace(device.sensor, step=values["step"]))
+    return _with_sensor(device, replace(device.sensor, resolution_mps2=values["step"]))
 
 
 def _draw_hum(context: EffectContext) -> dict[str, float]:
@@ -137,7 +141,7 @@ def _build_hum(device: Device, axis: int, values: Values) -> Device:
         device,
         replace(
             device.sensor,
-            hum=np.array([np.cos(values["phase"]) * amplitudes, np.sin(values["phase"]) * amplitudes]),
+            hum_mps2=np.array([np.cos(values["phase"]) * amplitudes, np.sin(values["phase"]) * amplitudes]),
             hum_hz=values["frequency"],
         ),
     )
@@ -150,7 +154,7 @@ def _draw_clock_error(context: EffectContext) -> dict[str, float]:
 
 def _build_clock_error(device: Device, axis: int, values: Values) -> Device:
     """Set the error of the sensor's clock."""
-    return _with_sensor(device, replace(device.sensor, ppm=values["ppm"]))
+    return _with_sensor(device, replace(device.sensor, clock_error_ppm=values["ppm"]))
 
 
 def _draw_lost_samples(context: EffectContext) -> dict[str, float]:
@@ -160,7 +164,7 @@ def _draw_lost_samples(context: EffectContext) -> dict[str, float]:
 
 def _build_lost_samples(device: Device, axis: int, values: Values) -> Device:
     """Set the fraction of lost samples."""
-    return _with_sensor(device, replace(device.sensor, lost=values["fraction"]))
+    return _with_sensor(device, replace(device.sensor, lost_fraction=values["fraction"]))
 
 
 def _draw_cross_axis(context: EffectContext) -> dict[str, float]:
@@ -187,7 +191,7 @@ def _draw_offset(context: EffectContext) -> dict[str, float]:
 def _build_offset(device: Device, axis: int, values: Values) -> Device:
     """Set the offset of one channel."""
     return _with_sensor(
-        device, replace(device.sensor, offset=_set_channel(device.sensor.offset, axis, values["offset"]))
+        device, replace(device.sensor, offset_mps2=_set_channel(device.sensor.offset_mps2, axis, values["offset"]))
     )
 
 
@@ -198,7 +202,7 @@ def _draw_logger_offset(context: EffectContext) -> dict[str, float]:
 
 def _build_logger_offset(device: Device, axis: int, values: Values) -> Device:
     """Set the delay of the acceleration."""
-    return _with_sensor(device, replace(device.sensor, late_s=values["offset"]))
+    return _with_sensor(device, replace(device.sensor, delay_s=values["offset"]))
 
 
 EFFECTS = (

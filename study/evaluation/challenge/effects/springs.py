@@ -14,15 +14,15 @@ import numpy as np
 from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectContext, Values, with_forces
 from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.handle_force_kernel import (
-    ABOVE,
-    BELOW,
-    CONSTANT,
-    CUBE,
-    PHASE,
-    PITCH,
-    RIPPLE,
-    SQUARE,
-    STOP,
+    COGGING_AMPLITUDE,
+    COGGING_PHASE,
+    COGGING_PITCH,
+    CONSTANT_FORCE,
+    CUBIC_STIFFNESS,
+    LOWER_STOP,
+    SQUARE_STIFFNESS,
+    STOP_STIFFNESS,
+    UPPER_STOP,
 )
 
 
@@ -32,7 +32,7 @@ def _draw_hardening(context: EffectContext) -> dict[str, float]:
 
 
 def _build_hardening(device: Device, axis: int, values: Values) -> Device:
-    return with_forces(device, axis, {CUBE: values["k3"]})
+    return with_forces(device, axis, {CUBIC_STIFFNESS: values["k3"]})
 
 
 def _draw_asymmetric(context: EffectContext) -> dict[str, float]:
@@ -46,7 +46,7 @@ def _draw_asymmetric(context: EffectContext) -> dict[str, float]:
 
 
 def _build_asymmetric(device: Device, axis: int, values: Values) -> Device:
-    return with_forces(device, axis, {SQUARE: values["k2"]})
+    return with_forces(device, axis, {SQUARE_STIFFNESS: values["k2"]})
 
 
 def _draw_constant(context: EffectContext) -> dict[str, float]:
@@ -54,7 +54,7 @@ def _draw_constant(context: EffectContext) -> dict[str, float]:
 
 
 def _build_constant(device: Device, axis: int, values: Values) -> Device:
-    return with_forces(device, axis, {CONSTANT: values["force"]})
+    return with_forces(device, axis, {CONSTANT_FORCE: values["force"]})
 
 
 def _draw_cogging(context: EffectContext) -> dict[str, float]:
@@ -66,7 +66,7 @@ def _draw_cogging(context: EffectContext) -> dict[str, float]:
 
 
 def _build_cogging(device: Device, axis: int, values: Values) -> Device:
-    cells = {RIPPLE: values["amplitude"], PITCH: values["pitch"], PHASE: values["phase"]}
+    cells = {COGGING_AMPLITUDE: values["amplitude"], COGGING_PITCH: values["pitch"], COGGING_PHASE: values["phase"]}
     return with_forces(device, axis, cells)
 
 
@@ -82,8 +82,8 @@ def _draw_stop(context: EffectContext) -> dict[str, float]:
 
 def _build_stop(device: Device, axis: int, values: Values) -> Device:
     position = values["position"]
-    near_side, far_side = (ABOVE, BELOW) if position > 0.0 else (BELOW, ABOVE)
-    cells = {near_side: position, STOP: values["stiffness"]}
+    near_side, far_side = (UPPER_STOP, LOWER_STOP) if position > 0.0 else (LOWER_STOP, UPPER_STOP)
+    cells = {near_side: position, STOP_STIFFNESS: values["stiffness"]}
     return with_forces(device, axis, cells | ({far_side: -position} if values["opposite"] else {}))
 
 

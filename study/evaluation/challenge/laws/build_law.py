@@ -125,7 +125,7 @@ def _build_change(
         return new_samples
 
     if kind.acts_on == ("response",):
-        return replace(device, sensor=replace(device.sensor, law=apply_law)), size
+        return replace(device, sensor=replace(device.sensor, static_law=apply_law)), size
     return replace(device, drive_law=apply_law), size
 
 

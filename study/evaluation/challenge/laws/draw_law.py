@@ -19,9 +19,9 @@ from study.evaluation.challenge.draw_case import (
     EFFECTS,
     Case,
     ModelOrigin,
+    compute_detectability,
     draw_case,
     make_recording,
-    measure_detectability,
 )
 from study.evaluation.challenge.drive_plan import RATE_HZ, DrivePlan, draw_multisine, draw_plan
 from study.evaluation.challenge.extras import with_extras
@@ -141,7 +141,7 @@ def generate_law_case(law_draw: LawDraw, name: str) -> LawCase:
         model,
         (),
         _refuse_repeat,
-        measure_detectability(baseline, device, (motions[0], motions[1]), settings),
+        compute_detectability(baseline, device, (motions[0], motions[1]), settings),
     )
     return LawCase(
         case, truth, tuple(_make_fresh_motion(device, settings, random, level) for level in (FRESH_N, LOUD_N))
@@ -187,7 +187,7 @@ def _make_fresh_motion(
         )
     motion, axes = simulate_full_motion(device, command), list(settings.axes)
     changed_command = command if device.drive_law is None else device.drive_law(command)
-    reading = motion.acceleration if device.sensor.law is None else device.sensor.law(motion.acceleration)
+    reading = motion.acceleration if device.sensor.static_law is None else device.sensor.static_law(motion.acceleration)
     return FreshTestMotion(
         level_n, command[:, axes], Motion(*(part[:, axes] for part in motion)), reading[:, axes],
         (motion.lawful + changed_command - command)[:, axes],

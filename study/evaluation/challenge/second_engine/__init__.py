@@ -1,6 +1,6 @@
 """Concealed cases from a second physics engine, MuJoCo, with another integrator, other friction and other contacts, so
 that the blind test does not depend on hapteq's own simulation alone.
 
-`second_engine` (the only entry; says whether MuJoCo is installed) -> `mujoco_case` (draws a case with the same
+`mujoco_access` (the only entry; tests whether MuJoCo is installed) -> `mujoco_case` (draws a case with the same
 parameters as for the other bench) -> `mujoco_bench` (the model in MuJoCo). Begin at `mujoco_case.py`.
 """

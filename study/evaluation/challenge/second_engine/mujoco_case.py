@@ -16,11 +16,11 @@ from study.evaluation.challenge.draw_case import (
     EFFECTS,
     Case,
     ModelOrigin,
+    compute_detectability,
     describe_added_mass,
     make_further_plan,
     make_recording,
     make_truth,
-    measure_detectability,
 )
 from study.evaluation.challenge.drive_plan import RATE_HZ, draw_plan
 from study.evaluation.challenge.nominal import as_model, draw_calibration, retune
@@ -77,7 +77,7 @@ def draw_mujoco_case(
         readings = read_sensor(measured.sensor, *measured_motion, RATE_HZ, np.random.default_rng([seed, noise]))
         return replace(make_recording(name, repeat_plan, *readings, settings), meta=describe_added_mass(added_kg))
 
-    detectability = measure_detectability(Device(bench), measured, (base_motion, motion), settings) if effects else 0.0
+    detectability = compute_detectability(Device(bench), measured, (base_motion, motion), settings) if effects else 0.0
     return Case(recording, as_model(name, nominal, tolerance, settings.axes), tuple(truth), record_again, detectability)
 
 

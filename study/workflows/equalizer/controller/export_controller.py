@@ -33,7 +33,7 @@ from study.workflows.equalizer.controller.c_text import (
     format_header,
     read_example,
 )
-from study.workflows.free_name import require_free
+from study.workflows.output_paths import require_new_outputs
 
 TITLE = "The controller was not exported"
 """Title of each error message of this command."""
@@ -74,7 +74,7 @@ class ExportedController:
 def export_controller(plan: ControllerPlan) -> ExportedController:
     """Compute the controller and write its sources. Raises StudyError for a cap above the force of the strongest
     supported device, and for a model or transient from which no controller can be made; nothing is written then."""
-    require_free(plan.out, title=TITLE, kind="controllers")
+    require_new_outputs(plan.out, title=TITLE, kind="controllers")
     if plan.settings.cap_n > STRONGEST_N:
         raise _make_refusal(
             f"The cap is {plan.settings.cap_n:g} N; the strongest device gives {STRONGEST_N:g} N.", EXAMPLE_SETTINGS

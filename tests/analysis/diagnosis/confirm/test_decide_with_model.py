@@ -145,7 +145,7 @@ def make_search_result(after, rival=None):
     ],
 )
 def test_a_rival_or_a_poor_prediction_is_an_objection_to_a_name(monkeypatch, after, rival, said):
-    monkeypatch.setattr(beside_given, "only_refines", lambda other, best: False)
+    monkeypatch.setattr(beside_given, "is_refined_candidate", lambda other, best: False)
     found = find_objection(make_search_result(after, rival), ())
     assert said in found
     assert bool(found) == bool(said)

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from analysis.diagnosis.data.driven_response import compute_response_significance
-from analysis.diagnosis.settings import ANSWER_DEVIATIONS
+from analysis.diagnosis.settings import DRIVEN_DEVIATIONS
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from tests.slow_instances import slow_after
@@ -33,7 +33,7 @@ def test_noise_of_any_colour_answers_nothing(colour, seed):
         "narrow": lfilter([1.0], [1.0, -1.8, 0.98], white, axis=0),
     }[colour]
     sure = compute_response_significance([make_recording(rng.standard_normal((12_000, 3)), noise)])
-    assert sure is not None and sure < ANSWER_DEVIATIONS
+    assert sure is not None and sure < DRIVEN_DEVIATIONS
 
 
 def test_one_channel_that_answers_weakly_is_enough():
@@ -41,7 +41,7 @@ def test_one_channel_that_answers_weakly_is_enough():
     command, response = rng.standard_normal((12_000, 3)), rng.standard_normal((12_000, 3))
     response[:, 1] += 0.3 * command[:, 2]
     sure = compute_response_significance([make_recording(command, response)])
-    assert sure is not None and sure > 2 * ANSWER_DEVIATIONS
+    assert sure is not None and sure > 2 * DRIVEN_DEVIATIONS
 
 
 def test_a_recording_too_short_for_it_is_not_judged():
@@ -58,7 +58,7 @@ def test_gaps_in_the_response_are_left_out():
     response = 2 * command
     response[3000:5000] = np.nan
     sure = compute_response_significance([make_recording(command, response)])
-    assert sure is not None and sure > ANSWER_DEVIATIONS
+    assert sure is not None and sure > DRIVEN_DEVIATIONS
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -70,11 +70,11 @@ def test_a_slow_force_beside_friction_below_the_commands_noise_is_no_noise(seed)
     current = 9 * np.sign(speed) + 8 * rng.standard_normal(5000)
     position = np.cumsum(speed)[:, None] / RATE_HZ
     sure = compute_response_significance([make_recording(current[:, None], position)])
-    assert sure is None or sure >= ANSWER_DEVIATIONS
+    assert sure is None or sure >= DRIVEN_DEVIATIONS
 
 
 def test_every_labelled_case_answers_its_commands(shared):
     from study.store.formats.recording_file import read_recording
 
     sure = compute_response_significance([read_recording(shared / "cases" / "open-05.h5")])
-    assert sure is not None and sure > 10 * ANSWER_DEVIATIONS
+    assert sure is not None and sure > 10 * DRIVEN_DEVIATIONS

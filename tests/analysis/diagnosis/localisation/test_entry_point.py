@@ -31,7 +31,7 @@ def make_entries():
         Entry("hand", "hand", None, g),
         Entry("sensor ax", "sensor", "x", unit[:, :, :1]),
         Entry("sensor ay", "sensor", "y", unit[:, :, 1:2]),
-        Entry("position x", "sensor", "x", unit[:, :, 2:3], of_position=True),
+        Entry("position x", "sensor", "x", unit[:, :, 2:3], is_position_error=True),
     ]
 
 

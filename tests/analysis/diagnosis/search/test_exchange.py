@@ -9,7 +9,7 @@ from analysis.diagnosis.errors.hypothesis import Claim, combine_hypotheses, make
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation, explain, is_worth_searching, retune_alone
-from analysis.diagnosis.search.parsimony import is_worthwhile, leaves_little
+from analysis.diagnosis.search.parsimony import has_small_error, is_worthwhile
 from analysis.diagnosis.search.revise_selection import (
     drop_needless,
     drop_unconfirmed,
@@ -209,7 +209,7 @@ def three_effects(make_context, k3):
 @pytest.mark.slow
 def test_three_stay_where_any_two_leave_more_than_laws_of_real_devices_do(make_context):
     context, found = three_effects(make_context, 1e5)
-    assert not leaves_little(found.retuned, found.steps[1])
+    assert not has_small_error(found.retuned, found.steps[1])
     assert effect_names(drop_needless(context, found, grant_time)) == effect_names(found)
 
 

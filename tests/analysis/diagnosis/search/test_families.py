@@ -3,7 +3,7 @@
 import pytest
 
 from analysis.diagnosis.errors.hypothesis import Claim
-from analysis.diagnosis.search.parsimony import FAMILIES, excludes
+from analysis.diagnosis.search.parsimony import FAMILIES, are_exclusive
 from equalizer.effects.catalogue import CATALOGUE, EFFECTS
 
 
@@ -16,21 +16,21 @@ def make_claim(name, *sites):
     [("coulomb_friction", "stribeck_friction"), ("amplifier_lag", "transport_delay"), ("backlash", "loose_joint")],
 )
 def test_one_thing_has_one_shape_at_a_place(one, other):
-    assert excludes(make_claim(one), make_claim(other)) and excludes(make_claim(other), make_claim(one))
+    assert are_exclusive(make_claim(one), make_claim(other)) and are_exclusive(make_claim(other), make_claim(one))
 
 
 def test_an_effect_is_not_there_twice():
     for effect in CATALOGUE:
-        assert excludes(make_claim(effect.name), make_claim(effect.name))
+        assert are_exclusive(make_claim(effect.name), make_claim(effect.name))
 
 
 def test_other_axes_are_other_things():
-    assert not excludes(make_claim("coulomb_friction", 0), make_claim("stribeck_friction", 1))
-    assert excludes(make_claim("coulomb_friction", 0, 1, 2), make_claim("stribeck_friction", 1))
+    assert not are_exclusive(make_claim("coulomb_friction", 0), make_claim("stribeck_friction", 1))
+    assert are_exclusive(make_claim("coulomb_friction", 0, 1, 2), make_claim("stribeck_friction", 1))
 
 
 def test_different_physics_stands_side_by_side():
-    assert not excludes(make_claim("coulomb_friction"), make_claim("sensor_lag"))
+    assert not are_exclusive(make_claim("coulomb_friction"), make_claim("sensor_lag"))
 
 
 def test_families_are_made_of_effects_that_there_are_and_do_not_meet():

@@ -9,18 +9,18 @@ from analysis.diagnosis.search.parsimony import (
     are_inseparable,
     compute_excess,
     is_equal_rival,
-    move_plainest_first,
-    only_refines,
+    is_refined_candidate,
+    move_preferred_first,
 )
 
 
 def plainest_effect(*fitted_candidates):
     ranked = sorted(fitted_candidates, key=lambda fitted_candidate: fitted_candidate.score.mean_log_error)
-    return move_plainest_first(ranked)[0].fitted.hypothesis.claims[-1].effect.name
+    return move_preferred_first(ranked)[0].fitted.hypothesis.claims[-1].effect.name
 
 
 def test_of_no_candidates_none_is_preferred():
-    assert move_plainest_first(()) == ()
+    assert move_preferred_first(()) == ()
 
 
 def test_the_better_one_of_two_unlike_laws_stands_first(make_candidate):
@@ -61,9 +61,9 @@ def test_what_rings_on_one_axis_is_a_mode_and_what_is_damped_more_than_a_mode_ca
 
 def test_a_law_refines_another_at_its_own_place_only(make_candidate):
     plain = make_candidate(1.5, "coulomb_friction")
-    assert only_refines(make_candidate(1.5, "stribeck_friction"), plain)
-    assert not only_refines(make_candidate(1.5, "stribeck_friction", sites=(1,)), plain)
-    assert not only_refines(plain, make_candidate(1.5, "stribeck_friction"))
+    assert is_refined_candidate(make_candidate(1.5, "stribeck_friction"), plain)
+    assert not is_refined_candidate(make_candidate(1.5, "stribeck_friction", sites=(1,)), plain)
+    assert not is_refined_candidate(plain, make_candidate(1.5, "stribeck_friction"))
 
 
 def test_of_two_that_are_as_good_the_one_with_fewer_numbers_is_preferred(make_candidate):
@@ -74,7 +74,7 @@ def test_of_two_that_are_as_good_the_one_with_fewer_numbers_is_preferred(make_ca
 
 def test_the_order_of_the_others_stays(make_candidate):
     ranked = [make_candidate(1.0 + k / 10, "force_gain") for k in range(4)]
-    assert move_plainest_first(ranked) == tuple(ranked)
+    assert move_preferred_first(ranked) == tuple(ranked)
 
 
 def test_near_the_noise_a_small_difference_tells(make_candidate):

@@ -13,7 +13,7 @@ from analysis.evaluation.blind_test.detection import (
     make_detection_strips,
 )
 from analysis.evaluation.blind_test.follow_up import FollowUp
-from analysis.evaluation.blind_test.outcome import Concealed, Outcome
+from analysis.evaluation.blind_test.outcome import ConcealedEffect, Outcome
 from analysis.evaluation.blind_test.score import compute_score, is_wrong_answer
 from analysis.evaluation.blind_test.wording import describe_answer, describe_concealed, format_figure
 from analysis.figures.blind_test_pictures import make_blind_test_pictures
@@ -40,7 +40,9 @@ def make_diagnosis(verdict, *effects):
 
 def make_outcome(kind="single", concealed=("coulomb_friction",), answer=None, bank="main", retuned=5.0, **more):
     hidden = tuple(
-        Concealed(name, getattr(EFFECTS_BY_NAME.get(name), "place", "mechanism"), "x", {"level": 1.0, "damping": 1.0})
+        ConcealedEffect(
+            name, getattr(EFFECTS_BY_NAME.get(name), "place", "mechanism"), "x", {"level": 1.0, "damping": 1.0}
+        )
         for name in concealed
     )
     found = {"before": {"ax": 9.0}, "retuned": {"ax": retuned, "x": 1.0}, "after": {"ax": 1.05}}

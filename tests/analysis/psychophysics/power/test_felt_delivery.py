@@ -8,7 +8,7 @@ import pytest
 from analysis.psychophysics.hierarchy.curve import NEPER_PER_DB, T_AT_THRESHOLD, Family
 from analysis.psychophysics.power.felt_delivery import FeltDelivery, tabulate_felt_delivery
 from analysis.psychophysics.power.simulated_study import Crowd, _apply_delivery, simulate_study
-from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track, pack_rule, play_run
+from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track, pack_rule, simulate_staircase
 from protocols.procedure.staircase import begin_staircase, is_finished, step
 from protocols.trial import Phase
 from study.participants.delivered_feeler import MPS2_PER_N, DeliveredFeeler
@@ -53,12 +53,12 @@ def test_a_compiled_run_is_that_of_the_observer_of_sessions(delivery, threshold_
     who = _apply_delivery(Participant(t0, pace, threshold_db, 0.03, 0.2, 0), delivery, 0)
     for seed in range(8):
         track = Track(*(np.empty(MOST_TRIALS) for _ in range(3)), np.full(PUBLISHED.reversals, np.nan))
-        n, *_ = play_run(pack_rule(PUBLISHED), who, seed, track)
+        n, *_ = simulate_staircase(pack_rule(PUBLISHED), who, seed, track)
         slow = reference_run(delivery, threshold_n, seed)
         assert n == len(slow)
         np.testing.assert_allclose(track.level_db[:n], [level_db for level_db, _, _ in slow], atol=1e-9)
         assert [1 if side > 0 else 2 for side in track.side[:n]] == [direction for _, direction, _ in slow]
-        assert track.right[:n].astype(bool).tolist() == [bool(right) for _, _, right in slow]
+        assert track.correct[:n].astype(bool).tolist() == [bool(right) for _, _, right in slow]
 
 
 def test_half_the_strength_is_twice_the_threshold():

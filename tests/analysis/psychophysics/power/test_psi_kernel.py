@@ -36,7 +36,7 @@ def test_levels_and_estimates_are_those_of_step(rule, threshold_n):
         for index in range(trials):
             assert not is_finished(rule, state)
             assert track.level_db[index] == pytest.approx(state.level_db, abs=1e-9)
-            state = step(rule, state, bool(track.right[index]))
+            state = step(rule, state, bool(track.correct[index]))
         assert is_finished(rule, state)
         expected = estimate_threshold(compute_posterior(state.answered, cap_db), cap_db)
         assert (mean_db, above) == pytest.approx((expected.mean_db, expected.above_cap), abs=1e-9)

@@ -9,7 +9,7 @@ from analysis.psychophysics.hierarchy.curve import NEPER_PER_DB, T_AT_THRESHOLD,
 from analysis.psychophysics.power.compare_rules import ComparedPerson, answer_trials, compare_rules, list_compared_rules
 from analysis.psychophysics.power.felt_delivery import tabulate_felt_delivery
 from analysis.psychophysics.power.simulated_study import FAMILIES, Crowd, _apply_delivery, simulate_study
-from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track, pack_rule, play_run
+from analysis.psychophysics.power.staircase_kernel import MOST_TRIALS, Participant, Track, pack_rule, simulate_staircase
 from protocols.procedure.staircase import begin_staircase, is_finished, step, to_db
 from tests.analysis.conftest import PUBLISHED
 from tests.analysis.psychophysics.power.test_felt_delivery import FLAWLESS, HZ, ROUGH, reference_run
@@ -21,7 +21,7 @@ SEEDS = range(12)
 
 def play_compiled(who, rule, rove_db, seed):
     track = Track(*(np.empty(MOST_TRIALS) for _ in range(3)), np.full(rule.reversals, np.nan))
-    n, *_ = play_run(pack_rule(rule, rove_db), who, seed, track)
+    n, *_ = simulate_staircase(pack_rule(rule, rove_db), who, seed, track)
     return n, track
 
 
@@ -52,7 +52,7 @@ def test_a_roved_run_is_that_of_the_observer_of_sessions(delivery, threshold_n):
         assert n == len(slow)
         np.testing.assert_allclose(track.level_db[:n], [level_db for level_db, _, _ in slow], atol=1e-9)
         assert [1 if side > 0 else 2 for side in track.side[:n]] == [direction for _, direction, _ in slow]
-        assert track.right[:n].astype(bool).tolist() == [bool(right) for _, _, right in slow]
+        assert track.correct[:n].astype(bool).tolist() == [bool(right) for _, _, right in slow]
 
 
 def test_the_staircase_moves_its_own_level_and_amplitudes_are_even_around_it():
@@ -63,7 +63,7 @@ def test_the_staircase_moves_its_own_level_and_amplitudes_are_even_around_it():
         for index in range(n):
             off_db.append(track.level_db[index] - state.level_db)
             sides.append(track.side[index])
-            state = step(RULE, state, bool(track.right[index]))
+            state = step(RULE, state, bool(track.correct[index]))
         assert is_finished(RULE, state)
         np.testing.assert_allclose(track.reversal_db, state.reversal_levels_db, atol=1e-9)
     assert -3.0 <= min(off_db) < -2.9 and 2.9 < max(off_db) <= 3.0

@@ -14,7 +14,7 @@ from analysis.psychophysics.power.staircase_kernel import (
     Track,
     compute_evidence,
     pack_rule,
-    play_run,
+    simulate_staircase,
 )
 from protocols.definition.staircase_rule import StaircaseRule, StepChange, StepPhase
 from protocols.procedure.staircase import begin_staircase, is_finished, step
@@ -37,7 +37,7 @@ def test_levels_and_reversals_are_those_of_step(rule, threshold_n):
         level, side, right = np.empty(MOST_TRIALS), np.empty(MOST_TRIALS), np.empty(MOST_TRIALS)
         turns = np.full(rule.reversals, np.nan)
         who = Participant(T_AT_THRESHOLD[Family.WEIBULL], 2.0 * NEPER_PER_DB, 20 * np.log10(threshold_n), 0.02, 0.1, 0)
-        trials, reversals, *_ = play_run(pack_rule(rule), who, seed, Track(level, side, right, turns))
+        trials, reversals, *_ = simulate_staircase(pack_rule(rule), who, seed, Track(level, side, right, turns))
         state = begin_staircase(rule)
         for index in range(trials):
             assert not is_finished(rule, state)
@@ -69,7 +69,7 @@ def test_shares_are_those_of_the_model_with_lapses_and_a_criterion():
     counts = np.zeros((2, 2))
     for seed in range(10):
         who = Participant(T_AT_THRESHOLD[Family.WEIBULL], 2.0 * NEPER_PER_DB, 0.0, 0.05, 0.4, 0)
-        n, *_ = play_run(pack_rule(rule), who, seed, Track(level, side, right, np.empty(100)))
+        n, *_ = simulate_staircase(pack_rule(rule), who, seed, Track(level, side, right, np.empty(100)))
         for index, sign in enumerate((1.0, -1.0)):
             shown = side[:n] == sign
             counts[index] += shown.sum(), right[:n][shown].sum()

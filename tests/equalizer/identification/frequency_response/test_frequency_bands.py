@@ -1,10 +1,10 @@
 import pytest
 
-from equalizer.identification.frequency_response.frequency_bands import frequency_bands
+from equalizer.identification.frequency_response.frequency_bands import compute_frequency_bands
 
 
 def edges(*arguments):
-    return [(band.name, band.low_hz, band.high_hz) for band in frequency_bands(*arguments)]
+    return [(band.name, band.low_hz, band.high_hz) for band in compute_frequency_bands(*arguments)]
 
 
 def test_all_axes_are_equalized_from_the_onset_of_coupling_to_the_limit_of_direction():
@@ -25,11 +25,11 @@ def test_a_device_that_couples_everywhere_has_no_low_band():
 
 
 def test_bands_follow_each_other_and_say_why():
-    bands = frequency_bands(10.5)
+    bands = compute_frequency_bands(10.5)
     assert [band.high_hz for band in bands[:-1]] == [band.low_hz for band in bands[1:]]
     assert all(band.method and band.why.endswith(".") for band in bands)
 
 
 def test_a_limit_outside_the_range_is_refused():
     with pytest.raises(ValueError, match="direction_limit_hz is 600; it must lie between 1 and 500 Hz"):
-        frequency_bands(10.0, 600.0)
+        compute_frequency_bands(10.0, 600.0)

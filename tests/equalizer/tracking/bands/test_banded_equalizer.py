@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import block_diag
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 from equalizer.tracking.bands.banded_equalizer import BandedEqualizer, CapPolicy, HighBand, LowBand
 from equalizer.tracking.bands.high_band import ModelledResponse
 from equalizer.tracking.bands.rigid_model import fit_rigid_model
@@ -193,7 +193,7 @@ def test_the_rendered_spring_is_left_its_part(band_model, low, high):
     found = BandedEqualizer(band_model, split, low, high, spring=spring).compute_forces(wanted)
     by_spring = (found.entering - found.commands)[found.rows_of_wanted(2000)]
     turning = np.exp(-2j * np.pi * 10 * t)
-    expected = spring.force_per_acceleration(np.array([10.0]))[0] * (turning @ wanted[:, 0])
+    expected = spring.compute_force_per_acceleration(np.array([10.0]))[0] * (turning @ wanted[:, 0])
     assert abs(turning @ by_spring[:, 0] - expected) < 0.01 * abs(expected)
     bare = BandedEqualizer(band_model, split, low, high).compute_forces(wanted)
     assert np.array_equal(bare.commands, bare.entering)
@@ -219,5 +219,5 @@ def test_bands_without_models_are_refused(band_model, low, high, change, said):
 def test_the_band_model_is_good_inside_and_wrong_above(device, band_model):
     inside, above = np.arange(5.0, 35.0, 0.25), np.array([84.0])
     assert band_model.order == 26
-    assert np.abs(model_response(band_model, inside) - device.response(inside)).max() < 0.02
-    assert np.abs(device.response(above)).max() > 5 * np.abs(model_response(band_model, above)).max()
+    assert np.abs(compute_model_response(band_model, inside) - device.response(inside)).max() < 0.02
+    assert np.abs(device.response(above)).max() > 5 * np.abs(compute_model_response(band_model, above)).max()

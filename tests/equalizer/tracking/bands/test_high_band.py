@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 from equalizer.tracking.bands.high_band import (
     HighBandSettings,
     MeasuredResponse,
@@ -87,7 +87,7 @@ def test_an_axis_that_is_near_its_limit_is_spared(source, burst):
 
 def test_a_response_measured_at_lines_serves_like_a_model(device_model, source, burst):
     lines = np.arange(1.0, 500.0, 0.25)
-    measured = MeasuredResponse(lines, model_response(device_model, lines))
+    measured = MeasuredResponse(lines, compute_model_response(device_model, lines))
     by_lines = compute_high_band_forces(burst, RATE_HZ, measured, settings=HighBandSettings(shared=False)).forces
     by_model = compute_high_band_forces(burst, RATE_HZ, source, settings=HighBandSettings(shared=False)).forces
     assert np.linalg.norm(by_lines - by_model) < 0.02 * np.linalg.norm(by_model)

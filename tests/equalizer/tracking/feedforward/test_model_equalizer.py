@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.plant.model_response import model_response, simulate
+from equalizer.plant.model_response import compute_model_response, simulate
 from equalizer.signals.signal import Signal
 from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
 from equalizer.tracking.feedforward.periodic_inverse import (
@@ -148,4 +148,4 @@ def test_response_and_simulation_of_a_model_agree(model):
     commands = np.zeros((n, 3))
     commands[:, 1] = np.sin(2 * np.pi * 20.0 / RATE_HZ * np.arange(n))
     spectrum = np.fft.rfft(simulate(model, commands)[-1000:], axis=0)[20] / np.fft.rfft(commands[-1000:, 1])[20]
-    assert np.allclose(spectrum, model_response(model, np.array([20.0]))[0, :, 1], rtol=1e-6)
+    assert np.allclose(spectrum, compute_model_response(model, np.array([20.0]))[0, :, 1], rtol=1e-6)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 from equalizer.tracking.feedforward.band_pass import filter_to_band
 from equalizer.tracking.learning.convergence import predict_convergence
 from equalizer.tracking.learning.iteration import (
@@ -122,7 +122,7 @@ def test_the_floor_from_two_plays_is_the_sensors(rubbing, plants, repetition, wa
 
 
 def test_at_a_place_shifted_by_a_fifth_divergence_is_predicted(plants, model):
-    inverse = np.linalg.inv(model_response(model, LINES_HZ))
+    inverse = np.linalg.inv(compute_model_response(model, LINES_HZ))
     here = predict_convergence(inverse, plants.omega_like().response(LINES_HZ), LINES_HZ, BAND_HZ)
     there = predict_convergence(inverse, plants.omega_like(0.2, 10.0).response(LINES_HZ), LINES_HZ, BAND_HZ)
     assert here.converges
@@ -132,7 +132,8 @@ def test_at_a_place_shifted_by_a_fifth_divergence_is_predicted(plants, model):
 
 
 def test_the_safe_gain_is_where_errors_begin_to_grow(plants, model):
-    inverse, device = np.linalg.inv(model_response(model, LINES_HZ)), plants.omega_like(0.1, 5.0).response(LINES_HZ)
+    inverse = np.linalg.inv(compute_model_response(model, LINES_HZ))
+    device = plants.omega_like(0.1, 5.0).response(LINES_HZ)
     safe = predict_convergence(inverse, device, LINES_HZ, BAND_HZ).safe_beta
     assert 0 < safe < 2
     assert predict_convergence(inverse, device, LINES_HZ, BAND_HZ, 0.999 * safe).converges
@@ -141,7 +142,7 @@ def test_the_safe_gain_is_where_errors_begin_to_grow(plants, model):
 
 @pytest.mark.parametrize("singular", [0, 1], ids=["learned inverse", "device"])
 def test_no_gain_is_safe_where_one_direction_is_not_corrected_or_does_not_move(plants, model, singular):
-    inverse, device = np.linalg.inv(model_response(model, LINES_HZ)), plants.omega_like().response(LINES_HZ)
+    inverse, device = np.linalg.inv(compute_model_response(model, LINES_HZ)), plants.omega_like().response(LINES_HZ)
     (inverse, device)[singular][:, 1] = (inverse, device)[singular][:, 0]
     found = predict_convergence(inverse, device, LINES_HZ, BAND_HZ)
     assert found.safe_beta == 0
@@ -149,14 +150,14 @@ def test_no_gain_is_safe_where_one_direction_is_not_corrected_or_does_not_move(p
 
 
 def test_of_several_possible_devices_the_worst_counts(plants, model):
-    inverse = np.linalg.inv(model_response(model, LINES_HZ))
+    inverse = np.linalg.inv(compute_model_response(model, LINES_HZ))
     one, other = (plants.omega_like(shift).response(LINES_HZ) for shift in (0.0, 0.1))
     both = predict_convergence(inverse, np.stack([one, other]), LINES_HZ, BAND_HZ)
     assert both.safe_beta == predict_convergence(inverse, other, LINES_HZ, BAND_HZ).safe_beta
 
 
 def test_responses_that_do_not_belong_together_are_refused(plants, model):
-    inverse = np.linalg.inv(model_response(model, LINES_HZ))
+    inverse = np.linalg.inv(compute_model_response(model, LINES_HZ))
     with pytest.raises(ValueError, match="as many forces as responses"):
         predict_convergence(inverse, inverse[:5], LINES_HZ, BAND_HZ)
     with pytest.raises(ValueError, match="no line lies in the band"):

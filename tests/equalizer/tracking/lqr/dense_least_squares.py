@@ -18,7 +18,7 @@ def least_squares_forces(
     """Optimal forces (N, m); arguments as of `track`, which must find the same. Time grows with N³, memory with N²."""
     r = require_trajectory(problem, wanted)
     N, q = len(r), problem.C.shape[0]
-    free, to_end = _free_response(problem, N, problem.state(x0))
+    free, to_end = _free_response(problem, N, problem.make_state(x0))
     missing = -free
     missing[:, : problem.outputs] += r
     output_root, force_root = _matrix_root(problem.Q), _matrix_root(problem.R)
@@ -27,7 +27,7 @@ def least_squares_forces(
     rows = [np.einsum("ij,njk->nik", output_root, T).reshape(N * q, -1), np.kron(np.eye(N), force_root)]
     rows.append(end_root @ _reachability_matrix(problem, N))
     right = [(missing @ output_root.T).ravel(), np.zeros(N * problem.inputs)]
-    right.append(end_root @ (problem.state(final_state) - to_end))
+    right.append(end_root @ (problem.make_state(final_state) - to_end))
     Qr, Rr = np.linalg.qr(np.vstack(rows))
     return np.asarray(solve_triangular(Rr, Qr.T @ np.concatenate(right))).reshape(N, problem.inputs)
 

@@ -34,10 +34,10 @@ def test_a_low_frequency_weight_keeps_slow_force_down(device_model):
 
 def test_the_model_s_own_state_is_filled_up_with_penalties_at_rest(problem_of):
     problem = problem_of(4, 1, low_frequency_weight=1.0)
-    assert problem.state(np.ones(4)).tolist() == [1, 1, 1, 1, 0, 0, 0]
-    assert problem.state(np.ones(7)).tolist() == [1] * 7
+    assert problem.make_state(np.ones(4)).tolist() == [1, 1, 1, 1, 0, 0, 0]
+    assert problem.make_state(np.ones(7)).tolist() == [1] * 7
     with pytest.raises(TrackingError, match=r"shape \(5,\); this problem takes \(7,\) or \(4,\)"):
-        problem.state(np.ones(5))
+        problem.make_state(np.ones(5))
 
 
 def test_a_state_that_is_no_number_is_refused(problem_of):

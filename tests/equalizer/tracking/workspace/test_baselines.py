@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from equalizer.plant.identified_model import IdentifiedModel
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 from equalizer.tracking.feedforward.baselines import (
     compute_baseline_inverses,
     fit_rigid_body_inverse,
@@ -73,7 +73,7 @@ def test_a_rigid_model_does_not_hold_resonances_but_is_exact_for_a_rigid_device(
         A, np.array([[0.0], [step / mass]]), np.array([[-40 / mass, -3 / mass]]), np.array([[1 / mass]]),
         rate, (5.0, 35.0), "N", "m/s^2", ("fx",), ("ax",),
     )  # fmt: skip
-    delivered = model_response(model, LINES) @ fit_rigid_body_inverse(model, LINES).response
+    delivered = compute_model_response(model, LINES) @ fit_rigid_body_inverse(model, LINES).response
     assert np.abs(delivered - 1).max() < 0.01
 
 

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from equalizer.plant.model_response import model_response
+from equalizer.plant.model_response import compute_model_response
 from equalizer.tracking.workspace.modal_interpolation import build_modal_interpolation
 from equalizer.tracking.workspace.mode_matching import ModesDoNotMatchError
 from equalizer.tracking.workspace.workspace_models import WorkspaceModels
@@ -18,7 +18,7 @@ def relative(found, truth):
 def test_at_a_given_place_the_given_model_comes_back(three):
     for model in three.models:
         found = build_modal_interpolation(three).at(model.place_m).models[0]
-        assert relative(model_response(found, LINES), model_response(model, LINES)) < 0.01
+        assert relative(compute_model_response(found, LINES), compute_model_response(model, LINES)) < 0.01
 
 
 def test_the_model_is_stable_small_and_says_what_it_is_made_of(three):
@@ -38,14 +38,18 @@ def test_the_order_in_which_models_are_given_does_not_matter(three):
     place = (0.041, 0.01, 0.0)
     one = build_modal_interpolation(three).at(place).models[0]
     other = build_modal_interpolation(WorkspaceModels(three.models[::-1])).at(place).models[0]
-    np.testing.assert_allclose(model_response(one, LINES), model_response(other, LINES), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(
+        compute_model_response(one, LINES), compute_model_response(other, LINES), rtol=1e-6, atol=1e-6
+    )
 
 
 def test_outside_the_nearest_place_is_used_and_reported(three):
     at = build_modal_interpolation(three).at((0.09, 0.01, 0.0))
     assert "30.0 mm outside" in at.remarks[0]
     edge = build_modal_interpolation(three).at((0.06, 0.01, 0.0)).models[0]
-    np.testing.assert_allclose(model_response(at.models[0], LINES), model_response(edge, LINES), rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(
+        compute_model_response(at.models[0], LINES), compute_model_response(edge, LINES), rtol=1e-4, atol=1e-4
+    )
 
 
 def test_devices_that_share_no_modes_are_refused_by_number(three):

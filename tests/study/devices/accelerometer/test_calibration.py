@@ -34,8 +34,8 @@ def test_bias_sensitivity_and_noise_are_recovered(seed):
     np.testing.assert_allclose(found.sensitivity, sensitivity, atol=0.002 * COUNTS_PER_MPS2)
     np.testing.assert_allclose(found.noise_mps2, 40 / COUNTS_PER_MPS2, rtol=0.2)
     moving = np.random.default_rng(seed).uniform(-25, 25, (100, 3))
-    np.testing.assert_allclose(found.acceleration(moving @ sensitivity.T + bias), moving, atol=0.1)
-    np.testing.assert_allclose(found.acceleration(sensitivity @ moving[0] + bias), moving[0], atol=0.1)
+    np.testing.assert_allclose(found.to_acceleration(moving @ sensitivity.T + bias), moving, atol=0.1)
+    np.testing.assert_allclose(found.to_acceleration(sensitivity @ moving[0] + bias), moving[0], atol=0.1)
 
 
 def test_tilts_of_a_degree_leave_a_percent():

@@ -27,10 +27,10 @@ def test_offset_and_drift_are_found(drift_ppm, seed):
     device_s, arrived_s, true_s = arrivals(drift_ppm, seed)
     fit = fit_clock(device_s, arrived_s)
     assert fit.drift_ppm == pytest.approx(drift_ppm, abs=3.0)
-    error_s = fit.host_s(device_s) - true_s
+    error_s = fit.to_host_s(device_s) - true_s
     assert np.abs(error_s).max() < 0.0006  # of which the least delay cannot be seen
     assert np.ptp(error_s) < 0.0002
-    assert (fit.host_s(device_s) <= arrived_s + 1e-9).all()
+    assert (fit.to_host_s(device_s) <= arrived_s + 1e-9).all()
     assert 0.001 < fit.longest_delay_s < 0.2
 
 

@@ -13,7 +13,7 @@ import pytest
 from study.devices.accelerometer.calibration import GRAVITY_MPS2, UP_DIRECTIONS, Calibration
 from study.devices.accelerometer.sensor import Accelerometer
 from study.devices.accelerometer.six_positions import calibrate_on_table
-from study.devices.accelerometer.sources import DUMMY_V, open_source
+from study.devices.accelerometer.sources import LOST_SCAN_V, open_source
 from study.errors import DeviceError
 
 RATE_HZ = 3999.0
@@ -34,7 +34,7 @@ class Scanner:
         numbers = np.arange(self.read_up_to, due)
         self.read_up_to = due
         volts = np.tile(VOLTS.bias + VOLTS.sensitivity @ self.acceleration, (len(numbers), 1))
-        volts[np.isin(numbers, list(self.lost))] = DUMMY_V
+        volts[np.isin(numbers, list(self.lost))] = LOST_SCAN_V
         return volts
 
 
@@ -112,7 +112,7 @@ def test_scans_that_a_labjack_lost_are_counted_and_left_out(labjack):
     while len(sequence) < 50:
         samples, _ = source.read()
         sequence += samples.sequence.tolist()
-        assert (samples.raw != DUMMY_V).all()
+        assert (samples.raw != LOST_SCAN_V).all()
     assert sequence == [k for k in range(sequence[-1] + 1) if k not in labjack.lost]
     assert (source.counts.lost, source.counts.packets) == (3, len(sequence))
 

@@ -178,7 +178,7 @@ def played(rigs, monkeypatch):
         runner = SteppedRunner(rig if compiled else Interpreted(rig), governor, False, clock.now_s, monotonic=True)
         drive = RealtimeDrive(runner, governor, clock, rigs.RATE_HZ, rigs.LIMITS.watchdog_s)
         assert drive.start(lambda: governor.begin_hold(rigs.sine(2.0, fade_s=0.01)))
-        governor.settings[cells.WATCHDOG_TICKS] = governor.state[cells.LONGEST] = np.inf
+        governor.settings[cells.WATCHDOG_TICKS] = governor.state[cells.LONGEST_HOLD] = np.inf
         clock.at_end = governor.request_stop
         drive._loop_state[THREAD_NEEDED] = 0.0
         calls = 0

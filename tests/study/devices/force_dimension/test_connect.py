@@ -9,7 +9,7 @@ import pytest
 
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.force_dimension import connect
-from study.devices.force_dimension.models import MODELS
+from study.devices.force_dimension.device_models import MODELS
 from study.devices.force_dimension.usb import UsbDevice
 from study.devices.opening import REAL, open_device
 from study.errors import DeviceError, ExitCode

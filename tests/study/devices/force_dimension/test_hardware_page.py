@@ -8,9 +8,9 @@ from pydantic import TypeAdapter
 
 from study.cli.main import main
 from study.devices.accelerometer.parser import PACKET_DTYPE, PACKET_SIZE
+from study.devices.force_dimension.device_models import MODELS
 from study.devices.force_dimension.lab import LabSettings, SensorSettings
-from study.devices.force_dimension.models import MODELS
-from study.devices.force_dimension.usb import RULE, RULE_FILE
+from study.devices.force_dimension.usb import UDEV_RULE, UDEV_RULE_FILE
 
 ROOT = Path(__file__).parents[4]
 PAGE = (ROOT / "docs" / "hardware.md").read_text("utf-8")
@@ -56,7 +56,7 @@ def test_the_commands_of_the_hardware_page_have_the_options_that_it_gives_them(c
 
 
 def test_rule_devices_and_packet_are_those_of_the_code():
-    assert RULE in PAGE and RULE_FILE in PAGE
+    assert UDEV_RULE in PAGE and UDEV_RULE_FILE in PAGE
     assert all(f"`{name}`" in PAGE or f"--device {name}`" in PAGE for name in MODELS)
     assert PACKET_DTYPE.itemsize == PACKET_SIZE == 16
     assert (PACKET_DTYPE.fields["time_us"][1], PACKET_DTYPE.fields["raw"][1], PACKET_DTYPE.fields["crc"][1]) == (

@@ -46,12 +46,12 @@ def test_ten_million_ticks_of_false_readings_never_exceed_the_force_limits(lying
 
 MUTATIONS = {
     "the fade turns the force round": (
-        govern, "force[i] = max(remaining_gain, 0.0) * state[LET_GO_FROM + i]",
-        "force[i] = -max(remaining_gain, 0.0) * state[LET_GO_FROM + i]", "fade: its sign",
+        govern, "force[i] = max(remaining_gain, 0.0) * state[LET_GO_FORCE + i]",
+        "force[i] = -max(remaining_gain, 0.0) * state[LET_GO_FORCE + i]", "fade: its sign",
     ),
     "the fade rises": (
-        govern, "remaining_gain = 1.0 - (state[TICK] - state[LET_GO_AT] + 1.0)",
-        "remaining_gain = 1.0 + (state[TICK] - state[LET_GO_AT] + 1.0)", "fade: no way down",
+        govern, "remaining_gain = 1.0 - (state[TICK] - state[LET_GO_START] + 1.0)",
+        "remaining_gain = 1.0 + (state[TICK] - state[LET_GO_START] + 1.0)", "fade: no way down",
     ),
     "the fade takes twice as long": (
         govern, "/ settings[LET_GO_TICKS]", "/ (2.0 * settings[LET_GO_TICKS])", "fade: longer",
@@ -81,13 +81,14 @@ MUTATIONS = {
         govern, "settings[SLEW_STEP] * LIMIT_FACTOR", "(2.0 * settings[SLEW_STEP])", "slew",
     ),
     "no watchdog": (
-        govern, "tick - state[LAST_SIGN] > settings[WATCHDOG_TICKS]", "False", "late: a force after the watchdog",
+        govern, "tick - state[LAST_KEEP_ALIVE_TICK] > settings[WATCHDOG_TICKS]", "False",
+        "late: a force after the watchdog",
     ),
     "no longest hold": (
-        govern, "tick >= state[LONGEST]", "False", "late: a force after the longest hold",
+        govern, "tick >= state[LONGEST_HOLD]", "False", "late: a force after the longest hold",
     ),
     "no ear for a release": (
-        govern, "state[RELEASE_ASKED] != 0.0 or", "", "",
+        govern, "state[RELEASE_REQUEST] != 0.0 or", "", "",
     ),
     "twice the spring": (
         feedback, "stiffness * (reading[0]", "2.0 * stiffness * (reading[0]", "",
@@ -168,7 +169,7 @@ def scenarios(lying, ticks: int = 900):
     clock = np.arange(ticks)
     shaken = 0.0007 * (-1.0) ** clock[:, None] * after * [0.6, 0.8, 0.0]
     late = ((clock > 300) & (clock % 92 != 0)).astype(float)
-    garbage = np.array([[400, cells.FORCE, 60.0], [500, cells.LET_GO_FROM, 1e4], [500, cells.PHASE, cells.LETTING_GO]])
+    garbage = np.array([[400, cells.FORCE, 60.0], [500, cells.LET_GO_FORCE, 1e4], [500, cells.PHASE, cells.LETTING_GO]])
     short = hold("none").settings
     yield hold("none", spring=False, release_at=431)
     yield hold("none", release_at=431)
@@ -265,7 +266,7 @@ def pull_at(governor, x_m: float, stamp_s: float) -> float:
     reading = np.zeros(READING_SIZE)
     reading[0] = x_m
     governor.restart_watchdog()
-    governor.state[cells.STAMP_S] = stamp_s
+    governor.state[cells.READING_TIME_S] = stamp_s
     govern.tick(governor.state, governor.settings, governor.loop, governor.buffer, reading, governor.force)
     return -float(governor.force[0])
 

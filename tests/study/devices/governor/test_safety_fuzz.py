@@ -86,7 +86,7 @@ def fuzz(rigs, seed: int, break_it=lambda governor: None):
     faults, found = Counter(), []
     while (left := TICKS_PER_DEVICE - int(rig.state[rigs.WRITES])) > 0:
         if not governor.moving:
-            governor.state[govern.STOP_ASKED] = 0.0  # as if it had been opened again
+            governor.state[govern.STOP_REQUEST] = 0.0  # as if it had been opened again
             rig.state[: rigs.WRITES] = 0.0
             rig.state[rigs.LEAN : rigs.LEAN + 3] = rng.normal(size=3) * 10 ** rng.uniform(-4, -1.2)
             governor.begin_hold(random_stimulus(rng, rigs))

@@ -42,7 +42,7 @@ class Writer:
         for _ in range(ticks):
             self.state[cells.TICK] += 1
             tick = self.state[cells.TICK]
-            self.state[[cells.STAMP_S, cells.FORCE, cells.MISSED]] = tick, 2 * tick, 3 * tick
+            self.state[[cells.READING_TIME_S, cells.FORCE, cells.MISSED]] = tick, 2 * tick, 3 * tick
             self.reading[:] = 4 * tick
             govern.publish(self.state, self.settings, self.rows, self.reading)
 
@@ -114,7 +114,7 @@ def hammer(state, settings, ring, reading, ticks: int) -> float:
     for _ in range(ticks):
         state[cells.TICK] += 1
         tick = state[cells.TICK]
-        state[cells.STAMP_S], state[cells.FORCE], state[cells.MISSED] = tick, 2 * tick, 3 * tick
+        state[cells.READING_TIME_S], state[cells.FORCE], state[cells.MISSED] = tick, 2 * tick, 3 * tick
         reading[:] = 4 * tick
         write_row(state, settings, ring, reading)
         for i in range(200):  # a reader must get something in between

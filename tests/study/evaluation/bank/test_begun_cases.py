@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, show_case
-from study.evaluation.bank.proof_folder import RECORDING, open_proof_folder
+from study.evaluation.bank.begun_cases import begin_case, finish_begun_cases, publish_case
+from study.evaluation.bank.proof_folder import RECORDING_FILE, open_proof_folder
 from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.seal_cases import BankPlan, seal_cases
 
@@ -47,8 +47,8 @@ def test_a_killed_sealing_goes_on_with_every_case_labelled(bank, when):
     assert len(kept) == (when == "after")
     seal_cases(bank, PLAN, 1, lambda done: None)
     (place,) = bank.open.iterdir()
-    assert place.name == read_label(bank.label_file(0))["name"]
-    assert (place / RECORDING).exists()
+    assert place.name == read_label(bank.get_label_file(0))["name"]
+    assert (place / RECORDING_FILE).exists()
     assert not bank.unfinished.exists()
     assert {path: path.read_bytes() for path in kept} == kept
 
@@ -56,11 +56,13 @@ def test_a_killed_sealing_goes_on_with_every_case_labelled(bank, when):
 def test_a_label_of_two_cases_finishes_both(bank):
     """Of follow-ups, whose label names the case of each kind."""
     shown, hidden, begun = (begin_case(bank) for _ in range(3))
-    bank.label_file(0).write_text(f'{{"proposed": {{"name": "{shown.name}"}}, "drawn": {{"name": "{hidden.name}"}}}}')
-    show_case(bank, shown)
+    bank.get_label_file(0).write_text(
+        f'{{"proposed": {{"name": "{shown.name}"}}, "drawn": {{"name": "{hidden.name}"}}}}'
+    )
+    publish_case(bank, shown)
     with finish_begun_cases(bank):
         new = begin_case(bank)
-        show_case(bank, new)
+        publish_case(bank, new)
     assert {place.name for place in bank.open.iterdir()} == {shown.name, hidden.name, new.name}
     assert not begun.exists()
     assert not bank.unfinished.exists()

@@ -13,12 +13,12 @@ from equalizer.plant.effect_vocabulary import EFFECT_NAMES
 from study.errors import StudyError
 from study.evaluation.bank.follow_up import FOLLOW_UP_FOLDER, PROPOSED_KEY, RANDOM_KEY, follow_up
 from study.evaluation.bank.proof_folder import (
-    ANSWER,
-    FURTHER_RECORDING,
-    MODEL,
-    RECORDING,
-    SETTINGS,
-    WORKER_DIED,
+    ANSWER_FILE,
+    FURTHER_RECORDING_FILE,
+    MODEL_FILE,
+    RECORDING_FILE,
+    SETTINGS_FILE,
+    WORKER_DIED_KEY,
     ProofFolder,
     open_proof_folder,
 )
@@ -51,23 +51,23 @@ def answer(place, effect="sensor_gain", rival="force_gain", best=""):
         "diagnosis": diagnosis,
         "channel_errors": {"retuned": {"ay": 9.0}},
         "proposal": {"axis": 0, "level": LEVEL_N, "best": [best] if best else []},
-        "recording_sha256": compute_sha256(place / RECORDING),
-        "model_sha256": compute_sha256(place / MODEL),
+        "recording_sha256": compute_sha256(place / RECORDING_FILE),
+        "model_sha256": compute_sha256(place / MODEL_FILE),
     }
-    (place / ANSWER).write_text(json.dumps(said))
+    (place / ANSWER_FILE).write_text(json.dumps(said))
 
 
 def started(path, best):
     folder = open_proof_folder(path, SEED, True)
     write_sealed_case(folder, draw_case_plan(SEED, NUMBER, True))
-    label = json.loads(folder.label_file(NUMBER).read_text())
+    label = json.loads(folder.get_label_file(NUMBER).read_text())
     place = folder.open / label["name"]
     without = [effect.name for effect in EFFECT_NAMES if effect.name not in CONSIDERED]
-    (place / SETTINGS).write_text(format_settings(without))
-    menu = list_experiments(read_mechanical_model(place / MODEL), 1000.0, 0, LEVEL_N)
+    (place / SETTINGS_FILE).write_text(format_settings(without))
+    menu = list_experiments(read_mechanical_model(place / MODEL_FILE), 1000.0, 0, LEVEL_N)
     answer(place, best=menu[0].words if best else "")
-    outcome = outcome_of(label, json.loads((place / ANSWER).read_text()))
-    (place / RECORDING).unlink()  # as a bank leaves it
+    outcome = outcome_of(label, json.loads((place / ANSWER_FILE).read_text()))
+    (place / RECORDING_FILE).unlink()  # as a bank leaves it
     return folder, outcome, menu
 
 
@@ -93,12 +93,16 @@ def test_the_right_name_is_left_by_the_recording_that_was_proposed(followed):
 def test_both_cases_are_told_nothing_of_which_is_which(followed):
     folder, *_ = followed
     again = ProofFolder(folder.path / FOLLOW_UP_FOLDER)
-    label = json.loads(again.label_file(NUMBER).read_text())
+    label = json.loads(again.get_label_file(NUMBER).read_text())
     assert {path.name for path in again.open.iterdir()} == {
         label[which]["name"] for which in (PROPOSED_KEY, RANDOM_KEY)
     }
     for place in again.open.iterdir():
-        assert {path.name for path in place.iterdir()} == {ANSWER, MODEL, "settings.json"}  # recordings are forgotten
+        assert {path.name for path in place.iterdir()} == {
+            ANSWER_FILE,
+            MODEL_FILE,
+            "settings.json",
+        }  # recordings are forgotten
 
 
 @pytest.mark.slow
@@ -119,7 +123,7 @@ def test_where_nothing_is_proposed_the_start_stays_open_and_the_random_one_is_pl
     with pytest.raises(StudyError, match="answer.json"):  # without an answer
         follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)
     (name,) = asked
-    assert (folder.path / FOLLOW_UP_FOLDER / "open" / name / FURTHER_RECORDING.format(2)).exists()
+    assert (folder.path / FOLLOW_UP_FOLDER / "open" / name / FURTHER_RECORDING_FILE.format(2)).exists()
 
 
 @pytest.mark.slow
@@ -128,28 +132,30 @@ def test_a_case_whose_process_died_keeps_all_its_recordings(tmp_path, monkeypatc
 
     def die(again, names, _, on_answered):
         for name in names:
-            (again.open / name / ANSWER).write_text(json.dumps({"name": name, "failed": "it died", WORKER_DIED: True}))
+            (again.open / name / ANSWER_FILE).write_text(
+                json.dumps({"name": name, "failed": "it died", WORKER_DIED_KEY: True})
+            )
             on_answered(name)
 
     folder, outcome, _ = started(tmp_path / "bank", False)
     monkeypatch.setattr("study.evaluation.bank.ask_engine.diagnose_cases", die)
     follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)
     (place,) = (folder.path / FOLLOW_UP_FOLDER / "open").iterdir()
-    assert {path.name for path in place.glob("*.h5")} == {RECORDING, FURTHER_RECORDING.format(2)}
+    assert {path.name for path in place.glob("*.h5")} == {RECORDING_FILE, FURTHER_RECORDING_FILE.format(2)}
 
 
 def test_a_start_with_one_name_is_not_taken_up_again(tmp_path):
     folder, _, _ = started(tmp_path / "bank", True)
-    place = folder.open / json.loads(folder.label_file(NUMBER).read_text())["name"]
-    said = json.loads((place / ANSWER).read_text())
+    place = folder.open / json.loads(folder.get_label_file(NUMBER).read_text())["name"]
+    said = json.loads((place / ANSWER_FILE).read_text())
     said["diagnosis"]["effects"][0]["rivals"] = []
-    alone = outcome_of(json.loads(folder.label_file(NUMBER).read_text()), said)
+    alone = outcome_of(json.loads(folder.get_label_file(NUMBER).read_text()), said)
     assert follow_up(folder, PLAN, (alone,), (1, False), lambda done, of: None) == ()
 
 
 def test_a_device_that_cannot_be_drawn_again_is_reported(tmp_path):
     folder, outcome, _ = started(tmp_path / "bank", True)
-    path = folder.label_file(NUMBER)
+    path = folder.get_label_file(NUMBER)
     path.write_text(json.dumps(json.loads(path.read_text()) | {"recording_sha256": "0" * 64}))
     with pytest.raises(StudyError, match="cannot be drawn again"):
         follow_up(folder, PLAN, (outcome,), (1, False), lambda done, of: None)

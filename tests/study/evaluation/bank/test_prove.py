@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from study.errors import StudyError, UserInterruptError
-from study.evaluation.bank.proof_folder import ANSWER, RECORDING, ProofFolder, open_proof_folder
+from study.evaluation.bank.proof_folder import ANSWER_FILE, RECORDING_FILE, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import read_answer
 from study.evaluation.bank.proof_summary import format_blind_test, summarise_blind_test
 from study.evaluation.bank.prove import outcome_of, prove
@@ -55,7 +55,7 @@ def test_seals_are_read_by_sha256sum_and_come_before_any_answer(proof):
     folder = proof[0].folder
     checked = subprocess.run(["sha256sum", "--check", "--status", "labels.sha256"], cwd=folder.path, check=False)
     assert checked.returncode == 0
-    answers = [path.stat().st_mtime_ns for path in folder.open.glob(f"*/{ANSWER}")]
+    answers = [path.stat().st_mtime_ns for path in folder.open.glob(f"*/{ANSWER_FILE}")]
     assert folder.seals_file.stat().st_mtime_ns <= min(answers)
 
 
@@ -64,12 +64,12 @@ def test_what_the_diagnosis_is_given_tells_neither_number_nor_seed(proof):
     for place in folder.open.iterdir():
         given = (place / "model.toml").read_text() + (place / "settings.json").read_text()
         assert str(SEED)[:4] not in given
-        assert not (place / RECORDING).exists()  # megabytes that have been answered
+        assert not (place / RECORDING_FILE).exists()  # megabytes that have been answered
 
 
 def test_the_process_that_answers_never_loads_the_challenge(proof):
     folder = proof[0].folder
-    answers = [json.loads(path.read_text()) for path in folder.open.glob(f"*/{ANSWER}")]
+    answers = [json.loads(path.read_text()) for path in folder.open.glob(f"*/{ANSWER_FILE}")]
     assert [answer["knows_the_challenge"] for answer in answers] == [False] * len(answers)
 
 
@@ -101,9 +101,9 @@ def test_the_process_that_answers_reaches_no_label(proof, does, refused):
 
 def test_the_same_command_continues_without_doing_anything_twice(proof):
     folder, seen = proof[0].folder, []
-    before = {path: path.stat().st_mtime_ns for path in folder.open.glob(f"*/{ANSWER}")}
+    before = {path: path.stat().st_mtime_ns for path in folder.open.glob(f"*/{ANSWER_FILE}")}
     again = prove(folder.path, PLAN, BankOptions(), lambda what, done, of: seen.append((what, done, of)))
-    assert {path: path.stat().st_mtime_ns for path in folder.open.glob(f"*/{ANSWER}")} == before
+    assert {path: path.stat().st_mtime_ns for path in folder.open.glob(f"*/{ANSWER_FILE}")} == before
     assert again.seal == proof[0].seal
     assert [outcome.number for outcome in again.outcomes] == [outcome.number for outcome in proof[0].outcomes]
 
@@ -152,23 +152,23 @@ def test_seals_that_are_none_break_the_proof(copied):
 
 @pytest.mark.parametrize("without", ["recording_sha256", "knows_the_challenge", "model_sha256"])
 def test_an_answer_that_does_not_say_what_it_is_to_breaks_the_seal(copied, without):
-    path = next(copied.open.glob(f"*/{ANSWER}"))
+    path = next(copied.open.glob(f"*/{ANSWER_FILE}"))
     said = json.loads(path.read_text())
     path.write_text(json.dumps({key: value for key, value in said.items() if key != without}))
     with pytest.raises(StudyError, match="A seal is broken"):
         reveal_bank(copied, 100, outcome_of)
 
 
-@pytest.mark.parametrize("torn", [ANSWER, "label"])
+@pytest.mark.parametrize("torn", [ANSWER_FILE, "label"])
 def test_a_torn_file_is_named(copied, torn):
-    path = next(copied.open.glob(f"*/{ANSWER}")) if torn == ANSWER else next(copied.sealed.glob("*.json"))
+    path = next(copied.open.glob(f"*/{ANSWER_FILE}")) if torn == ANSWER_FILE else next(copied.sealed.glob("*.json"))
     path.write_text(path.read_text()[:40])
-    with pytest.raises(StudyError, match=path.name if torn == ANSWER else "A seal is broken"):
+    with pytest.raises(StudyError, match=path.name if torn == ANSWER_FILE else "A seal is broken"):
         prove(copied.path, PLAN, BankOptions(), lambda *_: None)
 
 
 def test_an_error_that_is_not_known_is_read(copied):
-    path = next(copied.open.glob(f"*/{ANSWER}"))
+    path = next(copied.open.glob(f"*/{ANSWER_FILE}"))
     said = json.loads(path.read_text())
     path.write_text(json.dumps(said | {"channel_errors": {"retuned": {"ax": float("nan")}}}))
     assert "NaN" in path.read_text()
@@ -177,7 +177,7 @@ def test_an_error_that_is_not_known_is_read(copied):
 
 @pytest.mark.slow
 def test_an_answer_that_was_removed_is_given_again(copied):
-    path = next(copied.open.glob(f"*/{ANSWER}"))
+    path = next(copied.open.glob(f"*/{ANSWER_FILE}"))
     before = json.loads(path.read_text())
     path.unlink()
     again = prove(copied.path, PLAN, BankOptions(workers=1), lambda *_: None)
@@ -211,8 +211,8 @@ def test_the_short_bank_is_of_this_kind():
 
 
 def test_an_answer_that_is_nested_without_end_is_named(tmp_path):
-    (tmp_path / ANSWER).write_text("[" * 100_000)
+    (tmp_path / ANSWER_FILE).write_text("[" * 100_000)
     with pytest.raises(UnusableFileError, match="nested"):
         read_answer(tmp_path)
-    (tmp_path / ANSWER).write_text('{"error": NaN}')
+    (tmp_path / ANSWER_FILE).write_text('{"error": NaN}')
     assert math.isnan(read_answer(tmp_path)["error"])

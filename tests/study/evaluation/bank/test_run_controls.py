@@ -3,7 +3,7 @@
 import pytest
 
 from study.evaluation.bank.ask_engine import is_answered
-from study.evaluation.bank.proof_folder import ANSWER, WORKER_DIED
+from study.evaluation.bank.proof_folder import ANSWER_FILE, WORKER_DIED_KEY
 from study.evaluation.bank.run_controls import run_controls
 from study.evaluation.challenge.controls import CONTROLS
 
@@ -20,9 +20,9 @@ def test_noise_alone_and_a_clean_device_name_nothing_and_are_asked_once(tmp_path
 
 
 def test_a_case_whose_process_died_is_asked_again(tmp_path):
-    (tmp_path / ANSWER).write_text('{"failed": "killed", "' + WORKER_DIED + '": true}')
+    (tmp_path / ANSWER_FILE).write_text('{"failed": "killed", "' + WORKER_DIED_KEY + '": true}')
     assert not is_answered(tmp_path)
-    (tmp_path / ANSWER).write_text('{"failed": "an error of ours"}')
+    (tmp_path / ANSWER_FILE).write_text('{"failed": "an error of ours"}')
     assert is_answered(tmp_path)
 
 

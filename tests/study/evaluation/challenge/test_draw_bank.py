@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from study.evaluation.challenge.case_settings import CaseSettings
-from study.evaluation.challenge.draw_bank import BLOCK, COUNTS, EXCLUSIVE_EFFECTS, draw_case_plan, generate_case
+from study.evaluation.challenge.draw_bank import (
+    CASE_BLOCK,
+    CASE_COUNTS,
+    EXCLUSIVE_EFFECTS,
+    draw_case_plan,
+    generate_case,
+)
 from study.evaluation.challenge.draw_case import DECOYS, EFFECTS, draw_case
 
 WHOLE_TURNS = 15
@@ -14,7 +20,7 @@ WHOLE_TURNS = 15
 
 @pytest.fixture(scope="module")
 def bank():
-    return [draw_case_plan(50_000, number) for number in range(WHOLE_TURNS * len(BLOCK))]
+    return [draw_case_plan(50_000, number) for number in range(WHOLE_TURNS * len(CASE_BLOCK))]
 
 
 def test_six_hundred_draws_hold_what_the_protocol_asks_for(bank):
@@ -22,7 +28,7 @@ def test_six_hundred_draws_hold_what_the_protocol_asks_for(bank):
     assert len(bank) == 600
     assert kinds["nothing"] >= 150
     assert kinds["outside"] + kinds["without"] >= 120
-    assert Counter((each.kind, each.bank) for each in bank) == {key: WHOLE_TURNS * n for key, n in COUNTS.items()}
+    assert Counter((each.kind, each.bank) for each in bank) == {key: WHOLE_TURNS * n for key, n in CASE_COUNTS.items()}
 
 
 def test_every_effect_takes_its_turn_as_what_is_missing_and_as_what_must_not_be_named(bank):
@@ -32,7 +38,7 @@ def test_every_effect_takes_its_turn_as_what_is_missing_and_as_what_must_not_be_
 
 def test_a_part_of_a_bank_is_a_fair_sample_of_it(bank):
     first = Counter(each.kind for each in bank[:40])
-    assert first == Counter(kind for kind, _ in BLOCK)
+    assert first == Counter(kind for kind, _ in CASE_BLOCK)
 
 
 def test_a_case_is_drawn_alike_in_banks_of_any_length(bank):

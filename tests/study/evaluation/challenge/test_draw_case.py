@@ -11,7 +11,7 @@ from study.evaluation.challenge.device import Device, simulate_motion
 from study.evaluation.challenge.draw_case import draw_case
 from study.evaluation.challenge.drive_plan import DrivePlan, draw_plan
 from study.evaluation.challenge.nominal import RETUNED_TOLERANCE, draw_calibration, retune, shift_diagonals
-from study.evaluation.challenge.sensor_kernel import one_pole
+from study.evaluation.challenge.sensor_kernel import filter_first_order
 
 
 def first_seconds(plan):
@@ -79,7 +79,7 @@ def test_retuning_finds_the_bench_when_nothing_hides():
     bench, plan = draw_bench(random), first_seconds(draw_plan(random))
     start = shift_diagonals(bench, np.repeat((0.02, 0.5, 15.0), 3))
     each = [simulate_motion(Device(bench), plan.command[s.start : s.stop])[0] for s in plan.segments]
-    response = np.vstack([one_pole(part, 1.0 - np.exp(-np.pi)) for part in each])
+    response = np.vstack([filter_first_order(part, 1.0 - np.exp(-np.pi)) for part in each])
     found, tolerance = retune(start, response, plan)
     assert tolerance == RETUNED_TOLERANCE
     np.testing.assert_allclose(found.mass, bench.mass, atol=2e-4)

@@ -11,7 +11,7 @@ from study.evaluation.challenge.drive_plan import DrivePlan
 from study.evaluation.challenge.effects.actuator import EFFECTS as ACTUATOR
 from study.evaluation.challenge.nominal import retune
 from study.evaluation.challenge.sensor import NOISE_MPS2
-from study.evaluation.challenge.sensor_kernel import one_pole
+from study.evaluation.challenge.sensor_kernel import filter_first_order
 from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import read_recording
 
@@ -40,7 +40,7 @@ def opened(shared):
 def misfit(device, recording):
     """In units of the noise, worst channel, where nothing is clipped."""
     acceleration, _ = simulate_motion(device, recording.command.samples)
-    seen = one_pole(acceleration, 1.0 - np.exp(-np.pi)) @ device.sensor.orientation.T
+    seen = filter_first_order(acceleration, 1.0 - np.exp(-np.pi)) @ device.sensor.orientation.T
     apart = (recording.response.samples - seen) / NOISE_MPS2
     read = np.abs(recording.response.samples) < 29.0
     return max(apart[read[:, j], j].std() for j in range(3))

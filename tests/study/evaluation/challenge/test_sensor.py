@@ -22,10 +22,10 @@ def test_the_range_is_three_g():
 
 def test_a_clock_ahead_reads_what_comes_later():
     t = np.arange(len(REST))[:, None] / 1000.0
-    _, position = read_sensor(Sensor(ppm=1000.0), REST, 0.1 * t + REST, 1000.0, np.random.default_rng(1))
+    _, position = read_sensor(Sensor(clock_error_ppm=1000.0), REST, 0.1 * t + REST, 1000.0, np.random.default_rng(1))
     assert position[10_000, 0] == pytest.approx(0.1 * t[10_010, 0], abs=4e-5)
 
 
 def test_lost_samples_repeat_the_one_before():
-    response, _ = read_sensor(Sensor(lost=0.1), REST, REST, 1000.0, np.random.default_rng(1))
+    response, _ = read_sensor(Sensor(lost_fraction=0.1), REST, REST, 1000.0, np.random.default_rng(1))
     assert np.mean((np.diff(response, axis=0) == 0.0).all(axis=1)) == pytest.approx(0.1, abs=0.01)

@@ -120,7 +120,7 @@ def test_what_a_fault_changes_is_what_a_base_of_the_clean_half_misses(split):
 def test_the_labels_say_what_was_put_in_and_the_clean_half_stays(carrier, tmp_path: Path):
     folder = open_proof_folder(tmp_path / "bank", 4, False)
     names = seal_injections(folder, (carrier,), 8, 4)
-    labels = [json.loads(folder.label_file(number).read_text()) for number in range(8)]
+    labels = [json.loads(folder.get_label_file(number).read_text()) for number in range(8)]
     assert [each["name"] for each in labels] == list(names)
     assert {bool(each["effects"]) for each in labels} == {True, False}
     readings, commands = carrier.recording.response.samples, carrier.recording.command.samples
@@ -139,7 +139,7 @@ def test_the_labels_say_what_was_put_in_and_the_clean_half_stays(carrier, tmp_pa
 def test_labels_bind_recording_model_and_clean_half_and_the_search_has_its_time(carrier, tmp_path: Path):
     folder = open_proof_folder(tmp_path / "bank", 4, False)
     (name,) = seal_injections(folder, (carrier,), 1, 4)
-    label, place = json.loads(folder.label_file(0).read_text()), folder.open / name
+    label, place = json.loads(folder.get_label_file(0).read_text()), folder.open / name
     assert label["model_sha256"] == compute_sha256(place / "model.toml")
     assert label["others_sha256"] == {"clean/recording.h5": compute_sha256(place / "clean" / "recording.h5")}
     assert json.loads((place / "settings.json").read_text()) == {"without": [], "processor_s": PROCESSOR_S}
@@ -148,6 +148,6 @@ def test_labels_bind_recording_model_and_clean_half_and_the_search_has_its_time(
 def test_a_label_that_was_changed_breaks_its_seal(carrier, tmp_path: Path):
     folder = open_proof_folder(tmp_path / "bank", 4, False)
     seal_injections(folder, (carrier,), 1, 4)
-    folder.label_file(0).write_text(folder.label_file(0).read_text().replace('"strength"', '"strength" '))
+    folder.get_label_file(0).write_text(folder.get_label_file(0).read_text().replace('"strength"', '"strength" '))
     with pytest.raises(StudyError, match="A seal is broken"):
         seal_injections(folder, (carrier,), 1, 4)

@@ -9,7 +9,7 @@ from analysis.evaluation.reproduction.document import ReproductionError, reprodu
 from study.errors import StudyError, UserInterruptError
 from study.evaluation.reproduction.reproduce_paper import identify_or_load, reproduce_paper
 from study.evaluation.reproduction.reproduce_recordings import RecordingRequest, record_or_load
-from study.evaluation.reproduction.reproduction_plan import ReproducedProtocols, ReproductionPlan, Steps
+from study.evaluation.reproduction.reproduction_plan import ReproducedProtocols, ReproductionPlan, StepProgress
 from study.store.disk.file_errors import UnusableFileError
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.recording_file import read_recording, write_recording
@@ -152,7 +152,7 @@ def test_another_recording_of_that_name_is_refused(written, plan, wanted, why):
 
 
 def test_a_recording_that_cannot_be_read_is_left_alone(plan, tmp_path):
-    other = replace(plan, out=tmp_path)
+    other = replace(plan, output_folder=tmp_path)
     other.recordings.mkdir()
     (other.recordings / "centre.h5").write_text("no recording")
     with pytest.raises(StudyError, match="it cannot be read"):
@@ -162,7 +162,7 @@ def test_a_recording_that_cannot_be_read_is_left_alone(plan, tmp_path):
 
 @pytest.mark.slow
 def test_another_seed_in_the_same_folder_is_refused(written, plan):
-    other = ReproductionPlan(plan.out, 2, 4, 2, plan.protocols, order=8, period_s=2.0)
+    other = ReproductionPlan(plan.output_folder, 2, 4, 2, plan.protocols, order=8, period_s=2.0)
     with pytest.raises(StudyError, match="holds another reproduction.*made with another seed"):
         reproduce_paper(other, lambda share: None)
 
@@ -179,9 +179,9 @@ def test_interrupted_it_says_that_the_same_command_continues(plan, tmp_path):
 
 def test_progress_never_steps_back():
     told: list[float] = []
-    steps = Steps({"a": 1.0, "b": 3.0}, told.append)
-    steps.progress_of("a")(1.0)
-    steps.progress_of("b")(0.5)
-    steps.progress_of("b")(0.2)
-    steps.progress_of("b")(2.0)
+    steps = StepProgress({"a": 1.0, "b": 3.0}, told.append)
+    steps.make_callback("a")(1.0)
+    steps.make_callback("b")(0.5)
+    steps.make_callback("b")(0.2)
+    steps.make_callback("b")(2.0)
     assert told == [0.25, 0.625, 0.625, 1.0]

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from study.importing.arrays.arrays import KINDS
+from study.importing.arrays.read_arrays import READABLE_ENDINGS
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError
 from study.store.disk.file_errors import CannotReadError
@@ -125,7 +125,7 @@ def test_a_damaged_file_is_a_named_error(tmp_path, name, content):
 def test_a_file_of_no_known_kind_is_refused_with_the_known_ones(tmp_path):
     with pytest.raises(ImportRefusedError) as refused:
         read(written(tmp_path, "x", "a.docx"))
-    assert f"known are {KINDS}" in refused.value.happened
+    assert f"known are {READABLE_ENDINGS}" in refused.value.happened
 
 
 def test_a_file_with_no_arrays_is_refused(tmp_path):

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from study.importing.arrays.arrays import read_arrays
 from study.importing.arrays.json_arrays import is_own_document
+from study.importing.arrays.read_arrays import read_arrays
 from study.importing.header_map import describe_header_choices, make_header_map
 from study.importing.map_format.import_map import CsvMap
 from study.importing.map_format.map_errors import ImportRefusedError

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from openpyxl import Workbook, load_workbook
 
-from study.importing.arrays.arrays import read_arrays
+from study.importing.arrays.read_arrays import read_arrays
 from study.importing.build_recording import build_recording
 from study.importing.header_map import describe_header_choices, find_header_problems, make_header_map
 from study.importing.map_format.import_map import CsvMap

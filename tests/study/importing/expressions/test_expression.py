@@ -184,6 +184,6 @@ def test_arrays_that_wait_for_another_count_too():
 
 def test_a_larger_file_may_cost_more():
     budget = Budget()
-    budget.allow_for(3_000_000)
+    budget.add_allowance(3_000_000)
     text = "(-u + " * 10 + "u" + ")" * 10
     Namespace({"u": np.zeros(3_000_000)}, {}, "a.npz", budget).compute_value(text, Millisecond())

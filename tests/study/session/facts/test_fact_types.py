@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from study.session.facts.events import event_line, parse_event
+from study.session.facts.events import encode_event, parse_event
 
 FROZEN = Path(__file__).parents[3] / "frozen" / "v0_1" / "study" / "P01_001" / "events.jsonl"
 LINES = FROZEN.read_bytes().splitlines(keepends=True)
@@ -64,7 +64,7 @@ def test_a_field_outside_its_type_is_refused(kind, field, value):
 
 def test_every_line_of_an_earlier_version_is_read_and_written_as_it_was():
     for line in LINES:
-        assert event_line(parse_event(line)) == line
+        assert encode_event(parse_event(line)) == line
 
 
 @pytest.mark.parametrize("kind", BY_KIND)

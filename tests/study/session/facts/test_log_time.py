@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 
 import pytest
 
-from protocols.definition.exposure import SittingLimits
+from protocols.definition.session_settings import SittingLimits
 from study.session.facts.events import DemoPlayed, NoteTaken, SessionInterrupted, SessionResumed
 from study.session.facts.log_time import ClockStep, Moment, compute_elapsed_s, find_clock_step
 from study.session.state.fold import apply_event

@@ -10,7 +10,6 @@ from study.session.facts.events import (
     RestTaken,
     SessionResumed,
 )
-from study.session.state.draw_check import LogContradiction
 from study.session.state.fold import apply_event
 from study.session.state.machine import (
     CheckDevice,
@@ -22,6 +21,7 @@ from study.session.state.machine import (
     find_next_action,
     find_next_preparation,
 )
+from study.session.state.presentation_check import LogContradiction
 from study.session.views.form_views import FormKind, FormReply, find_missing_fields
 from study.session.views.forms import judge_form, make_form
 from tests.study.session.sitting.preparation import UTC, filled, prepared

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from protocols.definition.exposure import CatchSettings, DetectionSettings, SittingLimits
+from protocols.definition.session_settings import CatchSettings, DetectionSettings, SittingLimits
 from protocols.trial import Phase
 from study.session.facts.events import (
     DemoFinished,

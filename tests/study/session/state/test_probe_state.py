@@ -5,7 +5,7 @@ import pytest
 
 from protocols.definition.probes import ProbeSettings
 from study.session.facts.sitting_events import ProbePlayed
-from study.session.state.draw_check import LogContradiction
+from study.session.state.presentation_check import LogContradiction
 from study.session.state.probe_state import LARGEST_WEIGHT_HZ, ProbeState, begin_probe
 from study.session.state.vibration_dose import compute_hand_arm_weight
 

@@ -14,12 +14,12 @@ from study.session.facts.events import (
     SessionClosed,
     SessionInterrupted,
     TrialSpoiled,
-    event_line,
+    encode_event,
     parse_event,
 )
-from study.session.state.draw_check import LogContradiction
 from study.session.state.fold import apply_event
 from study.session.state.machine import Finish, TakeRest, find_next_action
+from study.session.state.presentation_check import LogContradiction
 from study.session.state.state import begin_session
 from tests.session_facts import UTC, answered, measured, one_trial, opened, presented
 
@@ -197,7 +197,7 @@ def test_every_event_survives_its_line(fresh):
         SessionClosed(UTC, "completed"),
     ]
     for event in events:
-        line = event_line(event)
+        line = encode_event(event)
         assert line.endswith(b"\n")
         assert line.count(b"\n") == 1
         assert parse_event(line) == event

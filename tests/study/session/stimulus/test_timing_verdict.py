@@ -5,7 +5,13 @@ import random
 import numpy as np
 import pytest
 
-from study.session.stimulus.timing_verdict import judge_late, judge_lateness, judge_load, judge_missed, measure_lateness
+from study.session.stimulus.timing_verdict import (
+    judge_late_ticks,
+    judge_lateness,
+    judge_load,
+    judge_missed_ticks,
+    measure_lateness,
+)
 
 
 def finding(late_ms, simulated: bool, rate_hz: float = 1000.0):
@@ -15,7 +21,7 @@ def finding(late_ms, simulated: bool, rate_hz: float = 1000.0):
 def test_the_figures_are_those_of_the_measurement():
     lateness = measure_lateness(np.arange(101) / 1000.0 / 100.0, 1000.0)
     assert (lateness.median_ms, lateness.p99_ms, lateness.longest_ms) == pytest.approx((0.5, 0.99, 1.0))
-    assert lateness.missing_a_tick == 0.0
+    assert lateness.missed_fraction == 0.0
     assert not lateness.too_late
     with pytest.raises(ValueError, match="no wake-up"):
         measure_lateness(np.array([]), 1000.0)
@@ -61,15 +67,15 @@ def test_load_is_a_warning_and_never_more():
 @pytest.mark.parametrize("missed", [0, 19, 20, 21, 99, 100, 101])
 def test_missed_ticks_are_late_ticks_and_judged_as_these(missed, load):
     """Else one line said fine of what the other calls wrong."""
-    found = judge_missed(missed, 10_000, simulated=False, load_per_processor=load)
-    assert found.fine is judge_late(missed, 2.0, 10_000, load).fine
+    found = judge_missed_ticks(missed, 10_000, simulated=False, load_per_processor=load)
+    assert found.fine is judge_late_ticks(missed, 2.0, 10_000, load).fine
     assert ("at most" in found.value) is not found.fine
 
 
 @pytest.mark.parametrize("load", [None, 0.0, 0.99, float("nan")])
 @pytest.mark.parametrize(("late", "fine"), [(0, True), (20, True), (21, False), (10_000, False)])
 def test_late_ticks_of_a_real_loop_are_judged_by_their_share(late, fine, load):
-    finding = judge_late(late, 3.21, 10_000, load)
+    finding = judge_late_ticks(late, 3.21, 10_000, load)
     assert (finding.fine, finding.warning) == (fine, False)
     assert f"{late} of 10000" in finding.value and "the latest 3.2 ms after its time" in finding.value
     assert finding.value.endswith("at most 0.2% are fine") != fine
@@ -77,6 +83,6 @@ def test_late_ticks_of_a_real_loop_are_judged_by_their_share(late, fine, load):
 
 @pytest.mark.parametrize(("late", "fine", "told"), [(20, True, False), (100, True, True), (101, False, True)])
 def test_with_all_cores_busy_more_late_ticks_are_fine_and_it_is_said(late, fine, told):
-    finding = judge_late(late, 3.21, 10_000, 1.0)
+    finding = judge_late_ticks(late, 3.21, 10_000, 1.0)
     assert (finding.fine, finding.warning) == (fine, False)
     assert finding.value.endswith("at most 1.0% are fine with all cores busy (0.2% else)") == told

@@ -2,14 +2,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study.session.views.form_entry import (
-    LONGEST_TEXT,
+    MAX_TEXT_CHARACTERS,
     FormEntry,
+    apply_key,
     click_choice,
     click_continue,
     make_blank_entry,
     make_reply,
-    paste,
-    press,
+    paste_text,
 )
 from study.session.views.form_views import Form, FormField, FormKind, find_missing_fields
 
@@ -23,7 +23,7 @@ SETUP = Form(FormKind.SETUP, "T", "", (FormField("hearing", "What?", LONG), Form
 def typed(form: Form, *keys: str, stacked: bool = False, entry: FormEntry | None = None) -> FormEntry:
     entry = make_blank_entry(form) if entry is None else entry
     for key in keys:
-        entry = press(entry, key, key if len(key) == 1 else None, stacked) or entry
+        entry = apply_key(entry, key, key if len(key) == 1 else None, stacked) or entry
     return entry
 
 
@@ -39,13 +39,13 @@ def test_enter_alone_answers_nothing_and_sends_nothing():
 
 def test_it_is_not_sent_while_an_answer_is_missing():
     entry = typed(EXCLUSION, "1", "down", "down", "2", "down", "enter")
-    assert (entry.is_sent, entry.cursor, entry.open) == (False, 1, (1,))
-    assert typed(EXCLUSION, "n", entry=entry).open == ()
+    assert (entry.is_sent, entry.cursor, entry.missing) == (False, 1, (1,))
+    assert typed(EXCLUSION, "n", entry=entry).missing == ()
 
 
 def test_a_changed_choice_is_looked_at_once_more_before_an_exclusion_is_sent():
     entry = typed(EXCLUSION, "1", "2", "enter", "2", "enter", "2", "enter", "enter")
-    assert (entry.is_sent, entry.cursor, entry.check) == (False, 0, (0,))
+    assert (entry.is_sent, entry.cursor, entry.unconfirmed) == (False, 0, (0,))
     again = typed(EXCLUSION, "down", "down", "down", "enter", entry=entry)
     assert again.is_sent and make_reply(again).answers == {"q0": "no", "q1": "no", "q2": "no"}
     assert typed(SETUP, "1", "2", "enter", "1", "enter", "enter").is_sent
@@ -62,18 +62,18 @@ def test_up_and_down_go_through_choices_below_each_other_first():
 def test_free_text_is_edited_at_its_caret():
     entry = typed(TEXT, *"pan", "left", "e", "left", "left", "home", "delete", "end", "s", "backspace", "t")
     assert entry.field_entries[0].answer == "aent"
-    assert len(typed(TEXT, *["x"] * (LONGEST_TEXT + 5)).field_entries[0].answer) == LONGEST_TEXT
+    assert len(typed(TEXT, *["x"] * (MAX_TEXT_CHARACTERS + 5)).field_entries[0].answer) == MAX_TEXT_CHARACTERS
 
 
 def test_a_paste_is_text_and_never_keys():
-    assert paste(make_blank_entry(EXCLUSION), "1\n1\n1\n\n") == make_blank_entry(EXCLUSION)
-    assert paste(make_blank_entry(TEXT), "two\nlines\x07").field_entries[0].answer == "two lines"
+    assert paste_text(make_blank_entry(EXCLUSION), "1\n1\n1\n\n") == make_blank_entry(EXCLUSION)
+    assert paste_text(make_blank_entry(TEXT), "two\nlines\x07").field_entries[0].answer == "two lines"
 
 
 def test_the_mouse_chooses_where_it_clicks_and_the_cursor_follows():
     entry = click_choice(make_blank_entry(EXCLUSION), 2, 1)
     assert entry.cursor == 2 and entry.field_entries[2].answer == "no"
-    assert click_continue(entry).open == (0, 1)
+    assert click_continue(entry).missing == (0, 1)
 
 
 KEYS = st.lists(st.sampled_from(["1", "2", "y", "n", "enter", "tab", "shift+tab", "up", "down", "left", "space", "x"]))

@@ -1,23 +1,23 @@
 import pytest
 
-from study.session.views.participant_codes import code_problem, is_code, suggest_code
+from study.session.views.participant_codes import explain_invalid_code, is_code, suggest_code
 
 
 @pytest.mark.parametrize("code", ["P01", "1", "a1", "A" * 15 + "1"])
 def test_letters_and_digits_with_a_digit_are_a_code(code):
     assert is_code(code)
-    assert code_problem(code) == ""
+    assert explain_invalid_code(code) == ""
 
 
 @pytest.mark.parametrize("text", ["Ada", "P 01", "p.01", "ada@lab1", "A" * 16 + "1", "P01\n", "Ünal1", "１"])
 def test_what_could_be_a_name_is_no_code_and_says_what_is(text):
     assert not is_code(text)
-    assert "1 to 16 letters and digits, at least one digit, such as P01" in code_problem(text)
+    assert "1 to 16 letters and digits, at least one digit, such as P01" in explain_invalid_code(text)
 
 
 @pytest.mark.parametrize("text", ["", "   "])
 def test_nothing_typed_asks_for_a_code(text):
-    assert code_problem(text).startswith("A code is needed")
+    assert explain_invalid_code(text).startswith("A code is needed")
 
 
 @pytest.mark.parametrize(

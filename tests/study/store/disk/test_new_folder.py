@@ -6,11 +6,11 @@ import pytest
 
 from study.errors import StudyError
 from study.store.disk.file_errors import CannotWriteError
-from study.store.disk.new_folder import new_folder, require_new_folder
+from study.store.disk.new_folder import create_new_folder, require_new_folder
 
 
 def test_what_was_written_stands_under_its_name_in_the_end(tmp_path):
-    with new_folder(tmp_path / "out") as folder:
+    with create_new_folder(tmp_path / "out") as folder:
         (folder / "a").write_text("1")
         assert not (tmp_path / "out").exists()
     assert (tmp_path / "out" / "a").read_text() == "1"
@@ -19,7 +19,7 @@ def test_what_was_written_stands_under_its_name_in_the_end(tmp_path):
 
 @pytest.mark.parametrize("end", [KeyboardInterrupt, ValueError])
 def test_ended_early_it_leaves_nothing(tmp_path, end):
-    with pytest.raises(end), new_folder(tmp_path / "out") as folder:
+    with pytest.raises(end), create_new_folder(tmp_path / "out") as folder:
         (folder / "a").write_text("1")
         raise end
     assert list(tmp_path.iterdir()) == []
@@ -27,7 +27,7 @@ def test_ended_early_it_leaves_nothing(tmp_path, end):
 
 def test_an_empty_folder_may_be_filled(tmp_path):
     (tmp_path / "out").mkdir()
-    with new_folder(tmp_path / "out") as folder:
+    with create_new_folder(tmp_path / "out") as folder:
         (folder / "a").write_text("1")
     assert (tmp_path / "out" / "a").exists()
 
@@ -46,7 +46,7 @@ def test_what_is_there_already_is_never_mixed_with(tmp_path):
 
 
 def test_a_folder_that_was_filled_meanwhile_is_left_alone(tmp_path):
-    with pytest.raises(StudyError, match="holds files already"), new_folder(tmp_path / "out"):
+    with pytest.raises(StudyError, match="holds files already"), create_new_folder(tmp_path / "out"):
         (tmp_path / "out").mkdir()
         (tmp_path / "out" / "mine").write_text("1")
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["mine"]

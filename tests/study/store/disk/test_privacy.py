@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from study.cli.main import app
-from study.session.watching.live import Live
+from study.session.watching.live_state import Live
 from study.session.watching.requests import NoteAsked
 from study.store.disk.atomic_write import write_atomically
 from study.store.disk.privacy import close_to_others, format_data_folder_warning, is_open_to_others, make_folder

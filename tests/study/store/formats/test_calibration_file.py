@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from study.store.disk.file_errors import UnusableFileError
-from study.store.disk.hdf5_file import SEAL_BYTES, add_seal
+from study.store.disk.hdf5_file import USER_BLOCK_BYTES, add_seal
 from study.store.formats.calibration_file import LAYOUT, read_calibration, write_calibration
 from study.workflows.files.validate import validate_file
 from tests.equalizer.linkage.truth import calibration, readings
@@ -48,7 +48,7 @@ def no_library(monkeypatch):
 
 def test_a_changed_byte_is_noticed_by_the_array_s_own_check_sum_too(path):
     with h5py.File(path) as file:
-        offset = SEAL_BYTES + file["inertia_kg"].id.get_chunk_info(0).byte_offset
+        offset = USER_BLOCK_BYTES + file["inertia_kg"].id.get_chunk_info(0).byte_offset
     content = bytearray(path.read_bytes())
     content[offset + 100] ^= 1
     path.write_bytes(add_seal(bytes(content)))
@@ -62,10 +62,10 @@ def test_mutated_files_are_refused_at_once_and_never_reach_the_hdf5_library(path
     for _ in range(40):
         mutated = bytearray(sound)
         for place in random.integers(
-            SEAL_BYTES if random.random() < 0.9 else 0, len(sound), random.choice([1, 1, 4, 30])
+            USER_BLOCK_BYTES if random.random() < 0.9 else 0, len(sound), random.choice([1, 1, 4, 30])
         ):
             mutated[place] ^= 1 << int(random.integers(8))
-        del mutated[int(random.choice([len(sound), random.integers(SEAL_BYTES, len(sound))])) :]
+        del mutated[int(random.choice([len(sound), random.integers(USER_BLOCK_BYTES, len(sound))])) :]
         path.write_bytes(mutated)
         if bytes(mutated) != sound:
             with pytest.raises(UnusableFileError, match="damaged, cut off, or changed"):
@@ -86,13 +86,13 @@ def test_validate_says_that_a_mutated_file_is_damaged(path):
 
 
 def test_a_calibration_that_another_program_wrote_needs_no_seal(path):
-    path.write_bytes(path.read_bytes()[SEAL_BYTES:])
+    path.write_bytes(path.read_bytes()[USER_BLOCK_BYTES:])
     assert read_calibration(path).device == "invented"
 
 
 def test_other_readers_of_hdf5_read_past_the_seal(path):
     with h5py.File(path) as file:
-        assert file.userblock_size == SEAL_BYTES
+        assert file.userblock_size == USER_BLOCK_BYTES
         assert file.attrs["format"] == "hapteq-calibration"
 
 

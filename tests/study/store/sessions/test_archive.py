@@ -2,7 +2,7 @@ import pytest
 
 from study.errors import StudyError, WrongUseError
 from study.store.sessions.archive import check_subject, create_session_folder, find_session, list_session_folders
-from study.store.sessions.session_lock import PLACES_NAME, hold_places_lock, hold_session_lock
+from study.store.sessions.session_lock import PLACES_LOCK_NAME, hold_places_lock, hold_session_lock
 
 
 def test_every_session_gets_a_folder_of_its_own(tmp_path):
@@ -69,6 +69,6 @@ def test_a_session_has_one_writer(tmp_path):
 
 
 def test_a_lock_that_cannot_be_made_is_said_so(tmp_path):
-    (tmp_path / PLACES_NAME).mkdir()
+    (tmp_path / PLACES_LOCK_NAME).mkdir()
     with pytest.raises(StudyError, match="The data folder cannot be written to"), hold_places_lock(tmp_path):
         raise AssertionError("held")

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from study.session.watching.live import Live
+from study.session.watching.live_state import Live
 from study.store.sessions.live_file import LIVE_NAME, read_live, remove_live, write_live
 
 LIVE = Live(

@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 from textual.widgets import Input
 
-from study.store.sessions.log_writer import is_log_locked
+from study.store.sessions.log_lock import is_log_locked
 from study.tui.app.app import HapteqApp
-from study.tui.app.app_start import AppStart
+from study.tui.app.start_options import StartOptions
 from study.tui.engine.from_engine import Failed, Finished
 from study.tui.engine.to_engine import BeginSession, SessionOrder
-from study.tui.home_messages import BeginWanted
+from study.tui.home_messages import BeginRequested
 from study.tui.screens.confirm_view import VIEW_SHOWN_NOTE
 
 pytestmark = [pytest.mark.real_time, pytest.mark.may_be_late]
@@ -86,7 +86,7 @@ def order(tmp_path, small_text) -> SessionOrder:
     return SessionOrder(str(path), "simulated", "P01", str(tmp_path / "data"), seed=4)
 
 
-def run(start: AppStart, story: Callable[[Person], Awaitable[None]]) -> HapteqApp:
+def run(start: StartOptions, story: Callable[[Person], Awaitable[None]]) -> HapteqApp:
     app = HapteqApp(start)
 
     async def play() -> None:
@@ -102,7 +102,7 @@ def run(start: AppStart, story: Callable[[Person], Awaitable[None]]) -> HapteqAp
 
 @pytest.fixture
 def sitting(order) -> Callable[[Callable[[Person], Awaitable[None]]], HapteqApp]:
-    return lambda story: run(AppStart(order.data, "simulated", first=BeginSession(order)), story)
+    return lambda story: run(StartOptions(order.data, "simulated", first_sitting=BeginSession(order)), story)
 
 
 @pytest.fixture
@@ -136,7 +136,7 @@ def test_from_the_start_screen_to_the_report_and_back(order, tmp_path):
         await person.press("escape")
         await person.until("HomeScreen")
 
-    app = run(AppStart(order.data, "simulated", protocol=str(path), seed=4), story)
+    app = run(StartOptions(order.data, "simulated", protocol=str(path), seed=4), story)
     assert isinstance(app.outcome, Finished)
     assert Path(app.outcome.results.report).is_file()
 
@@ -146,12 +146,12 @@ def test_beginning_twice_at_once_begins_one_sitting(order):
     async def story(person: Person) -> None:
         await person.until("HomeScreen")
         for _ in range(2):
-            person.app.post_message(BeginWanted("P01", "no_such_protocol", "simulated"))
+            person.app.post_message(BeginRequested("P01", "no_such_protocol", "simulated"))
         await person.until("OutcomeScreen")
         await person.pilot.pause(1.5)
         assert [type(screen).__name__ for screen in person.app.screen_stack].count("OutcomeScreen") == 1
 
-    run(AppStart(order.data, "simulated"), story)
+    run(StartOptions(order.data, "simulated"), story)
 
 
 @pytest.mark.slow
@@ -273,7 +273,7 @@ def test_help_themes_and_commands_are_there_on_every_screen(tmp_path):
         assert "hapteq study --subject CODE" in commands["Begin"]
         await person.press("ctrl+q")
 
-    app = run(AppStart(str(tmp_path), "simulated"), story)
+    app = run(StartOptions(str(tmp_path), "simulated"), story)
     assert app.return_code == 0
     assert app.outcome is None
 
@@ -285,6 +285,6 @@ def test_what_the_command_line_asked_for_and_cannot_be_is_reported_by_the_comman
             await asyncio.sleep(0.05)
 
     order = SessionOrder("no_such_protocol", "simulated", "P01", str(tmp_path))
-    app = run(AppStart(str(tmp_path), "simulated", first=BeginSession(order)), story)
+    app = run(StartOptions(str(tmp_path), "simulated", first_sitting=BeginSession(order)), story)
     assert isinstance(app.outcome, Failed)
     assert app.outcome.error.exit_code == 2

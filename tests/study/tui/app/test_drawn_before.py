@@ -5,7 +5,7 @@ from textual._styles_cache import StylesCache
 from textual.app import App
 from textual.widgets._footer import FooterKey
 
-from study.session.views.views import PlayingNotice
+from study.session.views.participant_views import PlayingNotice
 from study.tui.app.sitting_screens import clear_render_caches
 from study.tui.screens.playing import PlayingScreen
 from study.tui.screens.trial import TrialScreen

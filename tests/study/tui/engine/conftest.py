@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from study.session.views.form_views import FormReply
-from study.session.views.views import AfterPause, Answered, DemoDone
+from study.session.views.participant_views import AfterPause, Answered, DemoDone
 from study.tui.engine.client import EngineClient
 from study.tui.engine.from_engine import DisplayCall, Failed, Finished, FromEngine, ScreenRequest
 from study.tui.engine.to_engine import BeginSession, Heartbeat, Reply, SessionOrder, ToEngine

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from study.session.facts.void_reasons import SCREEN_DELAYED_BY_LOAD, SCREEN_UNRESPONSIVE
-from study.session.views.views import Answered
+from study.session.views.participant_views import Answered
 from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
-from study.store.sessions.log_writer import is_log_locked
+from study.store.sessions.log_lock import is_log_locked
 from study.tui.engine.from_engine import (
     CloseRequest,
     DisplayCall,

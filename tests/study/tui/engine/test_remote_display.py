@@ -11,7 +11,7 @@ import pytest
 
 from protocols.trial import Phase
 from study.devices.clock import RealClock
-from study.session.views.views import (
+from study.session.views.participant_views import (
     Answered,
     DemoDone,
     DemoMenu,

@@ -17,7 +17,7 @@ from textual.screen import Screen
 
 from study.session.views.archive_views import DiagnosisView, HomeView, ProtocolLine, SessionLine, SessionView, Staircase
 from study.tui import home_messages
-from study.tui.keys.keys_in_order import KeysInOrder
+from study.tui.keys.input_queue import InputQueue
 from study.tui.screens.help import HelpScreen
 from study.tui.themes import register_themes
 
@@ -38,7 +38,7 @@ class Bare(App[None]):
         self.opened: list[str] = []
         self.animation_level = "none"
         register_themes(self, theme)
-        self._keys = KeysInOrder(self, super().on_event)
+        self._keys = InputQueue(self, super().on_event)
 
     async def on_event(self, event: Event) -> None:
         await self._keys.handle_event(event)

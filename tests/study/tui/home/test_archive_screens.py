@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from study.session.views.archive_views import SessionView
-from study.tui.app.app_start import AppStart
 from study.tui.app.archive_screens import ArchiveScreens
+from study.tui.app.start_options import StartOptions
 from study.tui.engine.from_engine import SessionContent
 from study.tui.screens.confirm_view import ConfirmView
 from study.tui.screens.home import HomeScreen
@@ -26,7 +26,7 @@ def test_a_session_that_a_person_takes_now_is_shown_after_its_name_was_typed(on_
     view: SessionView = replace(session, line=replace(session.line, **changes))
 
     async def story(sight):
-        archive = ArchiveScreens(sight.app, lambda _: None, AppStart("data", "simulated"))
+        archive = ArchiveScreens(sight.app, lambda _: None, StartOptions("data", "simulated"))
         await archive.handle_message(SessionContent(view))
         await sight.pilot.pause()
         assert isinstance(sight.app.screen, ConfirmView) is asks_first

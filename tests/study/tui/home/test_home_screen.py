@@ -74,7 +74,7 @@ def test_a_code_and_a_key_begin_a_session(on_screen, home, key):
         await sight.press("P", "0", "6", key)
 
     app = on_screen(HomeScreen(home), story)
-    assert messages_of(app) == [("BeginWanted", "P06", "direction_threshold", "simulated", "")]
+    assert messages_of(app) == [("BeginRequested", "P06", "direction_threshold", "simulated", "")]
 
 
 @pytest.mark.slow
@@ -85,7 +85,7 @@ def test_another_protocol_can_be_chosen_with_the_keyboard(on_screen, home):
         await sight.press("f5")
 
     app = on_screen(HomeScreen(home), story)
-    assert messages_of(app) == [("BeginWanted", "P6", "direction_training", "simulated", "")]
+    assert messages_of(app) == [("BeginRequested", "P6", "direction_training", "simulated", "")]
 
 
 def with_equalized_first(home, *models):
@@ -102,7 +102,7 @@ def test_a_protocol_of_accelerations_asks_for_a_model_and_no_other_does(on_scree
         await sight.press("enter", "up", "enter", "f5")
 
     app = on_screen(HomeScreen(with_equalized_first(home, "/lab/centre.h5", "/lab/edge.h5")), story)
-    assert messages_of(app) == [("BeginWanted", "P06", "equalized_threshold", "simulated", "/lab/centre.h5")]
+    assert messages_of(app) == [("BeginRequested", "P06", "equalized_threshold", "simulated", "/lab/centre.h5")]
 
 
 @pytest.mark.parametrize("name", ["[bold]centre.h5", "centre[x='y].h5", "centre\x1b[2J\n.h5"])
@@ -114,7 +114,7 @@ def test_the_name_of_a_models_file_is_no_markup_and_prints_no_control_character(
         await sight.press("P", "0", "6", "f5")
 
     app = on_screen(HomeScreen(with_equalized_first(home, f"/lab/{name}")), story)
-    assert messages_of(app) == [("BeginWanted", "P06", "equalized_threshold", "simulated", f"/lab/{name}")]
+    assert messages_of(app) == [("BeginRequested", "P06", "equalized_threshold", "simulated", f"/lab/{name}")]
 
 
 @pytest.mark.slow
@@ -179,7 +179,7 @@ def test_a_paste_with_line_breaks_and_blanks_is_one_code(on_screen, home):
         await sight.press("f5")
 
     assert messages_of(on_screen(HomeScreen(home), story)) == [
-        ("BeginWanted", "P06", "direction_threshold", "simulated", "")
+        ("BeginRequested", "P06", "direction_threshold", "simulated", "")
     ]
 
 

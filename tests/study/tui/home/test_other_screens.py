@@ -39,7 +39,7 @@ def test_its_report_opens_in_the_browser_and_escape_goes_home(on_screen, diagnos
 
     app = on_screen(DiagnosisScreen(diagnosis), story)
     assert app.opened == ["file:///data/out/report.html"]
-    assert [type(m).__name__ for m in app.asked] == ["HomeWanted"]
+    assert [type(m).__name__ for m in app.asked] == ["HomeRequested"]
     assert on_screen(DiagnosisScreen(replace(diagnosis, report="")), story).opened == []
 
 

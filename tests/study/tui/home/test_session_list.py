@@ -17,9 +17,9 @@ from tests.study.tui.home.conftest import messages_of
     ("row", "key", "expected"),
     [
         (0, "enter", ("ShowSession", "/data/P05_001")),
-        (0, "w", ("WatchWanted", "/data/P05_001")),
+        (0, "w", ("WatchRequested", "/data/P05_001")),
         (1, "enter", ("ShowSession", "/data/P04_001")),
-        (2, "r", ("ResumeWanted", "/data/P03_001")),
+        (2, "r", ("ResumeRequested", "/data/P03_001")),
         (4, "enter", ("ShowSession", "/data/P01_001")),
     ],
 )
@@ -83,7 +83,7 @@ def test_f6_looks_again_and_keeps_what_is_typed_chosen_and_under_the_cursor(on_s
         assert screen.query_one(SessionTable).cursor_row == 3
         assert "P03_001 is not finished" in sight.words
 
-    assert messages_of(on_screen(HomeScreen(home), story)) == [("HomeWanted",)]
+    assert messages_of(on_screen(HomeScreen(home), story)) == [("HomeRequested",)]
 
 
 @pytest.mark.slow

@@ -39,18 +39,18 @@ def test_each_page_looks_like_this(on_screen, session, looks_like, size):
 @pytest.mark.slow
 def test_keys_ask_for_what_a_finished_session_allows(asked_by, session):
     assert asked_by(session, "r", "w", "a") == [("Analyze", "/data/P01_001")]
-    assert asked_by(session, "escape") == [("HomeWanted",)]
+    assert asked_by(session, "escape") == [("HomeRequested",)]
 
 
 @pytest.mark.slow
 def test_an_unfinished_session_can_be_resumed(asked_by, session):
-    assert asked_by(standing(session, "unfinished"), "r") == [("ResumeWanted", "/data/P01_001")]
+    assert asked_by(standing(session, "unfinished"), "r") == [("ResumeRequested", "/data/P01_001")]
 
 
 @pytest.mark.slow
 def test_a_running_session_can_be_watched_and_not_erased(asked_by, session):
     assert asked_by(standing(session, "running"), "x", "P", "0", "1", "enter", "r", "a", "w") == [
-        ("WatchWanted", "/data/P01_001")
+        ("WatchRequested", "/data/P01_001")
     ]
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from study.tui.keys.key_names import key_name
+from study.tui.keys.key_names import format_key_name
 
 
 @pytest.mark.parametrize(
@@ -10,4 +10,4 @@ from study.tui.keys.key_names import key_name
     [("f5", "F5"), ("shift+f4", "Shift+F4"), ("esc", "Esc"), ("space", "Space"), ("^p", "^p"), ("r", "r"), ("+", "+")],
 )
 def test_a_key_is_named_as_on_the_keyboard(shown, printed):
-    assert key_name(shown) == printed
+    assert format_key_name(shown) == printed

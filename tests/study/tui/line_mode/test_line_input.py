@@ -42,7 +42,7 @@ def test_the_last_line_of_a_pipe_needs_no_line_end(pipe):
 
 def test_what_is_typed_without_enter_is_no_line(pipe):
     lines, write = pipe
-    lines.interactive = True  # a terminal whose person types 1 and twice Ctrl-D
+    lines.is_interactive = True  # a terminal whose person types 1 and twice Ctrl-D
     os.write(write, b"1")
     os.close(write)
     assert lines.read(0.0) is None

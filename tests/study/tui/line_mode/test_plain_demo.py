@@ -3,7 +3,7 @@ from itertools import pairwise
 
 import pytest
 
-from study.session.views.views import (
+from study.session.views.participant_views import (
     DemoDone,
     DemoMenu,
     DirectionPicture,
@@ -24,9 +24,9 @@ class Person(LineInput):
 
     def __init__(self, clock, text: str, at_s: float) -> None:
         self._clock, self._text, self._at_s = clock, text, at_s
-        self.interactive = True
+        self.is_interactive = True
 
-    def forget(self) -> None:
+    def discard_early_lines(self) -> None:
         return None
 
     def has_ended(self) -> bool:

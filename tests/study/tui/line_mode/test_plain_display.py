@@ -4,7 +4,7 @@ import pytest
 
 from protocols.trial import Phase
 from study.session.facts.void_reasons import SCREEN_DELAYED_BY_LOAD
-from study.session.views.views import (
+from study.session.views.participant_views import (
     Answered,
     DirectionPicture,
     Goodbye,

@@ -9,7 +9,7 @@ import pytest
 
 from study.devices.clock import RealClock
 from study.session.views.form_views import Form, FormField, FormKind, find_missing_fields
-from study.session.views.views import DeviceFinding, DeviceReport
+from study.session.views.participant_views import DeviceFinding, DeviceReport
 from study.tui.line_mode.line_input import LineInput
 from study.tui.line_mode.plain_display import PlainDisplay
 

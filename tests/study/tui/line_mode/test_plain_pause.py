@@ -2,7 +2,7 @@ from itertools import pairwise
 
 import pytest
 
-from study.session.views.views import AfterPause, PauseNotice, Progress, RestNotice
+from study.session.views.participant_views import AfterPause, PauseNotice, Progress, RestNotice
 from study.session.watching.requests import NoteAsked
 
 PAUSE = PauseNotice("the experimenter asked for it", answers=12)

@@ -12,7 +12,7 @@ from protocols.wording.words import Words
 from study.devices.clock import VirtualClock
 from study.session.views.form_views import FormKind, FormReply
 from study.session.views.forms import make_confirmation, make_form
-from study.session.views.views import (
+from study.session.views.participant_views import (
     AfterPause,
     DemoDone,
     DemoMenu,

@@ -4,7 +4,7 @@ import random
 import pytest
 from textual import events
 
-from study.session.views.form_entry import make_blank_entry, make_reply, press
+from study.session.views.form_entry import apply_key, make_blank_entry, make_reply
 from study.session.views.form_views import Form, FormField, FormKind, FormReply
 from study.tui.screens.form import FormScreen
 from tests.slow_instances import slow_after
@@ -188,7 +188,7 @@ def follow_bursts(on_stage, form, seed, bursts):
                 keys[0] = "up"  # so that it goes on for long
             for key in keys:
                 character = key if len(key) == 1 else " " if key == "space" else None
-                wanted = press(wanted, key, character, stacked[wanted.cursor]) or wanted
+                wanted = apply_key(wanted, key, character, stacked[wanted.cursor]) or wanted
                 if wanted.is_sent:
                     break
             stage.burst(*keys)

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from study.session.views.views import (
+from study.session.views.participant_views import (
     DemoDone,
     DemoMenu,
     DeviceFinding,

@@ -1,6 +1,6 @@
 import pytest
 
-from study.session.views.views import AfterPause, PauseNotice
+from study.session.views.participant_views import AfterPause, PauseNotice
 from study.session.watching.requests import NoteAsked
 from study.tui.screens.note import NoteScreen
 from study.tui.screens.pause import PauseScreen

@@ -5,7 +5,7 @@ from textual.widgets._footer import FooterKey
 
 from protocols.trial import Phase
 from study.session.views.form_views import Form, FormField, FormKind
-from study.session.views.views import (
+from study.session.views.participant_views import (
     DemoMenu,
     DeviceFinding,
     DeviceReport,

@@ -12,12 +12,12 @@ import pytest
 
 from protocols.document.loading import protocol_from_values
 from protocols.wording.english import ENGLISH
-from protocols.wording.in_language import translate_protocol
+from protocols.wording.translation import translate_protocol
 from protocols.wording.words import Words
 from study.session.facts.void_reasons import SCREEN_DELAYED_BY_LOAD, SCREEN_UNRESPONSIVE
 from study.session.views.form_views import FormKind
 from study.session.views.forms import make_form
-from study.session.views.views import (
+from study.session.views.participant_views import (
     DemoMenu,
     DeviceFinding,
     DeviceReport,

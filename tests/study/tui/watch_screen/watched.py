@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from study.session.watching.live import Live
+from study.session.watching.live_state import Live
 from study.session.watching.watch_view import (
     Alarm,
     ClosedTrial,

@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 
-from study.session.views.views import DeviceFinding
+from study.session.views.participant_views import DeviceFinding
 from study.workflows.checks import bare_loop
 from study.workflows.checks.bare_loop import (
     BareLoopRun,

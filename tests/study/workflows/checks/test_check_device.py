@@ -12,7 +12,7 @@ from study.devices.clock import VirtualClock
 from study.devices.opening import open_device
 from study.devices.rig import READING_SIZE
 from study.devices.safe import SafeDevice
-from study.workflows.checks.check_device import READINGS, check_device
+from study.workflows.checks.check_device import READING_COUNT, check_device
 
 
 @pytest.fixture
@@ -88,7 +88,7 @@ def test_a_device_that_does_not_answer_is_told_so_and_nothing_is_said_of_its_sen
 
     rig.instead_of_sensing = gone
     found = findings(rig, rigs, clock)
-    assert (found["Answers"].value, found["Answers"].fine) == (f"0 of {READINGS} times", False)
+    assert (found["Answers"].value, found["Answers"].fine) == (f"0 of {READING_COUNT} times", False)
     assert found["Answers"].advice == "Check its power and its cable, then open it again."
     assert {"Handle", "Accelerometer"}.isdisjoint(found)
 

@@ -14,7 +14,7 @@ from study.devices.opening import open_device
 from study.devices.safe import SafeDevice
 from study.devices.telemetry import Ring
 from study.errors import DeviceError
-from study.session.views.views import DeviceFinding
+from study.session.views.participant_views import DeviceFinding
 from study.workflows.checks import examine_setup
 from study.workflows.checks.check_timing import check_computer, check_timing
 
@@ -44,7 +44,7 @@ def test_a_simulated_device_in_virtual_time_is_never_late(settings):
     assert timing.health.missed_ticks == 0
     assert timing.health.peak_command_n == 0.0
     assert timing.lateness.longest_ms == pytest.approx(0.0, abs=1e-6)
-    assert timing.lateness.missing_a_tick == 0.0
+    assert timing.lateness.missed_fraction == 0.0
     assert all(finding.fine for finding in timing.findings)
     assert "a simulated device's loop catches up, so it misses none" in timing.findings[1].value
     assert progress[-1] == pytest.approx(1.0)
@@ -68,7 +68,7 @@ def test_a_late_computer_is_a_warning_with_a_simulated_device(settings):
     clock = LateClock()
     timing, found = timed(open_device("simulated", settings, clock, seed=1), clock)
     assert timing.lateness.p99_ms > 1.0
-    assert timing.lateness.missing_a_tick > 0.5
+    assert timing.lateness.missed_fraction > 0.5
     assert (found["Lateness"].fine, found["Lateness"].warning) == (False, True)
     assert "too late for a real device" in found["Lateness"].value
     assert found["Lateness"].advice == "Close other programs, switch power saving off, and measure again."
@@ -156,7 +156,7 @@ def test_the_lateness_of_a_real_device_is_that_of_its_own_loop(rigs, settings):
     rig.before_sensing = lambda: time.sleep(0.003 if rig.sense_calls % 4 == 0 else 0.0)
     with contextlib.closing(SafeDevice(rig, settings, RealClock(), Ring())) as device:
         timing = check_timing(device, RealClock(), 0.5, lambda done: None)
-    assert timing.lateness.too_late and timing.lateness.missing_a_tick > 0.1
+    assert timing.lateness.too_late and timing.lateness.missed_fraction > 0.1
     assert timing.lateness.longest_ms > 2.5
     assert 1000 * timing.health.latest_s > timing.lateness.longest_ms - 1.0
 
@@ -170,7 +170,7 @@ def test_a_reading_after_missed_ticks_is_as_late_as_the_first_of_them_says(rigs,
         timing = check_timing(device, RealClock(), 0.5, lambda done: None)
     assert timing.health.missed_ticks > 20
     assert timing.lateness.longest_ms > 10.5
-    assert timing.lateness.missing_a_tick > 0.01
+    assert timing.lateness.missed_fraction > 0.01
 
 
 @pytest.mark.parametrize(("load", "fine"), [(1.3, True), (0.3, False), (None, False)])
@@ -196,7 +196,7 @@ def test_doctor_judges_late_ticks_by_the_load_that_it_shows(rigs, settings, monk
         asked.append(load)
         raise DeviceError("Enough", "It was asked.", "Go on.")
 
-    monkeypatch.setattr(examine_setup, "load_per_processor", lambda: 1.3)
+    monkeypatch.setattr(examine_setup, "get_load_per_processor", lambda: 1.3)
     monkeypatch.setattr(examine_setup, "check_timing", timing)
     clock = VirtualClock()
     with contextlib.closing(SafeDevice(rigs.ScriptedRig(), settings, clock)) as device, pytest.raises(DeviceError):

@@ -12,7 +12,7 @@ from study.cli.main import main
 from study.devices.force_dimension.acceptance import Acceptance, acceptance_file, write_acceptance
 from study.devices.opening import get_device_folder
 from study.errors import DeviceError, UserInterruptError
-from study.session.views.views import DeviceFinding, DeviceReport
+from study.session.views.participant_views import DeviceFinding, DeviceReport
 from study.workflows.checks import daily_check, examine_setup
 from study.workflows.checks.daily_check import MotionCallbacks, check_on_device, compare_recordings, judge_last_check
 from study.workflows.checks.device_changes import make_change_findings

@@ -14,7 +14,7 @@ from equalizer.signals.recording import Recording
 from study.cli.main import main
 from study.devices.opening import get_device_folder
 from study.errors import DeviceError
-from study.session.views.views import DeviceFinding, DeviceReport
+from study.session.views.participant_views import DeviceFinding, DeviceReport
 from study.store.disk.provenance import compute_sha256
 from study.store.formats.daily_check_file import DailyCheck, write_daily_check
 from study.store.formats.recording_file import read_recording

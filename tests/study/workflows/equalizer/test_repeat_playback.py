@@ -23,7 +23,7 @@ from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.stimulus.limits import SPRING_SLEW_N_PER_S, Limits
 from study.store.disk.file_errors import UnusableFileError
 from study.store.formats.recording_file import read_recording
-from study.store.formats.repeats_file import read_repeats, repeats_path
+from study.store.formats.repeats_file import get_repeats_path, read_repeats
 from study.store.formats.trajectory_file import read_trajectory
 from study.workflows.equalizer.repeat_playback import repeat_playback
 from study.workflows.equalizer.repeat_results import RepeatPlan, read_earlier_forces
@@ -151,7 +151,7 @@ def test_interrupted_the_best_so_far_is_kept_and_said(plan, tmp_path):
         repeat_playback(replace(plan, out=out), press)
     assert left.value.happened.startswith("3 of up to 11 plays were measured")
     assert left.value.saved == f"The best forces of 3 plays are in {out}."
-    document = read_repeats(repeats_path(out))
+    document = read_repeats(get_repeats_path(out))
     assert document.interrupted is True
     assert len(document.errors) == 3
     assert read_earlier_forces(out, plan.reference, plan.model_sha256).shape == (2000, 3)
@@ -218,12 +218,12 @@ def test_progress_counts_plays(plan):
 def test_a_document_that_is_wrong_says_where(plan, tmp_path):
     out = tmp_path / "forces.csv"
     repeat_playback(replace(plan, repeats=1, out=out), unheard)
-    document = json.loads(repeats_path(out).read_text())
-    assert validate_file(repeats_path(out)).kind.startswith("repeats, 2 plays, error 1")
+    document = json.loads(get_repeats_path(out).read_text())
+    assert validate_file(get_repeats_path(out)).kind.startswith("repeats, 2 plays, error 1")
     for name, value in (("errors", "many"), ("kept", 2)):
-        repeats_path(out).write_text(json.dumps({**document, name: value}))
+        get_repeats_path(out).write_text(json.dumps({**document, name: value}))
         with pytest.raises(UnusableFileError, match=name):
-            read_repeats(repeats_path(out))
+            read_repeats(get_repeats_path(out))
 
 
 def test_quiet_wishes_still_end_with_a_verdict(plan):

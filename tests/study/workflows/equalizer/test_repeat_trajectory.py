@@ -13,7 +13,7 @@ from equalizer.tracking.feedforward.trajectory import Trajectory
 from study.errors import DeviceError, StudyError, UserInterruptError
 from study.store.formats.identified_model_file import read_identified_model, write_identified_model
 from study.store.formats.mechanical_model_file import write_mechanical_model
-from study.store.formats.repeats_file import read_repeats, repeats_path
+from study.store.formats.repeats_file import get_repeats_path, read_repeats
 from study.store.formats.trajectory_file import read_trajectory, write_trajectory
 from study.workflows.equalizer.equalize_trajectory import EqualizePlan
 from study.workflows.equalizer.repeat_trajectory import (
@@ -68,7 +68,7 @@ def changed(plan, tmp_path, **more) -> EqualizePlan:
 def refusal(plan, order=ORDER, error=StudyError) -> StudyError:
     with pytest.raises(error) as caught:
         repeat_trajectory(plan, order, unheard)
-    assert not plan.out.exists() and not repeats_path(plan.out).exists()
+    assert not plan.out.exists() and not get_repeats_path(plan.out).exists()
     return caught.value
 
 
@@ -96,8 +96,8 @@ def test_convergence_is_tested_before_anything_is_played(done):
 def test_forces_and_how_they_were_found_are_written(done):
     out = done.equalized.plan.out
     assert len(read_trajectory(out).signal) == 2000
-    assert read_repeats(repeats_path(out)).errors == pytest.approx(done.repeated.errors)
-    assert summarise_repeats(done)["repeats"] == str(repeats_path(out))
+    assert read_repeats(get_repeats_path(out)).errors == pytest.approx(done.repeated.errors)
+    assert summarise_repeats(done)["repeats"] == str(get_repeats_path(out))
 
 
 @pytest.mark.slow
@@ -122,7 +122,7 @@ def test_interrupted_the_best_so_far_is_written(plan):
     with pytest.raises(UserInterruptError) as caught:
         repeat_trajectory(plan, ORDER, leave)
     assert f"in {plan.out}" in caught.value.saved
-    assert read_repeats(repeats_path(plan.out)).interrupted
+    assert read_repeats(get_repeats_path(plan.out)).interrupted
 
 
 def test_a_model_from_a_hand_is_not_repeated(plan, tmp_path):
@@ -191,6 +191,6 @@ def test_a_device_that_is_not_there_is_named(plan):
 
 
 def test_names_that_are_taken_are_refused_before_any_work(plan):
-    repeats_path(plan.out).write_text("mine")
+    get_repeats_path(plan.out).write_text("mine")
     with pytest.raises(StudyError, match="never overwritten"):
         repeat_trajectory(plan, ORDER, unheard)

@@ -92,7 +92,7 @@ def test_seconds_that_are_called_milliseconds_are_noticed(tmp_path):
     found, notes = read_any_recording(tmp_path / "b.csv")
     assert not any("unlikely" in note for note in notes)
     (check,) = check_clock(found, [(0, len(found))])
-    assert (check.level, check.seen) == (
+    assert (check.level, check.finding) == (
         "fine", "The time stamps of the file were even at its import; they give 1000 Hz."
     )  # fmt: skip
 

@@ -15,7 +15,7 @@ from study.devices.safe import SafeDevice
 from study.errors import DeviceError, StudyError, UserInterruptError
 from study.store.formats.recording_file import read_recording
 from study.workflows.diagnosis.write_twin import TwinPlan, write_twin
-from study.workflows.recording.play_pieces import MOST_TAKES
+from study.workflows.recording.play_pieces import MAX_TAKES
 from study.workflows.recording.record_device import RecordingPlan, record_device, record_on_device
 from tests.slow_instances import slow
 
@@ -101,7 +101,7 @@ def test_a_broken_sensor_does_not_keep_the_device_moving_for_ever(tmp_path, devi
     patient = replace(PROTOCOL, segments=(SWEEP,), least_amplitude_n=1e-6)
     record_on_device(device_that_clips_at(-1.0), plan(tmp_path / "r.h5", patient), lambda _: None)
     (about,) = read_recording(tmp_path / "r.h5").meta["segments"]
-    assert about["tries"] == MOST_TAKES
+    assert about["tries"] == MAX_TAKES
 
 
 def test_a_protocol_may_keep_the_amplitude_when_samples_clip(tmp_path, device_that_clips_at):

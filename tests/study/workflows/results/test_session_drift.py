@@ -32,7 +32,7 @@ def probed(sitter, monkeypatch):
         def counted(self, stimulus):
             held.extend([1] * (stimulus.fade_in_s == 0.25))
             if len(held) == AFTER + 2:  # and the test of the free handle
-                packed[-1][layout.FRICTION] *= times
+                packed[-1][layout.COULOMB_FRICTION] *= times
                 held.append(1)
             hold(self, stimulus)
 
@@ -95,7 +95,7 @@ def test_two_references_tell_what_changed_at_the_device_alone(sitter, monkeypatc
 
     def build(*values, **named):
         rig = build_omega3(*values, **named)
-        rig.parameters[layout.FRICTION] *= 2.0
+        rig.parameters[layout.COULOMB_FRICTION] *= 2.0
         return rig
 
     monkeypatch.setattr("study.devices.rigs_by_name.build_omega3", build)

@@ -5,7 +5,7 @@ import pytest
 from study.errors import UserInterruptError
 from study.session.facts.events import NoteTaken, TrialSpoiled
 from study.session.facts.void_reasons import SCREEN_DELAYED_BY_LOAD
-from study.session.views.views import Unanswered
+from study.session.views.participant_views import Unanswered
 from study.store.sessions.event_log import read_log
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.conduct_session import Participant, conduct_new

@@ -5,10 +5,10 @@ from datetime import datetime, timedelta
 import pytest
 
 from study.devices.clock import VirtualClock
-from study.participants.observers import find_observer
+from study.participants.observer_catalogue import find_observer
 from study.session.facts.events import NoteTaken, SessionResumed
 from study.session.state.sitting_state import compute_daily_dose
-from study.session.views.views import Unanswered
+from study.session.views.participant_views import Unanswered
 from study.store.sessions.event_log import read_log
 from study.workflows.files.validate import validate_file
 from study.workflows.results.fold_session import fold_session

@@ -8,7 +8,7 @@ import pytest
 from protocols.trial import Phase, TrialStatus
 from study.errors import DeviceError, StudyError, UserInterruptError
 from study.session.facts.events import TrialMeasured, TrialPresented, TrialSpoiled
-from study.session.views.views import Unanswered
+from study.session.views.participant_views import Unanswered
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.event_log import read_log
 from study.store.sessions.session_lock import hold_session_lock

@@ -119,9 +119,9 @@ def test_an_edited_value_is_named_by_its_line(session):
 def test_a_log_that_continues_under_this_version_covers_what_came_before(session, session_logs):
     session_logs.as_older(session)
     older = (session / "events.jsonl").read_bytes()
-    chain, line = session_logs.write_chained(read_log(session / "events.jsonl").chain, NOTE)
+    chain, line = session_logs.append_checksum(read_log(session / "events.jsonl").chain, NOTE)
     (session / "events.jsonl").write_bytes(older + line)
-    assert fold_session(SessionFolder(session)).log_contents.chain.since == chain.lines
+    assert fold_session(SessionFolder(session)).log_contents.chain.first_checksum_line == chain.lines
     (session / "events.jsonl").write_bytes(older.replace(b'"displacement_mm":0.', b'"displacement_mm":1.', 1) + line)
     with pytest.raises(StudyError, match="or one of the lines before it was changed"):
         fold_session(SessionFolder(session))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.psychophysics.repeated_trials import repeat_warning
+from analysis.psychophysics.repeated_trials import format_repeat_warning
 from protocols.trial import Phase, VoidCause
 from study.devices.clock import VirtualClock
 from study.errors import StudyError
@@ -51,7 +51,7 @@ def test_who_asks_again_when_unsure_is_flagged_and_within_the_limit(sitter, seed
     tested = [t for t in state.trials if t.phase is Phase.TEST]
     asked = [t for t in tested if t.void_cause is VoidCause.ASKED]
     assert 3 <= len(asked) <= 2 * sitter.protocol.trial.repeats_per_run
-    assert f"REPE{seed}" in repeat_warning(state.trials)
+    assert f"REPE{seed}" in format_repeat_warning(state.trials)
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_who_asks_again_when_unsure_is_flagged_and_within_the_limit(sitter, seed
     ],
 )
 def test_who_asks_for_nothing_is_not_flagged(sitter, observer):
-    assert repeat_warning(conducted(sitter, observer).state.trials) == ""
+    assert format_repeat_warning(conducted(sitter, observer).state.trials) == ""
 
 
 @pytest.mark.slow

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from protocols.definition.exposure import DetectionSettings
+from protocols.definition.session_settings import DetectionSettings
 from protocols.trial import Phase, TrialStatus, VoidCause
 from study.session.facts.events import TrialMeasured, TrialPresented
 from study.session.stimulus.stimulus import compute_direction_angle_deg

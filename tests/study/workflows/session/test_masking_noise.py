@@ -17,7 +17,7 @@ from study.session.facts.events import (
     TrialPresented,
     TrialSpoiled,
 )
-from study.session.views.views import Unanswered
+from study.session.views.participant_views import Unanswered
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import read_log
 from study.workflows.session import conduct_session

@@ -3,9 +3,9 @@
 import pytest
 
 from study.devices.clock import VirtualClock
-from study.participants.observers import find_observer
+from study.participants.observer_catalogue import find_observer
 from study.session.facts.events import NoteTaken, PauseTaken, SessionInterrupted
-from study.session.views.views import AfterPause, Unanswered
+from study.session.views.participant_views import AfterPause, Unanswered
 from study.session.watching.requests import NoteAsked
 from study.store.sessions.event_log import read_log
 from study.workflows.session.conduct_session import Participant, conduct_new

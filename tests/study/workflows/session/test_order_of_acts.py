@@ -7,7 +7,7 @@ import pytest
 
 from study.devices.device import Fault, Health, PlaybackResult
 from study.errors import StudyError, UserInterruptError
-from study.session.views.views import Unanswered
+from study.session.views.participant_views import Unanswered
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.event_log import EventLog, read_log
 from study.workflows.results.fold_session import fold_session

@@ -20,7 +20,7 @@ def number(sitter):
         from study.workflows.session.conduct_session import conduct_new
 
         plan = replace(sitter_plan, protocol=protocol, protocol_text=text)
-        from study.session.views.views import Unanswered
+        from study.session.views.participant_views import Unanswered
 
         leave = sitter.participant(0, lambda: Unanswered("left", ends_sitting=True))
         return conduct_new(plan, "simulated", leave).state.opened.participant_number

@@ -12,11 +12,11 @@ from protocols.document.dumping import dump_protocol
 from protocols.procedure.schedule import make_williams_rows
 from study.devices.clock import VirtualClock
 from study.errors import StudyError
-from study.participants.observers import find_observer
+from study.participants.observer_catalogue import find_observer
 from study.session.facts.events import FormFilled, PlaceTaken, SessionClosed, SessionInterrupted, SessionOpened
 from study.session.views.archive_views import INELIGIBILITY_REASONS
 from study.session.views.form_views import FormKind, FormReply
-from study.session.views.views import Unanswered
+from study.session.views.participant_views import Unanswered
 from study.session.watching.followed_session import apply_followed_event, begin_watching
 from study.session.watching.make_watch_view import LiveInfo, make_watch_view
 from study.store.sessions.event_log import read_log
@@ -214,7 +214,7 @@ def test_a_person_who_comes_again_begins_a_new_session_and_takes_a_place_then(vi
 
 
 def test_a_session_of_the_first_rules_keeps_the_number_of_its_opening_line(visit, monkeypatch):
-    monkeypatch.setattr("study.workflows.session.open_session.LATEST", 1)
+    monkeypatch.setattr("study.workflows.session.open_session.LATEST_RULES", 1)
     old, _ = visit("P01", consent="firm")
     monkeypatch.undo()
     assert of(old, PlaceTaken) == of(old, SessionClosed) == []

@@ -17,11 +17,11 @@ from study.session.facts.events import (
     TrialPresented,
     TrialSpoiled,
 )
-from study.session.state.draw_check import LogContradiction
 from study.session.state.fold import apply_event
+from study.session.state.presentation_check import LogContradiction
 from study.session.state.probe_state import ProbeState, apply_break
 from study.session.stimulus.probe_stimulus import make_probe_stimulus, make_reference_commands
-from study.session.views.views import PlayingNotice
+from study.session.views.participant_views import PlayingNotice
 from study.store.formats.recording_file import read_recording
 from study.store.sessions.event_log import EventLog, read_log
 from study.workflows.session.simulated_display import SimulatedDisplay

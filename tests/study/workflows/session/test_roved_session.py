@@ -8,12 +8,12 @@ import pytest
 from analysis.psychophysics.hierarchy.answers import count_answers
 from analysis.psychophysics.runs import InconsistentTrialsError, recompute_runs
 from analysis.psychophysics.study_analysis import analyse_study
-from protocols.definition.exposure import CatchSettings
+from protocols.definition.session_settings import CatchSettings
 from protocols.document.dumping import dump_protocol
 from protocols.procedure.staircase import to_db
 from protocols.trial import Phase
 from study.session.facts.events import TrialPresented
-from study.session.views.views import Unanswered
+from study.session.views.participant_views import Unanswered
 from study.store.formats.recording_file import read_recording
 from study.store.formats.trials_file import read_trials, write_trials
 from study.store.sessions.event_log import read_log

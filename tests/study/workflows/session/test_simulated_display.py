@@ -6,10 +6,18 @@ import pytest
 
 from protocols.trial import Phase
 from study.devices.clock import VirtualClock
-from study.participants.observers import find_observer
+from study.participants.observer_catalogue import find_observer
 from study.session.state.due_trial import PresentTrial
 from study.session.views.form_views import Form, FormField, FormKind
-from study.session.views.views import Answered, DirectionPicture, HandleView, Question, RestNotice, Task, Unanswered
+from study.session.views.participant_views import (
+    Answered,
+    DirectionPicture,
+    HandleView,
+    Question,
+    RestNotice,
+    Task,
+    Unanswered,
+)
 from study.workflows.session.simulated_display import SimulatedDisplay
 
 PICTURE = DirectionPicture("yz", (135.0, 45.0))

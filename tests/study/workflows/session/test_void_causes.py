@@ -7,8 +7,8 @@ import pytest
 from protocols.trial import VoidCause
 from study.devices.device import Fault
 from study.errors import UserInterruptError
-from study.session.state.rules import LATEST
-from study.session.views.views import Unanswered
+from study.session.state.rules import LATEST_RULES
+from study.session.views.participant_views import Unanswered
 from study.store.formats.trials_file import TRIALS_NAME, read_trials
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import read_log
@@ -49,7 +49,7 @@ def test_each_cause_is_logged_in_the_table_and_followed_by_the_same_stimulus(sit
     assert stimulus(void) == stimulus(again)
     assert sum(trial.repeat_cause is not None for trial in trials) == 1
     assert validate_file(end.folder.path).problems == ()
-    assert read_log(end.folder.log).events[0].rules == LATEST
+    assert read_log(end.folder.log).events[0].rules == LATEST_RULES
 
 
 def test_a_stall_is_distinguished_from_other_faults():
@@ -91,7 +91,7 @@ def test_a_session_of_the_first_rules_continues_under_them(sitter, monkeypatch):
     kept = set()
     for number in range(4):
         sitter.seed = 100 + number
-        monkeypatch.setattr("study.workflows.session.open_session.LATEST", 1)
+        monkeypatch.setattr("study.workflows.session.open_session.LATEST_RULES", 1)
         left = conduct_new(sitter.plan(f"Q{number}"), "simulated", sitter.participant(3, lambda: CAUSES[3][0]))
         monkeypatch.undo()
         done = sitter.resumed(left.folder)

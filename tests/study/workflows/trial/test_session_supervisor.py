@@ -7,9 +7,9 @@ import pytest
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Fault
 from study.devices.safe import SafeDevice
-from study.session.views.views import Answered, Unanswered
+from study.session.views.participant_views import Answered, Unanswered
 from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
-from study.workflows.trial.requests_port import ManyRequests, QueuedRequests
+from study.workflows.trial.requests_port import CombinedRequests, QueuedRequests
 from study.workflows.trial.session_supervisor import SessionSupervisor
 
 CUT = Unanswered("the stimulus ended early", ends_sitting=False)
@@ -120,7 +120,7 @@ def test_several_sources_are_heard_in_turn(requests):
     other = QueuedRequests()
     other.send(PauseAsked("participant"))
     requests.send(StopAsked("experimenter"))
-    assert ManyRequests(requests, other).take() == (StopAsked("experimenter"), PauseAsked("participant"))
+    assert CombinedRequests(requests, other).take() == (StopAsked("experimenter"), PauseAsked("participant"))
 
 
 @pytest.mark.real_time

@@ -21,7 +21,7 @@ def test_models_in_the_data_folder_and_beside_it_are_found_and_nothing_else(tmp_
     found = list_model_files(data)
     assert set(found) == {str(tmp_path / "beside.h5"), str(data / "within.h5")}
     assert make_home_view(data).models == found
-    assert {make_home_view(data).quality_of(model) for model in found} == {"quality not stored"}
+    assert {make_home_view(data).describe_quality(model) for model in found} == {"quality not stored"}
 
 
 def test_a_folder_that_is_not_there_has_none(tmp_path):

@@ -7,7 +7,7 @@ import pytest
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.document.dumping import dump_protocol
 from study.errors import WrongUseError
-from study.session.views.views import Unanswered
+from study.session.views.participant_views import Unanswered
 from study.store.sessions.archive import find_session
 from study.workflows.session.conduct_session import conduct_new
 from study.workflows.session.withdraw_participant import plan_withdrawal, withdraw

@@ -10,7 +10,7 @@ import pytest
 
 from study.devices.clock import RealClock
 from study.errors import StudyError
-from study.session.watching.live import Live
+from study.session.watching.live_state import Live
 from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import EventLog, read_log

@@ -13,11 +13,11 @@ from study.devices.clock import RealClock, VirtualClock
 from study.devices.opening import open_device
 from study.devices.safe import SafeDevice
 from study.devices.telemetry import Ring
-from study.session.watching.live import Live
+from study.session.watching.live_state import Live
 from study.store.sessions.live_file import write_live
 from study.workflows.views.lsl_outlets import MarkerOutlet, make_source_id
 from study.workflows.views.stream_session import measure_offset_s
-from study.workflows.views.stream_signals import LOOK_EVERY, STREAMS, SignalStreams
+from study.workflows.views.stream_signals import CALLS_PER_RING_CHECK, STREAMS, SignalStreams
 
 UTC = "2026-01-01T00:00:00+00:00"
 LIVE = Live(UTC, "trial", UTC, "", 0.5, True, 1.0, False, 0)
@@ -45,7 +45,7 @@ class Kept:
 
 
 def look(streams: SignalStreams) -> int:
-    return sum(streams.push(OFFSET_S) for _ in range(LOOK_EVERY + 1))
+    return sum(streams.push(OFFSET_S) for _ in range(CALLS_PER_RING_CHECK + 1))
 
 
 def played(rigs, clock, device) -> int:
@@ -71,7 +71,7 @@ def test_all_ticks_of_all_sittings_are_sent_with_their_times(tmp_path, rigs):
             assert np.allclose(np.array(at_s) - OFFSET_S - started_s, np.arange(1, count + 1) / 1000.0, atol=1e-9)
             ticks += count
         look(streams)
-    assert streams.sent == ticks and kept.rates_hz == {1000.0}
+    assert streams.sent_ticks == ticks and kept.rates_hz == {1000.0}
     for stream in STREAMS:
         assert np.shape(kept.samples[stream.name]) == (ticks, len(stream.channels)) == (ticks, len(stream.units))
     force = np.array(kept.samples["hapteq force"])
@@ -97,7 +97,7 @@ def test_a_ring_that_could_not_be_opened_at_first_is_opened_later(tmp_path, rigs
         ring.with_suffix(".moved").rename(ring)
         assert look(streams) == 0
         ticks = played(rigs, clock, device)
-        assert look(streams) == 0 and streams.sent == ticks > 0
+        assert look(streams) == 0 and streams.sent_ticks == ticks > 0
 
 
 def test_ticks_that_came_too_late_are_counted(tmp_path, rigs):
@@ -108,7 +108,7 @@ def test_ticks_that_came_too_late_are_counted(tmp_path, rigs):
         look(streams)
         ticks = played(rigs, clock, device)
         assert look(streams) == ticks - 100
-    assert streams.sent == 100
+    assert streams.sent_ticks == 100
 
 
 @pytest.mark.real_time
@@ -138,10 +138,10 @@ def test_force_and_acceleration_arrive_at_another_end_while_the_trial_runs(tmp_p
         health = device.release().health
         over.set()
         sending.join(20)
-    force, at_s = pulled(inlets["hapteq force"], streams.sent - during)
-    acceleration, _ = pulled(inlets["hapteq acceleration"], streams.sent)
+    force, at_s = pulled(inlets["hapteq force"], streams.sent_ticks - during)
+    acceleration, _ = pulled(inlets["hapteq acceleration"], streams.sent_ticks)
     assert during > 0
-    assert streams.sent == health.ticks
+    assert streams.sent_ticks == health.ticks
     assert np.all(np.diff(at_s) > 0) and np.std(acceleration) > 0.1
     assert np.linalg.norm(force[:, 3:], axis=1).max() <= rigs.LIMITS.total_cap_n * (1 + 1e-9)
     assert inlets["hapteq force"].info().desc().child("channels").child("channel").child_value("unit") == "N"

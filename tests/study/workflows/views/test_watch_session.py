@@ -7,12 +7,12 @@ from datetime import UTC, datetime
 import pytest
 
 from study.errors import StudyError
-from study.session.watching.live import Live
+from study.session.watching.live_state import Live
 from study.session.watching.requests import StopAsked
 from study.store.sessions.archive import SessionFolder
 from study.store.sessions.event_log import LOG_NAME, EventLog
 from study.store.sessions.live_file import write_live
-from study.store.sessions.log_writer import is_log_locked
+from study.store.sessions.log_lock import is_log_locked
 from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.files.validate import validate_file
 from study.workflows.views.watch_session import follow

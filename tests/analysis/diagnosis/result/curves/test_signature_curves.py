@@ -6,7 +6,7 @@ from analysis.diagnosis.errors.free_simulation import FreeSimulation
 from analysis.diagnosis.errors.hypothesis import NO_EFFECTS
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.errors.tuning import make_tuning
-from analysis.diagnosis.result.curves.signature_bins import bin_law_means
+from analysis.diagnosis.result.curves.signature_bins import compute_law_bin_means
 from analysis.diagnosis.result.curves.signature_curves import Names, compute_signature
 from equalizer.effects.catalogue import CATALOGUE
 from equalizer.effects.effect import PlacedEffect
@@ -95,7 +95,7 @@ def test_where_nothing_is_missing_the_dots_stay_far_from_a_law_that_is_claimed(m
 
 def test_a_law_whose_model_runs_away_has_the_curve_of_what_is_finite():
     at = np.append(np.linspace(-1, 1, 500), [np.inf, -np.inf])
-    places, means = bin_law_means(at, at**3)
+    places, means = compute_law_bin_means(at, at**3)
     assert np.isfinite(places).all() and len(places) > 10
     np.testing.assert_allclose(means, places**3, atol=0.01)
-    assert [len(each) for each in bin_law_means(at[-2:], at[-2:])] == [0, 0]
+    assert [len(each) for each in compute_law_bin_means(at[-2:], at[-2:])] == [0, 0]

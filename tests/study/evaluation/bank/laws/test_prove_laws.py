@@ -8,7 +8,7 @@ from study.errors import StudyError
 from study.evaluation.bank.laws.prove_laws import prove_laws, reveal_laws
 from study.evaluation.bank.laws.seal_laws import fresh_motions_path, read_fresh_motions, seal_laws
 from study.evaluation.bank.laws.write_law_proof import format_law_lines, write_law_proof
-from study.evaluation.bank.proof_folder import SETTINGS, open_proof_folder
+from study.evaluation.bank.proof_folder import SETTINGS_FILE, open_proof_folder
 from study.evaluation.bank.proof_seals import read_label
 from study.evaluation.bank.seal_cases import BankPlan
 from study.evaluation.bank.sealed_bank import BankOptions
@@ -27,7 +27,7 @@ def sealed(tmp_path_factory):
 @pytest.mark.slow
 def test_the_diagnosis_is_told_to_look_for_laws_and_not_for_which(sealed):
     place = next(sealed.open.iterdir())
-    asked = json.loads((place / SETTINGS).read_text())
+    asked = json.loads((place / SETTINGS_FILE).read_text())
     assert asked["discovery"]
     assert asked["without"] == []
     assert sorted(each.name for each in place.iterdir()) == ["model.toml", "recording.h5", "settings.json"]
@@ -35,7 +35,7 @@ def test_the_diagnosis_is_told_to_look_for_laws_and_not_for_which(sealed):
 
 @pytest.mark.slow
 def test_fresh_motion_lies_with_the_label(sealed):
-    label = read_label(sealed.label_file(0))
+    label = read_label(sealed.get_label_file(0))
     truth = label["truth"]
     found = read_fresh_motions(
         fresh_motions_path(sealed, 0), label["axes"], truth["axes"], truth["acts_on"] == ["response"]

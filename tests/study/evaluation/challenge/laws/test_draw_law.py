@@ -86,7 +86,7 @@ def test_the_labels_numbers_in_its_formula_are_the_change(bench, name, seed):
     samples = np.random.default_rng(1).normal(0.0, 2.0, (500, 3))
     moved = Motion(samples, 0.001 * samples, 0.1 * samples, 0.0 * samples)
     device, truth = build_law(Device(bench), kind, (moved, samples), (0, 1), 0.5, np.random.default_rng(seed))
-    become = device.drive_law if kind.acts_on[0] == "command" else device.sensor.law
+    become = device.drive_law if kind.acts_on[0] == "command" else device.sensor.static_law
     of, k, s = samples[:, 0], truth.numbers["k"], truth.numbers["s"]
     assert k > 0
     np.testing.assert_allclose(become(samples)[:, 0], of + s * k * (np.abs(of) if name[0] == "a" else of**2))

@@ -12,7 +12,7 @@ from study.evaluation.challenge.device import Device
 from study.evaluation.challenge.device import simulate_motion as simulate_bench_motion
 from study.evaluation.challenge.draw_case import EFFECTS
 from study.evaluation.challenge.drive_plan import draw_multisine
-from study.evaluation.challenge.second_engine import second_engine
+from study.evaluation.challenge.second_engine import mujoco_access
 from study.evaluation.challenge.sensor import NOISE_MPS2
 
 pytest.importorskip("mujoco", reason="the extra `prove` (MuJoCo) is not installed")
@@ -69,7 +69,7 @@ def test_a_contact_gives_way_as_much_as_its_spring_says(bench):
 
 def test_a_case_holds_what_it_says_and_is_the_same_again():
     drawn = [
-        second_engine.draw_engine_case(50_023, ("sensor_gain",), "calibrated", (0.9,), "a", CaseSettings((1,), 1000, 3))
+        mujoco_access.draw_engine_case(50_023, ("sensor_gain",), "calibrated", (0.9,), "a", CaseSettings((1,), 1000, 3))
         for _ in range(2)
     ]
     assert drawn[0].truth == drawn[1].truth
@@ -80,10 +80,10 @@ def test_a_case_holds_what_it_says_and_is_the_same_again():
 
 def test_what_the_engine_cannot_express_is_refused():
     with pytest.raises(ValueError, match="cannot conceal cogging"):
-        second_engine.draw_engine_case(1, ("cogging",), "calibrated", (0.5,), "a", CaseSettings((0,), 1000, 3))
+        mujoco_access.draw_engine_case(1, ("cogging",), "calibrated", (0.5,), "a", CaseSettings((0,), 1000, 3))
 
 
 def test_every_effect_of_its_list_can_be_built():
     from study.evaluation.challenge.second_engine.mujoco_case import BUILDERS, SENSOR_EFFECTS
 
-    assert set(second_engine.EFFECTS) == {*BUILDERS, *SENSOR_EFFECTS}
+    assert set(mujoco_access.EFFECTS) == {*BUILDERS, *SENSOR_EFFECTS}

@@ -8,7 +8,7 @@ import pytest
 from textual import events
 
 from study.devices.clock import VirtualClock
-from study.session.views.views import Answered
+from study.session.views.participant_views import Answered
 from study.tui.keys import key_presses
 from study.tui.keys.answer_keys import parse_keys
 from study.tui.screens import trial

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from protocols.trial import Phase
-from study.session.views.views import Answered, Progress, Question, Task
+from study.session.views.participant_views import Answered, Progress, Question, Task
 from study.tui.screens.trial import TrialScreen
 from study.tui.trial_replies import PAUSE, TIME_OVER
 from tests.study.tui.screens.trial.questions import PICTURE, QUESTION

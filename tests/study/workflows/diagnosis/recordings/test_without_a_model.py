@@ -8,7 +8,7 @@ import pytest
 from analysis.diagnosis.errors.choose_measure import make_measure
 from study.errors import UserInterruptError, WrongUseError
 from study.store.formats.recording_file import write_recording
-from study.workflows.diagnosis.diagnose_at_screen import diagnose_at_screen, free_out
+from study.workflows.diagnosis.diagnose_at_screen import choose_result_folder, diagnose_at_screen
 from study.workflows.diagnosis.diagnose_recordings import diagnose_recordings
 from tests.study.workflows.diagnosis.recordings.scripted import asked_of_engine, plan, quiet, refused_with
 
@@ -58,10 +58,10 @@ def test_at_the_screen_a_stop_is_reported_and_leaves_nothing(files, tmp_path):
 
 
 def test_results_of_the_screen_lie_in_a_session_or_beside_a_recording(tmp_path):
-    assert free_out(tmp_path / "rec.h5") == tmp_path / "rec-diagnosis"
+    assert choose_result_folder(tmp_path / "rec.h5") == tmp_path / "rec-diagnosis"
     (tmp_path / "rec-diagnosis").mkdir()
-    assert free_out(tmp_path / "rec.h5") == tmp_path / "rec-diagnosis-2"
-    assert free_out(tmp_path) == tmp_path / "diagnosis"
+    assert choose_result_folder(tmp_path / "rec.h5") == tmp_path / "rec-diagnosis-2"
+    assert choose_result_folder(tmp_path) == tmp_path / "diagnosis"
 
 
 def test_compare_and_seconds_reach_the_engine(files, findings, tmp_path):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from study.errors import StudyError
-from study.importing.arrays.arrays import read_arrays
+from study.importing.arrays.read_arrays import read_arrays
 from study.importing.map_format.import_map import CsvMap
 from study.store.formats.identified_model_file import read_identified_model
 from study.store.formats.mechanical_model_file import read_mechanical_model

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import pytest
 
-from protocols.definition.exposure import CatchSettings, DetectionSettings, GateSettings
 from protocols.definition.participant_text import Question
 from protocols.definition.preparation import (
     ConsentSettings,
@@ -12,6 +11,7 @@ from protocols.definition.preparation import (
     PracticeSettings,
     SetupSettings,
 )
+from protocols.definition.session_settings import CatchSettings, DetectionSettings, GateSettings
 from protocols.document.dumping import dump_protocol
 from protocols.document.loading import load_protocol
 from study.devices.clock import VirtualClock

@@ -1,8 +1,8 @@
 """A person at the screen, played by a simulated participant; and the events of a log."""
 
-from study.participants.observers import find_observer
+from study.participants.observer_catalogue import find_observer
 from study.session.views.form_views import FormKind, FormReply
-from study.session.views.views import AfterPause, DemoDone, PlayDemo
+from study.session.views.participant_views import AfterPause, DemoDone, PlayDemo
 from study.store.sessions.event_log import read_log
 from study.workflows.session.simulated_display import SimulatedDisplay
 

@@ -12,7 +12,7 @@ from study.session.facts.events import (
     TrialSpoiled,
 )
 from study.session.views.form_views import FormKind
-from study.session.views.views import AfterPause
+from study.session.views.participant_views import AfterPause
 from study.session.watching.requests import NoteAsked, PauseAsked, StopAsked
 from study.store.sessions.request_inbox import RequestInbox
 from study.workflows.session.conduct_session import Participant, conduct_new, conduct_resumed

@@ -7,7 +7,7 @@ import pytest
 from protocols.trial import Phase
 from study.devices.clock import VirtualClock
 from study.devices.device import Fault
-from study.participants.observers import find_observer
+from study.participants.observer_catalogue import find_observer
 from study.session.facts.events import (
     DemoPlayed,
     DeviceChecked,
@@ -17,7 +17,7 @@ from study.session.facts.events import (
     TrialPresented,
 )
 from study.session.views.form_views import FormKind, FormReply
-from study.session.views.views import Task
+from study.session.views.participant_views import Task
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.conduct_session import Participant, conduct_new
 from study.workflows.session.simulated_display import SimulatedDisplay

@@ -1,6 +1,7 @@
-"""Models of the vendor's devices that can be opened, with their constants.
+"""Device models of Force Dimension that can be opened (omega.3 to sigma.7), with their constants.
 
-The module imports nothing heavy, because the command line needs the names at every start.
+Used by the driver of this folder, and by `study.devices.opening` and `rigs_by_name`, which look a model up by the name
+in `--device`. Imports no large package, because the command line reads the names at every start.
 """
 
 from dataclasses import dataclass
@@ -21,7 +22,8 @@ class DeviceModel:
     none: the values are assumptions, from the simulated omega.3 and the heavier wrists of the other models. The
     spring's natural frequency changes with the square root of the ratio of assumed to true mass."""
     effector_mass_kg: float | None
-    """Mass for the gravity compensation. None: the library's default."""
+    """Mass for the gravity compensation (kg); the omega.3's is that of configurations for CHAI3D. None: the library's
+    default."""
 
 
 MODELS = {
@@ -34,6 +36,6 @@ MODELS = {
 """Models by the name that `--device` takes."""
 
 
-def name_of_type(system_type: int) -> str | None:
-    """Key of `MODELS` for a value of dhdGetSystemType; None for another device of the vendor."""
+def find_model_key(system_type: int) -> str | None:
+    """Find the key of `MODELS` for a value of dhdGetSystemType; None for another device of the vendor."""
     return next((name for name, model in MODELS.items() if system_type in model.system_types), None)

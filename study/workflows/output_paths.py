@@ -1,6 +1,7 @@
-"""Check of output names before any work: the files do not exist yet, and their folder does.
+"""Check the output paths of a command before its computation or recording: the files must not exist, their folder must.
 
-Results are never overwritten; a long computation must not fail only when it writes them.
+Results are never overwritten; a long computation must not fail only when it writes them. Called by workflows that write
+a recording, model, table of forces, controller or calibration.
 """
 
 from pathlib import Path
@@ -8,13 +9,13 @@ from pathlib import Path
 from study.errors import StudyError
 
 
-def require_free(
+def require_new_outputs(
     out_path: Path, *further_paths: Path, title: str, kind: str, saved: str = "Nothing was written."
 ) -> None:
-    """Raise StudyError if `out_path` or another path exists, or if the folder of `out_path` does not.
+    """Raise StudyError where `out_path` or one of `further_paths` exists, or where the folder of `out_path` does not.
 
-    further_paths: paths that will be written into the same folder. title, saved: of the error. kind: name of the files
-    that are never overwritten, in the plural, for the error.
+    further_paths: further files of the same folder. title, saved: texts of the error. kind: what the files are, in the
+    plural, for the error.
     """
     for path in (out_path, *further_paths):
         if path.exists():

@@ -93,7 +93,7 @@ def test_a_click_or_paste_waits_for_the_keys_before_it(on_screen, paste):
 
 def test_keys_that_were_read_before_something_new_was_asked_do_nothing(on_screen):
     async def story(sight):
-        sight.app._keys.forget_earlier()
+        sight.app._keys.discard_earlier_keys()
         burst(sight, *"old", read_s=time.monotonic() - 0.5)
         burst(sight, *"new")
         await sight.pilot.pause()

@@ -1,4 +1,7 @@
-"""Trials beside the staircase, where the handle must be, and how much of all this a hand may get in a sitting."""
+"""Session settings of a study protocol: detection runs, catch trials, start condition of a trial, limits of a sitting.
+
+Each class is a table of the TOML file; Pydantic checks its values. Part of `study_protocol`.
+"""
 
 from typing import Annotated, Self
 
@@ -12,9 +15,9 @@ from protocols.definition.staircase_rule import STRICT
 
 @dataclass(frozen=True, config=STRICT)
 class DetectionSettings:
-    """Detection of the vibration: one of two intervals contains a stimulus, and the participant states which.
+    """Detection runs: two-interval forced choice of the interval that contains the vibration.
 
-    The same up-down rule as in the study, with a start level of its own.
+    They follow the up-down rule of the study, from another start level.
     """
 
     frequencies_hz: Annotated[
@@ -46,8 +49,8 @@ class DetectionSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class CatchSettings:
-    """Trials at full level (the cap), mixed into the test runs. They do not move the staircase; wrong answers are
-    lapses."""
+    """Catch trials: trials at the cap, mixed into the test runs, whose wrong answers are lapses. They do not move the
+    staircase."""
 
     one_in: Annotated[
         int,
@@ -60,7 +63,8 @@ class CatchSettings:
     ] = 0
 
     @model_validator(mode="after")
-    def _rare(self) -> Self:
+    def _require_rare_trials(self) -> Self:
+        """Raise InconsistentError for one_in of 1 to 3."""
         if self.one_in and self.one_in < 4:
             refuse([Problem("one_in", f"is {self.one_in}", "0 for none, or at least 4: catch trials must stay rare")])
         return self
@@ -68,7 +72,7 @@ class CatchSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class GateSettings:
-    """Start condition of a trial: the handle must be near its place."""
+    """Start condition of a trial: the handle must have been near its place for some time."""
 
     radius_mm: Annotated[
         float,
@@ -91,8 +95,8 @@ class GateSettings:
 
 @dataclass(frozen=True, config=STRICT)
 class SittingLimits:
-    """Hard limits of one sitting of a person. At a limit the sitting ends between two trials; it continues on another
-    day."""
+    """Limits of duration and vibration exposure of one sitting of a person. At a limit the sitting ends between two
+    trials; it continues on another day."""
 
     longest_min: Annotated[
         float, Field(gt=0, le=480, description="Time from the first trial or demonstration. Default 120 minutes.")

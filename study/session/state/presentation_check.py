@@ -1,7 +1,7 @@
-"""Check of a logged presentation against the presentation that follows from rules, seed and position in the session.
+"""Check of a logged presentation against the presentation that follows from protocol, rules, seed and position.
 
-The state is computed from the log; a log that was written under other rules, or altered, is refused here instead of
-giving a wrong state.
+The state of a session is computed from its log. A log that was written under other rules, or altered, is refused here;
+otherwise it would give a wrong state. Called by `fold_trial`; other modules of this package raise `LogContradiction`.
 """
 
 import math
@@ -10,19 +10,20 @@ from study.session.facts.events import AnswerGiven, TrialMeasured, TrialPresente
 from study.session.state.due_trial import PresentTrial
 
 
-class LogContradiction(ValueError):  # noqa: N818 - a contradiction is what it is
+class LogContradiction(ValueError):  # noqa: N818 - no suffix: the log is contradictory, not the program
     """A logged event cannot follow the previous events, or its values differ from those that the rules give."""
 
 
-def check_draw(event: TrialPresented, expected: PresentTrial) -> None:
-    """Raise LogContradiction unless the logged presentation agrees with `expected`: position, phase, frequency (Hz),
-    level (N, dB), direction, angle (degrees), polarity, wanted acceleration (m/s²)."""
-    place = (expected.run, expected.trial, expected.attempt)
-    if (event.run, event.trial, event.attempt) != place:
+def check_presentation(event: TrialPresented, expected: PresentTrial) -> None:
+    """Raise LogContradiction unless the logged presentation agrees with `expected`: position in the session, phase,
+    frequency, level in N and dB, nominal level, direction, angle, polarity, wanted acceleration."""
+    due_place = (expected.run, expected.trial, expected.attempt)
+    if (event.run, event.trial, event.attempt) != due_place:
         raise LogContradiction(
-            f"{describe_place(event)} presented where run {place[0]}, trial {place[1]}, attempt {place[2]} was due"
+            f"{describe_place(event)} presented where run {due_place[0]}, trial {due_place[1]}, "
+            f"attempt {due_place[2]} was due"
         )
-    compared = {
+    compared_values = {
         "phase": (event.phase.value, expected.phase.value),
         "frequency_hz": (event.frequency_hz, expected.frequency_hz),
         "level_n": (event.level_n, expected.level_n),
@@ -33,14 +34,14 @@ def check_draw(event: TrialPresented, expected: PresentTrial) -> None:
         "wanted_mps2": (event.wanted_mps2, expected.wanted_mps2),
         "nominal_n": (event.nominal_n, expected.nominal_n),
     }
-    wrong = [
+    contradictions = [
         f"{name} {logged} where {expected_value} is due"
-        for name, (logged, expected_value) in compared.items()
+        for name, (logged, expected_value) in compared_values.items()
         if not _is_equal(logged, expected_value)
     ]
-    if wrong:
+    if contradictions:
         raise LogContradiction(
-            f"{describe_place(event)} was presented with {', '.join(wrong)}: "
+            f"{describe_place(event)} was presented with {', '.join(contradictions)}: "
             "this session was begun with different rules"
         )
 
@@ -54,5 +55,5 @@ def _is_equal(logged: str | float | None, expected_value: str | float | None) ->
 
 
 def describe_place(event: TrialPresented | AnswerGiven | TrialMeasured | TrialSpoiled) -> str:
-    """Run, trial and attempt in words, for messages."""
+    """Describe run, trial and attempt (indices from 0) in words, for messages."""
     return f"run {event.run}, trial {event.trial}, attempt {event.attempt}"

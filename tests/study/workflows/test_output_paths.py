@@ -3,17 +3,17 @@
 import pytest
 
 from study.errors import StudyError
-from study.workflows.free_name import require_free
+from study.workflows.output_paths import require_new_outputs
 
 
 def refusal(*paths) -> StudyError:
     with pytest.raises(StudyError) as refused:
-        require_free(*paths, title="Nothing was baked", kind="cakes", saved="The oven is off.")
+        require_new_outputs(*paths, title="Nothing was baked", kind="cakes", saved="The oven is off.")
     return refused.value
 
 
 def test_a_free_name_in_a_folder_is_fine(tmp_path):
-    require_free(tmp_path / "new.h5", tmp_path / "new.json", title="Nothing was baked", kind="cakes")
+    require_new_outputs(tmp_path / "new.h5", tmp_path / "new.json", title="Nothing was baked", kind="cakes")
 
 
 def test_what_is_there_is_never_overwritten_be_it_the_result_or_what_goes_beside_it(tmp_path):

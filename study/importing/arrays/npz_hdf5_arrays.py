@@ -1,7 +1,7 @@
-"""Read arrays from NPZ, NPY and HDF5 files under their names.
+"""Read the arrays of NPZ, NPY and HDF5 files by name; called by `read_arrays`.
 
 Declared sizes are checked before memory is allocated, and nothing in a file is executed: arrays of Python objects,
-which would have to be unpickled, are skipped.
+which would have to be unpickled, are not read.
 """
 
 import math
@@ -15,21 +15,22 @@ import numpy.typing as npt
 
 from study.regular_file import open_regular
 from study.store.disk.declared_size import SizeLimit
-from study.store.disk.hdf5_contents import datasets_in
+from study.store.disk.hdf5_contents import iterate_datasets
 from study.store.disk.hdf5_file import open_any_hdf5
 
 Array = npt.NDArray[Any]
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-"""Compressions that numpy.savez and numpy.savez_compressed use."""
-_CELL = "a cell, which is read where the file was saved with -v7"
+"""Compressions that numpy.savez and numpy.savez_compressed write; no other one is read."""
+_CELL_DESCRIPTION = "a cell, which is read where the file was saved with -v7"
 """Description of a Matlab cell, which an HDF5 file stores as references."""
-_NO_NUMBERS = np.array(None, dtype=object)
-"""Placeholder for texts and objects, which are reported but not read."""
+_NON_NUMERIC = np.array(None, dtype=object)
+"""Placeholder for the values of HDF5 texts and objects, which are listed but not read."""
 
 
 def read_npz_arrays(path: Path) -> dict[str, Array]:
-    """Arrays by name; that of a single `.npy` is called `data`. Raises OSError, ValueError, and for a damaged file
-    another exception of `file_errors.DAMAGED`."""
+    """Read arrays by name; that of an NPY file is called `data`. The content decides which of both formats it is.
+    Raises OSError, ValueError, DeclaredSizeError, and for a damaged file another exception of
+    `file_errors.DAMAGE_ERRORS`."""
     with open_regular(path) as file:
         limit = SizeLimit(path.stat().st_size)
         if file.peek(6)[:6] == b"\x93NUMPY":
@@ -40,8 +41,8 @@ def read_npz_arrays(path: Path) -> dict[str, Array]:
 
 
 def _read_members(archive: zipfile.ZipFile, limit: SizeLimit) -> dict[str, Array]:
-    """Arrays of the members of an archive, except Python objects. Raises ValueError for a compression that numpy does
-    not use."""
+    """Read the members of an archive that end in .npy, except Python objects. Raises ValueError for a compression that
+    numpy does not write, and as `_read_npy`."""
     arrays: dict[str, Array] = {}
     for member in archive.infolist():
         if not member.filename.endswith(".npy"):
@@ -56,15 +57,17 @@ def _read_members(archive: zipfile.ZipFile, limit: SizeLimit) -> dict[str, Array
     return arrays
 
 
-def _read_npy(file: Any, size: int, limit: SizeLimit, name: str) -> Array | None:
-    """One array; None for Python objects. size: unpacked size of its container (bytes). Raises ValueError where the
-    declared shape does not fit."""
+def _read_npy(file: Any, container_bytes: int, limit: SizeLimit, name: str) -> Array | None:
+    """Read one array; None for Python objects. container_bytes: size of the unpacked member or file. Raises ValueError
+    where the declared shape does not fit or the data end early, DeclaredSizeError where it is too large."""
     shape, fortran_order, dtype = _read_header(file)
     if dtype.hasobject:
         return None
     declared_bytes = math.prod(shape) * dtype.itemsize
-    if not 0 <= declared_bytes <= size:
-        raise ValueError(f"{name} is said to have the shape {shape}, {declared_bytes} bytes, but holds {size}")
+    if not 0 <= declared_bytes <= container_bytes:
+        raise ValueError(
+            f"{name} is said to have the shape {shape}, {declared_bytes} bytes, but holds {container_bytes}"
+        )
     limit.add_size(name, declared_bytes)
     content = file.read(declared_bytes)
     if len(content) != declared_bytes:
@@ -73,8 +76,8 @@ def _read_npy(file: Any, size: int, limit: SizeLimit, name: str) -> Array | None
 
 
 def _read_header(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
-    """Shape, whether the order is Fortran, and type of an array. Raises ValueError for an unknown version of the
-    format."""
+    """Read the header of an NPY array: shape, whether the order is Fortran, and data type. Raises ValueError for an
+    unknown version of the format."""
     version = np.lib.format.read_magic(file)
     if version == (1, 0):
         return np.lib.format.read_array_header_1_0(file)
@@ -84,23 +87,28 @@ def _read_header(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
 
 
 def read_hdf5_arrays(path: Path, *, transposed: bool) -> dict[str, Array]:
-    """Datasets by their path, as in `run1/force`. transposed: the file is of Matlab: dimensions are reversed, and names
-    have dots for slashes. Raises UnusableFileError."""
+    """Read datasets by path, as in `run1/force`. transposed: a file of Matlab 7.3, whose dimensions are reversed; names
+    then have dots in place of slashes. Texts, cells and objects are replaced by placeholders, except one-dimensional
+    arrays of texts, which may be dates. Raises UnusableFileError."""
     arrays: dict[str, Array] = {}
     with open_any_hdf5(path, "HDF5 file") as file:
-        for name, entry in datasets_in(file):
+        for name, entry in iterate_datasets(file):
             if name.startswith("#") or entry.shape is None:
                 continue
             kind = entry.attrs.get("MATLAB_class", b"")
             if kind == b"cell" or "MATLAB_object_decode" in entry.attrs:
-                kind_text = f"an object of the class {kind.decode('utf-8', 'replace')}" if kind != b"cell" else _CELL
+                kind_text = (
+                    f"an object of the class {kind.decode('utf-8', 'replace')}"
+                    if kind != b"cell"
+                    else _CELL_DESCRIPTION
+                )
                 values = np.array(kind_text, dtype=object)
             elif entry.dtype.kind in "fiub":
                 values = np.asarray(entry[()])
             elif h5py.check_string_dtype(entry.dtype) is not None and entry.ndim == 1 and len(entry):
                 values = np.asarray(entry.asstr(errors="replace")[()], dtype=str)
             elif entry.dtype.kind in "SUO":
-                values = _NO_NUMBERS
+                values = _NON_NUMERIC
             else:
                 continue
             arrays[name.replace("/", ".") if transposed else name] = values.T if transposed else values

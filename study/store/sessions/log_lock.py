@@ -1,6 +1,7 @@
 """Detect whether a process is writing a session's log, by the lock (flock) that the writer holds on the file.
 
-The operating system releases the lock when its holder ends, so that a crashed program does not count as a writer.
+`event_log` sets the lock. The operating system releases it when the process ends, so that a crashed program does not
+count as a writer. Called by `study.workflows.views` (`watch_session`, `send_request`, `take_note`, `session_line`).
 """
 
 from pathlib import Path
@@ -9,9 +10,9 @@ from study.regular_file import open_regular
 
 
 def is_log_locked(log: Path) -> bool | None:
-    """Whether a process holds the log's lock; None if this cannot be known: a system without flock (Windows), or a log
-    that is missing or unreadable. The probe itself holds a shared lock for an instant, during which a new writer would
-    be refused; therefore call it rarely."""
+    """Whether a process holds the log's lock; None where this cannot be determined: on a system without flock
+    (Windows), or for a log that is missing or unreadable. The test itself holds a shared lock for an instant, during
+    which a new writer would be refused; therefore call it rarely."""
     try:
         import fcntl
     except ImportError:  # Windows

@@ -5,7 +5,7 @@ import pytest
 
 from equalizer.signals.lockin import estimate_phasors
 from study.devices.accelerometer.history import ArrivedSamples
-from study.devices.accelerometer.placement import HALF_PERIODS, fit_and_resample, resample
+from study.devices.accelerometer.tick_resampling import HALF_LENGTH_PERIODS, fit_and_resample, resample
 
 TICK_HZ = 1000.0
 START_S = 5e4
@@ -99,7 +99,7 @@ def test_a_few_lost_packets_change_little_and_a_gap_leaves_ticks_without_a_value
     kept = ArrivedSamples(stretch.device_s[~lost], stretch.restarts[~lost], values[~lost], *_arrivals(stretch))
     placed = fit_and_resample(kept, values[~lost], TICKS_S, TICK_HZ).values
     known = np.isfinite(placed[:, 0])
-    around = np.abs(TICKS_S - (START_S + 11.01)) < 0.01 + HALF_PERIODS / TICK_HZ
+    around = np.abs(TICKS_S - (START_S + 11.01)) < 0.01 + HALF_LENGTH_PERIODS / TICK_HZ
     assert not known[around][1:-1].any() and known[~around].mean() > 0.97
     # 45 Hz, spaces of 1 to 2.5 ms bridged: the amplitude of a trial stays within a percent, and so does its phase.
     found = found_tone(np.where(np.isfinite(placed), placed, np.nan), TICKS_S, 45.0)

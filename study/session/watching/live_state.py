@@ -1,7 +1,8 @@
-"""Live state of a running session, which a viewer in another terminal reads.
+"""Live state of a running session, for viewers in other terminals.
 
-The session writes it to `live.json` beside its log, several times a second; the file is replaced each time. The log
-alone is the record of the session.
+`study.workflows.trial.session_supervisor` makes it several times a second, and `study.store.sessions.live_file` writes
+it to `live.json` beside the log, where it replaces the previous state. No result depends on it: the record of a session
+is its log.
 """
 
 from dataclasses import dataclass
@@ -16,26 +17,26 @@ Activity = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """Present state of the session. It contains no direction, because it can be read while a trial runs."""
+    """Present state of a session. It contains no direction, because it can be read while a trial runs."""
 
     utc: str
-    """Time at which this state was written."""
+    """Time of this state (UTC, ISO 8601)."""
     activity: Activity
     since_utc: str
-    """Time at which this activity began."""
+    """Time at which this activity began (UTC, ISO 8601)."""
     fault: str
     """Fault of the device in words; empty without a fault."""
     offset_mm: float | None
-    """Present distance of the handle from the place at which trials start; None where the position is unknown."""
+    """Distance of the handle from the position at which trials start (mm); None where its position is unknown."""
     handle_ready: bool
     """Whether the handle is within the gate (the radius within which a trial may start); true without a gate."""
     acceleration_mps2: float | None
-    """Present reading of the accelerometer, norm of the three axes; None without a reading."""
+    """Norm of the last reading of the accelerometer (m/s²); None without a reading."""
     sensor_clipped: bool
     """Whether the accelerometer is at the limit of its range."""
     missed_ticks: int
     """Number of missed ticks of the control loop in the present stimulus."""
     monotonic_s: float | None = None
-    """Reading of the session's monotonic clock at `utc`, as in its log; None from older versions."""
+    """Reading of the session's monotonic clock at `utc` (s), as in its log; None from older versions."""
     telemetry: str = ""
-    """Path of the ring buffer into which the device's control loop writes every tick; empty if there is none."""
+    """Path of the ring buffer into which the device's control loop writes every tick; empty without one."""

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from study.devices.force_dimension.locate import Computer, find_library
+from study.devices.force_dimension.locate_library import Computer, find_library
 from study.devices.force_dimension.usb import UsbDevice, find_usb_devices
 
 

@@ -1,6 +1,7 @@
 """Make the events of a trial for the session log (presented, measured, void), and save its recording.
 
-Units: levels in N, accelerations in m/s², times in s; displacement and offset in mm.
+Called by `present_trial`; `resume_session` restores the counters of an answered trial with `restore_health`. Units:
+levels in N, accelerations in m/s², times in s; displacement and offset in mm.
 """
 
 from dataclasses import asdict, dataclass
@@ -22,22 +23,23 @@ from study.workflows.trial.sitting import Sitting
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Outcome:
+class TrialOutcome:
     """Result of an answered trial that counts: what the device played and what was measured."""
 
     play_result: PlaybackResult
-    values: Delivered | None
-    """Delivered amplitudes; None where too little of the steady part was recorded."""
+    """Recording of the stimulus, and counters of the device."""
+    delivered: Delivered | None
+    """Delivered amplitudes; None where less than a period was measured or the acceleration cannot be trusted."""
     flags: tuple[str, ...]
-    """Remarks of the judgement, in words."""
-    vector: FloatArray
-    """(3,): unit vector of the direction played."""
-    measured: bool
+    """Reasons, in words, why the stimulus should be inspected; empty without any."""
+    unit_vector: FloatArray
+    """(3,), unit vector of the direction played, in device coordinates."""
+    acceleration_trusted: bool
     """Whether the acceleration of the recording can be trusted."""
 
 
 def make_presented_event(due_trial: PresentTrial, sitting: Sitting) -> TrialPresented:
-    """Event of a trial that is presented; logged before the stimulus is played."""
+    """Make the event of a trial that is presented, to be logged before the stimulus is played."""
     return TrialPresented(
         utc=sitting.clock.utc(),
         run=due_trial.run,
@@ -56,7 +58,8 @@ def make_presented_event(due_trial: PresentTrial, sitting: Sitting) -> TrialPres
 
 
 def make_answer_health(health: Health, felt_whole: bool) -> AnswerHealth:
-    """Counters of the device, as they are logged with the answer."""
+    """Make the counters of the device that are logged with the answer. felt_whole: whether the stimulus was complete
+    until the answer."""
     return AnswerHealth(
         fault=health.fault.name,
         felt_whole=felt_whole,
@@ -72,28 +75,28 @@ def make_answer_health(health: Health, felt_whole: bool) -> AnswerHealth:
     )
 
 
-def restore_health(logged: AnswerHealth) -> Health:
-    """Counters of the device from the log, without those that are not logged (feedback, sensor). An unknown name of a
-    fault, for example of a later version, counts as a fault."""
+def restore_health(logged_health: AnswerHealth) -> Health:
+    """Restore the counters of the device from the log. Those that are not logged (feedback, sensor, cause) have their
+    defaults. An unknown name of a fault, as of a later version, becomes `Fault.NOT_A_NUMBER`."""
     return Health(
-        fault=Fault.__members__.get(logged.fault, Fault.NOT_A_NUMBER),
-        ticks=logged.ticks,
-        missed_ticks=logged.missed_ticks,
-        stimulus_clipped=logged.stimulus_clipped,
-        total_clipped=logged.total_clipped,
-        slew_limited=logged.slew_limited,
-        sensor_clipped=logged.sensor_clipped,
-        peak_command_n=logged.peak_command_n,
-        late_ticks=logged.late_ticks or 0,
-        latest_s=logged.latest_s or 0.0,
+        fault=Fault.__members__.get(logged_health.fault, Fault.NOT_A_NUMBER),
+        ticks=logged_health.ticks,
+        missed_ticks=logged_health.missed_ticks,
+        stimulus_clipped=logged_health.stimulus_clipped,
+        total_clipped=logged_health.total_clipped,
+        slew_limited=logged_health.slew_limited,
+        sensor_clipped=logged_health.sensor_clipped,
+        peak_command_n=logged_health.peak_command_n,
+        late_ticks=logged_health.late_ticks or 0,
+        latest_s=logged_health.latest_s or 0.0,
     )
 
 
 def make_void_event(
     due_trial: PresentTrial, reason_and_cause: tuple[str, VoidCause], health: Health | None, sitting: Sitting
 ) -> TrialSpoiled:
-    """Event of a void trial. reason_and_cause: the reason in words, and its cause. health: None if nothing was
-    played."""
+    """Make the event of a void trial. reason_and_cause: the reason in words, and its cause. health: counters of the
+    device; None if nothing was played."""
     reason, cause = reason_and_cause
     return TrialSpoiled(
         utc=sitting.clock.utc(),
@@ -111,30 +114,30 @@ def make_void_event(
 
 
 def record_measured_trial(
-    due_trial: PresentTrial, outcome: Outcome, state: SessionState, sitting: Sitting
+    due_trial: PresentTrial, outcome: TrialOutcome, state: SessionState, sitting: Sitting
 ) -> TrialMeasured:
-    """Save the recording of a trial that counts, and return its event, which contains the recording's name and
-    SHA-256."""
-    saved = None
+    """Save the recording of a trial that counts, if there is one, and make its event with the name and SHA-256 of the
+    recording. Raises StudyError where the recording cannot be written."""
+    saved_recording = None
     if outcome.play_result.recording is not None:
-        conditions = _make_recording_metadata(due_trial, outcome, state, sitting)
+        metadata = _make_recording_metadata(due_trial, outcome, state, sitting)
         name = recording_name(due_trial.run, due_trial.trial, due_trial.attempt)
-        saved = save_trial_recording(sitting.folder, name, outcome.play_result.recording, conditions)
-    values = outcome.values
+        saved_recording = save_trial_recording(sitting.folder, name, outcome.play_result.recording, metadata)
+    delivered = outcome.delivered
     return TrialMeasured(
         utc=sitting.clock.utc(),
         run=due_trial.run,
         trial=due_trial.trial,
         attempt=due_trial.attempt,
-        # A quick answer comes before the steady part of the stimulus: nothing can be measured then, which is no fault.
-        status="flagged" if outcome.flags else "unmeasured" if values is None else "ok",
+        # After a quick answer, before the steady part of the stimulus, nothing can be measured; this is no fault.
+        status="flagged" if outcome.flags else "unmeasured" if delivered is None else "ok",
         flags=outcome.flags,
-        recording=saved.name if saved else None,
-        sha256=saved.sha256 if saved else None,
-        delivered_mps2=values.along_mps2 if values else None,
-        off_axis_mps2=values.off_axis_mps2 if values else None,
-        displacement_mm=values.displacement_mm if values else None,
-        harmonics_mps2=values.harmonics_mps2 if values else None,
+        recording=saved_recording.name if saved_recording else None,
+        sha256=saved_recording.sha256 if saved_recording else None,
+        delivered_mps2=delivered.along_mps2 if delivered else None,
+        off_axis_mps2=delivered.off_axis_mps2 if delivered else None,
+        displacement_mm=delivered.displacement_mm if delivered else None,
+        harmonics_mps2=delivered.harmonics_mps2 if delivered else None,
         missed_ticks=outcome.play_result.health.missed_ticks,
         late_ticks=outcome.play_result.health.late_ticks,
         latest_s=outcome.play_result.health.latest_s,
@@ -145,12 +148,13 @@ def record_measured_trial(
 
 
 def _compute_vibration_s(health: Health, sitting: Sitting) -> float:
-    """Duration of the vibration (s) from onset to rest, fades included: it counts for the vibration dose."""
+    """Compute the duration of the vibration (s), fades and missed ticks included, for the vibration dose."""
     return health.ticks / sitting.device.info.sample_rate_hz
 
 
 def _compute_largest_offset_mm(play_result: PlaybackResult, sitting: Sitting) -> float | None:
-    """Largest distance (mm) of the handle from its place during the recording; None without position data."""
+    """Compute the largest distance of the handle from the place where trials start during the recording (mm); None
+    without finite positions."""
     if play_result.recording is None or play_result.recording.position is None:
         return None
     offset_m = np.linalg.norm(play_result.recording.position.samples - np.asarray(sitting.place_m), axis=1)
@@ -158,22 +162,22 @@ def _compute_largest_offset_mm(play_result: PlaybackResult, sitting: Sitting) ->
 
 
 def _make_recording_metadata(
-    due_trial: PresentTrial, outcome: Outcome, state: SessionState, sitting: Sitting
+    due_trial: PresentTrial, outcome: TrialOutcome, state: SessionState, sitting: Sitting
 ) -> dict[str, Any]:
-    """Metadata of the recording file: what was played, counters of the device, and provenance."""
+    """Make the metadata of the recording file, as JSON values: what was played, counters of the device, provenance."""
     return {
         "session": sitting.folder.name,
         "trial": {"run": due_trial.run, "trial": due_trial.trial, "attempt": due_trial.attempt},
         "frequency_hz": due_trial.frequency_hz,
         "level_n": due_trial.level_n,
         "wanted_mps2": due_trial.wanted_mps2,
-        "unit_vector": [float(v) for v in outcome.vector],
+        "unit_vector": [float(component) for component in outcome.unit_vector],
         "hand": "held",
         "missed_ticks": outcome.play_result.health.missed_ticks,
         "late_ticks": outcome.play_result.health.late_ticks,
         "latest_s": outcome.play_result.health.latest_s,
         "flags": list(outcome.flags),
-        "acceleration_trusted": outcome.measured,
+        "acceleration_trusted": outcome.acceleration_trusted,
         "sensor": None if outcome.play_result.health.sensor is None else asdict(outcome.play_result.health.sensor),
         "equalizer": sitting.equalizer.name,
         "provenance": {

@@ -1,7 +1,7 @@
-"""Access to the second physics engine, MuJoCo, which is optional and imported only when a case is drawn.
+"""Access to MuJoCo, the optional second physics engine of the blind test; it is imported only when a case is drawn.
 
-With another integrator, other friction and other contacts, it shows whether a diagnosis depends on hapteq's own
-simulation.
+Its integrator, friction and contacts differ from those of hapteq's own simulation, so that cases from it show whether a
+diagnosis depends on that simulation. Called by `challenge.draw_bank` and `bank.seal_cases`.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ EFFECTS = (
     "coulomb_friction", "viscous_damping", "added_mass", "constant_force", "end_stop", "backlash", "extra_mode",
     "hand_impedance", "force_gain", "force_saturation", "amplifier_lag", "transport_delay", "sensor_lag", "sensor_gain",
 )  # fmt: skip
-"""Names of the effects that can be concealed with this engine."""
+"""Names of the effects that MuJoCo cases can conceal; `mujoco_case` builds each of them."""
 
 
 def is_installed() -> bool:
@@ -33,7 +33,8 @@ def draw_engine_case(
     name: str,
     settings: CaseSettings,
 ) -> "Case":
-    """Draw a case as `draw_case` does, simulated by MuJoCo. Raises ImportError where it is not installed."""
+    """Draw a blind-test case that MuJoCo simulates. The arguments are those of `challenge.draw_case.draw_case`. Raises
+    ImportError where MuJoCo is not installed."""
     from study.evaluation.challenge.second_engine.mujoco_case import draw_mujoco_case
 
     return draw_mujoco_case(seed, effects, origin, strength, name, settings)

@@ -1,7 +1,8 @@
-"""Data classes that the participant's display shows, and the participant's replies.
+"""Data classes that the participant's display shows, and the participant's replies to them.
 
 No value reveals level, frequency or correctness of a trial, so that the display cannot give hints. The module is quick
-to import, because a screen shows its first frame before numerical libraries are loaded.
+to import, because a screen shows its first frame before numerical libraries are loaded. `study.workflows` makes the
+values; the displays (`study.tui`, simulated participants) show them and give the replies.
 """
 
 from __future__ import annotations
@@ -37,24 +38,26 @@ class DirectionPicture:
 
 @dataclass(frozen=True, slots=True)
 class Welcome:
-    """Facts that a participant reads before the first trial."""
+    """Information that a participant reads before the first trial."""
 
     title: str
+    """Title of the study."""
     picture: DirectionPicture
     runs: int
     """Number of runs in the session."""
     training_runs: int
+    """Number of these runs that are training."""
     device: str
     """Name of the device."""
     device_moves: bool
-    """False where no device moves: the answers are practice."""
+    """Whether a real device moves; otherwise the answers are practice."""
     resumed_after: int
     """Number of answers from earlier sittings."""
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Progress of the session, from runs and counted trials; never from levels."""
+    """Progress of the session, computed from numbers of runs and trials only, because levels must not be revealed."""
 
     share_done: float
     """Fraction of the session done, 0 to 1."""
@@ -64,26 +67,28 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """One trial as the participant sees it. A catch trial looks like any other: its phase is given as TEST."""
+    """One trial as it is shown to the participant. A catch trial is shown like any other: its phase is TEST here."""
 
     phase: Phase
+    """Phase of the run: training, detection or test."""
     run_number: int
     """Number of the run within its phase, from 1."""
     runs_in_phase: int
+    """Number of runs of this phase."""
     trial_number: int
     """Number of the trial within the run, from 1."""
     repeated: bool
     """Whether the trial is presented again because its last presentation was void."""
     time_limit_s: float
-    """Time for an answer, as the protocol sets it."""
+    """Time limit for an answer (s), as the protocol sets it."""
     picture: DirectionPicture
     task: Task = Task.DIRECTION
     practice: bool = False
     """Whether the trial belongs to a short practice run with a criterion to pass."""
     progress: Progress | None = None
     repeats_left: int | None = None
-    """How often the participant may still ask for a repetition of a trial in this run; None: without limit (version 1
-    of `study.session.state.rules`)."""
+    """Number of repetitions of trials that the participant may still request in this run; None: without limit (version
+    1 of `study.session.state.rules`)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,22 +100,22 @@ class PlayingNotice:
     number: int
     """Direction or interval that is highlighted, 1 or 2; 0: none."""
     seconds: float
-    """Duration of the notice."""
+    """Duration of the notice (s)."""
     picture: DirectionPicture | None
     """None where no direction is drawn (an interval, a probe)."""
 
 
 @dataclass(frozen=True, slots=True)
 class DemoMenu:
-    """Menu of the labelled demonstration: each direction at each vibration (frequency), as often as wanted."""
+    """Menu of the labelled demonstration: each direction at each vibration (frequency), any number of times."""
 
     picture: DirectionPicture
     vibrations: int
-    """Number of vibrations; vibration 1 has the lowest frequency."""
+    """Number of different vibrations; vibration 1 has the lowest frequency."""
     vibration: int
     """Number of the present vibration, from 1."""
     played_pairs: tuple[tuple[int, int], ...]
-    """Pairs (vibration, direction number) that were played."""
+    """Pairs (vibration, direction number) that were already played."""
     handle_moves: bool
     """Whether a real handle moves; False with a simulated device."""
 
@@ -138,27 +143,31 @@ class DeviceFinding:
     """One finding of the device check, shown as a line."""
 
     name: str
+    """What was checked."""
     value: str
+    """Result in words, with units."""
     fine: bool
+    """Whether the result meets its requirement."""
     advice: str = ""
     """Advice to the experimenter where the finding is not fine."""
     warning: bool = False
-    """Whether a finding that is not fine does not prevent the use of the device."""
+    """Whether a finding that is not fine is only a warning: the device may be used."""
 
     @property
     def wrong(self) -> bool:
-        """Whether the finding prevents the study: neither fine nor a warning."""
+        """Whether the finding prevents the use of the device: neither fine nor a warning."""
         return not self.fine and not self.warning
 
     @property
     def verdict(self) -> str:
-        """Verdict in one word for a table: ok, warn (a warning) or look (wrong)."""
+        """Verdict in one word for a table: ok (fine), warn (a warning) or look (wrong)."""
         return "ok" if self.fine else "warn" if self.warning else "look"
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceReport:
-    """Findings of a device check. simulated: whether the device is simulated, so that no real handle moves."""
+    """Findings of a device check. device: its name; simulated: whether it is simulated, so that no real handle
+    moves."""
 
     device: str
     simulated: bool
@@ -166,7 +175,7 @@ class DeviceReport:
 
     @property
     def fine(self) -> bool:
-        """Whether all findings are fine; False with a warning too."""
+        """Whether all findings are fine, without any warning."""
         return all(finding.fine for finding in self.findings)
 
     @property
@@ -177,9 +186,10 @@ class DeviceReport:
 
 @dataclass(frozen=True, slots=True)
 class HandleView:
-    """Position of the handle, and whether a trial may start with it."""
+    """Position of the handle before a trial."""
 
     ready: bool
+    """Whether the handle is near enough to the centre to start a trial."""
     sentence: str
     """Instruction, such as "Bring the handle 12 mm back to the centre"."""
     offset_mm: tuple[float, float]
@@ -190,9 +200,10 @@ class HandleView:
 
 @dataclass(frozen=True, slots=True)
 class PracticeResult:
-    """Result of a short practice."""
+    """Result of a short practice run."""
 
     passed: bool
+    """Whether its criterion was met."""
     correct_count: int
     answer_count: int
     """Number of latest answers among which `correct_count` were correct."""
@@ -203,9 +214,9 @@ class PauseNotice:
     """Notice to the participant during a pause."""
 
     reason: str
-    """Who asked for the pause, or what happened, as a text for the participant."""
+    """Origin or cause of the pause, as a text for the participant."""
     answers: int
-    """Number of answers that are stored."""
+    """Number of answers that are stored so far."""
 
 
 class AfterPause(Enum):
@@ -221,7 +232,7 @@ class AfterPause(Enum):
 
 @dataclass(frozen=True, slots=True)
 class RestNotice:
-    """Notice to the participant during an enforced rest: its duration, the number of runs left, and the progress."""
+    """Notice to the participant during an enforced rest: its duration (s), the number of runs left, the progress."""
 
     seconds: float
     runs_left: int
@@ -230,14 +241,14 @@ class RestNotice:
 
 @dataclass(frozen=True, slots=True)
 class Goodbye:
-    """Last notice of a sitting. finished: whether the whole session is finished; answers: number of stored answers."""
+    """Last notice of a sitting. finished: whether the session is finished; answers: number of stored answers."""
 
     finished: bool
     answers: int
     reason: str = ""
-    """Why the sitting ended before the session was finished."""
+    """Cause of an end before the session was finished; empty otherwise."""
     outcome: Literal["", "refused", "excluded"] = ""
-    """Why a person does not take part; the session cannot be continued then. Empty for a participant."""
+    """Cause for which a person does not take part; the session is then closed. Empty for a participant."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,7 +269,7 @@ class Unanswered:
     """Reply without an answer: the trial is void."""
 
     reason: str
-    """Why, in words, as it is logged."""
+    """Reason in words, as it is logged."""
     ends_sitting: bool
     """Whether the participant or the experimenter ends the sitting; the session can be resumed."""
     repeat_requested: bool = False
@@ -274,7 +285,7 @@ Reply = Answered | Unanswered
 
 
 def make_direction_picture(directions: TestDirections, labels_swapped: bool) -> DirectionPicture:
-    """Picture of the two directions, 45 degrees to either side of the line of symmetry. labels_swapped: whether numbers
-    1 and 2 are exchanged for this participant."""
+    """Make the picture of the two directions, at +45 and -45 degrees from the line of symmetry. labels_swapped: whether
+    numbers 1 and 2 are exchanged for this participant."""
     first, second = directions.symmetry_deg + 45.0, directions.symmetry_deg - 45.0
     return DirectionPicture(directions.plane, (second, first) if labels_swapped else (first, second))

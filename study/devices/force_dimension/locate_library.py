@@ -1,7 +1,7 @@
-"""Locates the library of Force Dimension's SDK (libdrd or libdhd) on this computer.
+"""Locates the shared library of Force Dimension's SDK (libdrd or libdhd) on this computer. Called by `connect`.
 
-The folders named by environment variables are searched first, then those in which the vendor's installer and tools put
-the library on Windows, macOS and Linux.
+The folders that environment variables state are searched first, then those in which the vendor's installer and tools
+put the library on Windows, macOS and Linux.
 """
 
 import platform
@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 SDK_VARIABLES = ("FDSDK", "FORCEDIM_SDK")
-"""Environment variables that name the SDK's folder, in order of preference; the second is the older name."""
+"""Environment variables that contain the path of the SDK, in order of preference; the second is the older name."""
 
 WINDOWS_FOLDERS = (("LOCALAPPDATA", "Force Dimension"), ("ProgramFiles", "Force Dimension"))
-"""Windows: environment variable of a folder, and its subfolder that contains the folders sdk-VERSION."""
+"""Windows: environment variable with the path of a folder, and its subfolder that contains the folders sdk-VERSION."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,12 +32,12 @@ class Computer:
 
 
 def describe_this_computer(environ: Mapping[str, str]) -> Computer:
-    """The running computer, with these environment variables."""
+    """Describe the running computer, with these environment variables."""
     return Computer(sys.platform, platform.machine(), environ, Path.home())
 
 
 def find_library(computer: Computer) -> Path | None:
-    """Path of the newest library in the first folder that contains one; None where none is found. In each folder libdrd
+    """Find the newest library in the first folder that contains one; None where none is found. In each folder libdrd
     comes before libdhd: it has all functions of libdhd and the automatic calibration."""
     return next(
         (path for pattern in list_library_patterns(computer) if (path := _find_newest(*pattern)) is not None), None
@@ -45,7 +45,7 @@ def find_library(computer: Computer) -> Path | None:
 
 
 def list_library_patterns(computer: Computer) -> Iterator[tuple[Path, str]]:
-    """Pairs (folder, file pattern) in order of preference. Folders named by an environment variable come first, because
+    """List pairs (folder, file pattern) in order of preference. Folders of environment variables come first, because
     the user chose them."""
     for folder in _list_folders(computer):
         for library in ("drd", "dhd"):
@@ -53,7 +53,7 @@ def list_library_patterns(computer: Computer) -> Iterator[tuple[Path, str]]:
 
 
 def _list_folders(computer: Computer) -> Iterator[Path]:
-    """Folders to search, in order of preference."""
+    """List the folders to search, in order of preference; on Windows the newest version of the SDK first."""
     environ = computer.environ
     roots = [Path(environ[name]) for name in SDK_VARIABLES if environ.get(name)]
     if computer.system == "win32":
@@ -71,18 +71,18 @@ def _list_folders(computer: Computer) -> Iterator[Path]:
 
 
 def _make_file_pattern(library: str, computer: Computer) -> str:
-    """Glob pattern of a library's file names. library: drd or dhd."""
+    """Make the glob pattern of a library's file names. library: drd or dhd."""
     if computer.system == "win32":
         return f"{library}64.dll"
     return f"lib{library}*.dylib" if computer.system == "darwin" else f"lib{library}.so*"
 
 
 def _find_newest(folder: Path, pattern: str) -> Path | None:
-    """The file with the highest version number that matches the pattern; None where none does."""
+    """Find the file with the highest version number that matches the pattern; None where none does."""
     candidates = [path for path in folder.glob(pattern) if path.is_file()]
     return max(candidates, key=_parse_version, default=None)
 
 
 def _parse_version(path: Path) -> tuple[int, ...]:
-    """Version as the numbers in a name, so that libdrd.so.3.17.5 counts as newer than libdrd.so.3.9.0."""
+    """Parse the version as the numbers in a name, so that libdrd.so.3.17.5 is newer than libdrd.so.3.9.0."""
     return tuple(int(part) for part in path.name.replace("-", ".").split(".") if part.isdigit())

@@ -1,0 +1,35 @@
+"""Random numbers of simulated participants, keyed by seed and trial: the same trial of a session gets the same draws.
+
+Called by all participants with random answers: `direction_feeler`, `unsure_repeater`, `intensity_cue`,
+`control_observers`.
+"""
+
+import math
+from statistics import NormalDist
+
+import numpy as np
+
+from study.participants.observer import PerceivedStimulus
+
+_MEDIAN_RESPONSE_S = math.sqrt(1.2 * 2.5)
+"""Median response time (s): the geometric mean of 1.2 s and 2.5 s. Chosen."""
+_LOG_RESPONSE_SD = math.log(2.5 / 1.2) / (2 * 1.96)
+"""Standard deviation of the natural logarithm of the response time: 95 % (+-1.96 standard deviations) of the times lie
+between 1.2 s and 2.5 s. Chosen."""
+
+_OBSERVER_STREAM = 0x0B5E
+"""Arbitrary key that separates these random numbers from those of the schedule. With a shared seed, the draws of a
+participant would otherwise be correlated with the directions."""
+
+
+def draw_uniform(stimulus: PerceivedStimulus, seed: int, count: int) -> tuple[float, ...]:
+    """Draw `count` independent numbers, uniform in (0, 1), for one presentation. seed: of the session."""
+    key = (_OBSERVER_STREAM, stimulus.run, stimulus.trial, stimulus.attempt)
+    random_words = np.random.SeedSequence(entropy=seed, spawn_key=key).generate_state(count, np.uint64)
+    # 53 random bits, the precision of a float; the half keeps 0 and 1 out, whose normal quantiles are infinite.
+    return tuple(((int(word) >> 11) + 0.5) * 2.0**-53 for word in random_words)
+
+
+def draw_response_time_s(uniform_draw: float) -> float:
+    """Log-normal response time (s). uniform_draw: uniform in (0, 1)."""
+    return _MEDIAN_RESPONSE_S * math.exp(_LOG_RESPONSE_SD * NormalDist().inv_cdf(uniform_draw))
