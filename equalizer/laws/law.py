@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from equalizer.laws.parse import LawError, parse_formula
-from equalizer.laws.tree import Apply, FreeParameter, Node, Variable, format_formula, iterate_nodes
+from equalizer.laws.tree import Apply, FreeParameter, Node, Number, Variable, format_formula, iterate_nodes
 
 ActsOn = Literal["force", "command", "response"]
 KINDS: tuple[ActsOn, ...] = get_args(ActsOn)
@@ -64,6 +64,17 @@ class Law:
     def variables(self) -> tuple[str, ...]:
         """Signals in the formula, sorted."""
         return tuple(sorted({node.name for node in iterate_nodes(self.tree) if isinstance(node, Variable)} - {"pi"}))
+
+    @property
+    def exponents(self) -> tuple[float, ...]:
+        """Exponents in the formula, in their order: free parameters and literal numbers, but not expressions."""
+        powers = [node for node in iterate_nodes(self.tree) if isinstance(node, Apply) and node.name == "**"]
+        exponents = [power.arguments[1] for power in powers]
+        return tuple(
+            self.numbers[exponent.index] if isinstance(exponent, FreeParameter) else exponent.value
+            for exponent in exponents
+            if isinstance(exponent, FreeParameter | Number)
+        )
 
     def with_numbers(self, numbers: Sequence[float]) -> "Law":
         """The law with other values of p0, p1, … in SI units. Raises LawError for another number of them."""

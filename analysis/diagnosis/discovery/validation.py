@@ -17,6 +17,7 @@ from analysis.diagnosis.discovery.antisymmetric_pairs import can_coupling_imitat
 from analysis.diagnosis.discovery.convert_sum import convert_sum_to_law, list_fitted_laws
 from analysis.diagnosis.discovery.discover import Discovery, Round
 from analysis.diagnosis.discovery.fit_sum import Sum
+from analysis.diagnosis.discovery.grammar import POWER_BOUNDS
 from analysis.diagnosis.discovery.snap_exponents import snap_exponents
 from analysis.diagnosis.effect_words import get_noun
 from analysis.diagnosis.search.compare_candidates import refine
@@ -32,6 +33,11 @@ from equalizer.signals.signal import FloatArray
 NO_OTHER_EXCITATION = (
     "the held-out data contain no other kind of excitation than the data in which it was found, such as a stronger "
     "one or one on several axes"
+)
+
+STEEP_POWER = (
+    "its exponent {:.3g} is larger than any that the search begins with: such a power stands for an edge or a stop, "
+    "whose place these recordings do not determine"
 )
 
 COUPLING_EXPLAINS_HALF = (
@@ -102,6 +108,8 @@ def _run_checks(context: SearchContext, discovery: Discovery, rivals: Sequence[F
                 f"explains {100 * chance_share:.0f} % of the force when it is shuffled in time"
             )
         yield from _check_rival_laws(context, discovery, round_index)
+    for law in list_fitted_laws(discovery.explanation.after.fitted.hypothesis):
+        yield from (STEEP_POWER.format(k) for k in (law.exponents if law else ()) if k > POWER_BOUNDS[1])
     inputs = context.full_measure.records[0].recording.command.channels
     if can_coupling_imitate(context.tuning, discovery.explanation.after.fitted, inputs):
         yield COUPLING_EXPLAINS_HALF

@@ -25,6 +25,11 @@ def test_the_text_has_five_digits_and_the_exact_text_all():
     assert parse_law(law.exact_text, "force", "x") == law
 
 
+def test_exponents_are_free_or_part_of_the_form():
+    law = parse_law("-4.1*abs(vy)**1.5*sign(vy) - 0.1*y**2 + 3.0**(2*t)", "force", "y")
+    assert law.exponents == (1.5, 2.0)
+
+
 def test_other_numbers_keep_their_sign_where_they_stand():
     law = Law("p0*x - p1*vx**2 + x**p2 + p3**2", (-1.0, -2.0, -0.5, -3.0), (), "force", "x")
     assert law.text == "-1.0*x + 2.0*vx**2 + x**-0.5 + (-3.0)**2"

@@ -9,8 +9,14 @@ from analysis.diagnosis.discovery.add_laws import LawSearch, check_laws
 from analysis.diagnosis.discovery.convert_sum import list_fitted_laws
 from analysis.diagnosis.discovery.discover import Discovery, Round, discover
 from analysis.diagnosis.discovery.fit_sum import Sum
-from analysis.diagnosis.discovery.validation import choose_on_held_out, is_confirmed_on_held_out
+from analysis.diagnosis.discovery.validation import (
+    STEEP_POWER,
+    choose_on_held_out,
+    find_failed_checks,
+    is_confirmed_on_held_out,
+)
 from analysis.diagnosis.errors.hypothesis import Claim, combine_hypotheses, make_claim_hypothesis
+from analysis.diagnosis.errors.law_hypothesis import hypothesis_of_law
 from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.verdict import SearchResult, judge
@@ -141,3 +147,20 @@ def test_a_force_that_undoes_the_command_hides_no_law():
     drag = list_fitted_laws(found.explanation.after.fitted.hypothesis)[0]
     assert drag.expression == "p0*maximum(sign((-x) - p1), 0)*vx"
     assert drag.numbers == pytest.approx((-4.0, 0.002), rel=0.02)
+
+
+def test_a_steep_power_is_a_candidate_only(search_result):
+    context, _, found = search_result
+
+    def list_objections(exponent: int) -> list[str]:
+        steep = hypothesis_of_law(law(f"p0*x**{exponent}", -1e3), 0, context.measure.records[0].recording)
+        deviations = found.explanation.after.fitted.deviations
+        after = context.with_test_score(
+            context.score_fit(evaluate_fit(context.measure, context.tuning, deviations, steep))
+        )
+        explanation = replace(found.explanation, after=after, steps=(after,))
+        reasons = find_failed_checks(context, Discovery(explanation, found.rounds), ())
+        return [reason for reason in reasons if "stands for an edge" in reason]
+
+    assert list_objections(7) == [STEEP_POWER.format(7.0)]
+    assert list_objections(5) == []
