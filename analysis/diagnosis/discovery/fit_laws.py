@@ -5,7 +5,8 @@ fitted together by Gauss-Newton steps (`errors.output_error`).
 """
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from dataclasses import replace
+from functools import cache, partial
 from itertools import product
 from typing import TypeVar
 
@@ -30,6 +31,7 @@ from analysis.diagnosis.search.search_context import (
     SearchContext,
     compute_sensitivity,
 )
+from analysis.diagnosis.search.short_recordings import coarsen_steps, shorten_recordings
 from analysis.diagnosis.search.time_budget import OutOfTimeError
 from analysis.diagnosis.settings import LAW_NEAR
 from analysis.diagnosis.types import TimeBudget
@@ -43,12 +45,9 @@ def fit_sums(
 ) -> tuple[tuple[FittedCandidate, Sum], ...]:
     """The sums fitted by output error. The best sum, and simpler sums that are inseparable from it, are fitted to
     convergence, the others for a few steps. When the time ends, those begun by then; empty where none can be fitted."""
-    sensitivity = run_within_time(lambda: compute_sensitivity(context, base.deviations, base.hypothesis), None)
-    if sensitivity is None:
+    fit_few_steps = run_within_time(lambda: _prepare_first_fits(context, base), None)
+    if fit_few_steps is None:
         return ()
-    fit_few_steps = partial(
-        fit, context.measure, context.tuning, jacobian=sensitivity, rounds=FIRST_FIT_ROUNDS, map_=context.map_
-    )
     fits = [
         (run_within_time(partial(fit_few_steps, start), start), term_sum)
         for term_sum in sums
@@ -76,6 +75,30 @@ def fit_sums(
     ]
     refined += [(context.score_fit(_refine(context, candidate.fitted)), item) for candidate, item in simpler_candidates]
     return (*refined, *(pair for pair in other_candidates if pair not in simpler_candidates))
+
+
+def _prepare_first_fits(context: SearchContext, base: Fitted) -> Callable[[Fitted], Fitted]:
+    """Make the function that fits a start for a few steps. Where the drive repeats and the law does not depend on time,
+    it uses one period of each segment and longer simulation steps (`short_recordings`), which suffices for a ranking;
+    its result is that of all samples."""
+    tuning, short_form = context.tuning, shorten_recordings(context, base)
+    compute_sensitivity_to_model = cache(lambda ctx: compute_sensitivity(ctx, base.deviations, base.hypothesis))
+    short = None
+    if short_form is not None:
+        short = replace(short_form.context, measure=coarsen_steps(short_form.context.measure))
+
+    def fit_few_steps(start: Fitted) -> Fitted:
+        depends_on_time = any(effect.effect.of_time for effect in start.hypothesis.list_placed_effects())
+        if short is None or depends_on_time:
+            sensitivity = compute_sensitivity_to_model(context)
+            return fit(context.measure, tuning, start, sensitivity, FIRST_FIT_ROUNDS, context.map_)
+        sensitivity = compute_sensitivity_to_model(short)
+        short_start = evaluate_fit(short.measure, tuning, start.deviations, start.hypothesis)
+        fitted = fit(short.measure, tuning, short_start, sensitivity, FIRST_FIT_ROUNDS, context.map_)
+        on_all_samples = evaluate_fit(context.measure, tuning, fitted.deviations, fitted.hypothesis)
+        return min(on_all_samples, start, key=lambda candidate: candidate.cost)
+
+    return fit_few_steps
 
 
 def _make_starting_fits(context: SearchContext, base: Fitted, term_sum: Sum) -> list[Fitted]:

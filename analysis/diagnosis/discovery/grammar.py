@@ -62,6 +62,10 @@ POWER_BOUNDS = (0.15, 6.0)
 """Bounds of an exponent: near 0 a power is nearly a step, and a large one nearly an end stop."""
 
 
+STATIC_EXCESS_BOUNDS = (0.02, 20.0)
+"""Bounds of the excess of static over sliding friction, relative to the latter."""
+
+
 @dataclass(frozen=True, slots=True)
 class Axis:
     """Names of one axis's signals, and their largest magnitudes in a recording."""
@@ -165,9 +169,14 @@ def _generate_saturation_terms(axis: Axis) -> Iterator[Term]:
         yield Term(f"{signal_name}/(1 + ({signal_name}/p0)**2)", *width)
         yield Term(f"{signal_name}*exp(-({signal_name}/p0)**2)", *width)
     for share in (0.01, 0.03, 0.1, 0.3):
-        width = (share * axis.speed,), ((1e-3 * axis.speed, 10 * axis.speed),)
-        yield Term(f"sign({axis.v})*exp(-abs({axis.v})/p0)", *width)
-        yield Term(f"sign({axis.v})*exp(-({axis.v}/p0)**2)", *width)
+        speed_bounds = (1e-3 * axis.speed, 10 * axis.speed)
+        for decay in ("exp(-abs({0})/{1})", "exp(-({0}/{1})**2)"):
+            yield Term(f"sign({axis.v})*{decay.format(axis.v, 'p0')}", (share * axis.speed,), (speed_bounds,))
+            yield Term(
+                f"sign({axis.v})*(1 + p0*{decay.format(axis.v, 'p1')})",
+                (0.5, share * axis.speed),
+                (STATIC_EXCESS_BOUNDS, speed_bounds),
+            )
     yield from generate_soft_limit_terms(axis.f, axis.force)
     for share in (0.3, 0.5, 0.7, 0.9):
         yield Term(f"maximum(abs({axis.f}) - p0, 0)*sign({axis.f})", (share * axis.force,), ((0.0, axis.force),))
