@@ -1,6 +1,6 @@
 """Hand-made facts of a session, for folds driven without any device."""
 
-from protocols.document.hashing import protocol_hash
+from protocols.document.hashing import hash_protocol
 from study.session.facts.events import (
     AnswerGiven,
     DeviceFacts,
@@ -25,7 +25,7 @@ def opened(protocol, text, **changes):
         "participant_number": 0,
         "observer": None,
         "protocol_text": text,
-        "protocol_hash": protocol_hash(protocol),
+        "protocol_hash": hash_protocol(protocol),
         "protocol_locked": False,
         "seed": 7,
         "device": DeviceFacts("a device", simulated=False, sample_rate_hz=1000.0),

@@ -1,8 +1,9 @@
-"""Measures of a free device from one recording: friction from slow strokes, frequency response, noise at rest.
+"""Measure a free device (no hand on the handle) from one recording: friction from slow strokes, frequency response,
+noise at rest.
 
 The mean friction force (N) is the work dissipated in a closed stroke, the integral of F dx along its path, divided by
-the length of the path. Springs, weights and inertia do no net work over a closed path, so that no model is needed. Used
-by the daily check of a device (`compare_devices`).
+the length of the path. Springs, weights and inertia do no net work over a closed path, so that no model is needed.
+Called by `compare_devices` for the daily check of a device.
 """
 
 from dataclasses import dataclass, replace
@@ -26,7 +27,7 @@ protocols."""
 
 
 class NotMeasurableError(ValueError):
-    """A measure cannot be computed from the recording; the text says why."""
+    """A measure cannot be computed from the recording; the text of the error is the reason, a clause."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,12 +35,13 @@ class DeviceMeasures:
     """Friction, frequency response and noise of a free device, from a single recording."""
 
     friction_n: FloatArray
-    """(axes,): mean friction force during the strokes along each axis; NaN where the handle moved no further along the
-    axis than across it in any of its strokes."""
+    """(axes,): mean friction force over the strokes along each axis; NaN where in at least one of them the handle moved
+    no further along the axis than across it."""
     friction_error_n: FloatArray
-    """(axes,): standard error of the mean friction, from the standard deviation between strokes."""
+    """(axes,): standard error of the mean friction, from the standard deviation between strokes; NaN as
+    `friction_n`."""
     response: FrequencyResponse
-    """Estimated frequency response from the commands to the responses."""
+    """Estimated frequency response from the commands to the responses of the recording."""
     noise: FloatArray
     """(outputs,): rms of the response at rest after linear detrending, in the unit of the response."""
     noise_samples: int
@@ -51,17 +53,19 @@ def measure_device(recording: Recording) -> DeviceMeasures:
     along every axis, with rests. Raises NotMeasurableError where any of the three cannot be computed."""
     recording = _interpolate_gaps(recording)
     response = _estimate_response(recording)
-    friction = np.array([_measure_friction(recording, axis) for axis in range(len(recording.command.channels))])
+    friction_and_error_n = np.array(
+        [_measure_friction(recording, axis) for axis in range(len(recording.command.channels))]
+    )
     rest_responses = _select_settled_rests(recording)
     if not rest_responses:
         raise NotMeasurableError("the handle is never at rest, so the noise cannot be measured")
-    noise, samples = _measure_noise(recording, rest_responses)
-    return DeviceMeasures(friction[:, 0], friction[:, 1], response, noise, samples)
+    noise, sample_count = _measure_noise(recording, rest_responses)
+    return DeviceMeasures(friction_and_error_n[:, 0], friction_and_error_n[:, 1], response, noise, sample_count)
 
 
 def _interpolate_gaps(recording: Recording) -> Recording:
-    """Interpolate missing samples: a period with one would otherwise be left out. Raises NotMeasurableError without a
-    position, or for too many missing samples."""
+    """Interpolate missing samples of all signals, because the estimate of the frequency response leaves out periods
+    with missing samples. Raises NotMeasurableError without a position, or for too many missing samples."""
     if recording.position is None:
         raise NotMeasurableError("the recording contains no position signal")
     command, response = _fill_missing(recording.command, "command"), _fill_missing(recording.response, "response")
@@ -71,45 +75,44 @@ def _interpolate_gaps(recording: Recording) -> Recording:
 
 
 def _fill_missing(signal: Signal, name: str) -> Signal:
-    """The signal with missing samples interpolated. Raises NotMeasurableError for a share above `MISSED_LIMIT`."""
-    missing = 1 - float(np.isfinite(signal.samples).all(axis=1).mean())
-    if missing > MISSED_LIMIT:
+    """Interpolate the missing samples of a signal. Raises NotMeasurableError where more than `MISSED_LIMIT` of them are
+    missing in at least one channel. name: of the signal, for the error."""
+    gap_share = 1 - float(np.isfinite(signal.samples).all(axis=1).mean())
+    if gap_share > MISSED_LIMIT:
         raise NotMeasurableError(
-            f"{100 * missing:.1f} % of the samples of the {name} are missing; at most {100 * MISSED_LIMIT:g} % are "
+            f"{100 * gap_share:.1f} % of the samples of the {name} are missing; at most {100 * MISSED_LIMIT:g} % are "
             "allowed"
         )
     return replace(signal, samples=fill_gaps(signal.samples))
 
 
 def _estimate_response(recording: Recording) -> FrequencyResponse:
-    """Estimate the frequency response. Raises NotMeasurableError where no spectral line of it is reliable."""
+    """Estimate the frequency response. Raises NotMeasurableError where it cannot be estimated, or where no spectral
+    line is reliable."""
     try:
         response = estimate_transfer([recording])
-    except TransferEstimateError as refusal:
-        raise NotMeasurableError(str(refusal)) from refusal
+    except TransferEstimateError as error:
+        raise NotMeasurableError(str(error)) from error
     if not response.reliable.any():
         raise NotMeasurableError("no line of its frequency response is reliable")
     return response
 
 
 def _measure_friction(recording: Recording, axis: int) -> tuple[float, float]:
-    """Measure the mean friction along an axis and its standard error, both in N, from the work dissipated in each
-    stroke.
-
-    One period of a slow sinusoid is a stroke. Raises NotMeasurableError with fewer than two strokes along the axis.
-    """
-    stroke_n = [
+    """Measure the mean friction along an axis and its standard error, both in N, over its strokes, the periods of slow
+    sinusoids; NaN where any stroke gives NaN. Raises NotMeasurableError with fewer than two strokes along the axis."""
+    losses_n = [
         _measure_loss_per_path(recording, start, start + segment.period, axis)
         for segment in recording.segments
         if _is_stroke(recording, segment) and _find_driven_axis(recording, segment) == axis
         for start in range(segment.start, segment.stop - segment.period + 1, segment.period)
     ]
-    if len(stroke_n) < 2:
+    if len(losses_n) < 2:
         raise NotMeasurableError(
-            f"the recording contains {len(stroke_n)} slow strokes along {recording.command.channels[axis]}; at least 2 "
+            f"the recording contains {len(losses_n)} slow strokes along {recording.command.channels[axis]}; at least 2 "
             "are needed"
         )
-    return float(np.mean(stroke_n)), float(np.std(stroke_n, ddof=1) / np.sqrt(len(stroke_n)))
+    return float(np.mean(losses_n)), float(np.std(losses_n, ddof=1) / np.sqrt(len(losses_n)))
 
 
 def _is_stroke(recording: Recording, segment: Segment) -> bool:
@@ -118,13 +121,14 @@ def _is_stroke(recording: Recording, segment: Segment) -> bool:
 
 
 def _find_driven_axis(recording: Recording, segment: Segment) -> int:
-    """Index of the command with the largest peak-to-peak excitation in a segment."""
+    """Find the index of the command with the largest peak-to-peak excitation in a segment."""
     return int(np.argmax(np.ptp(select_instrument_signal(recording)[segment.start : segment.stop], axis=0)))
 
 
 def _measure_loss_per_path(recording: Recording, start: int, stop: int, axis: int) -> float:
-    """Work of the command force in one stroke, divided by the length of its path along the axis (N); NaN where the
-    handle moved no further along the axis than across it. start, stop: first sample of the stroke and of the next."""
+    """Compute the work of the command force in one stroke, divided by the length of its path along the axis (N); NaN
+    where the handle moved no further along the axis than across it. start, stop: indices of the first sample of the
+    stroke and of the sample after its last."""
     assert recording.position is not None
     position_m = recording.position.samples[start : stop + 1]
     force_n = recording.command.samples[start : start + len(position_m) - 1]
@@ -136,21 +140,27 @@ def _measure_loss_per_path(recording: Recording, start: int, stop: int, axis: in
 
 
 def _select_settled_rests(recording: Recording) -> list[FloatArray]:
-    """Responses (k, outputs) in the second half of each long rest; transients decay in the first half."""
+    """Select the responses (k, outputs) in the second half of each rest that is longer than half the longest;
+    transients decay in the first half. A rest is a run of samples without excitation; empty without any."""
     rests = find_runs(np.asarray(~select_instrument_signal(recording).any(axis=1)))
-    longest = max((stop - start for start, stop in rests), default=0)
+    longest_length = max((stop - start for start, stop in rests), default=0)
     return [
-        recording.response.samples[(start + stop) // 2 : stop] for start, stop in rests if stop - start > longest / 2
+        recording.response.samples[(start + stop) // 2 : stop]
+        for start, stop in rests
+        if stop - start > longest_length / 2
     ]
 
 
 def _measure_noise(recording: Recording, rest_responses: list[FloatArray]) -> tuple[FloatArray, int]:
-    """(outputs,): rms of the response about the least-squares line of each rest, and the number of samples."""
-    squares, samples = np.zeros(len(recording.response.channels)), 0
+    """Compute the rms (outputs,) of the response about the least-squares line of each rest, and the number of
+    samples."""
+    sums_of_squares, sample_count = np.zeros(len(recording.response.channels)), 0
     for rest_response in rest_responses:
-        index = np.arange(len(rest_response)) - (len(rest_response) - 1) / 2
+        centred_index = np.arange(len(rest_response)) - (len(rest_response) - 1) / 2
         detrended = rest_response - rest_response.mean(axis=0)
-        detrended = detrended - np.outer(index, index @ detrended / max(float(index @ index), 1.0))
-        squares += np.sum(detrended**2, axis=0)
-        samples += len(rest_response)
-    return np.sqrt(squares / max(samples, 1)), samples
+        detrended = detrended - np.outer(
+            centred_index, centred_index @ detrended / max(float(centred_index @ centred_index), 1.0)
+        )
+        sums_of_squares += np.sum(detrended**2, axis=0)
+        sample_count += len(rest_response)
+    return np.sqrt(sums_of_squares / max(sample_count, 1)), sample_count

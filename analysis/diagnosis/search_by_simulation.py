@@ -1,7 +1,9 @@
-"""The search by simulation: selects the effects to try, runs `search`, and adds rattling play where that explains more.
+"""Search by simulation for the physical effects that a model lacks: select the effects to try, run `search`, and add
+rattling play (impacts within a clearance) where that explains a mismatch that remains.
 
-Where force balances were fitted first, their laws decide which effects remain to be tried. With clean recordings, the
-model error learned from these counts as noise. Called by `diagnose`.
+Where force balances were fitted first, only effects that a balance cannot observe are tried, and none where a balance
+names a law. With clean recordings (without the fault), the model error learned from these counts as noise. Called by
+`diagnose`.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,11 +34,12 @@ if TYPE_CHECKING:
 
 
 BALANCE_TESTED_EFFECTS = ("force_deadband", "force_saturation", "force_nonlinearity")
-"""Laws of the command that a force balance tests; a law that it does not name is taken as absent."""
+"""Names of the effects of the actuator that a force balance tests; those that it does not name are taken as absent."""
 LOWEST_MAINS_HZ = 45.0
 """Lowest frequency (Hz) at which a tone is accepted as mains hum: power grids run at 50 or 60 Hz."""
 GAIN_EFFECTS = ("force_gain", "sensor_gain")
-"""Effects that a model fitted to the recordings absorbs: a wrong gain shows only with a calibrated model."""
+"""Names of the effects that a model fitted to the recordings absorbs: a wrong gain shows only with a calibrated
+model."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,8 +54,8 @@ class SearchOutcome:
 def make_search_context(
     recording: Recording, fitting: FittingMeasure, settings: DiagnosisSettings, map_: Mapper
 ) -> SearchContext:
-    """Make the shared state of the search. recording: as given by the user, for names and units; the records of a
-    measure that compares forces differ from it."""
+    """Make the shared state of the search. recording: as given by the user, for names and units, because the records of
+    a measure that compares forces have others. map_: maps a function over items, possibly in parallel."""
     measure = fitting.chosen.measure
     model = adopt_recording_units(
         fitting.model, recording.command.units, recording.response.units, select_time_unit(recording)
@@ -69,9 +72,10 @@ def search_by_simulation(
     progress: Progress,
     balances: "Sequence[Balance]",
 ) -> SearchOutcome:
-    """Search by simulation for the missing effects. balances: force balances of the same recordings, if any; where they
-    name a law, no effect is tried, else only effects of the actuator and the sensor that a balance cannot observe.
-    Raises IncomparableRecordingsError with clean recordings from which no model error can be learned."""
+    """Search by simulation for the missing effects. balances: force balances of the same recordings; where one names a
+    law, no effect is tried, else only effects of the actuator and the sensor that a balance cannot observe; empty: all
+    effects are tried. Raises IncomparableRecordingsError with clean recordings from which no model error can be
+    learned."""
     chosen, context = fitting.chosen, make_search_context(recordings[0], fitting, settings, map_)
     catalogue = _select_catalogue(settings, recordings[0], context.excluded)
     nameable_effects = [effect for effect in catalogue if effect.name not in context.excluded]
@@ -82,29 +86,29 @@ def search_by_simulation(
         catalogue = (
             []
             if has_named_law
-            else [e for e in catalogue if _is_unobservable(e.name, find_place(e), is_complete_command)]
+            else [entry for entry in catalogue if _is_unobservable(entry.name, find_place(entry), is_complete_command)]
         )
         nameable_effects = []
-    impacts = _ImpactSearch(fitting, nameable_effects, settings, progress)
+    impact_search = _ImpactSearch(fitting, nameable_effects, settings, progress)
     if settings.clean:
-        observable = [effect for effect in nameable_effects if chosen.measure.can_observe(effect)]
+        observable_effects = [effect for effect in nameable_effects if chosen.measure.can_observe(effect)]
         outcome = _search_with_learned_error(
-            recordings, fitting.model, (context, catalogue, observable), settings, progress
+            recordings, fitting.model, (context, catalogue, observable_effects), settings, progress
         )
     else:
-        outcome = _search(context, catalogue, settings, progress, impacts)
+        outcome = _search(context, catalogue, settings, progress, impact_search)
         if has_low_hum(outcome.result.found):
             catalogue = [effect for effect in catalogue if effect.name != HUM]
-            impacts = _ImpactSearch(fitting, nameable_effects, settings, progress)
-            outcome = _search(context, catalogue, settings, progress, impacts)
+            impact_search = _ImpactSearch(fitting, nameable_effects, settings, progress)
+            outcome = _search(context, catalogue, settings, progress, impact_search)
     if balances and outcome.result.judgement.named:
-        repeats = all(floor.method == "repeats" for floor in chosen.floors)
-        outcome = replace(outcome, result=unname_doubtful_effects(require_enough_gain(outcome.result, repeats)))
-    return replace(outcome, result=impacts.explain_at_end(outcome.result))
+        is_repeated = all(floor.method == "repeats" for floor in chosen.floors)
+        outcome = replace(outcome, result=unname_doubtful_effects(require_enough_gain(outcome.result, is_repeated)))
+    return replace(outcome, result=impact_search.explain_at_end(outcome.result))
 
 
 class _ImpactSearch:
-    """The search for rattling play, compared by band power. It runs once, before a third effect or at the end; again
+    """Search for rattling play, compared by band power. It runs once, before a third effect or at the end, and again
     only where the result has gained effects, which are then rivals of play."""
 
     def __init__(
@@ -116,18 +120,22 @@ class _ImpactSearch:
         self._searched_step_count = -1
 
     def explain_before_third_effect(self, result: SearchResult) -> SearchResult:
-        """Return the result with play, where the drive repeats, two effects leave the mismatch unexplained, and play
-        explains all of it: a third effect would take much time and could not predict a chaotic waveform."""
-        repeats = any(floor.method == "repeats" for floor in self._fitting.chosen.floors)
-        unexplained = not result.judgement.named and judge(result.found).verdict == "unexplained"
-        if not repeats or not unexplained or has_low_hum(result.found) or not self._settings.time_left():
+        """Return the result with play, where the drive repeats, the mismatch is unexplained, and play explains all of
+        it; else the result unchanged. A third effect would take much time and could not predict a chaotic waveform."""
+        is_repeated = any(floor.method == "repeats" for floor in self._fitting.chosen.floors)
+        is_unexplained = not result.judgement.named and judge(result.found).verdict == "unexplained"
+        if not is_repeated or not is_unexplained or has_low_hum(result.found) or not self._settings.time_left():
             return result
-        with_play = self._search_for_play(result)
-        return with_play if with_play is not None and with_play.judgement.verdict == "explained" else result
+        result_with_play = self._search_for_play(result)
+        return (
+            result_with_play
+            if result_with_play is not None and result_with_play.judgement.verdict == "explained"
+            else result
+        )
 
     def explain_at_end(self, result: SearchResult) -> SearchResult:
-        """Return the result with play, where the search leaves a mismatch that play explains; else the result as it is,
-        as where a discovered law is named, a sensor fault is certain, or no time is left."""
+        """Return the result with play, where the search leaves a mismatch that play explains; else the result
+        unchanged, also where a discovered law is named, a sensor fault is certain, or no time is left."""
         has_mismatch = result.judgement.verdict in ("unexplained", "partly_explained") and not has_discovered_law(
             result
         )
@@ -136,8 +144,9 @@ class _ImpactSearch:
         return self._search_for_play(result) or result
 
     def _search_for_play(self, result: SearchResult) -> SearchResult | None:
-        """Return the result with play, or None where play does not explain the recordings. Cached until the result has
-        more effects. Where the time ended before that is known, the result with a remark that says so."""
+        """Return the result with play, or None where play does not explain the recordings; the result with the remark
+        `OUT_OF_TIME` where the time ended before this was known. The return value is cached until `result` has more
+        effects."""
         if self._searched_step_count < 0 or (
             self._play_result is not None and len(result.found.steps) > self._searched_step_count
         ):
@@ -171,11 +180,11 @@ def _search_with_learned_error(
     from analysis.diagnosis.reference.model_free_faults import find_sensor_faults
     from analysis.diagnosis.reference.search_with_reference import search_with_reference
 
-    context, catalogue, observable = search_inputs
-    learned = learn_model_error(settings.clean, model, recordings, context.map_, progress)
-    context = replace(context, certain=find_sensor_faults(recordings, settings.clean, observable))
-    result = search_with_reference(context, learned, catalogue, progress, settings.time_left)
-    return SearchOutcome(result, learned.floor)
+    context, catalogue, observable_effects = search_inputs
+    learned_error = learn_model_error(settings.clean, model, recordings, context.map_, progress)
+    context = replace(context, certain=find_sensor_faults(recordings, settings.clean, observable_effects))
+    result = search_with_reference(context, learned_error, catalogue, progress, settings.time_left)
+    return SearchOutcome(result, learned_error.floor)
 
 
 def _search(
@@ -183,25 +192,31 @@ def _search(
     catalogue: Sequence[Effect],
     settings: DiagnosisSettings,
     progress: Progress,
-    impacts: _ImpactSearch,
+    impact_search: _ImpactSearch,
 ) -> SearchOutcome:
     """Search without clean recordings: with laws outside the catalogue where `settings` asks for them, and, unless
     the model was fitted to the recordings, repeated with a wider bound where needed."""
-    law_searches = FurtherSearches(before_thirds=impacts.explain_before_third_effect)
+    law_searches = FurtherSearches(before_thirds=impact_search.explain_before_third_effect)
     if settings.discovery and not settings.fitted:
         # Imported here, because only a diagnosis that searches for laws needs their grammar.
         from analysis.diagnosis.discovery.add_laws import LawSearch
 
-        laws = LawSearch(progress, settings.time_left)
+        law_search = LawSearch(progress, settings.time_left)
 
         def explain_before_third_effect(pair_result: SearchResult) -> SearchResult:
-            """Try rattling play, then laws."""
-            with_play = impacts.explain_before_third_effect(pair_result)
-            is_unchanged = with_play.found is pair_result.found
-            return _skip_with_hum(laws.add_before_third)(pair_result) if is_unchanged else with_play
+            """Add rattling play; where that changes nothing, search for laws."""
+            result_with_play = impact_search.explain_before_third_effect(pair_result)
+            is_unchanged = result_with_play.found is pair_result.found
+            return (
+                _skip_law_search_with_hum(law_search.add_before_third)(pair_result)
+                if is_unchanged
+                else result_with_play
+            )
 
         law_searches = FurtherSearches(
-            _skip_with_hum(laws.add_short), explain_before_third_effect, _skip_with_hum(laws.add_any)
+            _skip_law_search_with_hum(law_search.add_short),
+            explain_before_third_effect,
+            _skip_law_search_with_hum(law_search.add_any),
         )
     result = search_effects(context, catalogue, progress, settings.time_left, law_searches)
     # A model that was fitted to the recordings has no calibration, hence no bound to widen.
@@ -210,7 +225,9 @@ def _search(
     return SearchOutcome(result, ModelErrorFloor())
 
 
-def _skip_with_hum(add_laws: Callable[[SearchResult], SearchResult]) -> Callable[[SearchResult], SearchResult]:
+def _skip_law_search_with_hum(
+    add_laws: Callable[[SearchResult], SearchResult],
+) -> Callable[[SearchResult], SearchResult]:
     """Wrap the law search: skip it where hum below mains frequency was found, because the search is then repeated
     without hum before any law is added."""
     return lambda result: result if has_low_hum(result.found) else add_laws(result)
@@ -222,19 +239,21 @@ def _select_catalogue(settings: DiagnosisSettings, recording: Recording, exclude
     omitted = {*settings.without, *(GAIN_EFFECTS if settings.fitted and not settings.clean else ())}
     all_effects = (*CATALOGUE, *make_library_effects(settings.kept, recording))
     catalogue = [effect for effect in all_effects if effect.name not in omitted]
-    refined = {name for effect in catalogue for name in effect.simpler}
-    return catalogue + [effect for effect in CATALOGUE if effect.name in refined & excluded]
+    refined_names = {name for effect in catalogue for name in effect.simpler}
+    return catalogue + [effect for effect in CATALOGUE if effect.name in refined_names & excluded]
 
 
 def _is_unobservable(name: str, place: str, is_complete_command: bool) -> bool:
-    """Whether a force balance cannot observe an effect of the actuator or the sensor. complete: an actuator drives the
-    device with the commands as recorded, neither reduced by other forces nor with an imposed motion."""
+    """Whether an effect is of the sensor or the actuator and a force balance cannot observe it. name, place: of the
+    effect. is_complete_command: whether an actuator drives the device with the commands as recorded, neither reduced by
+    other forces nor with an imposed motion; otherwise effects of the actuator do not show at all."""
     is_untested = name != "body_on_actuator" and name not in BALANCE_TESTED_EFFECTS
     return place == "sensor" or (place == "actuator" and is_complete_command and is_untested)
 
 
 def has_low_hum(explanation: Explanation) -> bool:
-    """Whether mains hum was named at a frequency below `LOWEST_MAINS_HZ`: such a line comes from the drive itself."""
+    """Whether mains hum was placed at a frequency below `LOWEST_MAINS_HZ`: such a spectral line comes from the
+    excitation, not from the power grid."""
     placed_effects = explanation.after.fitted.hypothesis.list_placed_effects()
     return any(effect.effect.name == HUM and effect.values["frequency"] < LOWEST_MAINS_HZ for effect in placed_effects)
 

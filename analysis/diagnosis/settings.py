@@ -322,7 +322,7 @@ REVERSED_SIGN_GAIN = 0.1
 DERIVATIVE_NEEDED = 0.02
 
 # Reference predictions by which both sets are compared (`bases`, `force_base`, `autoregressive_base`, `sensor_base`,
-# `part`). By hand.
+# `recording_part`). By hand.
 BALANCE_HOLDS = 0.35  # largest share of the force's rms that a usable force balance leaves unexplained
 CONSTANT_SIGNAL = 0.0001  # standard deviation of a signal over its rms below which it counts as constant
 # ratio of the motions of both sets above which they are not compared: a recording of motion does not predict a device
@@ -356,7 +356,7 @@ SIZE_IS_NEAR = 0.02  # relative change of a fault's size, below which its invers
 # largest number of rounds in which a fault with a nonlinear inverse is inverted again at the size found before
 UNDOING_ROUNDS = 4
 
-# Which faults are named (`contrast.decide`). By hand.
+# Which faults are named (`contrast.choose_fault`). By hand.
 # factor by which the gain of a fault must exceed the largest gain between stretches of one set. By hand: for six public
 # devices without a fault, the factor between two halves was up to 3.7
 FAULT_BEYOND = 5.0

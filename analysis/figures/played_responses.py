@@ -1,8 +1,9 @@
-"""Magnitude of the response from target to delivered acceleration, with and without equalizer (published figure 5).
+"""Figure of the magnitude response from target to delivered acceleration, with and without equalizer (published
+figure 5).
 
 Each row of panels is one condition (centre or edge of the workspace, equalizer, friction), each column the axis of the
-target acceleration. A perfect equalizer gives 0 dB along that axis and nothing across it. `played_response` defines
-the response; `reproduction_pictures` calls this module.
+target acceleration. A perfect equalizer gives 0 dB along that axis and no response along the others. `played_response`
+defines the response; `reproduction_pictures` calls this module.
 """
 
 from collections.abc import Sequence
@@ -20,8 +21,9 @@ from analysis.figures.style import BLUE, GREEN, GREY, VERMILLION, create_figure,
 
 _AXES = "xyz"
 _COLOURS = (BLUE, VERMILLION, GREEN)
+"""Colours of the delivered axes x, y, z."""
 _LOWEST_DB, _HIGHEST_DB = -55.0, 12.0
-"""Range of the vertical axis, dB."""
+"""Range of the vertical axis (dB). Chosen."""
 _TICKS_HZ = (5, 10, 20, 35)
 """Ticks of the frequency axis, as in the published figure."""
 
@@ -53,8 +55,8 @@ def make_friction_picture(playbacks: Sequence[PlayedResponse]) -> Picture:
 
 
 def draw_played_responses(playbacks: Sequence[PlayedResponse]) -> Figure:
-    """Figure with a row of panels per response and three columns, one per axis of the target acceleration; a note
-    where nothing was played."""
+    """Draw a row of panels per response and three columns, one per axis of the target acceleration; a note where there
+    are no responses. Sizes in inches."""
     if not playbacks:
         return draw_no_data_note(create_figure(8.6, 2.0), "Nothing was played.")
     figure = create_figure(8.6, 0.8 + 1.75 * len(playbacks))
@@ -74,8 +76,8 @@ def draw_played_responses(playbacks: Sequence[PlayedResponse]) -> Figure:
 
 
 def _draw_panel(axes: Axes, playback: PlayedResponse, target_axis: int) -> None:
-    """Draw |T| in dB over frequency for the three delivered axes. target_axis: index of the axis of the
-    target, drawn thicker."""
+    """Draw |T| (dB) over frequency for the three delivered axes, the target's with a thicker line. target_axis: index
+    of the axis of the target."""
     style_axes(axes)
     axes.axhline(0, color=GREY, linewidth=0.8)
     for delivered_axis, colour in enumerate(_COLOURS):

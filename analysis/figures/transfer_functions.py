@@ -2,7 +2,7 @@
 
 Magnitude over frequency, both logarithmic, a panel per entry of the transfer matrix. Lines are averaged over bins of
 1/24 octave (`octave_bins`); the range of single lines and their expected noise are drawn as well, and on request the
-response of a fitted model. Called for the identification report and the reproduction of the paper.
+response of a fitted model. Called by `identification_report` and `reproduction_pictures`.
 """
 
 from collections.abc import Sequence
@@ -22,11 +22,11 @@ from equalizer.identification.frequency_response.octave_bins import OctaveBins, 
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _BIN_WIDTH_OCTAVES = 1 / 24
-"""Width of a bin in which lines are averaged for drawing, octaves."""
+"""Width of a bin in which lines are averaged for drawing, octaves. Chosen; the caption states it."""
 _UNRELIABLE_COLOUR = "#B8B8B8"
-"""Colour of bins that are not reliable."""
+"""Colour (grey) of bins that are not reliable."""
 _BAND_COLOUR = "#EEF3E6"
-"""Colour of a marked frequency band."""
+"""Colour (light green) of a marked frequency band."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,7 +34,9 @@ class ResponseCurve:
     """A response to draw on top of the measured response, such as that of a fitted model."""
 
     name: str
+    """Label in the legend."""
     frequency_hz: FloatArray
+    """(lines,), Hz."""
     response: ComplexArray
     """(lines, outputs, inputs), complex, in the unit of the measured response."""
 
@@ -57,8 +59,8 @@ def make_transfer_functions_picture(
 def draw_transfer_functions(
     response: FrequencyResponse, model: ResponseCurve | None = None, band_hz: tuple[float, float] | None = None
 ) -> Figure:
-    """Draw the magnitudes of all entries, a row per output and a column per input. model: drawn dashed; band_hz:
-    drawn shaded."""
+    """Draw the magnitudes of all entries, a row per output and a column per input; a note without any line. model:
+    drawn dashed; band_hz: drawn shaded."""
     if not len(response):
         return draw_no_data_note(create_figure(8.6, 2.0), "There is no line to draw.")
     output_count, input_count = response.response.shape[1:]
@@ -79,8 +81,10 @@ def draw_transfer_functions(
         f"Magnitude ({_typeset_unit(response.output_unit)} per {_typeset_unit(response.input_unit)})", fontsize=10
     )
     figure.supxlabel("Frequency (Hz)", fontsize=10)
-    handles = _make_legend_handles(bins, model, band_hz)
-    figure.legend(handles=handles, loc="outside upper center", ncols=len(handles), fontsize=8.5, frameon=False)
+    legend_handles = _make_legend_handles(bins, model, band_hz)
+    figure.legend(
+        handles=legend_handles, loc="outside upper center", ncols=len(legend_handles), fontsize=8.5, frameon=False
+    )
     return figure
 
 
@@ -120,10 +124,14 @@ def _scale_axes(axes: Axes, bins: OctaveBins) -> None:
     half its 1 % quantile, so that a single low bin does not set it."""
     axes.set_xscale("log")
     axes.set_yscale("log")
-    lowest_hz = 1.0 if bins.frequency_hz[-1] > 1.0 else 0.0  # of slow or untimed recordings, all is shown
-    in_range = bins.frequency_hz >= lowest_hz
+    lowest_hz = (
+        1.0 if bins.frequency_hz[-1] > 1.0 else 0.0
+    )  # if no line is above 1 Hz, as for slow or untimed recordings, all are shown
+    is_in_range = bins.frequency_hz >= lowest_hz
     axes.set_xlim(max(lowest_hz, float(bins.frequency_hz[0])), float(bins.frequency_hz[-1]))
-    magnitude = np.abs(bins.response[in_range & bins.reliable if (in_range & bins.reliable).any() else in_range])
+    magnitude = np.abs(
+        bins.response[is_in_range & bins.reliable if (is_in_range & bins.reliable).any() else is_in_range]
+    )
     axes.set_ylim(0.5 * float(np.quantile(magnitude, 0.01)), 2.0 * float(magnitude.max()))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

@@ -1,8 +1,8 @@
-"""Rms level of commands and responses in each segment, and a check of their proportionality.
+"""Rms level of commands and responses in each segment, and a check of their proportionality (linearity).
 
-In a linear device the response grows in proportion to the command. A gain that differs between the weakest and the
-strongest segment indicates a nonlinearity (friction, end stops, hardening, saturation), or noise.
-Called by `analysis.look.overview`.
+In a linear device the response grows in proportion to the command. A gain (rms of the response over rms of the command)
+that differs between the weakest and the strongest segment indicates a nonlinearity (friction, end stops, hardening,
+saturation), or noise. Called by `analysis.look.overview`.
 """
 
 from collections.abc import Sequence
@@ -16,31 +16,34 @@ from analysis.wording import typeset
 from equalizer.signals.recording import Recording, Segment
 
 LEVELS = "levels"
-"""Name of the check."""
+"""Name of the check in a report."""
 _LEAST_LEVEL_RATIO = 1.5
-"""Least ratio of the strongest to the weakest command for which gains are compared."""
+"""Ratio of the strongest to the weakest command above which gains are compared. Chosen."""
 NOTABLE_GAIN_CHANGE, LARGE_GAIN_CHANGE = 0.05, 0.3
-"""Relative change of the gain (rms of response over rms of command) above which it is reported, and called large."""
+"""Relative changes of the gain from the weakest to the strongest segment, from which it is noted, and above which it is
+called large. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
 class SegmentLevel:
-    """A segment with its start and duration (s) and the rms of every channel in it."""
+    """A segment of a recording with the rms of every channel in it."""
 
     number: int
     """Number of the segment from 1; 0 for a recording without segments."""
     kind: str
     role: str
+    """Kind of excitation, and role, as in `Segment`."""
     start_s: float
     duration_s: float
+    """Start and duration (s)."""
     period: int
     """Samples per period; 0 = not periodic."""
     rms: tuple[float, ...]
-    """Rms about the mean of each channel, in the channel's unit."""
+    """Rms about the mean of each channel over its finite samples, in the channel's unit."""
 
 
 def compute_segment_levels(recording: Recording, channels: Sequence[Channel]) -> tuple[SegmentLevel, ...]:
-    """Compute the levels of all segments, or of the whole recording where it has no segments."""
+    """Compute the levels of all segments, or of the full recording, kind "unmarked", where it has no segments."""
     full_record = (Segment(0, len(recording), "unmarked"),)
     rate_hz = recording.sample_rate_hz
     return tuple(
@@ -64,8 +67,9 @@ def _select_finite_samples(channel: Channel, segment: Segment) -> np.ndarray:
 
 
 def check_proportionality(levels: Sequence[SegmentLevel], channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """Check the proportionality of each response over segments of the most frequent kind, for each set of active
-    commands. Empty where commands differ in unit, or no segment is excited."""
+    """Check the proportionality of each response over the excited segments of the most frequent kind, for each set of
+    driven commands. Empty where commands differ in unit, no segment is excited (all are rest or free), or levels are
+    too similar (`_LEAST_LEVEL_RATIO`)."""
     command_indices = [index for index, channel in enumerate(channels) if channel.role == "command"]
     excited_kinds = [level.kind for level in levels if level.kind not in ("rest", "free")]
     if not excited_kinds or len({channels[index].unit for index in command_indices}) > 1:
@@ -95,12 +99,12 @@ def check_proportionality(levels: Sequence[SegmentLevel], channels: Sequence[Cha
 
 
 def _compute_command_rms(level: SegmentLevel, command_indices: Sequence[int]) -> float:
-    """Compute the root of the sum of squares of the commands' rms, in their common unit."""
+    """Compute the root of the sum of squares of the rms of all commands, in their common unit."""
     return float(np.hypot.reduce([level.rms[index] for index in command_indices]))
 
 
 def _find_active_commands(level: SegmentLevel, command_indices: Sequence[int]) -> tuple[bool, ...]:
-    """Find the driven commands: True where the rms exceeds a tenth of the largest in this segment."""
+    """Find the driven commands: True where the rms exceeds a tenth (chosen) of the largest in this segment."""
     strongest_rms = max(level.rms[index] for index in command_indices)
     return tuple(level.rms[index] > 0.1 * strongest_rms for index in command_indices)
 
@@ -108,22 +112,22 @@ def _find_active_commands(level: SegmentLevel, command_indices: Sequence[int]) -
 def _compare_response_gains(
     comparable_levels: Sequence[tuple[float, SegmentLevel]], response_index: int, channel: Channel
 ) -> Check | None:
-    """Compare the gains of one response in the weakest and the strongest segment; None where it does not move.
-
-    comparable: (rms of the command, segment) of comparable segments. response: index of the channel.
-    """
+    """Compare the gains of one response in the weakest and the strongest segment; None where its rms is 0 in one of
+    them. comparable_levels: at least two pairs (rms of the commands, level). response_index: index of `channel`."""
     ordered_levels = sorted(comparable_levels, key=lambda pair: pair[0])
     weakest, strongest = ordered_levels[0], ordered_levels[-1]
     if weakest[1].rms[response_index] == 0 or strongest[1].rms[response_index] == 0:
         return None
     gains = [level.rms[response_index] / command_rms for command_rms, level in (weakest, strongest)]
     gain_change = gains[1] / gains[0] - 1
-    text = (
+    sentence = (
         f"From the weakest to the strongest {weakest[1].kind} ({strongest[0] / weakest[0]:.3g} times) the rms of "
         f"{channel.label} over that of the command changes by {typeset(f'{100 * gain_change:+.3g}')} %."
     )
     if abs(gain_change) < NOTABLE_GAIN_CHANGE:
-        return Check(LEVELS, "fine", text)
+        return Check(LEVELS, "fine", sentence)
     is_large = abs(gain_change) > LARGE_GAIN_CHANGE
     advice = "The device is far from linear: friction, stops, hardening or saturation." if is_large else ""
-    return Check(LEVELS, "notice", text, advice or "The device is slightly nonlinear, or noise contributes to the rms.")
+    return Check(
+        LEVELS, "notice", sentence, advice or "The device is slightly nonlinear, or noise contributes to the rms."
+    )

@@ -1,14 +1,14 @@
-"""One-way analysis of variance between groups, as the study was published.
+"""One-way analysis of variance between groups, the test of the published direction-threshold study.
 
-It treats all values as coming from different people. Where the same people gave all groups (here: every participant
-takes every frequency) their differences stay in the error term, and the test is weaker than the data allow; see
-`analysis.psychophysics.repeated_measures` for the analysis that removes them. With k groups and N values,
+All values are taken as independent. Where the same participants contribute to all groups (here: every participant is
+tested at every frequency), the differences between participants stay in the error term, which lowers the power;
+`analysis.psychophysics.repeated_measures` removes them. With k groups and N values,
 
     F = (SS_between / (k - 1)) / (SS_within / (N - k))          eta² = SS_between / SS_total
     omega² = (SS_between - (k - 1) MS_within) / (SS_total + MS_within)
 
 References: Fisher, Statistical Methods for Research Workers (1925); Hays, Statistics (1963), for omega².
-Called by `analysis.psychophysics.study_analysis` and by the simulated studies of `power.power_curve`.
+Called by `study_analysis`, and by `power.power_curve` for simulated studies.
 """
 
 import math
@@ -28,13 +28,14 @@ class GroupSummary:
     name: str
     n: int
     mean: float | None
+    """None without values."""
     sd: float | None
     """Sample standard deviation; None below two values."""
 
 
 @dataclass(frozen=True, slots=True)
 class OneWayAnova:
-    """Result of a one-way ANOVA. Values that the data do not determine are None; `notes` say why, in sentences."""
+    """Result of a one-way ANOVA. Values that the data do not determine are None; `notes` state the reasons."""
 
     groups: tuple[GroupSummary, ...]
     df_between: int | None
@@ -51,8 +52,9 @@ class OneWayAnova:
 
 
 def compute_one_way_anova(groups: Mapping[str, Sequence[float | None]]) -> OneWayAnova:
-    """Compute a one-way ANOVA over named groups of values, all in one unit. None and NaN are gaps and left out; groups
-    may differ in size. Never raises: what the data do not determine is None, with the reason in `notes`."""
+    """Compute a one-way ANOVA over named groups of values, all in one unit. None, NaN and infinite values are left out
+    as missing; groups may differ in size. What the data do not determine is None, with the reason in `notes`; no data
+    raise an exception."""
     samples = {name: _select_finite_values(values) for name, values in groups.items()}
     summaries = tuple(_summarise_group(name, sample) for name, sample in samples.items())
     gap_count = sum(len(values) for values in groups.values()) - sum(len(sample) for sample in samples.values())
@@ -72,8 +74,8 @@ def compute_one_way_anova(groups: Mapping[str, Sequence[float | None]]) -> OneWa
 def _compute_anova(
     nonempty_groups: list[FloatArray], summaries: tuple[GroupSummary, ...], notes: list[str]
 ) -> OneWayAnova:
-    """Evaluate the equations of the module. nonempty_groups: at least two groups, not empty, with more values than
-    groups."""
+    """Evaluate the equations of the module; no F and p where all values within each group are equal. nonempty_groups:
+    at least two arrays (n,), n >= 1, with more values in total than groups."""
     all_values = np.concatenate(nonempty_groups)
     grand_mean = all_values.mean()
     ss_between = float(sum(len(sample) * (sample.mean() - grand_mean) ** 2 for sample in nonempty_groups))
@@ -101,8 +103,8 @@ def _compute_anova(
 
 
 def is_rounding_error(sum_of_squares: float, values: FloatArray) -> bool:
-    """Whether a sum of squares of differences is nothing but rounding of the values (n,) that it was computed from: at
-    most n (64 eps max |value|)², eps the relative spacing of 64-bit floats. 64 by hand."""
+    """Whether a sum of squared differences of values (n,), n >= 1, is within their rounding error: at most
+    n (64 eps max |value|)², with eps the relative spacing of 64-bit floats; the factor 64 is chosen."""
     largest_magnitude = float(np.abs(values).max())
     return bool(sum_of_squares <= values.size * (64 * np.finfo(float).eps * largest_magnitude) ** 2)
 
@@ -125,5 +127,5 @@ def _summarise_group(name: str, sample: FloatArray) -> GroupSummary:
 def _make_undetermined_anova(
     groups: tuple[GroupSummary, ...], notes: list[str], df_between: int | None = None, df_within: int | None = None
 ) -> OneWayAnova:
-    """Make a result without sums of squares, F and p; degrees of freedom where they are known."""
+    """Make a result without sums of squares, F and p; without degrees of freedom where they are None."""
     return OneWayAnova(groups, df_between, df_within, None, None, None, None, None, None, None, tuple(notes))

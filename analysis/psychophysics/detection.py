@@ -1,7 +1,8 @@
 """Detection thresholds from two-interval forced choice: one of two intervals of each trial holds a stimulus.
 
-Chance is 50 %, as for the choice of a direction, so the same staircase converges at the same proportion of right
-answers. Sensitivity is d' = (z(H) - z(F)) / sqrt(2). Direction thresholds are then given in dB above detection.
+Chance is 50 %, as in direction identification, so the same staircase converges at the same proportion correct.
+Sensitivity is d' = (z(H) - z(F)) / sqrt(2). Direction thresholds are then expressed in dB above detection. A threshold
+is censored ("cut") where the force cap limited its staircase (`thresholds.Threshold.censored`).
 
 Source of the two-interval sensitivity: N. A. Macmillan, C. D. Creelman, Detection Theory: A User's Guide, 2nd ed.
 (2005), chapter 7. Called by `analysis.psychophysics.study_analysis` for protocols with a detection phase.
@@ -22,7 +23,8 @@ from protocols.trial import Phase, Trial
 
 @dataclass(frozen=True, slots=True)
 class BelowDetection:
-    """A direction threshold below the detection threshold of the same participant and frequency."""
+    """A direction threshold below the detection threshold of the same participant and frequency, which is not
+    plausible: a direction cannot be identified without detection."""
 
     subject: str
     frequency_hz: float
@@ -36,7 +38,7 @@ def compute_detection_thresholds(trials: Iterable[Trial], protocol: StudyProtoco
     """Compute the threshold of each detection run. `d_prime` is that of two intervals; criterion as in
     `analysis.psychophysics.bias`.
 
-    Raises InconsistentTrialsError (a ValueError) where the trials contradict the rule.
+    Raises InconsistentTrialsError (a ValueError) where the trials contradict the staircase rule.
     """
     rule = make_staircase_rule(protocol, Phase.DETECTION)
     thresholds = (compute_run_threshold(run, rule) for run in recompute_runs(trials, rule, Phase.DETECTION))
@@ -49,9 +51,9 @@ def compute_detection_thresholds(trials: Iterable[Trial], protocol: StudyProtoco
 
 def compute_thresholds_above_detection(direction: ThresholdTable, detection: ThresholdTable) -> ThresholdTable:
     """Express direction thresholds in dB above the detection threshold of the same participant and frequency; None
-    where either is missing. Both tables in newtons. A value is marked as cut where the cap cut either threshold."""
+    where either is missing. Both tables in newtons. A value is censored where either threshold is."""
     rows_db, censored = [], []
-    for subject, row, cut_flags in zip(direction.subjects, direction.values, direction.censored, strict=True):
+    for subject, row, censored_flags in zip(direction.subjects, direction.values, direction.censored, strict=True):
         detection_cells = [
             _look_up_detection_threshold(detection, subject, frequency_hz) for frequency_hz in direction.frequencies_hz
         ]
@@ -62,7 +64,12 @@ def compute_thresholds_above_detection(direction: ThresholdTable, detection: Thr
             )
         )
         censored.append(
-            tuple(is_censored or is_cut for is_censored, (_, is_cut) in zip(cut_flags, detection_cells, strict=True))
+            tuple(
+                is_direction_censored or is_detection_censored
+                for is_direction_censored, (_, is_detection_censored) in zip(
+                    censored_flags, detection_cells, strict=True
+                )
+            )
         )
     return replace(direction, quantity="above_detection_db", values=tuple(rows_db), censored=tuple(censored), notes=())
 
@@ -70,7 +77,7 @@ def compute_thresholds_above_detection(direction: ThresholdTable, detection: Thr
 def _look_up_detection_threshold(
     detection: ThresholdTable, subject: str, frequency_hz: float
 ) -> tuple[float | None, bool]:
-    """Look up a detection threshold (N; None where missing), and whether the cap cut it."""
+    """Look up a detection threshold (N; None where missing), and whether it is censored."""
     if subject not in detection.subjects or frequency_hz not in detection.frequencies_hz:
         return None, False
     row, column = detection.subjects.index(subject), detection.frequencies_hz.index(frequency_hz)
@@ -79,16 +86,18 @@ def _look_up_detection_threshold(
 
 def find_directions_below_detection(direction: ThresholdTable, detection: ThresholdTable) -> tuple[BelowDetection, ...]:
     """Find participants and frequencies whose direction threshold lies below their detection threshold. Both tables in
-    newtons; direction thresholds that the cap cut are left out."""
-    detection_n = {
+    newtons; censored direction thresholds are left out."""
+    detection_thresholds_n = {
         (subject, frequency_hz): threshold_n
         for subject, row in zip(detection.subjects, detection.values, strict=True)
         for frequency_hz, threshold_n in zip(detection.frequencies_hz, row, strict=True)
         if threshold_n is not None
     }
     return tuple(
-        BelowDetection(subject, frequency_hz, threshold_n, detection_n[subject, frequency_hz])
-        for subject, row, cut_flags in zip(direction.subjects, direction.values, direction.censored, strict=True)
-        for frequency_hz, threshold_n, is_cut in zip(direction.frequencies_hz, row, cut_flags, strict=True)
-        if threshold_n is not None and not is_cut and threshold_n < detection_n.get((subject, frequency_hz), 0.0)
+        BelowDetection(subject, frequency_hz, threshold_n, detection_thresholds_n[subject, frequency_hz])
+        for subject, row, censored_flags in zip(direction.subjects, direction.values, direction.censored, strict=True)
+        for frequency_hz, threshold_n, is_censored in zip(direction.frequencies_hz, row, censored_flags, strict=True)
+        if threshold_n is not None
+        and not is_censored
+        and threshold_n < detection_thresholds_n.get((subject, frequency_hz), 0.0)
     )

@@ -1,7 +1,8 @@
-"""Runs of a study recomputed from the raw answers: the levels in the file are checked, not trusted.
+"""Recompute the runs of a study from the recorded answers, and check the recorded levels against them.
 
 The rule of the protocol (`protocols.procedure.staircase`: staircase or Psi) is replayed with the recorded answers. A
-level that differs from the replayed one, or a missing, doubled or surplus trial, raises InconsistentTrialsError.
+level that differs from the replayed one, or a missing, doubled or surplus trial, raises InconsistentTrialsError. Called
+by `study_analysis`, `thresholds` and `detection`.
 """
 
 import itertools
@@ -22,13 +23,13 @@ from protocols.procedure.staircase import (
 from protocols.trial import PARTICIPANT_CAUSES, Phase, Trial, TrialStatus
 
 LEVEL_TOLERANCE = 1e-4
-"""Relative tolerance of a level, about 0.001 dB: above rounding in a table, and far below any step."""
+"""Relative tolerance of a level, about 0.001 dB. Chosen: above rounding in a table, and far below any step."""
 ROUNDING_DB = 1e-3
-"""Tolerance of a roved level (dB) beyond its range, for rounding in a table."""
+"""Tolerance (dB) of a roved level beyond its range, for rounding in a table. Chosen."""
 
 
 class InconsistentTrialsError(ValueError):
-    """Raised for rows of trials that cannot have come from the stated rule."""
+    """Rows of trials that cannot result from the protocol's rule."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,17 +37,19 @@ class Run:
     """One run (staircase or Psi) of one participant at one frequency."""
 
     subject: str
+    """Code of the participant."""
     session: str
     run: int
+    """Number of the run in its session."""
     frequency_hz: float
     answered: tuple[Trial, ...]
-    """The trials that moved the staircase, in order, without catch trials."""
+    """The valid trials with an answer, in order, without catch trials."""
     spoiled_trials: int
-    """Number of spoiled presentations, without those of catch trials."""
+    """Number of presentations with the status SPOILED, without those of catch trials."""
     state: StaircaseState
     """State of the rule after the last answer."""
     complete: bool
-    """Whether the run has a threshold by its rule; False for a run that reached the trial limit before."""
+    """Whether the run has a threshold by its rule; False where it ended before, as at the trial limit."""
     presentations: int = 0
     """Number of all presentations, including void ones and catch trials."""
     repeats_at_will: int = 0
@@ -57,8 +60,8 @@ class Run:
 def recompute_runs(
     trials: Iterable[Trial], rule: StaircaseRule, phase: Phase = Phase.TEST, rove_db: float = 0.0
 ) -> tuple[Run, ...]:
-    """All runs of one phase, in the order in which they first occur. rove_db: width of the range around the staircase's
-    level from which the protocol draws the level of a trial.
+    """Recompute all runs of one phase, in the order in which they first occur. rove_db: width (dB) of the range around
+    the staircase's level from which the protocol draws the level of a trial; 0 = no roving.
 
     Catch trials lie within test runs, numbered in the same sequence, and do not move the staircase. Practice runs
     follow no staircase: a caller who passes TRAINING must leave them out of `trials` (see `study_analysis`).
@@ -67,25 +70,25 @@ def recompute_runs(
     answers before it lead to, or where a row is missing, doubled or too many.
     """
     phases = {phase, Phase.CATCH} if phase is Phase.TEST else {phase}
-    grouped: dict[tuple[str, str, int], list[Trial]] = {}
+    trials_by_run: dict[tuple[str, str, int], list[Trial]] = {}
     for trial in trials:
         if trial.phase in phases:
-            grouped.setdefault((trial.subject, trial.session, trial.run), []).append(trial)
-    return tuple(_recompute(rows, rule, rove_db) for rows in grouped.values())
+            trials_by_run.setdefault((trial.subject, trial.session, trial.run), []).append(trial)
+    return tuple(_recompute_run(rows, rule, rove_db) for rows in trials_by_run.values())
 
 
-def _recompute(rows: list[Trial], rule: StaircaseRule, rove_db: float) -> Run:
-    """The run of these rows, at least one, of one subject, session and run number."""
-    first = rows[0]
+def _recompute_run(rows: list[Trial], rule: StaircaseRule, rove_db: float) -> Run:
+    """Recompute the run of these rows, at least one, of one subject, session and run number."""
+    first_trial = rows[0]
     valid_trials = tuple(sorted((trial for trial in rows if trial.is_valid), key=lambda trial: trial.trial))
     _refuse_inconsistent_rows(rows, valid_trials)
     state = _replay_answers(valid_trials, rule, rove_db)
     staircase_trials = [trial for trial in rows if trial.phase is not Phase.CATCH]
     return Run(
-        subject=first.subject,
-        session=first.session,
-        run=first.run,
-        frequency_hz=first.frequency_hz,
+        subject=first_trial.subject,
+        session=first_trial.session,
+        run=first_trial.run,
+        frequency_hz=first_trial.frequency_hz,
         answered=tuple(trial for trial in valid_trials if trial.phase is not Phase.CATCH),
         spoiled_trials=sum(trial.status is TrialStatus.SPOILED for trial in staircase_trials),
         state=state,
@@ -96,25 +99,27 @@ def _recompute(rows: list[Trial], rule: StaircaseRule, rove_db: float) -> Run:
 
 
 def _replay_answers(valid_trials: tuple[Trial, ...], rule: StaircaseRule, rove_db: float) -> StaircaseState:
-    """State of the rule after all counted answers; each level is compared with that of the rule."""
+    """Replay the rule with all valid answers, and compare each level with that of the rule. Returns the last state.
+    Raises InconsistentTrialsError for another level, an answer after the end of the run, or an answer with `correct`
+    None."""
     state = begin_staircase(rule)
     for trial in valid_trials:
         if is_finished(rule, state):
             raise InconsistentTrialsError(
-                f"{_trial_text(trial)}: an answer follows although the run was over after {state.trials} trials "
+                f"{_describe_trial(trial)}: an answer follows although the run was over after {state.trials} trials "
                 f"with {state.reversals} reversals"
             )
         if trial.correct is None:
-            raise InconsistentTrialsError(f"{_trial_text(trial)}: there is an answer, but correct is empty")
+            raise InconsistentTrialsError(f"{_describe_trial(trial)}: there is an answer, but correct is empty")
         if trial.phase is Phase.CATCH:
             _refuse_weak_catch_trial(trial, rule)
             continue
         expected_n = level_n(rule, state)
         if not math.isclose(trial.staircase_n, expected_n, rel_tol=LEVEL_TOLERANCE):
-            name = "level_n" if trial.nominal_n is None else "nominal_n"
+            column_name = "level_n" if trial.nominal_n is None else "nominal_n"
             raise InconsistentTrialsError(
-                f"{_trial_text(trial)}: {name} is {trial.staircase_n:.6g} N, but the answers before it lead to "
-                f"{expected_n:.6g} N under the protocol's staircase; the rows belong to another rule or were changed"
+                f"{_describe_trial(trial)}: {column_name} is {trial.staircase_n:.6g} N, but the answers before it lead "
+                f"to {expected_n:.6g} N under the protocol's staircase; the rows belong to another rule or were changed"
             )
         _refuse_level_beyond_roving(trial, rove_db)
         state = step(rule, state, trial.correct)
@@ -122,46 +127,52 @@ def _replay_answers(valid_trials: tuple[Trial, ...], rule: StaircaseRule, rove_d
 
 
 def _refuse_level_beyond_roving(trial: Trial, rove_db: float) -> None:
-    """Raise where the level played is farther from the staircase's level than half the roving range."""
+    """Raise InconsistentTrialsError where the level played is farther from the staircase's level than half the roving
+    range; nothing is checked for a trial without a separate staircase level (`nominal_n` None)."""
     if trial.nominal_n is None:
         return
-    off_db = abs(to_db(trial.level_n) - to_db(trial.nominal_n)) if trial.nominal_n > 0 else math.inf
-    if rove_db == 0 or off_db > rove_db / 2 + ROUNDING_DB:
-        allowed = f"roves by {rove_db / 2:g} dB to either side" if rove_db else "roves no levels"
+    deviation_db = abs(to_db(trial.level_n) - to_db(trial.nominal_n)) if trial.nominal_n > 0 else math.inf
+    if rove_db == 0 or deviation_db > rove_db / 2 + ROUNDING_DB:
+        roving_text = f"roves by {rove_db / 2:g} dB to either side" if rove_db else "roves no levels"
         raise InconsistentTrialsError(
-            f"{_trial_text(trial)}: level_n is {trial.level_n:.6g} N around a nominal_n of {trial.nominal_n:.6g} N, "
-            f"but the protocol {allowed}; the rows belong to another protocol or were changed"
+            f"{_describe_trial(trial)}: level_n is {trial.level_n:.6g} N around a nominal_n of "
+            f"{trial.nominal_n:.6g} N, "
+            f"but the protocol {roving_text}; the rows belong to another protocol or were changed"
         )
 
 
 def _refuse_weak_catch_trial(trial: Trial, rule: StaircaseRule) -> None:
-    """Raise where a catch trial was not played at the cap: it may be a test trial whose phase was changed."""
+    """Raise InconsistentTrialsError where a catch trial was not played at the cap: it may be a test trial whose phase
+    was changed."""
     if not math.isclose(trial.level_n, rule.cap_n, rel_tol=LEVEL_TOLERANCE):
         raise InconsistentTrialsError(
-            f"{_trial_text(trial)}: level_n of a catch trial is {trial.level_n:.6g} N; catch trials are played at the "
-            f"cap of {rule.cap_n:g} N"
+            f"{_describe_trial(trial)}: level_n of a catch trial is {trial.level_n:.6g} N; catch trials are played "
+            f"at the cap of {rule.cap_n:g} N"
         )
 
 
 def _refuse_inconsistent_rows(rows: list[Trial], valid_trials: tuple[Trial, ...]) -> None:
-    """Raise where a run has two frequencies, or counted trials that are doubled or not numbered in sequence."""
-    first = rows[0]
+    """Raise InconsistentTrialsError where a run has two frequencies, or valid trials that are doubled or not numbered
+    in sequence."""
+    first_trial = rows[0]
     for trial in rows:
-        if trial.frequency_hz != first.frequency_hz:
+        if trial.frequency_hz != first_trial.frequency_hz:
             raise InconsistentTrialsError(
-                f"{_trial_text(trial)}: {trial.frequency_hz:g} Hz in a run that began at {first.frequency_hz:g} Hz"
+                f"{_describe_trial(trial)}: {trial.frequency_hz:g} Hz in a run that began at "
+                f"{first_trial.frequency_hz:g} Hz"
             )
-    for previous, following in itertools.pairwise(valid_trials):
-        if following.trial == previous.trial:
+    for previous_trial, next_trial in itertools.pairwise(valid_trials):
+        if next_trial.trial == previous_trial.trial:
             raise InconsistentTrialsError(
-                f"{_trial_text(following)}: two attempts of this trial have an answer that counts"
+                f"{_describe_trial(next_trial)}: two attempts of this trial have an answer that counts"
             )
-        if following.trial != previous.trial + 1:
+        if next_trial.trial != previous_trial.trial + 1:
             raise InconsistentTrialsError(
-                f"{_trial_text(following)}: the trial before it with an answer is {previous.trial}; those between are "
-                "missing"
+                f"{_describe_trial(next_trial)}: the trial before it with an answer is {previous_trial.trial}; those "
+                "between are missing"
             )
 
 
-def _trial_text(trial: Trial) -> str:
+def _describe_trial(trial: Trial) -> str:
+    """Describe the position of a trial, for messages."""
     return f"subject {trial.subject}, session {trial.session}, run {trial.run}, trial {trial.trial}"

@@ -123,6 +123,6 @@ def _format_slope_and_interval(answers: AnswersOnDelivery) -> tuple[str, str]:
 
 def _describe_dependence(finding: CueFinding) -> str:
     """Describe in a cell whether the answers depend on the cue, after Holm's correction."""
-    if finding.followed:
+    if finding.affects_answers:
         return "depend on the cue"
     return "do not" if finding.answers.is_conclusive else "not testable"

@@ -24,7 +24,8 @@ from equalizer.plant.identified_model import IdentifiedModel
 from equalizer.plant.model_response import compute_model_response
 
 CURVE_POINT_COUNT = 400
-"""Number of frequencies, logarithmically spaced over the model's band, at which the model's response is drawn."""
+"""Number of frequencies, logarithmically spaced over the model's band, at which the model's response is drawn.
+Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,8 +53,8 @@ class IdentificationFindings:
 
 
 def make_identification_pictures(findings: IdentificationFindings) -> tuple[Picture, ...]:
-    """Draw the transfer functions (published figure 4), the frequency bands (figure 1; only with bands) and the
-    held-out error by model order (only with a comparison of orders)."""
+    """Make the pictures of the transfer functions (published figure 4), the frequency bands (figure 1; only with bands)
+    and the held-out error by model order (only with a comparison of orders)."""
     low_hz, high_hz = findings.model.band_hz
     curve_hz = np.geomspace(low_hz, high_hz, CURVE_POINT_COUNT)
     model_curve = ResponseCurve("model", curve_hz, compute_model_response(findings.model, curve_hz))
@@ -71,7 +72,8 @@ def render_identification_report(
     findings: IdentificationFindings, pictures: Sequence[Picture], provenance: Mapping[str, str], generated: str
 ) -> str:
     """Render the report as an HTML page. pictures: those of `make_identification_pictures`, recognised by name; a
-    missing picture is left out. provenance: origin of the model by name. generated: local time of the report."""
+    missing picture is left out. provenance: facts on the origin of the model, by their names. generated: local time of
+    the report, as text."""
     pictures_by_name = {picture.name: picture for picture in pictures}
     low_hz, high_hz = findings.model.band_hz
 

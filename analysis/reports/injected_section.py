@@ -2,13 +2,13 @@
 
 A known fault of mechanism, actuator or sensor is added to one of two stretches of a real recording; the diagnosis gets
 both stretches and the model. The section has the rates of right answers with 95 % intervals, tallies by kind of fault
-and by recording, and every miss. `analysis.evaluation.blind_test.injected` judges the answers. Called by `real_report`.
-"""
+and by recording, and every miss. `analysis.evaluation.blind_test.injected_faults` judges the answers. Called by
+`real_report`."""
 
 from collections.abc import Sequence
 
 from analysis.evaluation.blind_test.confidence_intervals import IntervalEstimate
-from analysis.evaluation.blind_test.injected import (
+from analysis.evaluation.blind_test.injected_faults import (
     ANSWER_CLASSES,
     DETECTABLE,
     InjectedOutcome,
@@ -32,7 +32,9 @@ def make_injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
         "Detectable faults by recording", "recording", make_tallies(outcomes, lambda outcome: outcome.recording)
     )
     missed_outcomes = [
-        outcome for outcome in outcomes if not outcome.right and (outcome.detectable or outcome.answer_class == "wrong")
+        outcome
+        for outcome in outcomes
+        if not outcome.is_correct and (outcome.detectable or outcome.answer_class == "wrong")
     ]
     miss_table = Table(
         "Every miss, and every wrong fault named",
@@ -83,9 +85,9 @@ def _make_tally_table(title: str, heading: str, tallies: Sequence[Tally]) -> Tab
             (
                 tally.name,
                 str(tally.fault_count),
-                str(tally.right.of),
+                str(tally.correct_share.of),
                 *map(str, tally.counts),
-                format_rate(tally.right),
+                format_rate(tally.correct_share),
                 format_rate(tally.faultless),
             )
             for tally in tallies

@@ -22,7 +22,7 @@ from analysis.threshold_words import select_threshold_words
 from analysis.wording import MISSING, conjoin, format_number, format_p, format_p_text, format_signed
 
 BOUND_TOLERANCE_LOG = 0.01
-"""Distance of ln(standard deviation) from its upper bound below which the search counts as ended at the bound."""
+"""Distance of ln(standard deviation) from its upper bound, below which the fit counts as ended at the bound. Chosen."""
 INTRODUCTION = (
     "One psychometric model of all answers: thresholds differ by frequency, by person, and by person at each "
     "frequency; slopes and response biases differ by person. An answer at the cap is an answer like any other, "
@@ -81,7 +81,7 @@ def make_primary_section(analysis: StudyAnalysis) -> Section:
 
 
 def _make_single_section(analysis: StudyAnalysis) -> Section:
-    """Make the section without a model of all answers: thresholds of single persons, or why there are none."""
+    """Make the section without a model of all answers: thresholds of single persons, or the reason for their lack."""
     single_persons = analysis.single
     if single_persons is None:
         return Section("All answers in one model", paragraphs=(analysis.compared,))
@@ -91,8 +91,8 @@ def _make_single_section(analysis: StudyAnalysis) -> Section:
 
 
 def _describe_coverage(analysis: StudyAnalysis, analysis_name: str) -> tuple[str, ...]:
-    """Describe the measured coverage of an analysis (`coverage_words.TITLES`) where the data are cut or stopped; else
-    empty."""
+    """Describe the measured coverage of the intervals of one analysis, a name of `coverage_words.TITLES`; empty where
+    `describe_measured_coverage` is."""
     return describe_measured_coverage((analysis_name,), analysis.table, analysis.protocol.staircase)
 
 
@@ -124,8 +124,8 @@ def describe_far_above(primary: PrimaryAnalysis) -> str:
     sentence with a leading space; empty with fewer than two such frequencies."""
     if len(primary.far_above_hz) < 2:
         return ""
-    far_hz = conjoin([f"{frequency_hz:g} Hz" for frequency_hz in primary.far_above_hz])
-    return f" At {far_hz} the medians lie at more than twice the cap: the differences between these are not known."
+    hz_text = conjoin([f"{frequency_hz:g} Hz" for frequency_hz in primary.far_above_hz])
+    return f" At {hz_text} the medians lie at more than twice the cap: the differences between these are not known."
 
 
 def describe_undetermined(primary: PrimaryAnalysis) -> str:
@@ -244,7 +244,8 @@ def _make_run_table(runs: Sequence[RunLikelihood], confidence: float, notes: tup
 
 
 def format_run(run: RunLikelihood) -> tuple[str, str]:
-    """Format threshold and likelihood interval of a run (N), one-sided where an end is unknown; a dash without ends."""
+    """Format threshold and likelihood interval of a run (N), one-sided where an end is unknown, `MISSING` if both
+    are."""
     lower_n, upper_n = convert_to_newton(run.lower_db), convert_to_newton(run.upper_db)
     if run.below:
         threshold_text = "below the levels played"

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from analysis.diagnosis.real_answer.real_answer import OwnParameter, PairOutcome, RealAnswer
 from analysis.diagnosis.unit_wording import format_error, format_value
-from analysis.evaluation.blind_test.injected import InjectedOutcome
+from analysis.evaluation.blind_test.injected_faults import InjectedOutcome
 from analysis.figures.diagnosis.real_held_out import list_error_rows
 from analysis.figures.picture import Picture
 from analysis.reports.injected_section import make_injected_section

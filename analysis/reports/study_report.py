@@ -2,8 +2,8 @@
 
 This module decides which sections the page has and in which order: declared contrast, quality of the device model,
 warnings, thresholds and their comparison, detection, catch and practice trials, delivered stimuli, cues, acceleration
-ellipses, single runs, methods. The tables come from `study_tables`, `primary_tables` and `side_tables`, the statistics
-from `analysis.psychophysics.study_analysis`; no statistic is computed here. Called by
+ellipses, single runs, methods. The tables come from `study_tables`, `primary_tables` and `supplementary_tables`, the
+statistics from `analysis.psychophysics.study_analysis`; no statistic is computed here. Called by
 `study.workflows.results.analyze_data`.
 """
 
@@ -19,13 +19,6 @@ from analysis.reports.declared_section import make_declared_section
 from analysis.reports.methods_text import compose_methods_text
 from analysis.reports.page import Page, Section, render_page
 from analysis.reports.primary_tables import make_primary_section
-from analysis.reports.side_tables import (
-    make_catch_table,
-    make_delivery_tables,
-    make_detection_run_table,
-    make_detection_table,
-    make_practice_table,
-)
 from analysis.reports.study_tables import (
     make_ellipsoid_table,
     make_group_table,
@@ -35,15 +28,22 @@ from analysis.reports.study_tables import (
     make_threshold_table,
     make_within_table,
 )
+from analysis.reports.supplementary_tables import (
+    make_catch_table,
+    make_delivery_tables,
+    make_detection_run_table,
+    make_detection_table,
+    make_practice_table,
+)
 
-_BANNERS = {
+_BANNER_BY_POPULATION = {
     Population.PEOPLE: "",
     Population.SIMULATED: "Simulated participants: no person took part. These numbers test the method and the "
     "program; they are no evidence about human perception.",
     Population.NOT_FELT: "Nothing was felt: people answered while a simulated device moved nothing. These numbers are "
     "a rehearsal and must not be used as measurements of people.",
 }
-"""Banner on top of the page, by who answered; empty where people felt the stimuli."""
+"""Banner at the top of the page, by kind of respondents; empty where people felt the stimuli."""
 
 
 def render_study_report(
@@ -58,8 +58,8 @@ def render_study_report(
 
     pictures: those of `analysis.figures.study_pictures` for the same analysis and ellipsoids, recognised by name.
     provenance: versions, hashes and inputs by name. generated: local time of the report with its UTC offset.
-    ellipsoids: of the recordings of the device; may be empty. qualities: pairs (sessions, sentence) on the device
-    models that converted accelerations to forces; empty without models.
+    ellipsoids: acceleration ellipsoids from recordings of the device. qualities: pairs (sessions, sentence) on the
+    device models that converted accelerations to forces; empty without models.
     """
     pictures_by_name = {picture.name: picture for picture in pictures}
     sections = [
@@ -67,7 +67,7 @@ def render_study_report(
         *_make_model_sections(qualities),
         _make_warning_section(analysis),
         *_make_result_sections(analysis, pictures_by_name),
-        *_make_side_sections(analysis),
+        *_make_supplementary_sections(analysis),
         *_make_delivery_sections(analysis, pictures_by_name),
         *make_cue_sections(analysis.cues, analysis.cue_gaps, analysis.protocol.staircase),
         *_make_ellipsoid_sections(ellipsoids, pictures_by_name),
@@ -78,7 +78,7 @@ def render_study_report(
         Page(
             title=analysis.protocol.title,
             summary=_summarise_runs(analysis),
-            banner=_BANNERS[analysis.population] if analysis.population else "",
+            banner=_BANNER_BY_POPULATION[analysis.population] if analysis.population else "",
             sections=tuple(sections),
             generated=generated,
             provenance=provenance,
@@ -87,15 +87,16 @@ def render_study_report(
 
 
 def _summarise_runs(analysis: StudyAnalysis) -> str:
-    """Summarise the study in a line under the title: numbers of participants, runs, complete runs and counted trials;
-    without test runs, the number of detection runs."""
+    """Summarise the study in a sentence below the title: numbers of participants, test runs, complete runs and counted
+    trials; without test runs, the number of detection runs."""
     if not analysis.thresholds:
         return _summarise_detection_runs(analysis)
     complete_count = sum(row.complete for row in analysis.thresholds)
-    people, runs = len(analysis.table.subjects), len(analysis.thresholds)
-    simulated = "simulated " if analysis.population is Population.SIMULATED else ""
+    participant_count, run_count = len(analysis.table.subjects), len(analysis.thresholds)
+    simulated_prefix = "simulated " if analysis.population is Population.SIMULATED else ""
     return (
-        f"{people} {simulated}participant{'s' if people != 1 else ''}, {runs} run{'s' if runs != 1 else ''}, "
+        f"{participant_count} {simulated_prefix}participant{'s' if participant_count != 1 else ''}, "
+        f"{run_count} run{'s' if run_count != 1 else ''}, "
         f"{complete_count} of them complete, {sum(row.trials for row in analysis.thresholds)} counted trials."
     )
 
@@ -126,7 +127,7 @@ def _make_model_sections(qualities: Sequence[tuple[str, str]]) -> list[Section]:
 
 
 def _make_warning_section(analysis: StudyAnalysis) -> Section:
-    """Make the section of warnings, or of a sentence that there are none."""
+    """Make the section of warnings; without any, it states that no irregularity was found."""
     no_warning_note = ("No irregularities: all runs are complete, and no threshold touched the cap.",)
     return Section(
         "Before you read the numbers", paragraphs=() if analysis.warnings else no_warning_note, points=analysis.warnings
@@ -134,8 +135,8 @@ def _make_warning_section(analysis: StudyAnalysis) -> Section:
 
 
 def _make_result_sections(analysis: StudyAnalysis, pictures_by_name: Mapping[str, Picture]) -> list[Section]:
-    """Make the sections on thresholds, the primary analysis, and the published comparison, in this order; empty without
-    a test run. The table of pairs is left out where no pair can be compared."""
+    """Make the sections on thresholds, the primary analysis (model of all answers) and the comparison as published, in
+    this order; empty without a test run. The table of pairs is left out where no pair can be compared."""
     if not analysis.thresholds:
         return []
     pair_tables = (make_pair_table(analysis),) if analysis.comparisons.pairs else ()
@@ -158,7 +159,7 @@ def _make_result_sections(analysis: StudyAnalysis, pictures_by_name: Mapping[str
     return [threshold_section, model_section, comparison_section]
 
 
-def _make_side_sections(analysis: StudyAnalysis) -> list[Section]:
+def _make_supplementary_sections(analysis: StudyAnalysis) -> list[Section]:
     """Make the sections on detection, catch trials and practice runs, each only where the study has them."""
     sections = []
     if analysis.detection:
@@ -192,8 +193,8 @@ def _make_delivery_sections(analysis: StudyAnalysis, pictures_by_name: Mapping[s
 def _make_ellipsoid_sections(
     results: Sequence[EllipsoidResult], pictures_by_name: Mapping[str, Picture]
 ) -> list[Section]:
-    """Make the section on the acceleration ellipses; empty without results. Its picture is left out where it does not
-    exist."""
+    """Make the section on the acceleration ellipses; empty without results. It has no picture where the figure
+    `ellipsoids` does not exist."""
     if not results:
         return []
     pictures = (pictures_by_name["ellipsoids"],) if "ellipsoids" in pictures_by_name else ()
@@ -201,7 +202,7 @@ def _make_ellipsoid_sections(
 
 
 def _make_run_sections(analysis: StudyAnalysis, pictures: Sequence[Picture]) -> list[Section]:
-    """Make the section with the staircase figures and the table of all test runs; empty without runs."""
+    """Make the section with the staircase figures and the table of all test runs; empty without test runs."""
     if not analysis.runs:
         return []
     staircase_pictures = tuple(picture for picture in pictures if picture.name.startswith("staircases-"))

@@ -1,4 +1,5 @@
-"""Tables of a study report: thresholds, one-way ANOVA, Tukey-Kramer pairs, repeated-measures tests, runs, ellipses.
+"""Tables of the report of a threshold study: thresholds, one-way ANOVA, Tukey-Kramer pairs, tests within participants,
+runs, and acceleration ellipses.
 
 This module only formats values as text; tests and effect sizes are computed in `analysis.psychophysics.study_analysis`,
 ellipses in `analysis.psychophysics.ellipsoid`. Forces are in N, levels in dB re 1 N. Called by `study_report`.
@@ -45,8 +46,8 @@ def make_threshold_table(analysis: StudyAnalysis) -> Table:
 
 
 def make_group_table(analysis: StudyAnalysis) -> Table:
-    """Make the table of the frequencies: number, mean and standard deviation of thresholds, comparison interval, and
-    how many were cut by the cap or stopped by the trial limit."""
+    """Make the table of the frequencies: number, mean and standard deviation of the thresholds (N), comparison
+    interval, and how many were cut by the cap or stopped by the trial limit."""
     intervals = {interval.name: interval for interval in analysis.comparisons.intervals}
     cut_counts, stop_counts = (
         [sum(column) for column in zip(*cells, strict=True)]
@@ -136,7 +137,8 @@ def make_one_way_table(analysis: StudyAnalysis) -> Table:
 
 
 def make_pair_table(analysis: StudyAnalysis) -> Table:
-    """Make the table of all pairs of frequencies: difference of the means, simultaneous interval and p-value."""
+    """Make the table of all pairs of frequencies: difference of the means (second minus first, N), simultaneous
+    interval and p value."""
     comparisons = analysis.comparisons
     confidence_text = f"{100 * comparisons.confidence:g} %"
     return Table(
@@ -161,8 +163,8 @@ def make_pair_table(analysis: StudyAnalysis) -> Table:
 
 def make_within_table(analysis: StudyAnalysis) -> Table:
     """Make the table of the repeated-measures tests that can be computed: ANOVA with Greenhouse-Geisser's and with
-    Huynh-Feldt's correction and without one, and Friedman's test. The notes give effect sizes and Mauchly's test, and
-    say why a test is missing."""
+    Huynh-Feldt's correction (ε of 1 where that cannot be computed) and without one, and Friedman's test. The notes give
+    effect sizes and Mauchly's test, and say why a test is missing."""
     anova, friedman = analysis.within, analysis.ranks
     rows: list[tuple[str, ...]] = []
     notes = []
@@ -205,13 +207,13 @@ def make_within_table(analysis: StudyAnalysis) -> Table:
 
 
 REVERSALS_NOTE = "Reversals at the cap: of the averaged ones. Pushes: how often the rule required more than the cap."
-"""Note below the table of runs, for staircases."""
+"""Note below the table of runs, for staircases only."""
 
 
 def make_run_table(analysis: StudyAnalysis) -> Table:
-    """Make the folded table of all test runs with their trials, thresholds, d' and criterion; reversals and pushes only
-    for staircases."""
-    by_reversals = not analysis.protocol.staircase.is_bayesian
+    """Make the table of all test runs, shown folded, with their trials, thresholds, d' and criterion. Only staircases
+    have the columns of reversals and of steps that the rule required beyond the cap ("Pushes")."""
+    has_reversals = not analysis.protocol.staircase.is_bayesian
     reversal_columns: tuple[tuple[str, Callable[[Threshold], str]], ...] = (
         ("Reversals", lambda row: str(row.reversals)),
         ("at cap", lambda row: str(row.cap_reversals)),
@@ -226,10 +228,10 @@ def make_run_table(analysis: StudyAnalysis) -> Table:
         ("dB re 1 N", lambda row: format_number(row.threshold_db)),
         ("m/s²", lambda row: format_number(row.threshold_mps2)),
         ("mm", lambda row: format_number(row.threshold_mm, 3)),
-        *(reversal_columns if by_reversals else ()),
+        *(reversal_columns if has_reversals else ()),
         ("Trials", lambda row: str(row.trials)),
         ("at cap", lambda row: str(row.trials_at_cap)),
-        *(pushes if by_reversals else ()),
+        *(pushes if has_reversals else ()),
         ("Spoiled", lambda row: str(row.spoiled_trials)),
         ("At will", _format_repeats),
         ("% right", lambda row: format_number(row.percent_correct, 0)),
@@ -241,7 +243,7 @@ def make_run_table(analysis: StudyAnalysis) -> Table:
         header=tuple(name for name, _ in columns),
         rows=tuple(tuple(format_cell(row) for _, format_cell in columns) for row in analysis.thresholds),
         notes=(
-            *([REVERSALS_NOTE] if by_reversals else []),
+            *([REVERSALS_NOTE] if has_reversals else []),
             f"m/s² and mm: as measured in {select_threshold_words(analysis.protocol.staircase).measured_in}.",
             f"At will: presentations that the participant made void (asked for again, paused, left, answered outside "
             f"the time), with their share; ! {FREQUENT_WORDS}.",
@@ -257,8 +259,8 @@ def _format_threshold(row: Threshold) -> str:
 
 
 def _format_repeats(row: Threshold) -> str:
-    """Format number and share of the presentations that the participant made void; "!" marks frequent ones
-    (`FREQUENT_WORDS`)."""
+    """Format number and percentage of the presentations that the participant made void; "0" without any; "!" where they
+    are frequent (`FREQUENT_WORDS`)."""
     if not row.repeats_at_will:
         return "0"
     return f"{row.repeats_at_will} ({100 * row.repeat_rate:.1f} %){' !' * row.asked_often}"
@@ -266,7 +268,8 @@ def _format_repeats(row: Threshold) -> str:
 
 def make_ellipsoid_table(results: Sequence[EllipsoidResult]) -> Table:
     """Make the table of acceleration ellipses: ratio of the axes and tilt (degrees), from second moments and from
-    phasors at the driven frequency; ratio of off-axis to on-axis acceleration; share of harmonics in %."""
+    phasors at the driven frequency; ratio of off-axis to on-axis acceleration; energy of the harmonics in % of that of
+    the fundamental."""
     return Table(
         caption="Acceleration ellipses",
         header=(

@@ -3,6 +3,7 @@
     F = -k2 x^2        k2 in N/m^2 (a rotation: N m/rad^2)
 
 adds to the linear spring force -k x: with k2 > 0 the spring stiffens for x > 0 and softens for x < 0.
+`equalizer.effects.catalogue` lists the effect.
 """
 
 from equalizer.effects.effect import AxisForce, Effect, Parameter, Values, pack_values
@@ -15,9 +16,9 @@ from equalizer.signals.signal import FloatArray
 
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
-    """Mean of the forces (N) at the start and the end of the step (trapezoidal rule). The end position depends on the
-    force: an implicit step, solved by Newton's method, with the derivative kept at 0.5 or more against diverging steps.
-    parameters: k2."""
+    """Mean of the forces (N) at the start and the end of the step (trapezoidal rule), and the force at its end in
+    `step_motion`. The end position depends on the force (implicit step): four steps of Newton's method, which converges
+    quadratically, with the derivative limited to 0.5 or more against divergence (both chosen). parameters: k2."""
     half_stiffness, start_squared = 0.5 * parameters[0], step_motion[X] ** 2
     force = -half_stiffness * (start_squared + step_motion[X_FREE] ** 2)
     for _ in range(4):
@@ -29,8 +30,8 @@ def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion:
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """k2 by regression of the missing force on -x^2, with the linear terms of the motion projected out; empty where it
-    is zero."""
+    """Estimate k2 by regression of the missing force on -x^2, with the linear terms of the motion projected out; empty
+    where it is zero."""
     motion = select_axis_motion(evidence, axis)
     k2 = float(regress_out_linear_terms(motion).fit(-(motion.position**2)).strengths[0])
     return ({"k2": k2},) if k2 != 0 else ()

@@ -1,9 +1,11 @@
-"""Converts a mechanical model with its effects to reversed signs of chosen commands.
+"""Conversion of a mechanical model with its effects to reversed signs of chosen commands.
 
 The positive direction of a driven axis is that in which a positive command pushes. Where the sign of the command is
 reversed, the coordinate x of the axis and all forces along it reverse too: F(x, v) becomes -F(-x, -v). Odd laws, such
 as friction or springs, stay the same; `SIGN_REVERSED`, `DIRECTION_PAIRS` and `CROSS_AXIS_TILTS` list the parameters of
-other laws that change."""
+other effects that change. Called by `analysis.diagnosis.data.recorded_conditions`, for recordings that state reversed
+channels.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -33,8 +35,8 @@ reversed and the other is not."""
 def with_reversed_commands(
     model: MechanicalModel, signs: Sequence[float], inputs: tuple[str, ...], outputs: tuple[str, ...]
 ) -> MechanicalModel:
-    """The model whose response to the command times `signs` (1 or -1 per input) equals that of `model` to the command.
-    inputs, outputs: channel names. Raises PlacingError for an effect on an unknown axis."""
+    """Convert a model such that its response to the command times `signs` (1 or -1 per input) equals that of `model` to
+    the command. inputs, outputs: channel names. Raises PlacingError for an effect on an unknown axis."""
     axis_signs = np.asarray(signs, dtype=np.float64)
     effects = [
         reversed_effect
@@ -50,7 +52,7 @@ def _reverse_effects(
     axis_signs: FloatArray,
     channels: tuple[tuple[str, ...], tuple[str, ...]],
 ) -> tuple[ModelEffect, ...]:
-    """The effect for the reversed axes; one entry per axis where an effect that depends on the sign acts on several."""
+    """Convert one effect for the reversed axes; one entry per axis where a sign-dependent effect acts on several."""
     inputs, outputs = channels
     if effect.law is None and effect.kind not in (*SIGN_REVERSED, *DIRECTION_PAIRS, *CROSS_AXIS_TILTS):
         return (effect,)
@@ -67,7 +69,7 @@ def _reverse_effects(
 
 
 def _reverse_parameters(effect: ModelEffect, site: int, axis_signs: FloatArray) -> dict[str, float]:
-    """The effect's parameters at axis `site`. axis_signs: (m,), 1 or -1 per axis."""
+    """Convert the parameters of an effect at axis `site` (index). axis_signs: (m,), 1 or -1 per axis."""
     values = dict(effect.parameters)
     for offset, name in enumerate(CROSS_AXIS_TILTS.get(effect.kind, ()), start=1):
         if name in values:
@@ -78,14 +80,14 @@ def _reverse_parameters(effect: ModelEffect, site: int, axis_signs: FloatArray) 
         if parameter in values:
             values[parameter] = -values[parameter]
     if effect.kind in DIRECTION_PAIRS:
-        first, second = DIRECTION_PAIRS[effect.kind]
-        values[first], values[second] = values[second], values[first]
+        positive_name, negative_name = DIRECTION_PAIRS[effect.kind]
+        values[positive_name], values[negative_name] = values[negative_name], values[positive_name]
     return values
 
 
 def _reverse_law(law: Law, site: int, axis_signs: FloatArray, channels: tuple[tuple[str, ...], tuple[str, ...]]) -> Law:
-    """The law with the signals of reversed axes negated in its formula, and its result negated where its own axis
-    (site) is reversed."""
+    """Negate the signals of reversed axes in the formula of a law, and its result where its axis (`site`) is reversed.
+    Responses are negated only where there is one per command."""
     inputs, outputs = channels
     letters, reversed_names = derive_axis_letters(inputs), set[str]()
     for axis in np.flatnonzero(axis_signs < 0):
@@ -96,7 +98,7 @@ def _reverse_law(law: Law, site: int, axis_signs: FloatArray, channels: tuple[tu
 
 
 def _negate_variables(node: Node, reversed_names: set[str]) -> Node:
-    """The syntax tree with each variable named in `reversed_names` replaced by its negative."""
+    """Replace each variable named in `reversed_names` by its negative in a syntax tree."""
     match node:
         case Variable(name) if name in reversed_names:
             return Apply("neg", (node,))

@@ -2,6 +2,8 @@
 orthogonal.
 
     y_i = x_i + from_next x_(i+1) + from_after_next x_(i+2)        channels counted cyclically, shares without unit
+
+`EFFECT` is an entry of `equalizer.effects.catalogue`, whose effects are simulated and fitted by name.
 """
 
 import numpy as np
@@ -14,19 +16,19 @@ from equalizer.signals.signal import FloatArray
 SHARE_NAMES = ("from_next", "from_after_next")
 """Parameter names: share of the next channel, and of the channel after it, counted cyclically."""
 LARGEST_SHARE = 1.0
-"""Largest share of another channel: a larger one means exchanged channels, which is a wiring error."""
+"""Largest share of another channel. Chosen: a larger one indicates exchanged channels, a wiring error."""
 LEAST_SHARE = 1e-4
-"""Least share that is tried: a hundredth of the cross-axis sensitivity that accelerometer data sheets allow (1 %)."""
+"""Starting share up to which none is returned. Chosen: a hundredth of the 1 % that accelerometer data sheets allow."""
 
 
-def _list_following_channels(channel: int, channels: int) -> list[int]:
-    """Indices of the one or two channels that follow this one, cyclically."""
-    return [(channel + offset) % channels for offset in range(1, min(channels, 3))]
+def _list_following_channels(channel: int, channel_count: int) -> list[int]:
+    """List the indices of the channels that follow this one, cyclically: two, or fewer where there are not so many."""
+    return [(channel + offset) % channel_count for offset in range(1, min(channel_count, 3))]
 
 
 def _mix_channels(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
-    """The response (n, p) with the shares of the following channels added to each of `channels`; shares of channels
-    that the response does not have are ignored."""
+    """Add the shares of the following channels to each of `channels`: response (n, p) of the sensor. Shares of channels
+    that the response does not have are ignored; sample_rate_hz is not used."""
     sensed_response = response.copy()
     for channel in channels:
         for name, source_channel in zip(
@@ -37,9 +39,9 @@ def _mix_channels(response: FloatArray, sample_rate_hz: float, channels: tuple[i
 
 
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """Shares by linear regression of the channel's residual on the next one or two predicted channels and its own
-    prediction (an error of its gain). Empty for a single channel, and where the largest share is not between
-    `LEAST_SHARE` and `LARGEST_SHARE`; a missing channel gets the share 0."""
+    """Find starting shares by linear regression of the channel's residual on the next one or two predicted channels and
+    on its own prediction (an error of its gain). Empty for a single channel, and where the largest share is not between
+    `LEAST_SHARE` and `LARGEST_SHARE`; the share of a missing channel is 0."""
     source_channels = _list_following_channels(channel, evidence.response.shape[1])
     residual = evidence.response - evidence.predicted
     if not source_channels:

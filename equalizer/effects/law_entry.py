@@ -1,4 +1,4 @@
-"""Library entry of a discovered law: named effects that are searched for in other recordings like the catalogue's.
+"""Library entry of a discovered law: effects that are searched for in other recordings as those of the catalogue are.
 
 A law was found at one axis of one device. An entry yields one effect per axis of the new recording, with the axis
 letters of its formula permuted cyclically, and starting values by linear regression. Called by
@@ -36,6 +36,7 @@ class LawEntry:
     """Library entry: name, formula, origin of a discovered law, and its features in the data."""
 
     name: str
+    """Name of the effects that are made from the entry."""
     law: Law
     """The law with its starting parameters; `law.axis` is the axis at which it was found."""
     source: str
@@ -54,10 +55,10 @@ def make_library_effects(entries: Sequence[LawEntry], recording: Recording) -> t
 def make_effects_per_axis(entry: LawEntry, channels: Channels) -> tuple[Effect, ...]:
     """Make one effect per axis (response channel for a law of the response), the formula moved to it by a cyclic
     permutation of the axis letters. Raises LawError where the recording lacks a signal."""
-    letters = derive_axis_letters(channels.outputs if entry.law.acts_on == "response" else channels.inputs)
+    axis_letters = derive_axis_letters(channels.outputs if entry.law.acts_on == "response" else channels.inputs)
     effects = []
-    for site in range(len(letters)):
-        law = _permute_to_axis(entry.law, letters, site)
+    for site in range(len(axis_letters)):
+        law = _permute_to_axis(entry.law, axis_letters, site)
         effect = make_law_effect(law, channels)
         effects.append(
             replace(
@@ -71,21 +72,23 @@ def make_effects_per_axis(entry: LawEntry, channels: Channels) -> tuple[Effect, 
     return tuple(effects)
 
 
-def _permute_to_axis(law: Law, letters: tuple[str, ...], site: int) -> Law:
-    """Permute the letters in the formula cyclically, so that the axis of the law becomes axis number `site`."""
+def _permute_to_axis(law: Law, axis_letters: tuple[str, ...], site: int) -> Law:
+    """Permute the letters in the formula cyclically, so that the axis of the law becomes that with index `site`. If the
+    new recording lacks the letter of the law's axis, it counts as that of the first axis."""
     law_letter = law.axis[-1:]
-    letter_index = letters.index(law_letter) if law_letter in letters else 0
+    letter_index = axis_letters.index(law_letter) if law_letter in axis_letters else 0
     new_letters = {
-        letter: letters[(index + site - letter_index) % len(letters)] for index, letter in enumerate(letters)
+        letter: axis_letters[(index + site - letter_index) % len(axis_letters)]
+        for index, letter in enumerate(axis_letters)
     }
-    new_letters[law_letter] = letters[site]
+    new_letters[law_letter] = axis_letters[site]
     new_names = {
         prefix + letter: prefix + target
         for letter, target in new_letters.items()
         for prefix in (*DERIVATIVE_PREFIXES, COMMAND_PREFIX)
     }
     tree = _rename_signals(law.tree, new_names)
-    return replace(law, expression=format_formula(tree, None, None), axis=letters[site])
+    return replace(law, expression=format_formula(tree, None, None), axis=axis_letters[site])
 
 
 def _rename_signals(node: Node, new_names: Mapping[str, str]) -> Node:
@@ -101,22 +104,23 @@ def _rename_signals(node: Node, new_names: Mapping[str, str]) -> Node:
 def _make_starting_value_finder(
     law: Law, site: int, channels: Channels
 ) -> Callable[[Evidence, int], tuple[Values, ...]]:
-    """Make the function that finds starting values at axis number `site`; it returns none for other axes. For a force:
-    the law's factors by linear regression of the missing force, the other parameters as in the library; none where all
-    factors are 0. Otherwise, or where the law reads a recorded condition, which is no part of the evidence, or is not
-    finite along the motion, all as in the library."""
+    """Make the function that finds starting values at the axis with index `site`; it returns none for other axes.
+
+    For a law of a force: factors by linear regression of the missing force, other parameters as in the library; none
+    where all factors are 0. All parameters as in the library for a law of command or response, without factors, of a
+    recorded condition (no part of the evidence), or whose terms are not finite along the motion."""
     factors = [index for index, role in find_parameter_roles(law.tree).items() if role == "factor"]
     reads_conditions = not set(name_conditions(channels)).isdisjoint(law.variables)
 
     def find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-        """Find starting values at an axis, `Effect.starts` of this effect."""
+        """Find starting values at an axis: the `Effect.starts` of this effect."""
         if axis != site:
             return ()
         if law.acts_on != "force" or not factors or reads_conditions:
             return (get_law_values(law),)
         used, signals = evidence.used > 0, _collect_signals(evidence, channels)
         regressors = [
-            evaluate(_with_single_factor(law, factors, factor), signals, evidence.sample_rate_hz)[used]
+            evaluate(_isolate_factor(law, factors, factor), signals, evidence.sample_rate_hz)[used]
             for factor in factors
         ]
         if not np.isfinite(regressors).all():
@@ -128,19 +132,20 @@ def _make_starting_value_finder(
     return find_starting_values
 
 
-def _with_single_factor(law: Law, factors: Sequence[int], selected: int) -> Law:
-    """Return the law with the factor p<selected> set to 1 and the other factors to 0: the regressor of that factor."""
+def _isolate_factor(law: Law, factors: Sequence[int], selected: int) -> Law:
+    """Isolate a factor: the law with p<selected> set to 1 and the other factors to 0 is the regressor of that
+    factor."""
     return law.with_numbers(
         [float(index == selected) if index in factors else value for index, value in enumerate(law.numbers)]
     )
 
 
 def _collect_signals(evidence: Evidence, channels: Channels) -> dict[str, FloatArray]:
-    """Collect position, velocity, acceleration (central differences) and command of every axis, (n,) each, by the names
-    that formulas have for them: letters of the axes, and channel names."""
+    """Collect position, velocity, acceleration (central differences) and command of every axis, (n,) each, by their
+    names in formulas (`index_force_signals`)."""
     acceleration = np.gradient(evidence.axis_velocity, 1 / evidence.sample_rate_hz, axis=0)
-    by_axis = np.stack([evidence.axis_position, evidence.axis_velocity, acceleration, evidence.command], axis=2)
-    columns = by_axis.reshape(len(by_axis), -1)
+    signals_by_axis = np.stack([evidence.axis_position, evidence.axis_velocity, acceleration, evidence.command], axis=2)
+    columns = signals_by_axis.reshape(len(signals_by_axis), -1)
     return {
         name: columns[:, index - 1]
         for name, index in index_force_signals(channels).items()

@@ -2,7 +2,8 @@
 
     y = x + offset        in the unit of the response
 
-The measured position is not affected, in contrast to a constant force.
+The separately measured position is not affected, in contrast to a constant force. `equalizer.effects.catalogue` lists
+the effect.
 """
 
 import numpy as np
@@ -11,22 +12,25 @@ from equalizer.effects.effect import Effect, OnResponse, Parameter, Values
 from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
-LEAST_SIGMA = 4.0
-"""Least offset that is tried, in standard errors of the mean residual (samples taken as independent)."""
+SIGNIFICANCE_THRESHOLD = 4.0
+"""Least magnitude of a starting offset, in standard errors of the mean residual with samples taken as independent.
+Chosen: well above chance, because samples are correlated."""
 
 
 def _add_offset(response: FloatArray, sample_rate_hz: float, channels: tuple[int, ...], values: Values) -> FloatArray:
-    read = response.copy()
-    read[:, channels] += values["offset"]
-    return read
+    """Add the offset to the channels of a copy of the response (n, p)."""
+    offset_response = response.copy()
+    offset_response[:, channels] += values["offset"]
+    return offset_response
 
 
 def _find_starting_values(evidence: Evidence, channel: int) -> tuple[Values, ...]:
-    """The mean residual of the channel; empty where it is not significant."""
+    """Estimate the offset as the mean residual of the channel; empty where it is not significant, or without usable
+    samples."""
     residual = (evidence.response - evidence.predicted)[evidence.used > 0, channel]
     offset = float(residual.mean())
-    large = abs(offset) * np.sqrt(len(residual)) > LEAST_SIGMA * float(residual.std())
-    return ({"offset": offset},) if large else ()
+    is_significant = abs(offset) * np.sqrt(len(residual)) > SIGNIFICANCE_THRESHOLD * float(residual.std())
+    return ({"offset": offset},) if is_significant else ()
 
 
 EFFECT = Effect(

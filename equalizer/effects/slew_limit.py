@@ -1,7 +1,9 @@
-"""Slew-rate limit: an actuator's force follows the command at a limited rate, by voltage over inductance or a software
-ramp.
+"""Slew-rate limit: an actuator's force follows the command at a limited rate, set by voltage over inductance or by a
+software ramp.
 
-    |dF/dt| <= rate        command u and force F in N, rate in N/s (a rotation: N m/s)
+    |dF/dt| <= rate        command u and force F in N, rate in N/s (a rotation: N m and N m/s)
+
+An entry of `catalogue`; the force balance and the contrast of actuator faults call `limit_slew`.
 """
 
 import math
@@ -15,18 +17,20 @@ from equalizer.effects.starts.evidence import Evidence
 from equalizer.signals.signal import FloatArray
 
 RATE_SHARES = (0.3, 0.5, 0.75)
-"""Starting values for a limit that is rarely reached, as shares of the command's largest rate of change: all for a
-limit common to all axes, the middle one for a single axis. Chosen by hand."""
+"""Additional starting values, for a limit that is rarely reached, as shares of the command's largest rate of change:
+all for a limit common to all axes, the middle one for a single axis. Chosen by hand."""
 MISFIT_RATIO = 1.05
-"""Rms residual of a channel, over its noise, above which these starting values are tried. Chosen by hand."""
+"""Rms residual of a channel, over its noise, above which the starting values by `RATE_SHARES` are tried. Chosen by
+hand."""
 
 _INPUT_ARRAY = types.Array(types.float64, 1, "A", readonly=True)
+"""numba type of an input array (n,), which may be strided and read-only."""
 
 
 @njit(types.void(_INPUT_ARRAY, types.float64, types.float64[::1], types.float64[::1]), cache=True, nogil=True)
 def simulate_slew_limit(commands: FloatArray, max_change: float, mean_force: FloatArray, end_force: FloatArray) -> None:
     """Fill mean_force (n,) and end_force (n,): the mean over each step and the value at its end, for commands (n,) that
-    are constant within a step; the force starts at zero. max_change: largest change in one step, > 0."""
+    are constant within a step; the force starts at zero. max_change: largest change of the force in one step, > 0."""
     force = 0.0
     for k in range(commands.shape[0]):
         difference = commands[k] - force
@@ -45,23 +49,24 @@ def simulate_slew_limit(commands: FloatArray, max_change: float, mean_force: Flo
 def limit_slew(
     commands: FloatArray, step_s: float, rate: float, initial_force: float = 0.0, at_end: bool = False
 ) -> FloatArray:
-    """Slew-limited force (n,) for commands (n,): mean over each step, or value at its end. step_s: length of a step
-    (s); rate: limit, in units of force per s; initial_force: force before the first step."""
+    """Limit the slew rate of commands (n,): returns the force (n,), as mean over each step or, with at_end, as value at
+    its end. step_s: length of a step (s); rate: limit, > 0, in units of force per s, inf: none; initial_force: force
+    before the first step."""
     return np.asarray(initial_force + _compute_mean_and_end_force(commands - initial_force, step_s, rate)[int(at_end)])
 
 
 def _compute_mean_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    """Mean force (n,) over each step: `OnCommand.change` of this effect."""
+    """Compute the mean force (n,) over each step: `OnCommand.change` of this effect."""
     return limit_slew(commands, step_s, values["rate"])
 
 
 def _compute_end_force(commands: FloatArray, step_s: float, values: Values) -> FloatArray:
-    """Force (n,) at the end of each step: `OnCommand.at_end` of this effect."""
+    """Compute the force (n,) at the end of each step: `OnCommand.at_end` of this effect."""
     return limit_slew(commands, step_s, values["rate"], at_end=True)
 
 
 def _compute_mean_and_end_force(commands: FloatArray, step_s: float, rate: float) -> FloatArray:
-    """(2, n): mean force over each step, and force at its end; the command itself for an infinite rate."""
+    """Compute (2, n): mean force over each step, and force at its end; the command itself for an infinite rate."""
     if math.isinf(rate):
         return np.array([commands, commands])
     forces = np.empty((2, len(commands)))
@@ -70,10 +75,11 @@ def _compute_mean_and_end_force(commands: FloatArray, step_s: float, rate: float
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Starting values: the likeliest rate on a grid from 1 to 100 % of the command's largest rate of change; where the
-    residual of the response exceeds its noise, also `RATE_SHARES` of that rate."""
-    commanded = evidence.command if axis == ALL_SITES else evidence.command[:, axis]
-    largest_rate = float(np.abs(np.diff(commanded, axis=0)).max()) * evidence.sample_rate_hz
+    """Find starting values of the rate: the likeliest of twelve (chosen) from 1 to 100 % of the command's largest rate
+    of change, geometrically spaced; where the residual of the response exceeds its noise, also `RATE_SHARES` of that
+    largest rate. Empty for a constant command."""
+    commands = evidence.command if axis == ALL_SITES else evidence.command[:, axis]
+    largest_rate = float(np.abs(np.diff(commands, axis=0)).max()) * evidence.sample_rate_hz
     if largest_rate == 0:
         return ()
     rate = find_command_parameter(
@@ -93,7 +99,7 @@ def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
 
 
 def _has_unexplained_error(evidence: Evidence) -> bool:
-    """Whether the rms residual of any channel exceeds `MISFIT_RATIO` times its noise."""
+    """Whether the rms residual of the response exceeds `MISFIT_RATIO` times its noise in any channel."""
     residual = (evidence.response - evidence.predicted)[evidence.used > 0]
     return bool((np.sqrt(np.nanmean(residual**2, axis=0)) > MISFIT_RATIO * evidence.noise).any())
 

@@ -1,4 +1,4 @@
-"""A discrete-time linear state-space model fitted to recordings, with its band of validity and its uncertainty:
+"""Discrete-time linear state-space model fitted to recordings, with its band of validity and its uncertainty:
 
     x[k+1] = A x[k] + B u[k],    y[k] = C x[k] + D u[k]         x (n,), u (m,) commands, y (p,) responses
 
@@ -25,7 +25,7 @@ class IdentifiedModelError(ListedProblemsError):
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
 class IdentifiedModel(SummaryDisplay):
     """A discrete-time state-space model in SI units. As in recordings, y[k] is sampled just before u[k] is written, so
-    that D is zero for a causal device, unless D approximates the modes outside the band.
+    that D is zero for a strictly causal device, unless D approximates the modes outside the band.
 
     Raises IdentifiedModelError for inconsistent values. An unstable model is permitted; see `spectral_radius`.
     """
@@ -47,8 +47,9 @@ class IdentifiedModel(SummaryDisplay):
     output_unit: str | tuple[str, ...]
     """SI unit of all responses, or the units channel by channel."""
     input_channels: tuple[str, ...]
+    """Names of the m commands."""
     output_channels: tuple[str, ...]
-    """Names of the m commands and of the p responses."""
+    """Names of the p responses."""
     delay_samples: float = 0.0
     """Delay in samples from a command to the first response that it can change. For information only: A, B, C, D
     include it."""
@@ -59,12 +60,12 @@ class IdentifiedModel(SummaryDisplay):
     samples: FloatArray | None = None
     """(draws, k): random draws of `parameters` from the distribution of their errors; None = not known."""
     provenance: Mapping[str, Any] = field(default_factory=dict)
-    """JSON values: versions, command, seeds, parents."""
+    """Origin, as JSON values: versions, command line, random seeds, input files."""
     quality: ModelQuality | None = None
     """Relative errors of the model: misfit, scatter and held-out error; None = not known."""
 
     def __post_init__(self) -> None:
-        """Copy the arrays as read-only double precision, and check all values."""
+        """Copy the arrays as read-only double precision, and check all values. Raises IdentifiedModelError."""
         for name in ("A", "B", "C", "D", "covariance", "samples"):
             if getattr(self, name) is not None:
                 matrix = np.array(getattr(self, name), dtype=np.float64, ndmin=1)
@@ -85,7 +86,8 @@ class IdentifiedModel(SummaryDisplay):
         return np.concatenate([matrix.ravel() for matrix in (self.A, self.B, self.C, self.D)])
 
     def with_parameters(self, parameters: FloatArray) -> Self:
-        """A copy of the model with other entries of A, B, C, D. parameters: (k,), in the order of `parameters`."""
+        """Copy the model with other entries of A, B, C, D. parameters: (k,), in the order of the property
+        `parameters`."""
         shapes = [matrix.shape for matrix in (self.A, self.B, self.C, self.D)]
         split_indices = np.cumsum([rows * columns for rows, columns in shapes])[:-1]
         flat_matrices = np.split(np.asarray(parameters, dtype=np.float64), split_indices)
@@ -98,7 +100,7 @@ class IdentifiedModel(SummaryDisplay):
         return float(np.abs(np.linalg.eigvals(self.A)).max()) if self.order else 0.0
 
     def summary(self) -> Summary:
-        """Order, channels, band, rate and spectral radius, for printing."""
+        """Summarise order, channels, band, rate and spectral radius, for printing."""
         low_hz, high_hz = self.band_hz
         return Summary(
             "Identified state-space model",
@@ -114,7 +116,8 @@ class IdentifiedModel(SummaryDisplay):
 
 
 def _list_problems(model: IdentifiedModel) -> Iterator[str]:
-    """Sentences on all inconsistencies of a model."""
+    """List all inconsistencies of a model, a sentence each. Uncertainties are checked only where A, B, C and D
+    are valid."""
     shape_problems = tuple(_list_shape_problems(model))
     yield from shape_problems
     yield from _list_channel_problems("input", model.input_channels, model.input_unit, model.B.shape[-1])
@@ -135,7 +138,7 @@ def _list_problems(model: IdentifiedModel) -> Iterator[str]:
 
 
 def _list_shape_problems(model: IdentifiedModel) -> Iterator[str]:
-    """Sentences on matrices of a wrong shape or with values that are not finite."""
+    """List matrices of a wrong shape or with values that are not finite."""
     n, m, p = model.A.shape[0], model.B.shape[-1], model.C.shape[0]
     for name, shape in {"A": (n, n), "B": (n, m), "C": (p, n), "D": (p, m)}.items():
         matrix: FloatArray = getattr(model, name)
@@ -148,8 +151,8 @@ def _list_shape_problems(model: IdentifiedModel) -> Iterator[str]:
 def _list_channel_problems(
     direction: str, channels: tuple[str, ...], unit: str | tuple[str, ...], count: int
 ) -> Iterator[str]:
-    """Sentences on a wrong number of channels or units, repeated channels and units outside SI. direction: "input" or
-    "output"; count: number that the matrices have."""
+    """List a wrong number of channels or units, repeated channels and units outside SI. direction: "input" or "output";
+    count: number of channels of the matrices."""
     if len(channels) != count:
         yield f"{direction}_channels names {len(channels)} channels, but the matrices have {count}"
     if len(set(channels)) != len(channels):
@@ -168,8 +171,8 @@ def _list_channel_problems(
 
 
 def _list_uncertainty_problems(model: IdentifiedModel) -> Iterator[str]:
-    """Sentences on a covariance or on samples that do not fit the parameters; positive semidefiniteness is not checked
-    beyond the diagonal."""
+    """List errors of shape and values of covariance and samples. Of positive semidefiniteness, only the sign of the
+    variances is checked."""
     k = model.parameters.size
     covariance, samples = model.covariance, model.samples
     if covariance is not None:

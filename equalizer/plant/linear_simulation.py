@@ -2,8 +2,8 @@
 
 M q'' + D q' + K q = B u + P f has the state x = (q, v) and x' = F x + G (u, f), with commands u and forces f at the
 ports P. With both held constant over a step T, x[k+1] = A x[k] + H (u, f)[k] exactly, where [A H] are the upper rows of
-exp([[F, G], [0, 0]] T) (Van Loan, IEEE Trans. Autom. Control 23:395, 1978). SI units. The simulation itself is in
-`equalizer.effects.simulation.stepping`.
+exp([[F, G], [0, 0]] T) (Van Loan, IEEE Trans. Autom. Control 23:395, 1978). SI units. Called by the simulation
+(`equalizer.effects.simulation.stepping`), by effects and by the diagnosis.
 """
 
 from dataclasses import dataclass
@@ -44,14 +44,16 @@ class DiscreteModel:
 
 
 def compute_driven_axes(model: MechanicalModel) -> FloatArray:
-    """(n, m): per command, the unit vector in the coordinates along which it drives; 0 for a command without effect."""
-    length = np.linalg.norm(model.input, axis=0)
-    return np.asarray(model.input / np.where(length > 0, length, 1.0))
+    """Compute (n, m): per command, the unit vector of the coordinates along which it acts; zeros for a command without
+    effect."""
+    column_norms = np.linalg.norm(model.input, axis=0)
+    return np.asarray(model.input / np.where(column_norms > 0, column_norms, 1.0))
 
 
 def discretise_model(model: MechanicalModel, step_s: float, ports: FloatArray | None = None) -> DiscreteModel:
-    """Discretise the structure, without actuator, sensor and effects, with a step of `step_s`. ports: (n, r),
-    directions in the coordinates along which forces act and motion is output; None = the driven axes."""
+    """Discretise the linear mechanical part, without actuator, sensor and effects, with a step of `step_s`. ports: (n,
+    r), directions in the coordinates along which forces act and motion is output; None = the driven axes. Raises
+    numpy.linalg.LinAlgError for a singular mass matrix."""
     n, m = model.coordinates, model.inputs
     axes = compute_driven_axes(model) if ports is None else ports
     acceleration_by_input = np.asarray(np.linalg.solve(model.mass, np.hstack([model.input, axes])), dtype=np.float64)
@@ -76,8 +78,8 @@ def discretise_model(model: MechanicalModel, step_s: float, ports: FloatArray | 
         by_command=step_matrices[:state_count, state_count : state_count + m],
         by_axis_force=step_matrices[:state_count, state_count + m :],
         motion=np.vstack([rows for rows, _ in motion]),
-        motion_by_command=np.vstack([direct[:, :m] for _, direct in motion]),
-        motion_by_axis_force=np.vstack([direct[:, m:] for _, direct in motion]),
+        motion_by_command=np.vstack([feedthrough[:, :m] for _, feedthrough in motion]),
+        motion_by_axis_force=np.vstack([feedthrough[:, m:] for _, feedthrough in motion]),
         response=response,
         response_by_command=response_by_input[:, :m],
         response_by_axis_force=response_by_input[:, m:],
@@ -88,19 +90,20 @@ def discretise_model(model: MechanicalModel, step_s: float, ports: FloatArray | 
 def _build_output_rows(
     output: FloatArray, derivative_order: int, acceleration_by_state: FloatArray, acceleration_by_input: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Output matrix (p, 2n) and feedthrough (p, m + r) of a time derivative of the outputs. output: (p, n), outputs by
-    the coordinates. derivative_order: 0 position, 1 velocity, 2 acceleration, which alone depends on the inputs
-    directly."""
-    zeros, direct = np.zeros_like(output), np.zeros((len(output), acceleration_by_input.shape[1]))
+    """Build the output matrix (p, 2n) and the feedthrough (p, m + r) of a time derivative of the outputs. output: (p,
+    n), outputs by the coordinates. derivative_order: 0 position, 1 velocity, 2 acceleration, whose feedthrough alone is
+    not zero."""
+    zeros, feedthrough = np.zeros_like(output), np.zeros((len(output), acceleration_by_input.shape[1]))
     if derivative_order == 0:
-        return np.hstack([output, zeros]), direct
+        return np.hstack([output, zeros]), feedthrough
     if derivative_order == 1:
-        return np.hstack([zeros, output]), direct
+        return np.hstack([zeros, output]), feedthrough
     return output @ acceleration_by_state, output @ acceleration_by_input
 
 
 def compute_poles(model: MechanicalModel) -> ComplexArray:
-    """(2n,): poles, the eigenvalues of the continuous-time state matrix, 1/s; complex ones come in conjugate pairs."""
+    """Compute the poles (2n,), eigenvalues of the continuous-time state matrix, 1/s; complex ones in conjugate pairs.
+    Raises numpy.linalg.LinAlgError for a singular mass matrix."""
     n = model.coordinates
     state_matrix = np.block(
         [
@@ -112,5 +115,5 @@ def compute_poles(model: MechanicalModel) -> ComplexArray:
 
 
 def compute_growth_rate(model: MechanicalModel) -> float:
-    """Largest real part of the model's poles, 1/s; negative where all free motion decays."""
+    """Compute the largest real part of the model's poles, 1/s; negative where all free motion decays."""
     return float(compute_poles(model).real.max())

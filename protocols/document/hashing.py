@@ -1,7 +1,8 @@
 """Hash of a protocol: identifies the settings of a study, independent of the formatting of its file.
 
-Sessions and locks store it, so that a changed protocol is detected. Settings that were added to the format later enter
-the hash only where they differ from their defaults: the tables `*_SINCE` list them, and old hashes stay valid.
+Sessions, locks and recordings store it, so that a changed protocol is detected. Settings that later versions added to
+the format enter the hash only where they differ from their defaults, so that old hashes stay valid: the tables
+`*_ADDITIONS` list them.
 """
 
 import hashlib
@@ -27,7 +28,7 @@ from protocols.document.dumping import protocol_to_values
 DefaultValue = str | float | bool | list[Any] | dict[str, Any]
 """Default value of a field, as in JSON."""
 
-TABLES_SINCE = {
+TABLE_ADDITIONS = {
     "consent": ConsentSettings(),
     "setup": SetupSettings(),
     "masking": MaskingSettings(),
@@ -43,28 +44,28 @@ TABLES_SINCE = {
     "before": (),
     "debrief": (),
 }
-"""Tables added after the first locks and sessions, with their default values. A table at its defaults is left out of
-the hash, so that old hashes stay valid."""
+"""Tables of a study protocol added after the first locks and sessions, with their defaults. A table at its defaults is
+left out of the hash."""
 
-SAFETY_SINCE: dict[str, DefaultValue] = {"safety.feedback_cap_n": 1.5, "safety.plausibility": DEFAULT_VALUES}
-"""Safety settings added later, in study and recording protocols, by path, with their defaults. Force in N."""
+SAFETY_ADDITIONS: dict[str, DefaultValue] = {"safety.feedback_cap_n": 1.5, "safety.plausibility": DEFAULT_VALUES}
+"""Safety settings added later, in study and recording protocols, by dotted path, with their defaults; forces in N."""
 
-ROVE_SINCE: dict[str, DefaultValue] = {"demo.rove_db": 0.0, "practice.rove_db": 0.0, "stimulus.rove_db": 0.0}
-"""Roving of the level (dB, random variation) in demonstration, practice and test, added later."""
+ROVE_ADDITIONS: dict[str, DefaultValue] = {"demo.rove_db": 0.0, "practice.rove_db": 0.0, "stimulus.rove_db": 0.0}
+"""Roving (random variation, dB) of the level in demonstration, practice and test, added later; 0 = none."""
 
-TIMING_SINCE: dict[str, DefaultValue] = {"measurement.late_ticks_limit": 1.0, "measurement.longest_late_ms": 1000.0}
+TIMING_ADDITIONS: dict[str, DefaultValue] = {"measurement.late_ticks_limit": 1.0, "measurement.longest_late_ms": 1000.0}
 """Limits on late ticks of the control loop added later."""
 
-SENSOR_SINCE: dict[str, DefaultValue] = {
+SENSOR_ADDITIONS: dict[str, DefaultValue] = {
     "measurement.lost_packets_limit": 0.05,
     "measurement.accelerometer_needed": False,
 }
 """Requirements on the accelerometer added later."""
 
-SETUP_SINCE: dict[str, DefaultValue] = {"setup.daily_check_needed": False}
+SETUP_ADDITIONS: dict[str, DefaultValue] = {"setup.daily_check_needed": False}
 """Requirement of a daily device check, added later."""
 
-QUESTIONS_SINCE: dict[str, DefaultValue] = {
+QUESTION_ADDITIONS: dict[str, DefaultValue] = {
     "debrief.codes": [],
     "debrief.number": [],
     "debrief.unit": "",
@@ -72,44 +73,44 @@ QUESTIONS_SINCE: dict[str, DefaultValue] = {
     "debrief.ends": [],
 }
 """Kinds of answers to the questions of the debriefing added later; each path stands for all questions."""
-DECLARED_SINCE: dict[str, DefaultValue] = {"analysis.interval": "undeclared"}
+ANALYSIS_ADDITIONS: dict[str, DefaultValue] = {"analysis.interval": "undeclared"}
 """Declaration of the confidence interval, added later."""
 
-PLACEMENT_SINCE: dict[str, DefaultValue] = {"staircase.bayesian": {"trials": 0, "spread_db": 0.0}}
+STAIRCASE_ADDITIONS: dict[str, DefaultValue] = {"staircase.bayesian": {"trials": 0, "spread_db": 0.0}}
 """Bayesian placement of levels, added later; off by default."""
 
-FIELDS_SINCE: dict[str, dict[str, DefaultValue]] = {
+FIELD_ADDITIONS: dict[str, dict[str, DefaultValue]] = {
     "study": {
         "trial.device_buttons": [],
         "trial.repeats_per_run": 3,
-        **ROVE_SINCE,
-        **SAFETY_SINCE,
-        **TIMING_SINCE,
-        **SENSOR_SINCE,
-        **SETUP_SINCE,
-        **QUESTIONS_SINCE,
-        **PLACEMENT_SINCE,
-        **DECLARED_SINCE,
+        **ROVE_ADDITIONS,
+        **SAFETY_ADDITIONS,
+        **TIMING_ADDITIONS,
+        **SENSOR_ADDITIONS,
+        **SETUP_ADDITIONS,
+        **QUESTION_ADDITIONS,
+        **STAIRCASE_ADDITIONS,
+        **ANALYSIS_ADDITIONS,
     },
-    "recording": {"lower_on_clip": True, "least_amplitude_n": 0.2, "segments.role": "", **SAFETY_SINCE},
+    "recording": {"lower_on_clip": True, "least_amplitude_n": 0.2, "segments.role": "", **SAFETY_ADDITIONS},
 }
 """Fields added after the first locks and sessions, with their default values, by kind of protocol and dotted path. A
 path through a list, such as `segments.role`, applies to every entry."""
 
 
-def protocol_hash(protocol: StudyProtocol | RecordingProtocol) -> str:
-    """SHA-256 (64 hexadecimal digits) of all values as canonical JSON: keys sorted, no white space, no NaN.
+def hash_protocol(protocol: StudyProtocol | RecordingProtocol) -> str:
+    """Compute the SHA-256 (64 hexadecimal digits) of all values as canonical JSON: keys sorted, no white space.
 
-    Comments, the order of keys, and whether a default is written out make no difference. Title and source
-    do, because they are fixed before the data as well. Defaults are included, except those of later settings
-    (`*_SINCE`).
+    Comments, the order of keys, and whether a default is written out make no difference; title and source do, because
+    they are fixed before data are taken. Defaults are included, except those of `*_ADDITIONS`. Raises ValueError where
+    a value is NaN or infinite.
     """
     values = protocol_to_values(protocol)
     if isinstance(protocol, StudyProtocol):
-        for name, default in TABLES_SINCE.items():
+        for name, default in TABLE_ADDITIONS.items():
             if getattr(protocol, name) == default:
                 del values[name]
-    for path, default in FIELDS_SINCE[protocol.kind].items():
+    for path, default in FIELD_ADDITIONS[protocol.kind].items():
         _delete_default(values, path.split("."), default)
     # JSON writes 0.0 and -0.0 differently, though the values are equal; adding 0.0 turns -0.0 into 0.0.
     text = json.dumps(values, sort_keys=True, separators=(",", ":"), allow_nan=False)
@@ -119,8 +120,8 @@ def protocol_hash(protocol: StudyProtocol | RecordingProtocol) -> str:
 
 
 def _delete_default(values: Any, path: list[str], default: DefaultValue) -> None:
-    """Delete the field at a path from nested values, in place, where it has its default value; in each entry of a
-    list."""
+    """Delete the field at a path from nested dicts and lists, in place, where it has its default value; in a list, from
+    each entry. An absent field is ignored."""
     if isinstance(values, list):
         for entry in values:
             _delete_default(entry, path, default)

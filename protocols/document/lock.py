@@ -10,7 +10,7 @@ from typing import Any
 
 from protocols.definition.recording_protocol import RecordingProtocol
 from protocols.definition.study_protocol import StudyProtocol
-from protocols.document.hashing import protocol_hash
+from protocols.document.hashing import hash_protocol
 
 LOCK_FORMAT = "hapteq-protocol-lock"
 """Value of the key `format`, which identifies a JSON document as a lock."""
@@ -28,7 +28,7 @@ class ProtocolLock:
 
     name: str
     hash: str
-    """Hash of all settings (`protocols.document.hashing.protocol_hash`)."""
+    """Hash of all settings (`protocols.document.hashing.hash_protocol`)."""
     locked_utc: str
     """Time of the lock, UTC, ISO 8601."""
     hapteq: str
@@ -37,7 +37,7 @@ class ProtocolLock:
 
 def make_lock(protocol: StudyProtocol | RecordingProtocol, locked_utc: str, hapteq_version: str) -> ProtocolLock:
     """Make the lock of a protocol. locked_utc: time, ISO 8601; hapteq_version: version of the program that makes it."""
-    return ProtocolLock(protocol.name, protocol_hash(protocol), locked_utc, hapteq_version)
+    return ProtocolLock(protocol.name, hash_protocol(protocol), locked_utc, hapteq_version)
 
 
 def check_lock(lock: ProtocolLock, protocol: StudyProtocol | RecordingProtocol, locked_time: str) -> None:
@@ -49,7 +49,7 @@ def check_lock(lock: ProtocolLock, protocol: StudyProtocol | RecordingProtocol, 
         raise LockError(
             f"the lock is that of protocol {lock.name}, not of {protocol.name}; give the lock of this protocol"
         )
-    current_hash = protocol_hash(protocol)
+    current_hash = hash_protocol(protocol)
     if current_hash != lock.hash:
         raise LockError(
             f"protocol {lock.name} was locked on {locked_time} and has changed since: "

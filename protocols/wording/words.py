@@ -1,7 +1,8 @@
-"""Lookup of every text that is shown to a participant: the protocol's own text, or the English one where it has none.
+"""Lookup of the texts that are shown to a participant: the protocol's text in its language, else the English default.
 
-Sentences that a session composes itself are logged in English; `Words.translate_fact` recognises them by pattern and
-gives their translation. The screens and the line mode of a session take their texts from here.
+The screens and the line mode of a session take their texts from here. Facts (`english_facts`) are sentences that a
+session composes and logs in English, such as the reason for a void trial; `Words.translate_fact` recognises them by
+pattern and translates them.
 """
 
 import re
@@ -13,11 +14,11 @@ from protocols.wording.english_facts import FACTS
 from protocols.wording.english_screens import SCREEN_TEXTS
 
 FOOTER_KEYS = {text: key for key, text in SCREEN_TEXTS.items() if key.startswith("key_")}
-"""Key of each word in the footer (what a keyboard key does), by its English text."""
+"""Key of each label in the footer (the action of a keyboard key), by its English text."""
 
 
 def _compile_pattern(text: str) -> re.Pattern[str]:
-    """Regular expression for a fact whose placeholders are filled in; each placeholder becomes a named group."""
+    """Compile the regular expression of a fact; each placeholder becomes a named group that matches its value."""
     parts = re.split(r"\{(\w+)\}", text)  # plain text and names of placeholders alternate
     groups = (f"(?P<{part}>.+?)" if index % 2 else re.escape(part) for index, part in enumerate(parts))
     return re.compile("".join(groups), re.DOTALL)
@@ -35,29 +36,30 @@ class Words:
     """The texts of one protocol in one language."""
 
     own_texts: Mapping[str, str] = field(default_factory=dict, hash=False)
-    """The protocol's own texts by key. The English text is used for a missing key or an empty text."""
+    """Texts of the protocol by key. The English text is used for a missing key or an empty text."""
 
     def __getitem__(self, key: str) -> str:
         """The text with this key; KeyError where neither the protocol nor the English texts have it."""
         return self.own_texts.get(key) or ENGLISH[key]
 
     def fill(self, key: str, values: Mapping[str, object]) -> str:
-        """Fill in the placeholders of a text. The English text is shown where the placeholders of the protocol's own
-        text differ (from another version of hapteq), so that no sentence is missing on the screen."""
+        """Fill in the placeholders of a text. The English text is used where the placeholders of the protocol's text
+        differ, because it was written for another version of hapteq. Raises KeyError for an unknown key or a missing
+        value."""
         has_same_placeholders = list_placeholders(self[key]) == list_placeholders(ENGLISH[key])
         return (self[key] if has_same_placeholders else ENGLISH[key]).format_map(values)
 
     def fill_count(self, key: str, count: int) -> str:
-        """The text in the singular for a count of 1, else in the plural."""
+        """Fill a count into a text: `<key>_1`, the singular, for a count of 1, else `<key>_n`."""
         return self[f"{key}_1"] if count == 1 else self.fill(f"{key}_n", {"count": count})
 
     def translate_key(self, english: str) -> str:
-        """Translate the footer's word for a keyboard key; unchanged where it is not in `FOOTER_KEYS`, as on the
+        """Translate the footer's label of a keyboard key; unchanged where it is not in `FOOTER_KEYS`, as on the
         experimenter's screens."""
         return self[FOOTER_KEYS[english]] if english in FOOTER_KEYS else english
 
     def translate_fact(self, english: str) -> str:
-        """Translate a sentence that a session composed in English; unchanged where it matches no pattern."""
+        """Translate a fact, with the facts in its placeholders; unchanged where it matches no pattern."""
         for key, pattern in FACT_PATTERNS.items():
             match = pattern.fullmatch(english)
             if match is not None:
@@ -65,8 +67,8 @@ class Words:
         return english
 
     def _translate_value(self, value: str) -> str:
-        """Translate a value in a fact: itself a fact, a list of facts separated by commas, or unchanged (a
-        number)."""
+        """Translate the value of a placeholder: a fact, or facts separated by ", "; other values, such as numbers, stay
+        unchanged."""
         return (
             ", ".join(self.translate_fact(sentence) for sentence in value.split(", "))
             if self.translate_fact(value) == value
@@ -75,4 +77,4 @@ class Words:
 
 
 ENGLISH_WORDS = Words()
-"""The English texts, without any of a protocol's own."""
+"""The English texts only."""

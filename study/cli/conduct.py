@@ -99,7 +99,7 @@ def run_resumed_session(
         return
     _confirm_free_handle(opened.observer, device, hands_off)
     in_real_time = opened.observer is None or needs_real_time(device)
-    clock: Clock = RealClock() if in_real_time else VirtualClock.resume_at(state.sitting.last.utc)
+    clock: Clock = RealClock() if in_real_time else VirtualClock.resume_at(state.sitting.last_moment.utc)
     with _provide_participant(opened.observer, opened.seed, keys, clock, make_words(state.protocol)) as participant:
         end = conduct_resumed(folder, device, participant)
     print_results(end_sitting(end, RealClock().utc()), as_json)

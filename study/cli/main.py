@@ -1,7 +1,8 @@
 """Entry point of the command `hapteq`: runs a subcommand, and maps errors to messages and exit codes.
 
 The subcommands are listed in `command_table`, a file for each. Results are written to stdout, messages and progress to
-stderr. Modules are imported in the bodies of the commands, so that `--help` is fast.
+stderr. Modules are imported in the bodies of the commands, so that `--help` is fast. `main` is called by the console
+script `hapteq` (`study/launcher/hapteq_launcher.py`).
 """
 
 import io
@@ -40,7 +41,7 @@ INTERRUPTED = StudyError(
     "Run it again.",
     saved="Files that it had written are complete.",
 )
-"""Message after Ctrl-C, unless the command raises a more specific error."""
+"""Error that is reported after Ctrl-C, unless the command raises a more specific one."""
 
 
 def _print_version(is_requested: bool) -> None:
@@ -63,7 +64,8 @@ def options(
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run a command; returns its exit code (`ExitCode`). arguments: None = those of the process."""
+    """Run a command and return its exit code (`ExitCode`); StudyError, OSError, wrong use and Ctrl-C are reported on
+    stderr, any other exception is raised. arguments: None = those of the process."""
     _configure_process()
     try:
         code = app(args=arguments, standalone_mode=False)
@@ -110,8 +112,8 @@ def print_error(error: StudyError) -> None:
 
 
 def qualify_commands(text: str) -> str:
-    """The text with `hapteq` in its commands replaced by the path of the executable, if the shell would not find it:
-    after `make study`, hapteq is not on the PATH."""
+    """Replace `hapteq` in the commands of a text by the path of the executable, if the shell would not find it: after
+    `make study`, hapteq is not on the PATH."""
     executable = Path(sys.argv[0])
     if shutil.which("hapteq") or executable.name != "hapteq":
         return text
@@ -119,8 +121,7 @@ def qualify_commands(text: str) -> str:
 
 
 def _describe_system_error(problem: OSError) -> StudyError:
-    """The error to report for an operating-system error without a more specific one, such as missing permissions or a
-    full disk."""
+    """Describe an operating-system error that no command reports itself, such as missing permissions or a full disk."""
     file_note = f" ({problem.filename})" if problem.filename else ""
     return StudyError(
         "The system refused",

@@ -38,7 +38,7 @@ def show(
 ) -> None:
     """Every key of a protocol with its value, its default and the reason for it."""
     from protocols.document.explain import explain_protocol
-    from protocols.document.hashing import protocol_hash
+    from protocols.document.hashing import hash_protocol
     from study.session.stimulus.limits import describe_forces
     from study.store.formats.protocol_files import read_protocol
 
@@ -49,9 +49,9 @@ def show(
     fields = explain_protocol(file.protocol)
     if as_json:
         rows = [{"key": f.key, "value": f.value, "default": f.default, "reason": f.description} for f in fields]
-        typer.echo(json.dumps({"hash": protocol_hash(file.protocol), "fields": rows}, indent=2, default=str))
+        typer.echo(json.dumps({"hash": hash_protocol(file.protocol), "fields": rows}, indent=2, default=str))
         return
-    typer.echo(f"{file.protocol.title} (hash {protocol_hash(file.protocol)[:12]})")
+    typer.echo(f"{file.protocol.title} (hash {hash_protocol(file.protocol)[:12]})")
     typer.echo(f"Force at the handle: {describe_forces(file.protocol.safety)}.")
     for field in fields:
         typer.echo(f"\n{field.key} = {field.value}")

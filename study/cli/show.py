@@ -1,5 +1,9 @@
 """`hapteq show`: print a session (facts, thresholds, staircases), a diagnosis, or a recording. Registered in
-`study.cli.command_table`."""
+`study.cli.command_table`.
+
+WHAT is taken as a recording file, else as a diagnosis (any other file, or a folder with diagnosis.json), else as a
+session.
+"""
 
 import json
 from collections.abc import Iterable
@@ -17,7 +21,7 @@ if TYPE_CHECKING:
     from study.session.views.archive_views import DiagnosisView, SessionView, Staircase
 
 PLOT_COLUMNS, PLOT_ROWS = 78, 12
-"""Width and height of a staircase's plot, in characters."""
+"""Width and height of a staircase's plot, in characters. Chosen for a terminal of 80 columns."""
 
 
 def show(
@@ -83,8 +87,8 @@ def _show_recording(path: Path, as_json: bool) -> None:
 
 
 def _find_session_folder(target: str, data: Path) -> Path:
-    """Folder of a session, also of one that was withdrawn or cannot be read: these can be shown too. target: the
-    folder, or its name in `data`. Raises what `find_session` raises for others."""
+    """Find the folder of a session, also of a withdrawn or unreadable one. target: the folder, or its name in `data`.
+    Raises as `find_session` where it is no session."""
     from study.store.sessions.archive import find_session, list_session_folders
 
     folder = Path(target) if Path(target).is_dir() else data / target
@@ -93,7 +97,8 @@ def _find_session_folder(target: str, data: Path) -> Path:
 
 
 def _format_session(view: "SessionView", log: bool) -> Iterable[str]:
-    """Lines of a session: summary, facts, thresholds, warnings, staircases; with `log` also its events in words."""
+    """Format the lines of a session: summary, facts, thresholds, warnings, staircases, with `log` its events in words,
+    and path of the report."""
     from study.tui.drawing.staircase_drawing import LEGEND
     from study.tui.session_status import describe_session
     from study.tui.text_rows import align_rows
@@ -116,7 +121,7 @@ def _format_session(view: "SessionView", log: bool) -> Iterable[str]:
 
 
 def _draw_plot(staircase: "Staircase") -> Iterable[str]:
-    """Lines of a staircase: title, plot and summary."""
+    """Draw the lines of a staircase: title, plot and summary."""
     from study.tui.drawing.staircase_drawing import draw_staircase, summarize_staircase
 
     yield f"\n{staircase.title}"
@@ -125,7 +130,8 @@ def _draw_plot(staircase: "Staircase") -> Iterable[str]:
 
 
 def _format_diagnosis(view: "DiagnosisView") -> Iterable[str]:
-    """Lines of a diagnosis: verdict, effects, rejected candidates, fit, mismatch, notes and the next experiment."""
+    """Format the lines of a diagnosis: verdict, effects, candidates, rivals, fit, mismatch, remainder, notes, next
+    experiment, and path of the report; empty sections are left out."""
     from study.tui.text_rows import align_rows
 
     width = read_terminal_width()

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 LOG_NAME = "events.jsonl"
 """Same as `study.store.sessions.event_log.LOG_NAME`, whose import would delay the first frame."""
 PLAIN_UPDATE_INTERVAL_S = 0.2
-"""Interval (s) between two updates of the output as plain lines."""
+"""Interval (s) between two updates of the output as plain lines. Chosen."""
 
 
 def watch(
@@ -40,7 +40,7 @@ def watch(
     if stop or pause or note or adverse:
         _send_requests(folder, stop, pause, ((note, False), (adverse, True)))
     elif once or as_json:
-        _print_once(folder, as_json)
+        _print_state(folder, as_json)
     elif plain or not (sys.stdin is not None and sys.stdin.isatty() and sys.stdout.isatty()):
         _follow_in_lines(folder)
     else:
@@ -48,7 +48,8 @@ def watch(
 
 
 def _find_folder(session: str, data: Path) -> Path:
-    """Find the session's folder by its path or name. Raises StudyError."""
+    """Find the session's folder by its path, or by its name in `data`. Raises StudyError where there is no session, or
+    a withdrawn one."""
     for path in (Path(session), data / session):
         if (path / LOG_NAME).is_file():
             return path.resolve()
@@ -58,7 +59,7 @@ def _find_folder(session: str, data: Path) -> Path:
 
 
 def _find_last_changed(data: Path) -> str:
-    """Name of the session whose log changed last. Raises WrongUseError without a session."""
+    """Find the name of the session in `data` whose log changed last. Raises WrongUseError without a session."""
     logs = sorted(data.glob(f"*/{LOG_NAME}"), key=lambda log: log.stat().st_mtime)
     if not logs:
         from study.errors import WrongUseError
@@ -83,8 +84,9 @@ def _show_screen(folder: Path) -> None:
         feed.close()
 
 
-def _print_once(folder: Path, as_json: bool) -> None:
-    """Print the present state, as lines or JSON. Raises StudyError where the log is empty."""
+def _print_state(folder: Path, as_json: bool) -> None:
+    """Print the present state of the session, as lines or as one JSON document. Raises StudyError where the log is
+    empty."""
     from dataclasses import asdict
 
     from study.devices.clock import RealClock
@@ -105,7 +107,7 @@ def _print_once(folder: Path, as_json: bool) -> None:
 
 
 def _follow_in_lines(folder: Path) -> None:
-    """Print each change as a line until the session no longer runs."""
+    """Print each change of the session as a line, until its program no longer runs."""
     from study.devices.clock import RealClock
     from study.session.watching.watch_view import RUNNING_STATUSES
     from study.tui.watch.watch_lines import format_changes
@@ -122,7 +124,8 @@ def _follow_in_lines(folder: Path) -> None:
 
 
 def _send_requests(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str, bool], ...]) -> None:
-    """Send the requests to the session, a stop first. notes: text, and whether it is an adverse event."""
+    """Send the requests to the session in the order stop, notes, pause. notes: text (an empty one is not sent), and
+    whether it is an adverse event."""
     from study.cli.note import write_note
     from study.session.watching.requests import PauseAsked, StopAsked
     from study.store.sessions.archive import SessionFolder
@@ -139,7 +142,7 @@ def _send_requests(folder: Path, stop: bool, pause: bool, notes: tuple[tuple[str
 
 
 def _send_request(session: "SessionFolder", request: "Request", confirmation: str) -> None:
-    """Send a request, then print the confirmation on stderr."""
+    """Send a request to the session, then print the confirmation on stderr."""
     from study.devices.clock import RealClock
     from study.workflows.views.send_request import send_request
 

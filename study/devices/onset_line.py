@@ -1,8 +1,8 @@
 """Trigger pulse at the onset of each trial's force, for an external recorder (EEG, EMG, a camera).
 
-The pulse is a byte or a control line (DTR, RTS) of a serial port, or the data lines of a parallel port; the interface
-`Line` covers all of them. A line that fails does not interrupt a trial: the pulse is reported as lost
-(`Pulse.at_s` is None), and the next pulse tries to open the line again.
+The pulse is a byte or a control line (DTR, RTS) of a serial port, or the data lines of a parallel port; `Line` is their
+common interface. A line that fails does not interrupt a trial: the pulse is reported as lost (`Pulse.at_s` is None),
+and the next request opens the line again. Opened by `opening.open_lab_onset_line` for `conduct_session`.
 """
 
 import contextlib
@@ -22,7 +22,7 @@ from protocols.definition.staircase_rule import STRICT
 from study.errors import DeviceError
 
 PULSE_TIMEOUT_S = 0.05
-"""Timeout of a pulse (s); a working line needs well below a millisecond."""
+"""Timeout of a pulse (s). Chosen: a working line needs well below a millisecond."""
 
 CLAIM_PORT, WRITE_DATA, RELEASE_PORT = 0x708B, 0x40017086, 0x708C
 """Requests (ioctl) of Linux' parallel port driver: PPCLAIM, PPWDATA and PPRELEASE of linux/ppdev.h."""
@@ -51,10 +51,10 @@ class Pulse:
     line: str
     """Description of the line."""
     at_s: float | None
-    """Time at which the driver had accepted the pulse, on this program's monotonic clock (s); None: it may not have
+    """Time at which the driver had accepted the pulse, by this process's monotonic clock (s); None: it may not have
     been sent."""
     trouble: str = ""
-    """Reason why the pulse is lost; empty where it was sent."""
+    """Reason for which the pulse is lost; empty where it was sent."""
 
 
 @checked_dataclass(frozen=True, config=STRICT)
@@ -66,9 +66,9 @@ class PulseSettings:
     port: str
     """Such as /dev/ttyUSB0 or COM3 (serial), /dev/parport0 (parallel)."""
     code: Annotated[int, Field(ge=1, le=255)] = 1
-    """Byte that is sent, or value of the data lines of a parallel port. The control lines do not use it."""
+    """Byte that is sent, or value of the data lines of a parallel port; not used for a control line."""
     width_s: Annotated[float, Field(gt=0, le=0.1)] = 0.005
-    """Duration of the pulse (s). After it, the byte 0 is sent, or the line is lowered."""
+    """Duration of the pulse (s), after which the byte 0 is sent or the line is lowered."""
     baud: Annotated[int, Field(gt=0)] = 115_200
     """Baud rate of a serial port (bit/s)."""
 
@@ -80,11 +80,10 @@ class PulseSettings:
 
 
 class OnsetLine:
-    """Sends trigger pulses. Only a separate thread calls the line, so that `send_pulse` never raises and waits at most
-    `PULSE_TIMEOUT_S`.
+    """Sends trigger pulses through a line. Only a separate thread calls the line, so that `send_pulse` raises no
+    exception of a driver and waits at most `PULSE_TIMEOUT_S`.
 
-    open_line: opens the line; may raise any exception. line: the line if it is open already; None: the first pulse
-    opens it."""
+    open_line: opens the line; may raise any exception. line: the open line; None: the first pulse opens it."""
 
     def __init__(
         self, settings: PulseSettings, open_line: Callable[[PulseSettings], Line], line: Line | None = None
@@ -93,19 +92,19 @@ class OnsetLine:
         self._open_line = open_line
         self._line = line
         self._requests: SimpleQueue[SimpleQueue[Pulse] | None] = SimpleQueue()
-        self._busy = threading.Lock()
+        self._pulse_lock = threading.Lock()
         self._thread = threading.Thread(target=self._run_thread, name="onset line", daemon=True)
         self._thread.start()
 
     def send_pulse(self) -> Pulse:
         """Send a pulse, and wait at most `PULSE_TIMEOUT_S` until the driver has accepted it. A lost pulse states its
         reason."""
-        if self._busy.locked():
+        if self._pulse_lock.locked():
             return self._make_lost_pulse("the previous pulse has not been finished")
-        answer: SimpleQueue[Pulse] = SimpleQueue()
-        self._requests.put(answer)
+        reply_queue: SimpleQueue[Pulse] = SimpleQueue()
+        self._requests.put(reply_queue)
         try:
-            return answer.get(timeout=PULSE_TIMEOUT_S)
+            return reply_queue.get(timeout=PULSE_TIMEOUT_S)
         except Empty:
             return self._make_lost_pulse(f"the line accepted none within {1000 * PULSE_TIMEOUT_S:g} ms")
 
@@ -116,22 +115,22 @@ class OnsetLine:
 
     def _run_thread(self) -> None:
         """Send the requested pulses until `close`, then close the line."""
-        while (answer := self._requests.get()) is not None:
-            with self._busy:
-                self._raise_and_lower(answer)
+        while (reply_queue := self._requests.get()) is not None:
+            with self._pulse_lock:
+                self._play_pulse(reply_queue)
         self._close_line()
 
-    def _raise_and_lower(self, answer: SimpleQueue[Pulse]) -> None:
-        """Open the line if needed, raise it, put the result into `answer`, and lower it after `width_s` (s). A line
-        that fails is closed."""
+    def _play_pulse(self, reply_queue: SimpleQueue[Pulse]) -> None:
+        """Open the line if needed, raise it, put the result into `reply_queue`, and lower it after `width_s` (s). A
+        line that fails is closed."""
         try:
             self._line = self._line or self._open_line(self._settings)
             self._line.raise_level()
-        except Exception as problem:  # noqa: BLE001 - a trial goes on without its pulse for any error of a driver
-            answer.put(self._make_lost_pulse(str(problem) or type(problem).__name__))
+        except Exception as error:  # noqa: BLE001 - a trial goes on without its pulse for any error of a driver
+            reply_queue.put(self._make_lost_pulse(str(error) or type(error).__name__))
             self._close_line()
             return
-        answer.put(Pulse(self._settings.words, time.monotonic()))
+        reply_queue.put(Pulse(self._settings.words, time.monotonic()))
         time.sleep(self._settings.width_s)
         with contextlib.suppress(Exception):  # a failure shows at the next pulse
             self._line.lower_level()
@@ -145,21 +144,21 @@ class OnsetLine:
                     shut_down()
 
     def _make_lost_pulse(self, trouble: str) -> Pulse:
-        """Result for a pulse that may not have been sent. trouble: the reason."""
+        """Make the result for a pulse that may not have been sent. trouble: the reason."""
         return Pulse(self._settings.words, None, trouble)
 
 
 def open_onset_line(settings: PulseSettings) -> OnsetLine:
-    """Open the line of the lab's file before a session: opening resets some boards, which then accept no byte for a
-    second or two. Raises `DeviceError` for a line that cannot be opened."""
+    """Open the line before a session, because opening resets some boards, which then accept no byte for a second or
+    two. Raises `DeviceError` for a line that cannot be opened."""
     try:
         line = open_port(settings)
-    except (OSError, ValueError) as problem:
+    except (OSError, ValueError) as error:
         raise DeviceError(
             "The line for onset pulses cannot be opened",
-            f"{settings.words}: {problem}.",
+            f"{settings.words}: {error}.",
             "Plug it in, or remove [pulse] from the device's file (docs/hardware.md).",
-        ) from problem
+        ) from error
     return OnsetLine(settings, open_port, line)
 
 
@@ -188,7 +187,7 @@ def open_port(settings: PulseSettings) -> Line:
 
 
 class _SerialBytePort:
-    """A byte on a serial port; a zero byte ends the pulse."""
+    """A byte on an open serial port; a zero byte ends the pulse. line: pyserial's port; code: the byte, 1 to 255."""
 
     def __init__(self, line: Any, code: int) -> None:
         self._line, self._code = line, code
@@ -208,7 +207,7 @@ class _SerialBytePort:
 
 
 class _SerialControlLine:
-    """A control line of a serial port. kind: serial-dtr or serial-rts."""
+    """A control line of an open serial port. line: pyserial's port; kind: serial-dtr or serial-rts."""
 
     def __init__(self, line: Any, kind: str) -> None:
         self._line, self._name = line, kind.removeprefix("serial-")
@@ -224,7 +223,8 @@ class _SerialControlLine:
 
 
 class _ParallelPort:
-    """The data lines of a parallel port through Linux' ppdev. Tested with a scripted driver only."""
+    """The data lines of a parallel port through Linux' driver ppdev. Raises OSError on other systems, and where the
+    port cannot be opened or claimed. Tested with a simulated driver only."""
 
     def __init__(self, settings: PulseSettings) -> None:
         if sys.platform != "linux":

@@ -1,9 +1,8 @@
-"""Opens devices by name. The rest of the program reaches a device only through this module. Every device that it
-returns for playing forces is behind the safety layer (`study.devices.safe`); only `accept_device` also commands past
-it, to test the cap of the vendor's library.
+"""Open devices by name; other packages access a device only through this module (`study.workflows`, `study.cli`).
 
-Modules that take long to import (numba above all) are imported when a device is opened, so that the command line starts
-at once.
+Every device that it returns for playing forces is behind the safety layer (`study.devices.safe`); only `accept_device`
+also sends commands without it, to test the force cap of the vendor's library. Modules with a slow import (numba above
+all) are imported when a device is opened, so that the command line starts quickly.
 """
 
 import contextlib
@@ -30,23 +29,23 @@ if TYPE_CHECKING:
     from study.devices.telemetry import TelemetryReader
 
 SIMULATED = "simulated"
-"""Name of the simulated omega.3, as `--device` takes it."""
+"""Name of the simulated omega.3, as in `--device`."""
 
 REAL = tuple(MODELS)
-"""Names of the real devices, which need the vendor's library and real time."""
+"""Names of the real devices, which need the vendor's library and a real-time clock."""
 
-STRONGEST_N = max(model.max_force_n for model in MODELS.values())
-"""Largest force of the strongest real device (N): a setting above it is a mistake."""
+LARGEST_DEVICE_FORCE_N = max(model.max_force_n for model in MODELS.values())
+"""Largest force (N) of all real devices: a force limit above it is refused as an error."""
 
 DEVICES = (SIMULATED, *REAL)
-"""Names of the devices on which a study or a recording may be made."""
+"""Names of the devices that are offered for studies and recordings."""
 
 FRICTIONLESS = "simulated-frictionless"
-"""Name of the simulated omega.3 without dry friction in its drives: the comparison shows the effect of friction. Not
-among `DEVICES`."""
+"""Name of the simulated omega.3 without dry friction in its drives, for comparison with `SIMULATED`; not in
+`DEVICES`."""
 
 SIMULATIONS = (SIMULATED, FRICTIONLESS)
-"""Names of the simulated devices, which need no real clock."""
+"""Names of the simulated devices, which run in virtual time."""
 
 
 def needs_real_time(name: str) -> bool:
@@ -56,7 +55,7 @@ def needs_real_time(name: str) -> bool:
 
 
 class LinkageSource(Protocol):
-    """Interface to the linkage (kinematics and inertia) that a device reports of itself."""
+    """Interface to the linkage data (kinematics and inertia) that a device's driver returns."""
 
     @property
     def info(self) -> DeviceInfo:
@@ -64,8 +63,7 @@ class LinkageSource(Protocol):
         ...
 
     def compute_reading_at(self, position_m: "FloatArray") -> "LinkageReading | None":
-        """The linkage at a position (3,), m, also where the handle is elsewhere; None out of reach. Raises
-        `DeviceError`."""
+        """Linkage data at any position (3,), m, of the workspace; None out of reach. Raises `DeviceError`."""
         ...
 
     def compute_angles_at(self, position_m: "FloatArray") -> "FloatArray | None":
@@ -73,8 +71,8 @@ class LinkageSource(Protocol):
         ...
 
     def check_frame(self) -> None:
-        """Raises `DeviceError` where the positions of `compute_reading_at` and `compute_angles_at` are not in the axes
-        of the device's readings, in which a calibration of the linkage needs them."""
+        """Raise `DeviceError` where the positions of `compute_reading_at` and `compute_angles_at` are in other axes
+        than the device's readings; a calibration of the linkage requires the same axes."""
         ...
 
 
@@ -82,8 +80,8 @@ def open_device(
     name: str, settings: DeviceSettings, clock: Clock, seed: int, *, own_process: bool = True, telemetry: str = ""
 ) -> Device:
     """Open a device behind the safety layer. seed: of the random numbers of a simulated device. own_process: run the
-    loop of a real device in a separate process, which alone holds the device; False within that process, and in tests.
-    telemetry: path of the caller's telemetry ring; empty: a new ring, if in real time and own_process. Raises
+    control loop of a real device in a separate process; False within that process, and in tests. telemetry: path of the
+    caller's telemetry ring; empty: a new ring if the clock is not virtual and own_process is True, else none. Raises
     `DeviceError`, and `StudyError` for a recording or calibration that cannot be used."""
     if name not in SIMULATIONS and name not in REAL and not name.startswith((REPLAY, CALIBRATED)):
         raise _make_unknown_device_error(name)
@@ -102,7 +100,7 @@ def open_device(
     rig = find_rig(name, settings, seed)
     ring: Ring | None = None
     try:
-        _check_hand(name, rig.info, settings)
+        _check_acceptance(name, rig.info, settings)
         ring = Ring(telemetry) if telemetry or (own_process and not clock.virtual) else None
         return SafeDevice(rig, settings, clock, ring)
     except BaseException:
@@ -112,17 +110,17 @@ def open_device(
         raise
 
 
-def _check_hand(name: str, info: DeviceInfo, settings: DeviceSettings) -> None:
-    """Raises `DeviceError` where a hand is to hold a device without a valid acceptance. Only a device that is simulated
-    by its name and by its driver needs none: the statement of a lab's own driver alone does not suffice."""
+def _check_acceptance(name: str, info: DeviceInfo, settings: DeviceSettings) -> None:
+    """Raise `DeviceError` where a hand is to hold a device without a valid acceptance test. A device needs none only if
+    it is simulated both by its name and by the statement of its driver (`DeviceInfo.simulated`)."""
     if settings.hand_on_handle and (needs_real_time(name) or not info.simulated):
         find_accepted_baseline(info, datetime.now(UTC).date())
 
 
 @contextlib.contextmanager
 def open_linkage(name: str) -> "Iterator[LinkageSource]":
-    """Context with the source of a device's linkage: joint angles, Jacobian and inertia by position. Nothing moves, and
-    a real device stays braked. Raises `DeviceError`."""
+    """Open the source of a device's linkage data: joint angles, Jacobian and inertia by position. Nothing moves, and a
+    real device stays braked. Raises `DeviceError`."""
     if name in REAL:
         from study.devices.force_dimension.linkage import open_vendor_linkage
 
@@ -145,7 +143,7 @@ def open_linkage(name: str) -> "Iterator[LinkageSource]":
 
 
 def _make_unknown_device_error(name: str) -> DeviceError:
-    """Error for a name that belongs to no device; it lists the known names."""
+    """Make the error for a name that belongs to no device; it lists the known names."""
     return DeviceError(
         f"There is no device called {name!r}",
         f"Known are {', '.join(DEVICES)}, {REPLAY}FILE.h5 for a recording, and {CALIBRATED}FILE.h5 for a calibration.",
@@ -154,15 +152,15 @@ def _make_unknown_device_error(name: str) -> DeviceError:
 
 
 def open_telemetry(path: str) -> "TelemetryReader":
-    """Reader of the telemetry ring of a running loop. path: of the ring. Raises `StudyError` where the loop has ended
-    or its ring cannot be read."""
+    """Open a reader of the telemetry ring of a running control loop. path: of the ring. Raises `StudyError` where the
+    loop has ended or its ring cannot be read."""
     from study.devices.telemetry import TelemetryReader
 
     return TelemetryReader(Path(path))
 
 
-def find_onset_line() -> "OnsetLine | None":
-    """Open the line for onset pulses that the lab's file names; None where it names none. Raises `DeviceError`."""
+def open_lab_onset_line() -> "OnsetLine | None":
+    """Open the line for onset pulses that is set in the lab's file; None where none is set. Raises `DeviceError`."""
     from study.devices.force_dimension.lab import read_lab
     from study.devices.onset_line import open_onset_line
 
@@ -171,30 +169,31 @@ def find_onset_line() -> "OnsetLine | None":
 
 
 def make_masking_sound(samples: "Samples", rate_hz: int) -> "MaskingSound":
-    """Masking noise: `samples`, repeated on the system's sound output, not yet started. Raises `DeviceError` where
-    there is no sound output."""
+    """Make the masking noise: `samples`, repeated on the system's sound output, not yet started. rate_hz: sample rate.
+    Raises `DeviceError` where there is no sound output."""
     from study.devices.masking_sound import MaskingSound, open_stream
 
     return MaskingSound(samples, rate_hz, open_stream)
 
 
 def raise_thread_priority() -> AbstractContextManager[object]:
-    """Context in which the calling thread has the real-time priority of a real device's loop, where the system allows
-    it."""
+    """Context in which the calling thread has the real-time priority of a real device's control loop, where the system
+    permits it."""
     from study.devices.drive.real_time_class import real_time_class
 
     return real_time_class()
 
 
 def check_loop_priority() -> DeviceFinding:
-    """Finding on whether the system grants real-time priority to this account's loops."""
+    """Check whether the system permits real-time priority to this user account."""
     from study.devices.drive.real_time_class import check_real_time_rights
 
     return check_real_time_rights()
 
 
 def examine_device(name: str) -> tuple[DeviceFinding, ...]:
-    """Findings on a real device and its driver, with zero force; empty for other devices. Never raises."""
+    """Examine a real device and its driver, with zero force; empty for other devices. Problems are returned as
+    findings, not raised."""
     if name not in REAL:
         return ()
     from study.devices.force_dimension.findings import examine
@@ -203,8 +202,8 @@ def examine_device(name: str) -> tuple[DeviceFinding, ...]:
 
 
 def calibrate_device(name: str, patience_s: float) -> None:
-    """Wait, at most `patience_s`, until a person has moved the handle of a real device into its calibration position.
-    Raises `DeviceError`."""
+    """Wait, at most `patience_s` (s), until a person has moved the handle of a real device into its calibration
+    position. Raises `DeviceError`, also for a device that is not real."""
     if name not in REAL:
         raise DeviceError("There is nothing to calibrate", f"{name!r} is no real device.", "Leave --calibrate out.")
     from study.devices.force_dimension.findings import calibrate
@@ -215,23 +214,23 @@ def calibrate_device(name: str, patience_s: float) -> None:
 def calibrate_accelerometer(
     port: str, baud: int, await_position: Callable[[str, tuple[float, float, float] | None], None]
 ) -> str:
-    """Calibrate an accelerometer by gravity in six positions (`six_positions.calibrate_on_table`). Returns the table
-    for the lab's file, as TOML. Raises `DeviceError`."""
+    """Calibrate an accelerometer by gravity in six positions (`six_positions.calibrate_on_table`). baud: of the serial
+    port (bit/s). Returns the calibration as a TOML table for the lab's file. Raises `DeviceError`."""
     from study.devices.accelerometer.six_positions import calibrate_on_table
 
     return calibrate_on_table(port, baud, await_position)
 
 
 def save_accelerometer_calibration(table: str) -> Path:
-    """Write the table of an accelerometer's calibration into the lab's file. Raises `DeviceError`, and then leaves the
-    file unchanged."""
+    """Write the TOML table of an accelerometer's calibration into the lab's file. Returns its path. Raises
+    `DeviceError`; the file is then unchanged."""
     from study.devices.force_dimension.lab import write_sensor_table
 
     return write_sensor_table(table)
 
 
 def get_lab_file_path() -> Path:
-    """Path of the lab's settings of its device; the file need not exist."""
+    """Path of the lab's file, with the settings of its device; it need not exist."""
     from study.devices.force_dimension.lab import locate_lab_file
 
     return locate_lab_file()
@@ -243,15 +242,15 @@ def get_device_folder() -> Path:
 
 
 def find_accepted_baseline(info: DeviceInfo, today: date) -> tuple[str, str]:
-    """File name (in `get_device_folder()`) and SHA-256 of the baseline recording of the acceptance; both empty where
-    none was made. Raises `DeviceError` where this device was not accepted, or too long ago."""
+    """Find file name (in `get_device_folder()`) and SHA-256 of the baseline recording of the acceptance test; both
+    empty where none was made. Raises `DeviceError` where this device was not accepted, or too long ago."""
     from study.devices.force_dimension.acceptance import check_accepted
 
     return check_accepted(info, today)
 
 
 def get_limit_test_force_n() -> float:
-    """Cap (N) under which `accept_device` tests the device, and the force that it holds on the handle."""
+    """Force cap (N) with which `accept_device` tests the device; also the force that it holds."""
     from study.devices.force_dimension.force_limit_check import TEST_FORCE_N
 
     return TEST_FORCE_N
@@ -260,11 +259,10 @@ def get_limit_test_force_n() -> float:
 def accept_device(
     name: str, settings: DeviceSettings, clock: Clock, operator: str, baseline: tuple[str, str] = ("", "")
 ) -> str:
-    """Acceptance test of the force limit, with no hand on the handle: command more than the cap, hold a small force,
-    stop the loop on purpose; write the acceptance if the device got no more than the cap and dropped the force. Returns
-    a sentence with the results. Raises `DeviceError`. The caller (`study.workflows.checks.examine_setup`) has made all
-    other checks before. operator: name of the person; baseline: file name and SHA-256 of the recording for the daily
-    check."""
+    """Test the force limit of a real device without a hand on the handle: command more than the cap, hold the force of
+    the cap, stop the loop; write the acceptance if the force stayed within the cap and was switched off. Returns a
+    sentence with the results. Raises `DeviceError`. The caller (`study.workflows.checks.examine_setup`) has made all
+    other checks. operator: name of the person; baseline: file name and SHA-256 of the recording for the daily check."""
     from study.devices.force_dimension.acceptance import Acceptance, write_acceptance
     from study.devices.force_dimension.force_limit_check import (
         COMMAND_TO_CAP_RATIO,

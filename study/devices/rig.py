@@ -1,6 +1,8 @@
-"""Rig port: the interface of a bare device, without limits. Only the safety layer (`study.devices.safe`) may drive it.
+"""Interfaces of a bare haptic device ("rig"), which has no limits of force. Only the safety layer
+(`study.devices.safe`) may drive it; the drivers and simulations of devices implement it.
 
 A tick of the 1 kHz loop is: `sense` (at t_k), spring and limits (by the safety layer), `write` (held until t_(k+1)).
+`Rig` is called from Python at each tick; `CompiledIo` and `CompiledRig` are called from compiled loops.
 
 The indices below are compiled into the safety layer and the drivers. A change of this file compiles them anew, because
 its fingerprint is part of theirs (`study.devices.governor.compiling`).
@@ -26,7 +28,7 @@ TRUE_ACCELERATION = slice(6, 9)
 SENSOR_CLIPPED = 9
 """Index in a reading: 1 if a channel of the accelerometer was at its limit, else 0."""
 READING_SIZE = 10
-"""Numbers in a reading."""
+"""Number of elements of a reading, shape (READING_SIZE,)."""
 
 
 class Rig(Protocol):
@@ -52,11 +54,13 @@ class Rig(Protocol):
         ...
 
     def sense(self) -> FloatArray:
-        """A reading, shape (READING_SIZE,). Raises `study.errors.DeviceError` when the device is gone."""
+        """Read the sensors: a reading, shape (READING_SIZE,). Raises `study.errors.DeviceError` when the device is
+        gone."""
         ...
 
     def buttons(self) -> frozenset[int]:
-        """Numbers of the pressed buttons. Called after every reading in the same thread, so it must be as fast."""
+        """Read the numbers of the pressed buttons. Called after every reading in the same thread: it must not take
+        longer than `sense`."""
         ...
 
     def write(self, force_n: FloatArray) -> None:
@@ -64,30 +68,33 @@ class Rig(Protocol):
         ...
 
     def close(self) -> bool | None:
-        """Force off, then disconnect. False where the device did not accept it. Never raises; may be called again."""
+        """Switch the force off, then disconnect. Returns False where the device did not accept the command, so that the
+        force may still be on. Never raises; may be called again."""
         ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CompiledIo:
-    """Compiled version of a rig's driver: a `Rig` with an attribute `halves` is driven without the interpreter.
+    """Compiled `sense` and `write` of a rig's driver: a `Rig` with an attribute `halves` of this type is driven by a
+    compiled loop, without the Python interpreter.
 
-    Both functions do exactly what the rig's own `sense` and `write` do, including errors; the rig's `buttons` may then
-    be called from any thread. See `study.devices.drive.compiled_drive` for the signatures.
-    """
+    Both functions do exactly what the rig's methods of the same names do, including errors; the rig's `buttons` may
+    then be called from any thread. See `study.devices.drive.compiled_drive` for the signatures."""
 
     sense: Callable[..., Any]
     """sense(calls, cells, samples, reading): fills reading, shape (READING_SIZE,). Returns 0, or an error code > 0."""
     write: Callable[..., Any]
     """write(calls, cells, force_n): force_n, shape (3,). Returns 0, or an error code > 0."""
     calls: npt.NDArray[np.int64]
-    """Addresses of C functions: `study.devices.native.collect_system_calls`, followed by the driver's own."""
+    """Addresses of C functions: those of `study.devices.native.collect_system_calls`, followed by those of the
+    driver."""
     cells: FloatArray
-    """State of the driver, as `sense` and `write` use it."""
+    """State of the driver, read and changed by `sense` and `write`; its layout is that of the driver."""
     samples: FloatArray
     """Samples of the accelerometer, shape (rows, columns)."""
     error: Callable[[int], Exception]
-    """error(code): the exception that the rig's own method raises; called in the thread that got the code."""
+    """error(code): the exception that the rig's method of the same name raises; called in the thread that got the
+    code."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,14 +108,14 @@ class SensedAcceleration:
 
 
 @runtime_checkable
-class OwnClockSensor(Protocol):
-    """A rig whose accelerometer has a separate clock. Each reading holds its newest sample; the acceleration at a tick
-    is known only later."""
+class AsynchronousAccelerometer(Protocol):
+    """Interface of a rig or sensor whose accelerometer samples by a clock other than that of the loop. A reading holds
+    its newest sample; the acceleration at the time of a tick is interpolated later."""
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration | None:
-        """Acceleration at past ticks. tick_s (k,): due times of the ticks, 1 / rate_hz apart, on the loop's clock (s);
-        since_s: start of the interval that `health` describes. None without such a sensor. May be called in any thread
-        while nothing moves; may take 0.1 s."""
+        """Estimate the acceleration at past ticks. tick_s (k,): due times of the ticks, 1 / rate_hz apart, on the
+        loop's clock (s); since_s: start of the interval that `health` describes. None without such a sensor. May be
+        called in any thread while nothing moves; may take 0.1 s."""
         ...
 
 
@@ -139,12 +146,14 @@ class CompiledRig:
     sense: Callable[..., Any]
     """sense(state, parameters, noise, reading): fills reading, shape (READING_SIZE,)."""
     advance: Callable[..., Any]
-    """advance(state, parameters, force_n): moves by a tick under the constant force_n, shape (3,), N."""
+    """advance(state, parameters, force_n): integrates the motion over a tick under the constant force_n, shape (3,),
+    N."""
     buttons: Callable[[], frozenset[int]] = read_no_buttons
     """Numbers of the pressed buttons."""
     prepare: Callable[[FloatArray, bool, int], None] = skip_preparation
-    """prepare(rows, repeats, wait): called before a stimulus begins; used by a replay, which does not respond to force.
-    rows (n, 3), N: played once or, if `repeats`, repeatedly; the first row comes after `wait` ticks."""
+    """prepare(rows, repeats, wait): called before a stimulus begins; used by the replay of a recording, whose motion
+    does not depend on the force. rows (n, 3), N: played once or, if `repeats`, repeatedly; the first after `wait`
+    ticks."""
     simulate_hand: Callable[[bool], None] = ignore_hand
     """simulate_hand(on_handle): True: the simulated hand takes the handle; False: it lets go."""
 

@@ -23,7 +23,7 @@ from study.devices.drive.runner import CompiledRunner, Runner
 from study.devices.drive.stepped_runner import SteppedRunner
 from study.devices.drive.virtual_drive import VirtualDrive
 from study.devices.governor.governor import SETTLE_S, Governor
-from study.devices.rig import CompiledRig, OwnClockSensor, Rig, ignore_hand
+from study.devices.rig import AsynchronousAccelerometer, CompiledRig, Rig, ignore_hand
 from study.devices.telemetry import Ring
 from study.errors import DeviceError
 from study.session.stimulus.held_stimulus import HeldStimulus
@@ -57,7 +57,7 @@ class SafeDevice:
             check_hardware(rig.drops_force_after_s, rig.info, settings)
         self._info = rig.info
         self._set_simulated_hand = rig.simulate_hand if isinstance(rig, CompiledRig) else ignore_hand
-        self._own_clock_sensor = rig if isinstance(rig, OwnClockSensor) else None
+        self._own_clock_sensor = rig if isinstance(rig, AsynchronousAccelerometer) else None
         self._limits = settings.limits
         self._hand_on_handle = settings.hand_on_handle
         self._clock = clock

@@ -47,9 +47,9 @@ class DeliveredFeeler:
         """Answer (1 or 2) and response time (s) for one presentation."""
         return self.feeler.reply(replace(felt, level_n=self.felt_n(felt)), seed)
 
-    def compute_right_share(self, felt: PerceivedStimulus) -> float:
+    def compute_proportion_correct(self, felt: PerceivedStimulus) -> float:
         """Probability of the right answer."""
-        return self.feeler.compute_right_share(replace(felt, level_n=self.felt_n(felt)))
+        return self.feeler.compute_proportion_correct(replace(felt, level_n=self.felt_n(felt)))
 
     def felt_n(self, felt: PerceivedStimulus) -> float:
         """Force (N) which, delivered without disturbance and before adaptation, would be felt as well as this trial."""

@@ -62,7 +62,7 @@ class DirectionFeeler:
         share_without_lapses = _NORMAL.cdf(sign * self.compute_d_prime(felt) / 2 - self.compute_criterion(felt))
         return self.lapse + (1.0 - 2.0 * self.lapse) * share_without_lapses
 
-    def compute_right_share(self, felt: PerceivedStimulus) -> float:
+    def compute_proportion_correct(self, felt: PerceivedStimulus) -> float:
         """Probability of the right answer, lapses included."""
         share_of_1 = self.compute_share_of_answer_1(felt)
         return share_of_1 if felt.direction_shown == 1 else 1.0 - share_of_1

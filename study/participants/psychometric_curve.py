@@ -1,44 +1,48 @@
-"""Psychometric function of a task with two alternatives: fraction of right answers as a function of level (Weibull).
-Used by the simulated participants (`direction_feeler`, `intensity_cue`)."""
+"""Psychometric function of a two-alternative forced-choice task (Weibull): proportion of correct answers by level.
+
+Used by the simulated participants (`direction_feeler`, `delivered_feeler`, `intensity_cue`) and by
+`study.cli.power`."""
 
 import math
 from dataclasses import dataclass
 from itertools import pairwise
 from statistics import NormalDist
 
-TARGET_FRACTION = 0.5 ** (1 / 3)
-"""Convergence point of the one-up three-down rule: 79.37 % right (H. Levitt, J. Acoust. Soc. Am. 49 (1971),
+TARGET_PROPORTION = 0.5 ** (1 / 3)
+"""Proportion correct to which the one-up three-down rule converges, 0.7937 (H. Levitt, J. Acoust. Soc. Am. 49 (1971),
 467-477)."""
 
 
 @dataclass(frozen=True, slots=True)
 class WeibullCurve:
-    """Fraction right = 0.5 + 0.5 F(x) with F(x) = 1 - exp(-(x / a)^slope), x the level (N); a is chosen so that
-    `threshold_n` (N) gives TARGET_FRACTION."""
+    """Psychometric function p(x) = 0.5 + 0.5 F(x) with F(x) = 1 - exp(-(x / a)^slope), x the level (N); the scale a is
+    chosen so that p(threshold_n) = TARGET_PROPORTION."""
 
     threshold_n: float
+    """Level (N) with `TARGET_PROPORTION` of correct answers; above 0."""
     slope: float
+    """Exponent of the Weibull function, without unit; above 0."""
 
-    def compute_right_share(self, level_n: float) -> float:
-        """Fraction of right answers at this level (N)."""
+    def compute_proportion_correct(self, level_n: float) -> float:
+        """Compute the proportion of correct answers, 0.5 to 1, at this level (N), at least 0."""
         return 1.0 - 0.5 * math.exp(-_EXPONENT_AT_TARGET * (level_n / self.threshold_n) ** self.slope)
 
     def compute_d_prime(self, level_n: float) -> float:
-        """d' (distance of the two alternatives in standard deviations) that gives this fraction without bias: d' = 2
-        Phi^-1(fraction)."""
-        return 2.0 * NormalDist().inv_cdf(min(self.compute_right_share(level_n), _MAX_FRACTION))
+        """Compute the sensitivity d' (distance of the two alternatives in standard deviations) with this proportion
+        correct p of an unbiased observer: d' = 2 Phi^-1(p), p at most `_LARGEST_PROPORTION`."""
+        return 2.0 * NormalDist().inv_cdf(min(self.compute_proportion_correct(level_n), _LARGEST_PROPORTION))
 
 
-_MAX_FRACTION = 1.0 - 1e-12
-"""Largest fraction that is inserted in the inverse normal distribution, which is infinite at 1."""
+_LARGEST_PROPORTION = 1.0 - 1e-12
+"""Largest proportion correct for which d' is computed: the inverse normal distribution is infinite at 1."""
 
-_EXPONENT_AT_TARGET = -math.log(2.0 * (1.0 - TARGET_FRACTION))
-"""Value of (x / a)^slope at the threshold: -ln(2 (1 - TARGET_FRACTION))."""
+_EXPONENT_AT_TARGET = -math.log(2.0 * (1.0 - TARGET_PROPORTION))
+"""Value of (x / a)^slope at the threshold: -ln(2 (1 - TARGET_PROPORTION))."""
 
 
 def interpolate_threshold_n(thresholds_n: tuple[tuple[float, float], ...], frequency_hz: float) -> float:
-    """Threshold (N) at any frequency from (Hz, N) pairs in ascending order: linear on logarithmic axes, constant
-    beyond the ends."""
+    """Interpolate the threshold (N) at a frequency from (Hz, N) pairs, at least one, in ascending order of frequency:
+    linear on logarithmic axes, constant beyond the ends."""
     if frequency_hz <= thresholds_n[0][0]:
         return thresholds_n[0][1]
     for (low_hz, low_n), (high_hz, high_n) in pairwise(thresholds_n):

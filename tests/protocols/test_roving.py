@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from protocols.definition.preparation import DemoSettings, PracticeSettings
-from protocols.document.hashing import protocol_hash
+from protocols.document.hashing import hash_protocol
 from protocols.document.loading import ProtocolError, load_protocol
 from protocols.procedure.schedule import draw_demo_level_n, draw_practice_level_n, draw_trial, rove_level_n
 from protocols.procedure.staircase import to_db
@@ -104,11 +104,11 @@ def test_a_range_that_would_pass_the_force_cap_is_refused_with_the_cap_that_woul
 
 
 def test_roving_counts_in_the_fingerprint_only_where_it_is_used(small_text):
-    plain = protocol_hash(load_protocol(small_text, "mine.toml"))
-    assert protocol_hash(load_protocol(roved(small_text, 0.0, 3.0), "mine.toml")) == plain
+    plain = hash_protocol(load_protocol(small_text, "mine.toml"))
+    assert hash_protocol(load_protocol(roved(small_text, 0.0, 3.0), "mine.toml")) == plain
     lower = small_text.replace("cap_n = 3.0\nup", "cap_n = 2.0\nup")
-    with_range = protocol_hash(load_protocol(roved(small_text, 6.0, 2.0), "mine.toml"))
-    assert with_range != protocol_hash(load_protocol(lower, "mine.toml"))
+    with_range = hash_protocol(load_protocol(roved(small_text, 6.0, 2.0), "mine.toml"))
+    assert with_range != hash_protocol(load_protocol(lower, "mine.toml"))
 
 
 def test_shipped_studies_play_the_staircases_level(shipped):

@@ -16,7 +16,7 @@ from study.evaluation.challenge.bench import Bench, draw_bench
 from study.evaluation.challenge.device import Device, record
 from study.evaluation.challenge.draw_case import DECOYS, EFFECTS
 from study.evaluation.challenge.drive_plan import LEVELS_N, RATE_HZ
-from study.evaluation.challenge.nominal import as_model, draw_calibration
+from study.evaluation.challenge.nominal_models import as_model, draw_calibration
 
 PERIOD, PERIODS, REST = 1000, 3, 300
 LAST_LINE = 200

@@ -1,11 +1,13 @@
-"""Friction, damping, stiffness and force that depend on a recorded condition, such as a temperature or a setting.
+"""Laws of friction, damping, stiffness and force that depend on a recorded condition, such as a temperature.
 
-With c the deviation of the condition from its mean, in units of its standard deviation, and q, v the motion of one
-axis, the force that resists the motion is (`laws` adds these laws to its candidates)
+With c the deviation of the condition from its mean, in units of its standard deviation, and q, v position and velocity
+of one axis, the force that resists the motion is
 
     friction  (w1 + w2 c) tanh(v / width)      damping  w c v      stiffness  w c q      force  w c
 
-The catalogue has no such effects; simulations use the formulas of these laws.
+with the weights w, w1, w2 fitted by `regression`. The catalogue has no such effects; simulations use the formulas of
+these laws, with sgn(v) for tanh. `laws` adds the laws to its candidates. In callables, m is the motion, n the nonlinear
+parameters and w the weights, as in `law`.
 """
 
 import math
@@ -20,13 +22,14 @@ from equalizer.signals.signal import FloatArray
 
 
 def make_condition_laws(motions: Sequence[Motion], channel: int, scales: Scales) -> Iterator[Law]:
-    """Make the laws of one axis for every recorded condition. channel: of the motion; scales: of that motion."""
+    """Make the laws of one axis for every recorded condition. channel: index in the motion; scales: of its position and
+    velocity, from which the friction widths follow."""
     for condition_index, condition in enumerate(motions[0].conditions):
         yield from _make_laws_of_condition(condition, condition_index, channel, scales)
 
 
 def _make_laws_of_condition(condition: Condition, index: int, channel: int, scales: Scales) -> Iterator[Law]:
-    """Make the laws of one condition. index: its column in `Motion.condition`; else as `make_condition_laws`."""
+    """Make the laws of one condition; no damping without a time axis. index: its column in `Motion.condition`."""
     widths, width_bounds = compute_friction_widths(scales)
     for width in widths:
         yield Law(
@@ -49,7 +52,7 @@ def _make_laws_of_condition(condition: Condition, index: int, channel: int, scal
 
 
 def _make_friction_columns(channel: int, index: int) -> Columns:
-    """Columns (n, 2): the smoothed sign of the velocity, and the same times the condition."""
+    """Make the function for the columns (n, 2): the smoothed sign of the velocity, and the same times the condition."""
 
     def compute_columns(m: Motion, n: tuple[float, ...]) -> FloatArray:
         friction_sign = smooth_sign(m.velocity[:, [channel]], n[0])
@@ -59,12 +62,14 @@ def _make_friction_columns(channel: int, index: int) -> Columns:
 
 
 def _read_friction_values(w: FloatArray, n: tuple[float, ...], mass: float) -> dict[str, float] | None:
-    """Convert the weights to level and change (N or N m); None where the mean friction is not positive."""
+    """Convert the weights to the friction at the mean condition (level) and its change per standard deviation (N or N
+    m); None where the level is not positive."""
     return {"level": float(w[0]), "change": float(w[1])} if w[0] > 0 else None
 
 
 def _make_friction_formula(condition: Condition) -> Callable[[dict[str, float]], Formula]:
-    """Make the formula of the friction, limited to at least 0: negative friction would drive the motion."""
+    """Make the formula of the friction, whose magnitude is limited to at least 0: negative friction would drive the
+    motion."""
     text = f"-maximum(p0 + p1*{_format_deviation(condition)}, 0)*sign(v)"
     return lambda parameters: Formula(text, (parameters["level"], parameters["change"]), "force")
 
@@ -76,9 +81,9 @@ def _make_formula(condition: Condition, *factors: str) -> Callable[[dict[str, fl
 
 
 def _format_deviation(condition: Condition) -> str:
-    """Format a condition's deviation from its mean, in standard deviations, as a formula. Its numbers are integers: a
-    formula's integers are constants that are not fitted. The standard deviation is rounded to about four digits, the
-    mean to the same decimal place."""
+    """Format a condition's deviation from its mean, in standard deviations, as a formula. Its numbers are integers,
+    because integers in a formula are constants that are not fitted. The standard deviation, above 0, is rounded to
+    about four digits, fewer where the mean would exceed 15 digits, and the mean to the same decimal place."""
     factor = 10 ** max(0, min(3 - math.floor(math.log10(condition.spread)), 15 - _count_integer_digits(condition.mean)))
     mean, spread = round(condition.mean * factor), max(round(condition.spread * factor), 1)
     scaled = condition.name if factor == 1 else f"{factor}*{condition.name}"

@@ -1,8 +1,8 @@
-"""Decide by held-out data which laws of a force balance are named. Called by `balances`, `actuator`, `confirm`.
+"""Test the laws of a force balance on held-out data. Called by `balances`, `actuator` and `confirm.balance_with_model`.
 
-No model of a real device reaches the noise of the sensors. A law is therefore tested by the decrease of the held-out
-error that it gives (its gain; interval by block bootstrap: Kunsch, Ann. Stat. 17:1217, 1989), against the best rival in
-its place, and by its share of the gain of all laws (the ceiling). Laws that fit equally well are returned as a class.
+No model of a real device reaches the sensor noise. A law is named by the relative decrease of the held-out squared
+error that it gives (its gain; interval by block bootstrap: Kunsch, Ann. Stat. 17:1217, 1989), by its share of the
+decrease by all laws together, which leave the error `ceiling`, and unless other effects fit equally well (its class).
 """
 
 from collections.abc import Sequence
@@ -41,9 +41,9 @@ from equalizer.signals.signal import FloatArray
 
 SIMILAR = "it acts like a named law, and may only correct the shape of that law"
 WEAK_GAINS = ("its gain is too small to be named", "its gain varies too much from stretch to stretch of the recording")
-"""Objections to a further law, by whether its gain is above `FURTHER_LAW_GAIN` (no, yes)."""
+"""Objections: to a second law of a family; to a further law whose gain is not above, or above `FURTHER_LAW_GAIN`."""
 CONDITION_LAWS = {"condition_dependent_friction", "condition_dependent_damping"}
-"""Laws that depend on a measured condition. They may form a class, although they belong to different families."""
+"""Laws that depend on a recorded condition. They may form a class, although they belong to different families."""
 SIMULATED_AS = {"drifting_friction": "coulomb_friction"}
 """Laws without a simulation, each with the law that is simulated in its place and forms a class with it."""
 
@@ -53,9 +53,9 @@ class Balance:
     """Result of the force balance of one axis: the chosen structure, with a test of each of its laws.
 
     laws: of the chosen structure, the largest gain first. further_laws: others that would explain part of its residual.
-    linear, error, ceiling: held-out error, relative to the signal's rms, of mass, damping and stiffness alone, of the
-    chosen structure, and of all laws together. complete: whether the search of structures was completed. tested:
-    whether the held-out blocks, or else the fit blocks, contain enough motion for a test."""
+    linear, error, ceiling: rms error on the test blocks, relative to the force's rms, of mass, damping and stiffness
+    alone, of the chosen structure, and of all laws together; without a test, all three are the cross-validated linear
+    error. complete: whether the structure search was completed. tested: whether the blocks allow a test."""
 
     search: StructureSearch
     chosen: Structure
@@ -78,20 +78,20 @@ class Balance:
         return (*self.search.regression.base_terms.laws, *(law.law for law in self.laws if law.law.linear))
 
     def withdraw_names(self, reason: str) -> "Balance":
-        """A copy in which no law is named. reason: objection, as a sentence, to each law that has none."""
+        """Copy the balance without named laws. reason: objection, as a clause, to each law that has none."""
         return replace(self, laws=tuple(replace(law, objection=law.objection or reason) for law in self.laws))
 
-    def compute_error(self, laws: Sequence[int]) -> float:
-        """Held-out error with these laws, relative to the signal's rms. laws: indices in the regression."""
+    def compute_error(self, law_indices: Sequence[int]) -> float:
+        """Compute the error on the test blocks with laws (indices in the regression), relative to the force's rms."""
         regression = self.search.regression
-        return float(np.sqrt(_compute_errors(regression, laws).sum() / _sum_signal_power(regression)))
+        return float(np.sqrt(_compute_errors(regression, law_indices).sum() / _sum_power(regression)))
 
 
 def judge_laws(search: StructureSearch) -> Balance:
-    """Choose the simplest structure of a search, test each of its laws on held-out blocks, and name it or not."""
+    """Choose the simplest structure of a search, test each of its laws, and decide whether it is named."""
     regression = search.regression
     if not select_test_blocks(regression):
-        error = float(np.sqrt(search.linear.error / _sum_signal_power(regression)))
+        error = float(np.sqrt(search.linear.error / _sum_power(regression)))
         return Balance(search, search.linear, (), (), error, error, error, search.complete, tested=False)
     balance = _judge_structure(search, choose_simplest_structure(search))
     if balance.named or not _has_two_frictions(regression, balance.chosen.laws):
@@ -103,31 +103,31 @@ def judge_laws(search: StructureSearch) -> Balance:
     return simpler if simpler.named else balance
 
 
-def _has_two_frictions(regression: Regression, laws: Sequence[int]) -> bool:
-    """Whether these laws contain two frictions of the same channel. laws: indices in the regression."""
-    keys = [regression.laws[law_index].key for law_index in laws]
+def _has_two_frictions(regression: Regression, law_indices: Sequence[int]) -> bool:
+    """Whether laws (indices in the regression) contain two different frictions of the same channel."""
+    keys = [regression.laws[law_index].key for law_index in law_indices]
     channels = [channel for effect, channel in set(keys) if effect in find_family("coulomb_friction")]
     return len(channels) > len(set(channels))
 
 
 def _judge_structure(search: StructureSearch, chosen: Structure) -> Balance:
-    """The balance with `chosen` as its structure: each of its laws, and further laws, are tested."""
+    """Test each law of `chosen`, and further laws; the decrease is at least 1e-6 of the linear error (a divisor)."""
     regression = search.regression
     errors = _compute_errors(regression, chosen.laws)
-    linear = _compute_errors(regression, ())
+    linear_errors = _compute_errors(regression, ())
     ceiling = _compute_ceiling(regression, errors)
-    excess = max(float(linear.sum() - ceiling), 1e-6 * float(linear.sum()), 1e-300)
-    coverage = 1 - float(errors.sum() - ceiling) / excess
-    laws = [_judge_law(regression, chosen.laws, law_index, (errors, excess, coverage)) for law_index in chosen.laws]
-    further_laws = _judge_further_laws(regression, chosen, (errors, excess))
-    ratios = [float(np.sqrt(error / _sum_signal_power(regression))) for error in (linear.sum(), errors.sum(), ceiling)]
+    decrease = max(float(linear_errors.sum() - ceiling), 1e-6 * float(linear_errors.sum()), 1e-300)
+    coverage = 1 - float(errors.sum() - ceiling) / decrease
+    laws = [_judge_law(regression, chosen.laws, index, (errors, decrease, coverage)) for index in chosen.laws]
+    further_laws = _judge_further_laws(regression, chosen, (errors, decrease))
+    ratios = [float(np.sqrt(error / _sum_power(regression))) for error in (linear_errors.sum(), errors.sum(), ceiling)]
     checked_laws = _name_once_per_family(sorted(laws, key=lambda law: -law.gain))
     return Balance(search, chosen, checked_laws, further_laws, ratios[0], ratios[1], ratios[2], search.complete)
 
 
 def _name_once_per_family(laws: Sequence[JudgedLaw]) -> tuple[JudgedLaw, ...]:
-    """Add an objection to a second law of a family unless it explains most of the residual: it may only correct the
-    shape of the first law. laws: the largest gain first."""
+    """Object to each further named law of a family whose gain is below `SECOND_OF_FAMILY`: it may only correct the
+    shape of the first. laws: the largest gain first."""
     checked: list[JudgedLaw] = []
     for law in laws:
         family = [prior for prior in checked if prior.named and find_family(prior.law.effect) & {law.law.effect}]
@@ -136,8 +136,8 @@ def _name_once_per_family(laws: Sequence[JudgedLaw]) -> tuple[JudgedLaw, ...]:
 
 
 def select_test_blocks(regression: Regression) -> tuple[Block, ...]:
-    """Blocks on which laws are tested: the held-out ones if the device moves in them; else, by cross-validation, the
-    fit blocks if it moves in several or held-out ones are few; else none, as a single movement cannot test a law."""
+    """Select the blocks for tests: the held-out ones if enough and moving; else, by cross-validation, the fit blocks if
+    motion is in several or held-out ones are few; else none, as a single movement cannot test a law."""
     if len(regression.test) >= LEAST_JUDGED_BLOCKS and has_held_out_motion(regression):
         return regression.test
     fit_speeds = _measure_speeds(regression, regression.fit)
@@ -146,31 +146,31 @@ def select_test_blocks(regression: Regression) -> tuple[Block, ...]:
 
 
 def has_held_out_motion(regression: Regression) -> bool:
-    """Whether the mean square speed in the held-out blocks (one or more) is at least `STILL_SHARE` of the fitted."""
+    """Whether the mean square speed in the held-out blocks, at least one, is `STILL_SHARE` or more of the fitted."""
     fit_speed, test_speed = (_measure_speeds(regression, blocks).mean() for blocks in (regression.fit, regression.test))
     return bool(test_speed >= STILL_SHARE * fit_speed)
 
 
 def _measure_speeds(regression: Regression, blocks: Sequence[Block]) -> FloatArray:
-    """(blocks,): mean square of the speed of the driven channel, relative to its scale."""
+    """Compute the mean square speed of the driven channel in each block, (blocks,), relative to its scale."""
     speed = len(regression.motions[0].channels) + regression.base_terms.driven_channel
     return np.array([block.gram[speed, speed] / max(len(block.rows), 1) for block in blocks])
 
 
-def _sum_signal_power(regression: Regression) -> float:
-    """Sum of squares of the force about its mean, over the test blocks (or the fit blocks if there are none)."""
+def _sum_power(regression: Regression) -> float:
+    """Sum the squares of the force about its mean, at least 1e-300, over the test blocks, or else the fit blocks."""
     return max(sum(block.signal for block in select_test_blocks(regression) or regression.fit), 1e-300)
 
 
-def _compute_errors(regression: Regression, laws: Sequence[int]) -> FloatArray:
-    """(blocks,): sum of squared force errors with these laws on each test block."""
-    columns = regression.select_columns(laws)
+def _compute_errors(regression: Regression, law_indices: Sequence[int]) -> FloatArray:
+    """Compute the sum of squared force errors with laws (indices in the regression) on each test block, (blocks,)."""
+    columns = regression.select_columns(law_indices)
     uses_held_out = select_test_blocks(regression) is regression.test
     return regression.compute_test_errors(columns) if uses_held_out else regression.cross_validate(columns)
 
 
 def _compute_ceiling(regression: Regression, chosen_errors: FloatArray) -> float:
-    """Sum of squared errors with all laws together, but at most that of the chosen structure."""
+    """Compute the sum of squared errors with all laws together, but at most that of the chosen structure."""
     cross_validated, blocks = fit_all_laws(regression, range(regression.columns[0].shape[1]))
     error = float(blocks.sum()) if select_test_blocks(regression) is regression.test else cross_validated
     return min(error, float(chosen_errors.sum()))
@@ -179,17 +179,17 @@ def _compute_ceiling(regression: Regression, chosen_errors: FloatArray) -> float
 def _judge_law(
     regression: Regression, laws: Sequence[int], law_index: int, reference: tuple[FloatArray, float, float]
 ) -> JudgedLaw:
-    """Test law `law_index` of `laws`. reference: errors (blocks,) with all of `laws`; decrease of the error by all laws
-    of the regression together; share of that decrease by `laws`."""
-    full, excess, coverage = reference
+    """Test law `law_index` of `laws` (indices). reference: squared errors (blocks,) with all of `laws`; decrease of
+    their sum by all laws of the regression together; share of that decrease by `laws`."""
+    full, decrease, coverage = reference
     other_laws = tuple(index for index in laws if index != law_index)
     reduced = _compute_errors(regression, other_laws)
     gain, gain_low = bootstrap_gain(reduced, full)
-    share = float((reduced - full).sum()) / excess
+    share = float((reduced - full).sum()) / decrease
     law = regression.laws[law_index]
     values = dict(zip(laws, fit_values(regression, laws), strict=True))[law_index]
     equivalents, probability = _find_equivalents(regression, other_laws, law_index, (reduced, full))
-    force_share = float(np.sqrt(max(float((reduced - full).sum()), 0.0) / _sum_signal_power(regression)))
+    force_share = float(np.sqrt(max(float((reduced - full).sum()), 0.0) / _sum_power(regression)))
     weakness = f"it explains {100 * force_share:.1f} % of the force, less than such recordings can confirm"
     objection = _find_objection(law, values, (gain, gain_low, share, coverage), equivalents) or (
         weakness if force_share < LAW_OF_SIGNAL else ""
@@ -211,7 +211,7 @@ def _judge_law(
 
 
 def _compute_fold_errors(regression: Regression, law_sets: Sequence[Sequence[int]]) -> list[FloatArray]:
-    """Cross-validated errors (fit blocks,) of each set of laws; empty if the fit blocks are themselves the test."""
+    """Compute cross-validated errors (fit blocks,) of each set of laws; empty if these blocks are the test blocks."""
     if select_test_blocks(regression) is not regression.test:
         return [np.zeros(0) for _ in law_sets]
     return [regression.cross_validate(regression.select_columns(laws)) for laws in law_sets]
@@ -220,7 +220,7 @@ def _compute_fold_errors(regression: Regression, law_sets: Sequence[Sequence[int
 def _find_equivalents(
     regression: Regression, other_laws: tuple[int, ...], law_index: int, errors: tuple[FloatArray, FloatArray]
 ) -> tuple[tuple[str, ...], float]:
-    """Effects with a similar error in place of a law; share of draws in which none but a refinement is better."""
+    """Find `JudgedLaw.equivalents` and `.probability` of a law. errors: (blocks,), without and with the law."""
     reduced_errors, full_errors = errors
     tested_law = regression.laws[law_index]
     best_by_effect: dict[str, tuple[float, tuple[int, ...]]] = {}
@@ -233,25 +233,25 @@ def _find_equivalents(
         error = float(regression.cross_validate(regression.select_columns(laws)).sum())
         if law.effect not in best_by_effect or error < best_by_effect[law.effect][0]:
             best_by_effect[law.effect] = error, laws
-    total_gain = float((reduced_errors - full_errors).sum())
+    decrease = float((reduced_errors - full_errors).sum())
     equivalents, draws = [], draw_bootstrap_blocks(len(full_errors))
     is_best = np.ones(BOOTSTRAP_DRAWS, dtype=np.bool_)
     for effect, (_, laws) in best_by_effect.items():
-        excess = _compute_errors(regression, laws) - full_errors
+        increases = _compute_errors(regression, laws) - full_errors
         if tested_law.effect not in list_simpler(effect):
-            is_best &= excess[draws].sum(axis=1) >= 0
+            is_best &= increases[draws].sum(axis=1) >= 0
         # Of two equally good laws, the simpler: a law of another kind with more parameters must have a smaller error.
         is_richer = count_parameters(regression, laws[-1:]) > count_parameters(regression, [law_index])
-        limit = 0.0 if is_richer and effect not in find_family(tested_law.effect) else RIVAL_STAYS_BEHIND * total_gain
-        if float(excess.sum()) <= limit:
-            equivalents.append((float(excess.sum()), effect))
+        limit = 0.0 if is_richer and effect not in find_family(tested_law.effect) else RIVAL_STAYS_BEHIND * decrease
+        if float(increases.sum()) <= limit:
+            equivalents.append((float(increases.sum()), effect))
     return tuple(effect for _, effect in sorted(equivalents)), float(is_best.mean())
 
 
 def _find_objection(
     law: Law, values: dict[str, float] | None, scores: tuple[float, float, float, float], equivalents: tuple[str, ...]
 ) -> str:
-    """Reason not to name a law, as a sentence; empty if it is named. scores: gain, its bound, share, coverage."""
+    """Find the reason not to name a law, empty if none. scores: gain, its lower bound, share and coverage."""
     gain, gain_low, share, coverage = scores
     if law.linear:
         return "it is a linear model of a higher order: part of the first model and no missing physics"
@@ -276,25 +276,25 @@ def _find_objection(
 def _judge_further_laws(
     regression: Regression, chosen: Structure, reference: tuple[FloatArray, float]
 ) -> tuple[JudgedLaw, ...]:
-    """Of the best law of each other effect, the eight with the least error: those with a significant gain, by it."""
-    chosen_errors, excess = reference
-    effects = {regression.laws[index].effect for index in chosen.laws}
+    """Test the best law of each other effect, the best eight (chosen): those with a significant gain, largest first."""
+    chosen_errors, decrease = reference
+    effects = {regression.laws[chosen_index].effect for chosen_index in chosen.laws}
     best_by_effect: dict[str, tuple[float, int]] = {}
-    for law_no, law in enumerate(regression.laws):
-        if law.effect in effects or fit_values(regression, (*chosen.laws, law_no))[-1] is None:
+    for index, law in enumerate(regression.laws):
+        if law.effect in effects or fit_values(regression, (*chosen.laws, index))[-1] is None:
             continue
-        error = float(regression.cross_validate(regression.select_columns((*chosen.laws, law_no))).sum())
+        error = float(regression.cross_validate(regression.select_columns((*chosen.laws, index))).sum())
         if law.effect not in best_by_effect or error < best_by_effect[law.effect][0]:
-            best_by_effect[law.effect] = error, law_no
-    judged_laws = []
-    for _, law_no in sorted(best_by_effect.values())[:8]:
-        laws = (*chosen.laws, law_no)
+            best_by_effect[law.effect] = error, index
+    judged = []
+    for _, index in sorted(best_by_effect.values())[:8]:
+        laws = (*chosen.laws, index)
         errors = _compute_errors(regression, laws)
         gain, low = bootstrap_gain(chosen_errors, errors)
-        values, share = fit_values(regression, laws)[-1] or {}, float((chosen_errors - errors).sum()) / excess
+        values, share = fit_values(regression, laws)[-1] or {}, float((chosen_errors - errors).sum()) / decrease
         reason = ("it explains too little in addition to the named laws" if chosen.laws
                   else WEAK_GAINS[gain > FURTHER_LAW_GAIN])  # fmt: skip
         if gain > 0 and low > 0:
-            law, physical = regression.laws[law_no], compute_force_ratio(regression, laws, law_no) <= LARGEST_LAW_FORCE
-            judged_laws.append(JudgedLaw(law_no, law, values, gain, low, share, (), 0.0, reason, is_physical=physical))
-    return tuple(sorted(judged_laws, key=lambda judged_law: -judged_law.gain))
+            law, is_physical = regression.laws[index], compute_force_ratio(regression, laws, index) <= LARGEST_LAW_FORCE
+            judged.append(JudgedLaw(index, law, values, gain, low, share, (), 0.0, reason, is_physical=is_physical))
+    return tuple(sorted(judged, key=lambda judged_law: -judged_law.gain))

@@ -4,7 +4,8 @@ Both are columns of a linear regression of the measured force. The column of the
 The other columns are the change of that force per standard deviation of each parameter's calibration, so that their
 weights have the prior N(0, 1). The precision of this prior in the normal equations is the variance of the residual: its
 sum of squares per degree of freedom, of which a residual with a narrow spectrum has few (equivalent degrees of freedom
-of a power estimate; Bendat and Piersol 2010, Random Data, ch. 8). Called by `structures` and `confirm`.
+of a power estimate; Bendat and Piersol 2010, Random Data, ch. 8). Called by `structures`; `confirm.balance_with_model`
+builds the columns.
 """
 
 from collections.abc import Sequence
@@ -18,13 +19,13 @@ from analysis.diagnosis.balance.regression import Regression, build_regression, 
 from equalizer.signals.signal import FloatArray
 
 FIXED_WEIGHT_PRECISION = 1e6
-"""Precision of the prior that fixes the first weight at 1, relative to the precision that the data give to it: large
-enough that the data do not move it."""
+"""Precision of the prior that fixes the first weight at 1, relative to its precision by the data. Chosen so large
+that the data do not change the weight."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class GivenBase:
-    """Columns of a given model along one axis, which replace free mass, damping and stiffness."""
+class ModelBase:
+    """Columns of a given mechanical model along one axis, in place of free mass, damping and stiffness."""
 
     columns: tuple[FloatArray, ...]
     """Per motion, (n, 1 + parameters), N (N m): the force that the model requires along the measured motion, and its
@@ -36,40 +37,41 @@ class GivenBase:
 
 
 def build_regression_with_model(
-    motions: Sequence[Motion], axis: int, laws: Sequence[Law], model_base: GivenBase
+    motions: Sequence[Motion], axis: int, laws: Sequence[Law], model_base: ModelBase
 ) -> Regression:
     """Build a regression as `build_regression`, with the model's required force and its sensitivities as the base.
-    Free parameters that change the force by less than 1e-9 of its rms are left out."""
+    Free parameters that change the force by no more than 1e-9 of its rms (rounding) are left out."""
     sensitive_columns = _find_sensitive_columns(model_base)
     columns = [motion_columns[:, sensitive_columns] for motion_columns in model_base.columns]
     regression = replace(build_regression(motions, axis, laws, False, None, columns), mass=model_base.mass)
-    scale = regression.scale[: regression.base - 1]
-    precision, precision_times_mean = np.zeros(len(scale)), np.zeros(len(scale))
+    base_scales = regression.scale[: regression.base - 1]
+    precision, precision_times_mean = np.zeros(len(base_scales)), np.zeros(len(base_scales))
     precision[0] = FIXED_WEIGHT_PRECISION * sum(block.gram[0, 0] for block in regression.fit)
-    precision_times_mean[0] = precision[0] * scale[0]
+    precision_times_mean[0] = precision[0] * base_scales[0]
     unconstrained = replace(regression, prior=(precision.copy(), precision_times_mean))
-    precision[1:] = _estimate_residual_variance(unconstrained) / scale[1:] ** 2
+    precision[1:] = _estimate_residual_variance(unconstrained) / base_scales[1:] ** 2
     return replace(regression, prior=(precision, precision_times_mean))
 
 
-def explains_enough(regression: Regression, least_share: float) -> bool:
-    """Whether all laws together lower the cross-validated sum of squares by more than least² of the force's power, so
-    that they explain more than the share `least_share` of its rms."""
+def can_laws_explain(regression: Regression, least_share: float) -> bool:
+    """Whether all laws together explain more than the share `least_share` of the force's rms: they lower the
+    cross-validated sum of squares by more than `least_share`² times the force's sum of squares."""
     base_error = float(regression.cross_validate(regression.select_columns(())).sum())
     all_laws_error = fit_all_laws(regression, range(regression.columns[0].shape[1]))[0]
     return base_error - all_laws_error > least_share**2 * sum(block.signal for block in regression.fit)
 
 
-def _find_sensitive_columns(model_base: GivenBase) -> list[int]:
-    """Find the columns of the required force and of the parameters that change it by more than rounding."""
+def _find_sensitive_columns(model_base: ModelBase) -> list[int]:
+    """Find the indices of the columns: 0 (required force), and those of the parameters that change its rms by more than
+    1e-9."""
     rms = np.sqrt(np.mean(np.vstack(model_base.columns) ** 2, axis=0))
-    return [0, *(k for k in range(1, len(rms)) if rms[k] > 1e-9 * rms[0])]
+    return [0, *(column for column in range(1, len(rms)) if rms[column] > 1e-9 * rms[0])]
 
 
 def _estimate_residual_variance(regression: Regression) -> float:
-    """Estimate the residual sum of squares per equivalent degree of freedom; the free parameters are fitted without
-    their prior. With the residual's power P on each spectral line, a motion has 2 (sum P)² / sum P² degrees of
-    freedom."""
+    """Estimate the residual sum of squares per equivalent degree of freedom (at least 1), with the base alone as
+    regressors and the prior of `regression`. With the residual's power P on each spectral line, a motion has
+    2 (sum P)² / sum P² degrees of freedom."""
     residuals = regression.compute_residuals(regression.select_columns(()))
     sum_of_squares, degrees_of_freedom = 0.0, 0.0
     for residual, motion in zip(residuals, regression.motions, strict=True):

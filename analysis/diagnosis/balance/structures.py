@@ -13,7 +13,7 @@ import numpy as np
 
 from analysis.diagnosis.balance.law import BaseTerms, Law, Scales, measure_scales
 from analysis.diagnosis.balance.laws import find_likely_pitches, make_cogging_law, make_laws
-from analysis.diagnosis.balance.model_base import GivenBase, build_regression_with_model, explains_enough
+from analysis.diagnosis.balance.model_base import ModelBase, build_regression_with_model, can_laws_explain
 from analysis.diagnosis.balance.motion import Motion, NoMotionError
 from analysis.diagnosis.balance.regression import (
     Regression,
@@ -75,7 +75,7 @@ def search_structures(
     rotational: bool,
     excluded: frozenset[str],
     time_left: TimeBudget,
-    base: BaseTerms | GivenBase | None = None,
+    base: BaseTerms | ModelBase | None = None,
 ) -> StructureSearch:
     """Beam search for the sum of at most three laws with the least cross-validated error. excluded: effects that are
     left out. base: None = mass, damping and stiffness alone. Raises NoMotionError where nothing can be fitted."""
@@ -89,9 +89,9 @@ def search_structures(
         for law in make_laws(motions, rotational)
         if law.effect not in excluded and (law.key, law.numbers) not in fixed
     ]
-    if isinstance(base, GivenBase):
+    if isinstance(base, ModelBase):
         regression = build_regression_with_model(motions, axis, laws, base)
-        if not explains_enough(regression, base.least_share):
+        if not can_laws_explain(regression, base.least_share):
             base_only = _fit_linear_structure(regression)
             return StructureSearch(regression, base_only, base_only, (base_only,), True)
     else:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.diagnosis.balance.judge_laws import Balance, judge_laws
-from analysis.diagnosis.balance.model_base import GivenBase
+from analysis.diagnosis.balance.model_base import ModelBase
 from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_motions
 from analysis.diagnosis.balance.structures import search_structures
 from analysis.diagnosis.data.measured_motion import has_motion
@@ -59,7 +59,7 @@ def find_balances_with_model(
                 search_structures(
                     [_select_axis(axis_data.motion, axis) for axis_data in data], axis, model.rotational, excluded,
                     time_left,
-                    GivenBase(tuple(axis_data.columns[axis] for axis_data in data), float(mass[axis]), LAW_OF_SIGNAL),
+                    ModelBase(tuple(axis_data.columns[axis] for axis_data in data), float(mass[axis]), LAW_OF_SIGNAL),
                 )
             )
             for axis in range(model.inputs)
@@ -82,7 +82,7 @@ class _AxisData:
     motion: Motion
     """Motion of the driven axes; its force is that of the actuators and known effects there, in N (N m)."""
     columns: tuple[FloatArray, ...]
-    """Per axis, the columns of `GivenBase`, (n, 1 + parameters)."""
+    """Per axis, the columns of `ModelBase`, (n, 1 + parameters)."""
 
 
 def _prepare_axis_data(record: Observed, motion: Motion, model: MechanicalModel) -> _AxisData:

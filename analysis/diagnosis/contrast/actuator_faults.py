@@ -27,7 +27,7 @@ from analysis.diagnosis.contrast.fault import (
     proportional_parameter,
 )
 from analysis.diagnosis.contrast.interpolation import shift_samples
-from analysis.diagnosis.contrast.part import Part
+from analysis.diagnosis.contrast.recording_part import Part
 from analysis.diagnosis.settings import LONGEST_DELAY
 from equalizer.effects.simulation.sensor_path import filter_one_pole
 from equalizer.effects.slew_limit import limit_slew

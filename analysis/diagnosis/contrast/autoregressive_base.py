@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.diagnosis.balance.motion import filter_low_pass
-from analysis.diagnosis.contrast.part import Part
+from analysis.diagnosis.contrast.recording_part import Part
 from analysis.diagnosis.settings import RESPONSE_BAND_SHARE, RESPONSE_OVERSAMPLED
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray

@@ -9,7 +9,7 @@ from analysis.diagnosis.balance.motion import Motion, NoMotionError, compute_mot
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase, choose_decimation_step
 from analysis.diagnosis.contrast.compared_base import FEWEST_ROWS, Base
 from analysis.diagnosis.contrast.force_base import build_force_base
-from analysis.diagnosis.contrast.part import Part
+from analysis.diagnosis.contrast.recording_part import Part
 from analysis.diagnosis.settings import AUTOREGRESSIVE_ORDER, BALANCE_HOLDS, CONSTANT_SIGNAL, MOTIONS_APART
 from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray

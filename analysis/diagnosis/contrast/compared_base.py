@@ -21,8 +21,8 @@ from scipy.linalg import solve_toeplitz
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase
 from analysis.diagnosis.contrast.fault import ALL_CHANNELS, ColumnChange, Curve, Fault, Undo, Variant
 from analysis.diagnosis.contrast.force_base import ForceBase
-from analysis.diagnosis.contrast.joint_products import ColumnIndices, Grams, solve_residual_weights
-from analysis.diagnosis.contrast.part import Part
+from analysis.diagnosis.contrast.joint_products import ColumnIndices, GramBlocks, solve_residual_weights
+from analysis.diagnosis.contrast.recording_part import Part
 from analysis.diagnosis.contrast.sensor_base import SensorBase
 from analysis.diagnosis.data.correlated_residuals import compute_lagged_products
 from analysis.diagnosis.settings import CONTRAST_BLOCKS, CONTRAST_WHITENING_ORDER, LEAST_GAPLESS_SHARE
@@ -90,13 +90,13 @@ class ComparedBase:
         base = self.base
         return 1 / base.rate_hz if isinstance(base, ForceBase) else base.step / self.clean.parts[0].rate_hz
 
-    def compute_grams(self, side: RecordingSet, changed: Sequence[UndoneRows]) -> Grams:
-        """Gram matrices of a set's rows and of their changes by undone faults; see `Grams`. side: the set."""
+    def compute_grams(self, side: RecordingSet, changed: Sequence[UndoneRows]) -> GramBlocks:
+        """Gram matrices of a set's rows and of their changes by undone faults; see `GramBlocks`. side: the set."""
         changed_columns = [_find_changed_columns(undone.rows, side.rows) for undone in changed]
         joint_rows = np.hstack(
             [side.white, *(self._whiten_changes(side, *pair) for pair in zip(changed, changed_columns, strict=True))]
         )
-        return Grams(
+        return GramBlocks(
             np.array([block.T @ block for block in np.array_split(joint_rows, CONTRAST_BLOCKS)]),
             tuple(changed_columns),
             len(self.columns),

@@ -3,7 +3,8 @@
 A base is a linear model of the device (`bases`) that predicts a signal from others. With E the sum of squared whitened
 errors of one base fitted to both sets, and E0 that of a separate base for each set, the excess is E / E0 - 1. It is
 compared with the excess between stretches of a single set (negative control), where the device is the same. Undoing a
-fault means to transform the recorded signals to those without it (`fault`). Made by `rank_faults`, read by `decide`.
+fault means to transform the recorded signals to those without it (`fault`). Made by `rank_faults`, read by
+`choose_fault`.
 """
 
 from dataclasses import dataclass

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.diagnosis.contrast.part import Part
+from analysis.diagnosis.contrast.recording_part import Part
 from equalizer.plant.effect_vocabulary import Place
 from equalizer.signals.signal import FloatArray
 

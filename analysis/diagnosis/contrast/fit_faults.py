@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from analysis.diagnosis.contrast.compared_base import ComparedBase, undo_fault_in_rows
 from analysis.diagnosis.contrast.fault import Fault, Variant, fix_size
-from analysis.diagnosis.contrast.joint_products import Fit, Pair, fit_sizes
+from analysis.diagnosis.contrast.joint_products import SetPair, SizeFit, fit_sizes
 from analysis.diagnosis.settings import CONTRAST_BLOCKS, SIZE_IS_NEAR, UNDOING_ROUNDS
 from analysis.diagnosis.types import TimeBudget
 
@@ -28,11 +28,11 @@ sizes. Chosen by hand; each takes as long as a first fit."""
 class FittedVariant(NamedTuple):
     """A variant of a fault, undone at its best size."""
 
-    fit: Fit
+    fit: SizeFit
     """Fitted sizes, and the sums of squared errors with the fault undone."""
     fault: Fault
     variant: Variant
-    pairs: list[Pair]
+    pairs: list[SetPair]
     """Per base (force, sensor or autoregressive model): least-squares products of both sets, with the fault undone."""
 
 
@@ -40,7 +40,7 @@ class FittedVariant(NamedTuple):
 class FaultFits:
     """Result of `fit_faults`: each fault with its best variant and size, and the products without any fault undone."""
 
-    unchanged_pairs: list[Pair]
+    unchanged_pairs: list[SetPair]
     """Per base, the products of both sets with nothing undone."""
     variants: list[FittedVariant]
     """The best variant of each fault that could be undone, in order of rising error."""
@@ -53,7 +53,7 @@ def fit_faults(compared_bases: Sequence[ComparedBase], faults: Sequence[Fault], 
     well-conditioned are left out."""
     clean_blocks_by_base = [compared.compute_grams(compared.clean, []).blocks for compared in compared_bases]
     unchanged_pairs = [
-        Pair(
+        SetPair(
             compared.compute_grams(compared.faulty, []),
             ALL_BLOCKS,
             tuple(clean_blocks),
@@ -77,7 +77,7 @@ def fit_faults(compared_bases: Sequence[ComparedBase], faults: Sequence[Fault], 
 
 
 def _fit_variant(
-    unchanged_pairs: Sequence[Pair], compared_bases: Sequence[ComparedBase], fault: Fault, variant: Variant
+    unchanged_pairs: Sequence[SetPair], compared_bases: Sequence[ComparedBase], fault: Fault, variant: Variant
 ) -> FittedVariant | None:
     """Undo the fault by this variant and fit its sizes; None where undoing it is ill-conditioned. unchanged_pairs: per
     base, the products without any fault undone."""
@@ -100,7 +100,7 @@ def _get_error(fitted_variant: FittedVariant) -> float:
 
 
 def _choose_best_variant(
-    fits: Sequence[FittedVariant], unchanged_pairs: Sequence[Pair], compared_bases: Sequence[ComparedBase]
+    fits: Sequence[FittedVariant], unchanged_pairs: Sequence[SetPair], compared_bases: Sequence[ComparedBase]
 ) -> FittedVariant:
     """Choose the variant with the smallest error, after linearisation about its size. Of a fault that is valid at size
     1 only (`Variant.exact`), several are compared at size 1: at another size, a wrong variant may have the smallest
@@ -116,7 +116,7 @@ def _choose_best_variant(
 
 
 def _iterate_linearisation(
-    current: FittedVariant, unchanged_pairs: Sequence[Pair], compared_bases: Sequence[ComparedBase]
+    current: FittedVariant, unchanged_pairs: Sequence[SetPair], compared_bases: Sequence[ComparedBase]
 ) -> FittedVariant:
     """Return the best fit of at most `UNDOING_ROUNDS` Gauss-Newton iterations. Each linearises the fault about the size
     that the last iteration found; in the linearised variant, that size is 1. They end where the fitted size differs

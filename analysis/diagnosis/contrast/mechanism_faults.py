@@ -19,7 +19,7 @@ from analysis.diagnosis.balance.friction_laws import LEAST_WIDTH_SHARE
 from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import Motion
 from analysis.diagnosis.contrast.fault import Fault, ParametersOf, Undo, Variant, proportional_parameter
-from analysis.diagnosis.contrast.part import Part
+from analysis.diagnosis.contrast.recording_part import Part
 from equalizer.effects.simulation.dry_friction_kernel import compute_bristle_deflection
 from equalizer.signals.signal import FloatArray
 

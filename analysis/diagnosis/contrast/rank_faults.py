@@ -10,7 +10,7 @@ No real device repeats itself exactly, and a fault with free parameters gains a 
 the same gain is computed between stretches of one set, where no fault can have appeared; E(f) is raised by the median
 of these gains. A confidence bound of the corrected gain comes from resampling blocks (bootstrap), standard errors of a
 fault's values from leaving out groups of blocks in turn (delete-a-group jackknife; Efron and Tibshirani, An
-Introduction to the Bootstrap, 1993, chapter 11). Called by `compare_with_reference`; `decide` names a fault.
+Introduction to the Bootstrap, 1993, chapter 11). Called by `compare_with_reference`; `choose_fault` names a fault.
 """
 
 from collections.abc import Iterator, Sequence
@@ -33,8 +33,8 @@ from analysis.diagnosis.contrast.fault import Fault, Rows, Variant
 from analysis.diagnosis.contrast.fit_faults import ALL_BLOCKS, FaultFits, FittedVariant, fit_faults, restrict_sizes
 from analysis.diagnosis.contrast.force_base import ForceBase
 from analysis.diagnosis.contrast.joint_products import (
-    Fit,
-    Pair,
+    SetPair,
+    SizeFit,
     compute_error,
     compute_held_out_error,
     compute_own_fit_error,
@@ -42,7 +42,7 @@ from analysis.diagnosis.contrast.joint_products import (
 )
 from analysis.diagnosis.contrast.likely_delays import suggest_clock_rates, suggest_delays_s
 from analysis.diagnosis.contrast.mechanism_faults import make_mechanism_faults
-from analysis.diagnosis.contrast.part import Part, split_into_parts
+from analysis.diagnosis.contrast.recording_part import Part, split_into_parts
 from analysis.diagnosis.contrast.sensor_base import build_sensor_bases
 from analysis.diagnosis.contrast.sensor_faults import make_misalignment_fault, make_sensor_faults, make_shared_faults
 from analysis.diagnosis.data.correlated_residuals import draw_bootstrap_blocks
@@ -198,7 +198,7 @@ def _yield_control_excesses(sides: Sequence[FloatArray]) -> Iterator[float]:
 
 
 def _judge_fault(
-    compared_bases: Sequence[ComparedBase], fitted_variant: FittedVariant, baseline_fit: Fit, sample_count: int
+    compared_bases: Sequence[ComparedBase], fitted_variant: FittedVariant, baseline_fit: SizeFit, sample_count: int
 ) -> JudgedFault:
     """The fault with its values and their standard errors, its gain, and the gains of the negative control.
     baseline_fit: the fit with no fault undone. sample_count: in both sets, over all bases."""
@@ -236,7 +236,7 @@ def _judge_fault(
         share=(baseline_fit.error - corrected_error) / excess if excess > 0 else 0.0,
         held_out_squares=held_out_squares,
         gain_low=float(np.quantile(drawn_gains, BOOTSTRAP_LEVEL)),
-        control_excess=max(_yield_control_excesses([pair.undone.undo_sizes(fit.sizes) for pair in pairs])),
+        control_excess=max(_yield_control_excesses([pair.undone.undo_fault(fit.sizes) for pair in pairs])),
     )
 
 
@@ -254,7 +254,7 @@ def _estimate_standard_errors(
     }
 
 
-def _fit_without_clean_sixths(pairs: Sequence[Pair], variant: Variant) -> list[FloatArray]:
+def _fit_without_clean_sixths(pairs: Sequence[SetPair], variant: Variant) -> list[FloatArray]:
     """The fault's sizes, with each sixth of the clean set left out in turn."""
     folds = [
         [
@@ -272,7 +272,7 @@ def _estimate_variance(values: Sequence[float]) -> float:
     return float((len(values) - 1) * np.var(values))
 
 
-def _leave_out_sixths(pairs: Sequence[Pair]) -> list[list[Pair]]:
+def _leave_out_sixths(pairs: Sequence[SetPair]) -> list[list[SetPair]]:
     """The pairs with each sixth of the faulty set left out in turn."""
     return [
         [replace(pair, undone_blocks=tuple(block for block in ALL_BLOCKS if block not in left_out)) for pair in pairs]
@@ -296,5 +296,5 @@ def _yield_control_gains(
         ]
         for stretch in CONTROL_STRETCHES:
             other_blocks = [block for block in ALL_BLOCKS if block not in stretch]
-            pairs = [Pair(grams, stretch, tuple(grams.undo_sizes(common_sizes)[other_blocks])) for grams in products]
+            pairs = [SetPair(grams, stretch, tuple(grams.undo_fault(common_sizes)[other_blocks])) for grams in products]
             yield compute_error(pairs, common_sizes) / max(fit_sizes(pairs, variant).error, 1e-300) - 1

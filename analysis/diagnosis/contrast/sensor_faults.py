@@ -36,7 +36,7 @@ from analysis.diagnosis.contrast.fault import (
     proportional_parameter,
 )
 from analysis.diagnosis.contrast.interpolation import compute_noise_gain, resample, shift_samples
-from analysis.diagnosis.contrast.part import Part
+from analysis.diagnosis.contrast.recording_part import Part
 from analysis.diagnosis.settings import CLOCK_FASTEST, REVERSAL_OF_GAP
 from equalizer.effects.simulation.dry_friction_kernel import compute_bristle_deflection
 from equalizer.signals.signal import FloatArray

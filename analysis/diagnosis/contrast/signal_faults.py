@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.diagnosis.contrast.part import Part
+from analysis.diagnosis.contrast.recording_part import Part
 from analysis.diagnosis.settings import (
     LINE_IS_NEW,
     LINE_STANDS_OUT,

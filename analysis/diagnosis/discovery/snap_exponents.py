@@ -9,8 +9,8 @@ import numpy as np
 
 from analysis.diagnosis.discovery.convert_sum import list_fitted_laws
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, combine_hypotheses, make_claim_hypothesis
-from analysis.diagnosis.errors.intervals import compute_full_sensitivity, compute_standard_errors
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
+from analysis.diagnosis.errors.standard_errors import compute_full_sensitivity, compute_standard_errors
 from analysis.diagnosis.search.search_context import FIRST_FIT_ROUNDS, SearchContext
 from analysis.diagnosis.settings import INTERVAL_FACTOR, LAW_SNAP
 from equalizer.effects.discovered_law import collect_channels, get_law_values, make_law_effect

@@ -1,9 +1,10 @@
-"""Error measure for impacts: the power of each channel in each band and segment, because waveforms are unpredictable.
+"""Error measure for impacts: differences of the power of each channel in each band and segment.
 
-Compared is ln a, with a² the mean power density in a band of half an octave (Welch's method, windows of 1 s); the
-noise's power is added to a predicted a². Impacts make the motion chaotic: the waveforms of two simulations whose
-initial states differ by less than any sensor resolves diverge; their band amplitudes agree to a few per cent. Fitted
-by `band_power_fit`; candidates are compared by `band_power_comparison`.
+Impacts make the motion chaotic: the waveforms of two simulations whose initial states differ by less than the
+resolution of any sensor diverge, while their band amplitudes agree to a few per cent. Therefore ln a is compared, with
+a² the mean power density in a band of half an octave (Welch's method, windows of 1 s); the noise's power is added to a
+predicted a². Used by `band_power_fit` (fit of parameters), `search.band_power_comparison` (comparison of candidates)
+and `search.impacts`.
 """
 
 from collections.abc import Sequence
@@ -20,14 +21,15 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import estimate_spectral_density
 
 WINDOW_S, OCTAVES = 1.0, 0.5
-"""Length of a Welch window in s, and width of a band in octaves."""
+"""Length of a Welch window (s), and width of a band in octaves. Chosen."""
 LOWEST_LINE, HIGHEST_SHARE = 2.0, 0.48
-"""Lower end of the lowest band in lines of a window (1 / WINDOW_S), and limit of the highest over the sample rate."""
+"""Lower end of the lowest band in lines of a window (1 / WINDOW_S), and upper limit of the highest band relative to the
+sample rate, below the Nyquist frequency. Chosen."""
 LONGEST_S, LEAST_SAMPLES = 8.0, 256
-"""Longest stretch of a record without segments (s), and least number of samples of any stretch."""
+"""Longest stretch (s) of a record without segments, and least number of samples of any stretch. Chosen."""
 LEAST_POWER_RATIO = 4.0
-"""Least ratio of a band's power to that of the noise; bands below it are not compared."""
-PARTS = ("fit", "choose", "test")
+"""Ratio of a band's power to that of the noise, up to which a band is not compared. Chosen."""
+ROLES = ("fit", "choose", "test")
 """Roles of samples, by the names of the masks of `Observed`."""
 Residuals = tuple[FloatArray, ...]
 """Residuals of an error measure: per record (n, c), in units of `ErrorMeasure.unit`."""
@@ -35,42 +37,42 @@ Residuals = tuple[FloatArray, ...]
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Samples `first` to `last` (exclusive) of one record, all with the same role (`part`: fit, choose or test)."""
+    """Samples `start` to `stop` (exclusive) of the record with index `record`, all with the same role of `ROLES`."""
 
     record: int
-    first: int
-    last: int
-    part: str
+    start: int
+    stop: int
+    role: str
 
 
 @dataclass(frozen=True, eq=False)
 class BandPower:
-    """Band powers of the signals of an error measure, measured and predicted, by stretch, band and channel."""
+    """Band powers of the c signals of an error measure, measured and predicted, by stretch, band and channel."""
 
     measure: ErrorMeasure
 
     @cached_property
     def stretches(self) -> tuple[Stretch, ...]:
-        """Per segment (rest left out) and role, the longest run of its samples, where that has `LEAST_SAMPLES` or more.
-        A record without segments is divided into pieces of `LONGEST_S`."""
+        """Per segment (rest left out) and role, the longest run of samples with that role, if it has at least
+        `LEAST_SAMPLES`. A record without segments in motion is divided into pieces of `LONGEST_S`."""
         return tuple(
-            Stretch(record_index, first, last, part)
+            Stretch(record_index, start, stop, role)
             for record_index, record in enumerate(self.measure.records)
-            for first, last in self._list_spans(record_index)
-            for part in PARTS
-            for first, last in _find_longest_run(getattr(record, part), first, last)
+            for start, stop in self._list_spans(record_index)
+            for role in ROLES
+            for start, stop in _find_longest_run(getattr(record, role), start, stop)
         )
 
     @cached_property
     def measured(self) -> FloatArray:
-        """(stretches, bands, c): ln a of the measured signals; NaN where the power is below `LEAST_POWER_RATIO` times
-        the noise."""
+        """(stretches, bands, c): ln a of the measured signals; NaN where the power is at most `LEAST_POWER_RATIO` times
+        that of the noise."""
         power = self._compute_band_power([record.measured for record in self.measure.records])
         with np.errstate(divide="ignore"):
             return np.where(power > LEAST_POWER_RATIO * self._noise, 0.5 * np.log(power), np.nan)
 
     def predict(self, residuals: Residuals) -> FloatArray:
-        """(stretches, bands, c): ln a of the predicted signals, with the noise's power added."""
+        """Compute ln a of the predicted signals, (stretches, bands, c), with the noise's power added."""
         unit = self.measure.unit
         predicted = [
             record.measured - residual * unit for record, residual in zip(self.measure.records, residuals, strict=True)
@@ -78,10 +80,10 @@ class BandPower:
         return np.asarray(0.5 * np.log(self._compute_band_power(predicted) + self._noise))
 
     def compute_misfits(self, log_errors: FloatArray) -> FitScore:
-        """Rms per channel of differences of ln a, (stretches, bands, c), by role; NaN without a compared band."""
+        """Compute the rms (c,) of differences of ln a, (stretches, bands, c), by role; NaN without a compared band."""
         compared_errors = np.where(np.isnan(self.measured), np.nan, log_errors)
         return FitScore(
-            *(_compute_rms(compared_errors[[stretch.part == part for stretch in self.stretches]]) for part in PARTS)
+            *(_compute_rms(compared_errors[[stretch.role == role for stretch in self.stretches]]) for role in ROLES)
         )
 
     @cached_property
@@ -98,14 +100,14 @@ class BandPower:
         return np.asarray(self.measure.noise**2 / (rate_hz / 2))
 
     def _compute_band_power(self, predicted: Sequence[FloatArray]) -> FloatArray:
-        """(stretches, bands, c): a², mean power density over the lines of each band, in units squared per hertz. A
-        band between two lines takes the line above it. predicted: signals (n, c), per record."""
+        """Compute a², (stretches, bands, c): mean power density over the lines of each band, in units squared per
+        hertz. A band between two lines has the density of the line above it. predicted: signals (n, c), per record."""
         rate_hz = self.measure.records[0].recording.sample_rate_hz
         band_powers = np.empty((len(self.stretches), len(self._edges) - 1, len(self.measure.noise)))
         for stretch_powers, stretch in zip(band_powers, self.stretches, strict=True):
-            window_samples = min(int(WINDOW_S * rate_hz), stretch.last - stretch.first)
+            window_samples = min(int(WINDOW_S * rate_hz), stretch.stop - stretch.start)
             frequency_hz, density = estimate_spectral_density(
-                predicted[stretch.record][stretch.first : stretch.last], rate_hz, window_samples
+                predicted[stretch.record][stretch.start : stretch.stop], rate_hz, window_samples
             )
             first_lines = np.searchsorted(frequency_hz, self._edges)
             for band, (first_line, stop_line) in enumerate(pairwise(first_lines)):
@@ -113,17 +115,18 @@ class BandPower:
         return band_powers
 
     def _list_spans(self, record_index: int) -> list[tuple[int, int]]:
-        """Start and stop of the segments of a record in motion, or of pieces of it where it has none."""
+        """List start and stop of the segments of a record in motion or, where there are none, of its pieces."""
         record = self.measure.records[record_index]
         segments = [(segment.start, segment.stop) for segment in record.recording.segments if segment.kind != "rest"]
         length, longest_samples = len(record.measured), int(LONGEST_S * record.recording.sample_rate_hz)
         return segments or [
-            (first, min(first + longest_samples, length)) for first in range(0, length, longest_samples)
+            (start, min(start + longest_samples, length)) for start in range(0, length, longest_samples)
         ]
 
 
 def _find_longest_run(mask: Mask, start: int, stop: int) -> list[tuple[int, int]]:
-    """Start and stop of the longest run of masked samples between start and stop; empty below `LEAST_SAMPLES`."""
+    """Find start and stop of the longest run of True in the mask between start and stop; empty where it has fewer than
+    `LEAST_SAMPLES` samples."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask[start:stop].astype(np.int8), [0]]))).reshape(-1, 2)
     runs = [
         (start + int(run_start), start + int(run_stop))
@@ -134,7 +137,7 @@ def _find_longest_run(mask: Mask, start: int, stop: int) -> list[tuple[int, int]
 
 
 def _compute_rms(log_errors: FloatArray) -> FloatArray:
-    """(c,): rms over stretches and bands, without NaN; NaN where all are NaN."""
+    """Compute the rms (c,) over stretches and bands, without NaN; NaN where all are NaN."""
     compared_count = np.sum(np.isfinite(log_errors), axis=(0, 1))
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(np.sqrt(np.nansum(log_errors**2, axis=(0, 1)) / compared_count))

@@ -86,7 +86,7 @@ class BandPowerProblem:
     @property
     def weights(self) -> FloatArray:
         """(stretches, bands, c): 1 / s; 0 for held-out stretches and bands below the noise."""
-        is_fitted = np.array([stretch.part != "test" for stretch in self.power.stretches], dtype=np.bool_)
+        is_fitted = np.array([stretch.role != "test" for stretch in self.power.stretches], dtype=np.bool_)
         is_compared = np.isfinite(self.power.measured) & is_fitted[:, None, None]
         return np.asarray(np.where(is_compared, 1 / np.hypot(self.spread, SPREAD_FLOOR), 0.0))
 

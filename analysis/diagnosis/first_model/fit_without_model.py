@@ -1,11 +1,11 @@
-"""Fit the mechanical model that a diagnosis starts from where the user gave none.
+"""Fit the first mechanical model, from which a diagnosis starts where the user gave no model.
 
 Methods, in the order in which they are tried: a spring per axis by force balance, for quasi-static recordings without
 time; the coefficients of the force balances, where these name laws along the motion of one body per command; mass,
 damper and spring by force balance, for a free motion; rigid bodies fitted to forces, for recordings in closed loop or
 of an imposed motion (`fit_rigid_model`); a mechanical model fitted to frequency responses (`mechanical_fit`), which
-takes longest. Tolerances are wide, because unmodelled physics biases the fitted parameters. Called by `diagnose_values`
-and `study.workflows.diagnosis.fit_without_model`.
+takes longest, or rigid bodies where that fails. Tolerances are wide, because unmodelled physics biases the fitted
+parameters. Called by `diagnose_values` and `study.workflows.diagnosis.fit_without_model`.
 """
 
 from collections.abc import Callable, Sequence
@@ -55,6 +55,7 @@ FREE_REMARK = (
     "No model was given. A damper and a spring per axis were fitted first to the force per unit mass that the free "
     "motion shows; the mass in the file is a lower bound."
 )
+"""Remarks of a diagnosis on its first model, by the method of the fit."""
 
 
 def fit_first_model(
@@ -65,8 +66,9 @@ def fit_first_model(
     map_: Mapper = map,
 ) -> FirstModel:
     """Fit the first model: by force balance where that is possible, else by `fit_first_linear_model`, which takes
-    longer. recordings: as converted by `one_motion_per_force`. excluded_effects: names of effects that the balance must
-    not name. map_: a possibly parallel `map`. Raises NothingToDiagnose where no model can be fitted."""
+    longer. recordings: at least one, as converted by `one_motion_per_force`. excluded_effects: names of effects that
+    the balance must not name. on_progress: called with a text and the completed fraction, 0 to 1. map_: a possibly
+    parallel `map`. Raises NothingToDiagnose where no model can be fitted."""
     _require_no_weight(recordings)
     on_progress("testing laws in the force balance", 0.0)
     balances = find_balances(recordings, frozenset(excluded_effects), time_left, map_)
@@ -90,8 +92,8 @@ def fit_first_model(
 
 
 def _fix_mass(model: MechanicalModel) -> MechanicalModel:
-    """Return the model with a mass tolerance so small (`FIXED_SHARE` of the largest mass) that re-tuning does not
-    change the mass."""
+    """Reduce the mass tolerance of a model to `FIXED_SHARE` of the largest mass, so that re-tuning does not change the
+    mass. model: with a tolerance."""
     assert model.tolerance is not None
     return replace(model, tolerance=replace(model.tolerance, mass_kg=FIXED_SHARE * float(np.abs(model.mass).max())))
 
@@ -115,18 +117,18 @@ def fit_first_linear_model(
     recordings: Sequence[Recording], on_progress: Callable[[float], None], source: str = "these recordings"
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
     """Fit a linear model to forces (`fit_rigid_model`) or to frequency responses. Returns the model and remarks, as
-    sentences. source: the recordings in words, for the remarks. Raises NothingToDiagnose where no model can be
+    sentences. source: description of the recordings, for the remarks. Raises NothingToDiagnose where no model can be
     fitted."""
     _require_no_weight(recordings)
-    if should_use_rigid_model(recordings) and (rigid := _try_rigid_model(recordings, source)) is not None:
-        return rigid, (RIGID_REMARK,)
+    if should_use_rigid_model(recordings) and (rigid_model := _try_rigid_model(recordings, source)) is not None:
+        return rigid_model, (RIGID_REMARK,)
     try:
         fit = fit_mechanical_model(recordings, on_progress=on_progress, name=f"fitted to {source}")
         if not any(_responds_to_commands(fit.model, recording) for recording in recordings):
             raise MechanicalFitRefused("the model that fits best hardly responds to the commands")
     except (MechanicalFitRefused, MechanicalModelError, np.linalg.LinAlgError) as refusal:
-        if (rigid := _try_rigid_model(recordings, source)) is not None:
-            return rigid, (RIGID_REMARK,)
+        if (rigid_model := _try_rigid_model(recordings, source)) is not None:
+            return rigid_model, (RIGID_REMARK,)
         raise NothingToDiagnose((f"no model was given, and none can be fitted: {refusal}",)) from refusal
     held_out_text = "" if fit.held_out is None else f" and of {100 * fit.held_out:.1f} % on held-out data"
     first_remark = (
@@ -135,7 +137,10 @@ def fit_first_linear_model(
         "parameters can represent, such as friction at one level as damping, is part of this model and is therefore "
         "not named."
     )
-    return widen_tolerance(fit.model), (first_remark, *(format_sentence(remark) for remark in fit.remarks))
+    return widen_tolerance(fit.model), (
+        first_remark,
+        *(format_sentence(remark) for remark in fit.remarks),
+    )
 
 
 def _responds_to_commands(model: MechanicalModel, recording: Recording) -> bool:
@@ -150,7 +155,7 @@ def _responds_to_commands(model: MechanicalModel, recording: Recording) -> bool:
 
 
 def _require_no_weight(recordings: Sequence[Recording]) -> None:
-    """Raises NothingToDiagnose where the device carried a weight, whose mass a fitted model would include."""
+    """Raise NothingToDiagnose where the device carried a weight, whose mass a fitted model would include."""
     if has_carried_weight(recordings):
         raise NothingToDiagnose(
             (

@@ -1,8 +1,9 @@
-"""Converts a motion that is not driven, such as a decay, to a recording of the force per unit mass that it implies.
+"""Converts recordings of a free motion, such as a decay, to recordings of the force per unit mass that it implies.
 
-Without a force, m q'' + c q' + k q + h(q, q') = 0 determines each term up to a common factor. Per unit of mass, the
-force -q'' balances damping, spring and laws along the motion q: like a recording with an imposed motion and a measured
-force, without a mass.
+Without a driving force, m q'' + c q' + k q + h(q, q') = 0 determines each term up to a common factor. Per unit mass,
+the force -q'' balances damping, spring and nonlinear laws h along the motion q: as in a recording with an imposed
+motion and a measured force, without a mass. A decay is divided into segments by amplitude, so that fit and test both
+contain all levels. Called by `one_motion_per_force`.
 """
 
 from collections.abc import Sequence
@@ -22,18 +23,20 @@ from equalizer.signals.recording import Recording, Segment
 from equalizer.signals.signal import FloatArray, Signal
 
 
-def is_free_motion(recordings: Sequence[Recording]) -> bool:
-    """Whether no command ever changes, and positions or velocities were measured over time."""
+def is_undriven_motion(recordings: Sequence[Recording]) -> bool:
+    """Whether no command ever changes, and positions or velocities, of one order and either linear or angular, were
+    measured, in recordings none of which is quasi-static. recordings: at least one, alike in channels."""
     orders = {DERIVATIVE_OF_QUANTITY.get(quantity, 2) for quantity in recordings[0].response.quantities}
-    rotational = {unit.startswith("rad") for unit in recordings[0].response.units}
-    is_uniform = len(orders) == 1 and len(rotational) == 1
+    rotational_flags = {unit.startswith("rad") for unit in recordings[0].response.units}
+    is_uniform = len(orders) == 1 and len(rotational_flags) == 1
     return not is_driven(recordings) and is_uniform and max(orders) < 2 and not any(map(is_quasi_static, recordings))
 
 
-def read_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recording, ...], str]:
-    """The recordings with the force per unit mass as their command, and a sentence about it; unchanged, with an empty
-    sentence, where a command drives the motion."""
-    if not recordings or not is_free_motion(recordings):
+def convert_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recording, ...], str]:
+    """Replace the command of recordings of a free motion by the force per unit mass -q'' (N, for a mass of 1 kg, or N m
+    for 1 kg m^2), and return a sentence about it. Unchanged, with an empty sentence, without recordings or where
+    `is_undriven_motion` is False."""
+    if not recordings or not is_undriven_motion(recordings):
         return tuple(recordings), ""
     response = recordings[0].response
     order, rate_hz = DERIVATIVE_OF_QUANTITY[response.quantities[0]], response.sample_rate_hz
@@ -57,7 +60,7 @@ def read_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recording, 
         has_levels = (
             any(segment.role for segment in recording.segments) or len({s.amplitude for s in recording.segments}) > 1
         )
-        segments = recording.segments if has_levels else _levels(recording, samples)
+        segments = recording.segments if has_levels else _split_into_levels(recording, samples)
         meta = {**recording.meta, "imposed": FREE_MOTION}
         converted.append(replace(recording, command=command, excitation=None, segments=segments, meta=meta))
     unit_mass = "inertia (1 kg m^2)" if is_rotational else "mass (1 kg)"
@@ -67,17 +70,18 @@ def read_free_motion(recordings: Sequence[Recording]) -> tuple[tuple[Recording, 
     )
 
 
-def _levels(recording: Recording, samples: FloatArray) -> tuple[Segment, ...]:
-    """Segments of at least `DECAY_LEAST_CYCLES` cycles each, with their amplitude: a decaying motion passes through all
-    levels, and every level should be among the samples to fit and to test by. samples: (n, p)."""
+def _split_into_levels(recording: Recording, samples: FloatArray) -> tuple[Segment, ...]:
+    """Split each moving part into equally long segments with their amplitude: at most `DECAY_MOST_LEVELS`, of about
+    `DECAY_LEAST_CYCLES` cycles or more each; a shorter motion is one segment. A decay passes through all levels, and
+    each should be both fitted and tested. samples: (n, p)."""
     segments = []
     for span in find_moving_spans(samples, find_parts(recording)):
         motion = samples[span.start : span.end_of_motion]
         displacement = motion[:, int(np.argmax(np.ptp(motion, axis=0)))]
         rest_position = float(np.median(samples[span.start : span.stop, int(np.argmax(np.ptp(motion, axis=0)))]))
-        cycles = np.count_nonzero(np.diff(np.signbit(displacement - rest_position))) / 2
-        count = int(np.clip(cycles / DECAY_LEAST_CYCLES, 1, DECAY_MOST_LEVELS))
-        edges = np.linspace(span.start, span.end_of_motion, count + 1).astype(int)
+        cycle_count = np.count_nonzero(np.diff(np.signbit(displacement - rest_position))) / 2
+        level_count = int(np.clip(cycle_count / DECAY_LEAST_CYCLES, 1, DECAY_MOST_LEVELS))
+        edges = np.linspace(span.start, span.end_of_motion, level_count + 1).astype(int)
         for start, stop in pairwise(edges.tolist()):
             segments.append(
                 Segment(

@@ -14,7 +14,7 @@ from analysis.diagnosis.balance.friction_laws import LEAST_WIDTH_SHARE
 from analysis.diagnosis.balance.law import smooth_sign
 from analysis.diagnosis.balance.motion import NoMotionError, compute_motions
 from analysis.diagnosis.data.observed_parts import observe_parts
-from analysis.diagnosis.first_model.free_motion import read_free_motion
+from analysis.diagnosis.first_model.free_motion import convert_free_motion
 from analysis.diagnosis.first_model.infer_quantity import infer_quantities
 from analysis.diagnosis.first_model.restore_sign import restore_sign
 from analysis.diagnosis.first_model.reversed_commands import reverse_commands
@@ -46,7 +46,7 @@ def convert_to_driven_motions(
     directions."""
     converted, remarks = tuple(recordings), []
     steps: tuple[Step, ...] = (
-        infer_quantities, read_free_motion, _separate_conditions, _select_imposed_motion, _select_motions,
+        infer_quantities, convert_free_motion, _separate_conditions, _select_imposed_motion, _select_motions,
         _select_forces, restore_sign, _drop_constant_commands, _merge_commands,
     )  # fmt: skip
     for step in (*steps, reverse_commands) if turns else steps:

@@ -1,11 +1,13 @@
-"""Fits a model with one body per command to a device in closed loop, by least squares on forces.
+"""Fit a rigid model, with one body per command, to a device in closed loop, by least squares on forces (inverse
+dynamics).
 
-    f = M q'' + D q' + K q + f0        M, D, K made symmetric after the fit; K only where springs reduce the misfit
+    f = M q'' + D q' + K q + f0        f, q: (samples, m) commands and measured motion, low-pass filtered alike
 
-along the measured motion q, both sides low-pass filtered, as rigid robots are identified (Gautier, Vandanjon and Pressé
-1994). Frequency responses from commands to motions would be biased by the controller. Called by `fit_without_model`,
-where no model was given.
-"""
+The fitted matrices are made symmetric. K is kept only where it reduces the misfit by `SPRING_SHARE`. D and K that are
+not positive semidefinite are replaced, so that the model is passive, and the masses have a lower bound. Rigid robots
+are identified by the same regression: Gautier, Vandanjon and Pressé, Proc. IEEE Conf. Decision and Control 1994.
+Frequency responses from commands to motions would be biased by the controller. Called by `fit_without_model`, where no
+model was given."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -25,24 +27,27 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 _FIT_COUNT = 2
-"""Number of fits: the band in which forces are compared depends on the model, so the fit is repeated with the first."""
+"""Number of fits: the band in which forces are compared depends on the model, so the second fit uses the band of the
+first model. Chosen."""
 
 
 def should_use_rigid_model(recordings: Sequence[Recording]) -> bool:
-    """Whether a rigid model is preferred: a controller made the commands, or a motion was imposed."""
+    """Whether a rigid model can be fitted and is preferred: in any recording, a controller made the commands or a
+    motion was imposed."""
     return can_be_rigid(recordings) and any(
         is_in_closed_loop(recording) or recording.meta.get("imposed") for recording in recordings
     )
 
 
 def can_be_rigid(recordings: Sequence[Recording]) -> bool:
-    """Whether one position or velocity was measured for every command, all of the same order of derivative."""
+    """Whether, in every recording, one position or velocity was measured for each command, and all responses are of the
+    same derivative of the position."""
     return all(_is_square(recording) for recording in recordings)
 
 
 def fit_rigid_model(recordings: Sequence[Recording], name: str) -> MechanicalModel:
-    """Least-squares model with one body per command. Raises MechanicalModelError where the forces give no positive
-    mass, or where no motion was measured."""
+    """Fit the model with one body per command to at least one recording. Raises MechanicalModelError where the fitted
+    mass matrix is not positive definite, or where no motion was measured."""
     model = _make_unit_mass_model(recordings[0], name)
     records = observe_parts(recordings, model.outputs)
     if not all(has_motion(record.recording, model) for record in records):
@@ -54,8 +59,8 @@ def fit_rigid_model(recordings: Sequence[Recording], name: str) -> MechanicalMod
 
 
 def _is_square(recording: Recording) -> bool:
-    """Whether there is one response per command, all responses are of one derivative of the position, and a position or
-    velocity was measured for each."""
+    """Whether there is one response per command, all responses are of one derivative of the position (an unknown
+    quantity counts as acceleration), and a position or velocity was measured for each."""
     derivative_orders = [DERIVATIVE_OF_QUANTITY.get(quantity, 2) for quantity in recording.response.quantities]
     is_paired = len(recording.command.channels) == len(recording.response.channels)
     motion = recording.position if max(derivative_orders) == 2 else recording.response
@@ -68,7 +73,7 @@ def _is_square(recording: Recording) -> bool:
 
 
 def _make_unit_mass_model(recording: Recording, name: str) -> MechanicalModel:
-    """The model that the first band is computed with: unit masses without dampers and springs."""
+    """Make the model that gives the band of the first fit: unit masses without dampers and springs."""
     identity = np.eye(len(recording.command.channels))
     return MechanicalModel(
         name,
@@ -83,8 +88,10 @@ def _make_unit_mass_model(recording: Recording, name: str) -> MechanicalModel:
 
 
 def _fit_to_forces(model: MechanicalModel, measure: PredictedForce) -> MechanicalModel:
-    """The model with fitted matrices, made passive, and with their tolerances."""
-    regressor_rows, targets = [], []
+    """Fit mass, damping and stiffness to the measured forces, make the model passive, and state its tolerances: the
+    shares `RIGID_MASS_SHARE` and `RIGID_SHARE` of the largest diagonal entries. measure: records and motions of the
+    fit."""
+    regressor_blocks, target_blocks = [], []
     for record, motion in zip(measure.records, measure.motions, strict=True):
         motion_and_force = compute_required_force(model, motion)
         is_used = record.fit | record.choose
@@ -94,9 +101,9 @@ def _fit_to_forces(model: MechanicalModel, measure: PredictedForce) -> Mechanica
             motion_and_force.axis_position,
             np.ones((len(is_used), 1)),
         )
-        regressor_rows.append(np.hstack(columns)[is_used])
-        targets.append(record.measured[is_used])
-    regressors, target, m = np.vstack(regressor_rows), np.vstack(targets), model.inputs
+        regressor_blocks.append(np.hstack(columns)[is_used])
+        target_blocks.append(record.measured[is_used])
+    regressors, target, m = np.vstack(regressor_blocks), np.vstack(target_blocks), model.inputs
     full_fit, full_error = _solve_least_squares(regressors, target)
     springless_fit, springless_error = _solve_least_squares(np.delete(regressors, range(2 * m, 3 * m), axis=1), target)
     has_springs = full_error < (1 - SPRING_SHARE) * springless_error
@@ -105,8 +112,8 @@ def _fit_to_forces(model: MechanicalModel, measure: PredictedForce) -> Mechanica
     )
     mass = mass + np.diag(np.maximum(_compute_least_mass(regressors[:, :m], target) - np.diagonal(mass), 0.0))
     stiffness = (full_fit[2 * m : 3 * m] + full_fit[2 * m : 3 * m].T) / 2 if has_springs else np.zeros((m, m))
-    # Negative damping or stiffness is set to zero: a linear model must be passive, and the diagnosis looks for the
-    # cause.
+    # A linear model must be passive: of damping that is not positive semidefinite only positive diagonal entries are
+    # kept, and such stiffness is dropped. The diagnosis looks for the cause.
     damping = damping if np.linalg.eigvalsh(damping)[0] >= 0 else np.diag(np.maximum(np.diagonal(damping), 0.0))
     stiffness = stiffness if np.linalg.eigvalsh(stiffness)[0] >= 0 else np.zeros((m, m))
     largest_entries = [float(np.abs(np.diagonal(matrix)).max()) for matrix in (mass, damping, stiffness)]
@@ -120,12 +127,15 @@ def _fit_to_forces(model: MechanicalModel, measure: PredictedForce) -> Mechanica
 
 
 def _compute_least_mass(acceleration: FloatArray, force: FloatArray) -> FloatArray:
-    """(m,): least masses, for bodies whose inertia does not show in the force: a simulation needs a positive mass."""
+    """Compute lower bounds (m,) of the diagonal masses: the inertial force of each body is at least `MASSLESS_SHARE` of
+    the force (standard deviations), because a simulation needs positive masses. acceleration, force: (samples, m). A
+    body without acceleration gets a huge finite bound (the divisor is at least 1e-300)."""
     return np.asarray(MASSLESS_SHARE * force.std(axis=0) / np.maximum(acceleration.std(axis=0), 1e-300))
 
 
 def _solve_least_squares(regressors: FloatArray, target: FloatArray) -> tuple[FloatArray, float]:
-    """(k, m): coefficients; and the mean square of the residual."""
+    """Solve for the coefficients (k, m), and compute the mean square of the residual. regressors: (samples, k), scaled
+    to unit column norms for the solution; target: (samples, m)."""
     column_norms = np.maximum(np.linalg.norm(regressors, axis=0), np.finfo(float).tiny)
     coefficients = np.linalg.lstsq(regressors / column_norms, target, rcond=None)[0] / column_norms[:, None]
     return np.asarray(coefficients), float(np.mean((target - regressors @ coefficients) ** 2))

@@ -1,8 +1,9 @@
 """Power spectrum of the residual, by segment and octave; called by `mismatch_cells`.
 
-Where periods repeat: the spectrum of their mean, whose lines are independent. Elsewhere: Hann windows that overlap by
-half (Welch 1967); their correlation reduces the degrees of freedom. Powers are mean squares in the signal's unit
-squared, one-sided: twice the squared magnitudes of the lines of positive frequency.
+In periodic segments: the spectrum of the mean period, whose lines are independent. Elsewhere: Hann windows that overlap
+by half (Welch, IEEE Trans. Audio Electroacoust. 15:70, 1967), whose correlation reduces the degrees of freedom. Powers
+are mean squares in the signal's unit squared, one-sided: twice the squared magnitudes of the lines of positive
+frequency.
 """
 
 from collections.abc import Sequence
@@ -27,19 +28,19 @@ from equalizer.signals.signal import FloatArray
 from equalizer.signals.spectral_density import compute_line_spectra, hann
 
 _WINDOW_S = 1.0
-"""Length of a window where nothing is periodic (s). By hand."""
+"""Longest window (s) in segments without a period. By hand."""
 _DRIVEN_BAND_SHARE = 1e-4
-"""Share of the strongest band's power of the command below which a band is not driven. By hand."""
+"""Share of the strongest band's power of the command up to which a band is not driven. By hand."""
 _DRIVEN_WINDOW_SHARE = 1e-2
-"""Share of its band's strongest window below which a window does not count for the band. By hand."""
+"""Share of the power of its band's strongest window up to which a window is left out of the band. By hand."""
 _HANN_NEIGHBOUR_FACTOR = 1.944
-"""1 + 2 (4/9 + 1/36): factor by which the correlation of neighbouring lines of a Hann window, 2/3 and 1/6, reduces the
-degrees of freedom."""
+"""1 + 2 (4/9 + 1/36): factor by which the correlations 2/3 and 1/6 of a Hann window's line with the next two lines
+reduce the degrees of freedom."""
 _HANN_OVERLAP_FACTOR = 1.056
-"""1 + 2/36: the same for windows that overlap by half, whose correlation is 1/6."""
+"""1 + 2/36: the same for consecutive windows that overlap by half, whose correlation is 1/6."""
 _LEAST_AMPLITUDE_SHARE = 0.1
-"""Least amplitude of a channel, relative to the strongest of its quantity, by hand: the response of a channel that is
-hardly driven depends on fractions of a degree of misalignment, so the strongest is the reference."""
+"""Lower limit of a channel's amplitude, relative to the strongest channel of its quantity. By hand: the response of a
+channel that is hardly driven depends on fractions of a degree of misalignment."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,40 +48,47 @@ class ResidualLines:
     """Powers of one signal in one band of one segment; each array (channels,)."""
 
     input: str
+    """Driven inputs, joined by "+"."""
     amplitude: float
+    """Level of the segment's excitation, in the command's unit."""
     band_hz: Band
+    """Lower and upper end (Hz); an octave."""
     seconds: float
-    """Duration of the data."""
+    """Duration (s) of the data."""
     lines: float
-    """Number of independent lines."""
+    """Number of independent lines, at least 1."""
     residual: FloatArray
     """Mean square of the residual, summed over lines, noise included."""
     noise: FloatArray
-    """The same expected from noise alone."""
+    """Mean square of the residual that is expected from noise alone."""
     signal: FloatArray
-    """Mean square of the response without its noise."""
+    """Mean square of the response less its noise, weak channels raised by `_LEAST_AMPLITUDE_SHARE`."""
     whitened: FloatArray
     """Mean over lines of residual power / noise power: 1 for noise alone."""
     signal_to_noise: FloatArray
-    """Signal over noise power, summed over independent lines; weak channels count with a tenth of the strongest
-    channel's amplitude."""
+    """Ratio of signal to noise power, summed over independent lines."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observation:
-    """One signal with its prediction; each (n, channels)."""
+    """One measured signal with its prediction and noise."""
 
     measured: FloatArray
+    """(n, channels)"""
     predicted: FloatArray
+    """(n, channels)"""
     noise: ChannelNoise
+    """Noise of the measured signal."""
     noise_hz: FloatArray
-    """Frequencies of the noise's spectral density (Hz)."""
+    """(lines,): frequencies of the noise's spectral density (Hz)."""
     quantities: tuple[str, ...]
+    """Quantity of each channel."""
 
 
 def compute_residual_lines(recording: Recording, observation: Observation, used: Mask) -> list[ResidualLines]:
-    """Compute the residual power by segment and octave. used: (n,), the samples that count. Segments of rest, and those
-    without a complete period or window, are left out."""
+    """Compute the residual power by segment and octave. used: (n,), mask of the samples to use. Segments of rest, and
+    those without a complete period or window of used, finite samples, are left out; a recording without segments counts
+    as one segment."""
     usable = used & np.isfinite(observation.measured).all(axis=1) & np.isfinite(observation.predicted).all(axis=1)
     settled_periods = {period.index: period for period in find_settled_periods(recording)}
     residual = observation.measured - observation.predicted
@@ -138,9 +146,9 @@ def _sum_period_octaves(
 def _sum_window_octaves(
     recording: Recording, observation: Observation, residual: FloatArray, segment_and_mask: tuple[Segment, Mask]
 ) -> list[ResidualLines]:
-    """Compute the residual power of Hann windows, by octave; empty where the segment is shorter than 16 samples, has no
-    usable window, or a command is missing. residual: (n, channels). segment_and_mask: the segment, and the mask
-    (n,) of samples that count."""
+    """Compute the residual power of Hann windows, by octave from the second line on; empty where the segment is shorter
+    than 16 samples (too few lines), has no usable window, or a command is missing. residual: (n, channels).
+    segment_and_mask: the segment, and the mask (n,) of usable samples."""
     segment, usable = segment_and_mask
     length = min(round(_WINDOW_S * recording.sample_rate_hz), segment.stop - segment.start)
     all_starts = range(segment.start, segment.stop - length + 1, max(length // 2, 1))
@@ -176,16 +184,16 @@ def _sum_window_octaves(
 
 
 def _compute_window_power(samples: FloatArray, starts: Sequence[int], length: int) -> FloatArray:
-    """Squared magnitudes (windows, lines, channels) of windows without their mean, times a Hann window of unit
-    power."""
-    window = np.sqrt(8 / 3) * hann(length)
-    periods = np.stack([samples[start : start + length] for start in starts])
-    return np.abs(compute_line_spectra((periods - periods.mean(axis=1, keepdims=True)) * window[:, None])) ** 2
+    """Compute the squared magnitudes (windows, lines, channels) of the spectra of windows without their mean, times a
+    Hann taper of unit power. starts, length: of the windows, in samples."""
+    taper = np.sqrt(8 / 3) * hann(length)
+    windows = np.stack([samples[start : start + length] for start in starts])
+    return np.abs(compute_line_spectra((windows - windows.mean(axis=1, keepdims=True)) * taper[:, None])) ** 2
 
 
 def _compute_noise_power(observation: Observation, lines_hz: FloatArray, periods: int) -> FloatArray:
-    """(lines, channels): noise power of a line times the length, for a mean of `periods` periods. The part of rounding
-    that repeats in every period does not average out."""
+    """Compute the noise power of a line times the length of a period, (lines, channels), for a mean of `periods`
+    periods. The part of the rounding error that repeats in every period does not average out."""
     density = np.stack(
         [np.interp(lines_hz, observation.noise_hz, channel) for channel in observation.noise.density.T], axis=1
     )
@@ -223,8 +231,8 @@ def _sum_lines(
 
 
 def _divide_by_windows(summed: ResidualLines, windows: int) -> ResidualLines:
-    """Divide sums over all windows by their number, which gives the mean squares of a window. Ratios and line counts
-    stay."""
+    """Divide the sums over all windows by their number, which gives the mean squares of a window. Ratios and line
+    counts are kept."""
     return ResidualLines(
         summed.input, summed.amplitude, summed.band_hz, summed.seconds, summed.lines,
         summed.residual / windows, summed.noise / windows, summed.signal / windows,

@@ -1,7 +1,9 @@
 """Mean spectrum of each periodic segment with its variance, corrected for the command's content on silent lines.
 
 Silent lines are those that the excitation does not drive; `distortion`, which calls this module, finds nonlinear
-distortion there. Under feedback distortion returns through the command: its linear response is subtracted.
+distortion there. With feedback, distortion of the response also appears in the command: the linear response to the
+command's silent lines is estimated from the driven lines (H1 estimate) and subtracted. Spectra are those of
+`periods.compute_period_spectra` (DFT divided by the length of the period).
 """
 
 from collections.abc import Sequence
@@ -18,35 +20,41 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import ComplexArray, FloatArray, Signal
 
 _SMOOTHED_LINES = 9
-"""Lines over which the spread between periods is averaged."""
+"""Number of lines over which the variance between periods is averaged. Chosen."""
 _NEGLIGIBLE_SHARE = 1e-5
-"""Share of a command's strongest line below which its content on a silent line is negligible."""
+"""Share of a command's strongest line up to which its content on silent lines is negligible. Chosen."""
 _LEAST_SINGULAR_VALUE_RATIO = 1e-3
-"""Least ratio of the smallest to the largest singular value of the inputs for which a line determines a response."""
-_INTERPOLATION_ERROR = 0.1
-"""Relative error of a response that is interpolated between driven lines."""
+"""Ratio of the smallest to the largest singular value of the inputs above which a line determines a response.
+Chosen."""
+_RELATIVE_INTERPOLATION_ERROR = 0.1
+"""Relative error (rms) of a response that is interpolated between driven lines. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SegmentSpectrum:
-    """Mean spectrum of one signal in one segment, with its errors. Arrays are (lines, channels)."""
+    """Mean spectrum of one signal in one segment, with its error variances. Arrays are (lines, channels); spectra are
+    in the signal's unit, variances in its square."""
 
     input: str
     """Driven inputs, joined by "+"."""
     amplitude: float
+    """Level of the segment's excitation, in the command's unit."""
     lines: DetectionLines
+    """Driven and silent lines."""
     frequency_hz: FloatArray
+    """(lines,)"""
     mean: ComplexArray
-    """Mean over the periods; on silent lines without the command's own contribution."""
+    """Mean over the periods, less the response to the command's silent lines."""
     error: FloatArray
-    """Expected |error|² of the mean."""
+    """Variance of the mean, that of the subtracted response included."""
     spread: FloatArray
-    """|error|² of one period, from the differences between periods; the floor's where there is one period."""
+    """Variance of one period, from the differences between periods; equal to `floor` where there is one period."""
     floor: FloatArray
-    """|error|² of one period from noise alone."""
+    """Variance of one period from noise alone, without the rounding that repeats in every period."""
     count: int
+    """Number of periods."""
     floor_freedom: FloatArray
-    """(channels,)"""
+    """(channels,): degrees of freedom of `floor`; 0 where unknown."""
 
 
 def compute_segment_spectra(
@@ -56,8 +64,9 @@ def compute_segment_spectra(
     floor_hz: FloatArray,
     periods: Sequence[tuple[Periods, DetectionLines]],
 ) -> list[SegmentSpectrum]:
-    """Compute the spectrum of each periodic segment; segments of equal period share one estimate of the linear
-    response. noise: of the signal, on the lines floor_hz."""
+    """Compute the spectrum of each periodic segment, ordered by the first occurrence of its length of period; segments
+    with equal length share one estimate of the linear response. noise: of the signal; floor_hz: (lines,), frequencies
+    of its density."""
     spectra = []
     for length in dict.fromkeys(period.length for period, _ in periods):
         equal_periods = [(period, lines) for period, lines in periods if period.length == length]
@@ -81,13 +90,13 @@ def compute_segment_spectra(
                 mean, error = mean - contribution, error + contribution_error
             spectrum_values = (lines, lines_hz, mean, error, spread, floor, period.count, noise.freedom)
             spectra.append(
-                SegmentSpectrum(name_driven_inputs(recording, period), period.segment.amplitude, *spectrum_values)
+                SegmentSpectrum(join_driven_input_names(recording, period), period.segment.amplitude, *spectrum_values)
             )
     return spectra
 
 
-def name_driven_inputs(recording: Recording, periods: Periods) -> str:
-    """Return the names of the inputs that are driven in the first of the periods, joined by "+"."""
+def join_driven_input_names(recording: Recording, periods: Periods) -> str:
+    """Join the names of the inputs that are driven in the first of the periods by "+"."""
     first_period = slice(periods.starts[0], periods.starts[0] + periods.length)
     return "+".join(
         find_driven_inputs(select_instrument_signal(recording)[first_period].var(axis=0), recording.command.channels)
@@ -95,28 +104,29 @@ def name_driven_inputs(recording: Recording, periods: Periods) -> str:
 
 
 def _interpolate_noise(noise: ChannelNoise, floor_hz: FloatArray, lines_hz: FloatArray) -> FloatArray:
-    """Interpolate the noise density to the lines, (lines, channels), without the part of rounding that repeats in every
-    period: the density of the differences between periods. floor_hz: frequencies of the density."""
+    """Interpolate the noise density to the frequencies `lines_hz`, (lines, channels), without the part of rounding that
+    repeats in every period. floor_hz: frequencies of the density."""
     return np.stack([np.interp(lines_hz, floor_hz, channel) for channel in noise.density.T], axis=1) - noise.rounding
 
 
 def _estimate_mean(
     response: ComplexArray, floor: FloatArray, rounding: FloatArray
 ) -> tuple[ComplexArray, FloatArray, FloatArray]:
-    """Estimate the mean over periods, the variance of the mean, and that of one period; each (lines, channels).
-    response: (periods, lines, channels). floor: noise variance of one period, the lower limit. rounding:
-    (channels,)."""
-    count = len(response)
-    spread = compute_period_variance(response) if count > 1 else floor
+    """Estimate the mean over periods, the variance of the mean, and that of one period (not smoothed); each (lines,
+    channels). response: (periods, lines, channels). floor: noise variance of one period, the lower limit of the
+    smoothed variance. rounding: (channels,), variance of the rounding error that repeats in every period."""
+    period_count = len(response)
+    spread = compute_period_variance(response) if period_count > 1 else floor
     smoothed_spread = np.maximum(floor, smooth_over_lines(spread, _SMOOTHED_LINES))
-    return response.mean(axis=0), smoothed_spread / count + rounding, spread
+    return response.mean(axis=0), smoothed_spread / period_count + rounding, spread
 
 
 def _estimate_linear_response(
     driven: Sequence[ComplexArray], commands: Sequence[ComplexArray], responses: Sequence[ComplexArray]
 ) -> ComplexArray | None:
-    """Estimate the linear frequency response at all lines; None where the commands are negligible on silent lines
-    (`_NEGLIGIBLE_SHARE`), or fewer than two lines determine it. driven: commands, zero on silent lines."""
+    """Estimate the linear frequency response at all lines, (lines, outputs, inputs); None where the commands are
+    negligible on silent lines (`_NEGLIGIBLE_SHARE`), or fewer than two lines determine it. driven: commands, zero on
+    silent lines; responses: (periods, lines, outputs) per segment."""
     is_negligible = all(
         np.abs(command - driven_lines).max(initial=0.0) <= _NEGLIGIBLE_SHARE * np.abs(command).max(initial=0.0)
         for driven_lines, command in zip(driven, commands, strict=True)
@@ -129,10 +139,9 @@ def _estimate_linear_response(
 
 
 def estimate_line_responses(commands: Sequence[ComplexArray], responses: Sequence[ComplexArray]) -> ComplexArray:
-    """(lines, outputs, inputs): the linear response by least squares over experiments (H1), at lines where these drive
-    every direction; NaN elsewhere. commands: each (lines, inputs), zero where not driven; responses: each (lines,
-    outputs). With it the part of the response is subtracted that the command causes on silent lines: under feedback
-    distortion returns through the command."""
+    """Estimate the frequency response (lines, outputs, inputs) by least squares over experiments (H1), at lines where
+    these excite all input directions; NaN elsewhere. commands: each (lines, inputs), zero where not driven; responses:
+    each (lines, outputs)."""
     inputs, outputs = np.stack(commands, axis=1), np.stack(responses, axis=1)
     singular_values = np.linalg.svd(inputs, compute_uv=False)
     is_determined = (inputs.shape[1] >= inputs.shape[2]) & (
@@ -146,8 +155,8 @@ def estimate_line_responses(commands: Sequence[ComplexArray], responses: Sequenc
 
 
 def interpolate_response(response: ComplexArray) -> ComplexArray | None:
-    """Interpolate the response linearly between known lines; None with fewer than two known lines. response: (lines,
-    outputs, inputs), NaN where not known."""
+    """Interpolate the response linearly between known lines, constant beyond them; None with fewer than two known
+    lines. response: (lines, outputs, inputs), NaN where not known."""
     known_lines = np.flatnonzero(np.isfinite(response).all(axis=(1, 2)))
     if len(known_lines) < 2:
         return None
@@ -159,6 +168,7 @@ def interpolate_response(response: ComplexArray) -> ComplexArray | None:
 
 
 def compute_command_contribution(response: ComplexArray, command: ComplexArray) -> tuple[ComplexArray, FloatArray]:
-    """Compute the linear response to the command's lines, and the variance of its error: both (lines, outputs)."""
+    """Compute the linear response to the command's lines, and the variance of its error from interpolation: both
+    (lines, outputs). response: (lines, outputs, inputs); command: (lines, inputs)."""
     contribution = np.einsum("lij,lj->li", response, command)
-    return contribution, _INTERPOLATION_ERROR**2 * np.abs(contribution) ** 2
+    return contribution, _RELATIVE_INTERPOLATION_ERROR**2 * np.abs(contribution) ** 2

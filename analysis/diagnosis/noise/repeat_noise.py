@@ -1,7 +1,8 @@
-"""Estimates noise from the differences between repeated periods. Called by `noise_floor`.
+"""Estimate noise from the differences between repeated periods. Called by `noise_floor`.
 
 Noise does not depend on the excitation, whereas variations of the device itself between periods grow with it. Therefore
-the segments with the smallest variance are used and, where even these exceed the noise at rest, the noise at rest.
+the segments with the smallest variance are averaged and, where even these exceed the noise at rest, the noise at rest
+is used. Densities are as in `ChannelNoise`: mean over lines = variance, in the channel's unit squared.
 """
 
 from collections.abc import Sequence
@@ -19,19 +20,21 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 
 _SMOOTHED_LINES = 9
-"""Lines over which the variance between periods is averaged."""
+"""Number of lines over which the variance between periods is averaged. Chosen."""
 _SIGNIFICANCE = 1e-4
-"""Significance level of the test for equal noise."""
+"""Significance level of the F test for equal noise. Chosen."""
 _LEAST_STEPS = 1.2
-"""Least rms of a motion, in rounding steps, for a segment to count: below it, rounding may hide noise or add to it."""
-_TINY = np.finfo(np.float64).tiny
+"""Least standard deviation of a motion, in rounding steps, for a segment to be used. Chosen: below it, rounding may
+hide noise or add to it."""
+_SMALLEST_NORMAL = np.finfo(np.float64).tiny
+"""Lower limit of divisors, against division by zero."""
 
 
 def estimate_repeat_noise(
     recording: Recording, samples: FloatArray, periods: Sequence[Periods], lines_hz: FloatArray
 ) -> ChannelNoise:
-    """Noise of each channel from the differences between periods. periods: at least two of each segment. lines_hz:
-    frequencies of the estimated density."""
+    """Estimate the noise of each channel from the differences between periods. samples: (n, channels); periods: at
+    least two of each segment; lines_hz: (lines,), frequencies of the estimated density."""
     spreads = [_estimate_spread(recording, samples, period, lines_hz) for period in periods]
     density, freedom = (
         np.stack([spread for spread, _ in spreads]),
@@ -41,28 +44,30 @@ def estimate_repeat_noise(
     is_moving = _find_moving_channels(samples, periods)
     is_pooled = is_moving & mask_quietest(np.where(is_moving, variance, np.inf), freedom)
     weights = np.where(is_pooled, freedom, 0.0)
-    pooled = np.einsum("sc,slc->lc", weights, density) / weights.sum(axis=0)
-    freedom_pooled = weights.sum(axis=0)
+    pooled_density = np.einsum("sc,slc->lc", weights, density) / weights.sum(axis=0)
+    pooled_freedom = weights.sum(axis=0)
     varies = np.asarray(is_moving & ~is_pooled)
-    smooth = smooth_over_lines(pooled, _SMOOTHED_LINES)
-    smooth *= pooled.mean(axis=0) / np.maximum(smooth.mean(axis=0), _TINY)
-    floor, above_rest = _limit_to_rest_noise(recording, samples, smooth, freedom_pooled, np.asarray(varies.any(axis=0)))
+    smoothed_density = smooth_over_lines(pooled_density, _SMOOTHED_LINES)
+    smoothed_density *= pooled_density.mean(axis=0) / np.maximum(smoothed_density.mean(axis=0), _SMALLEST_NORMAL)
+    floor, above_rest = _limit_to_rest_noise(
+        recording, samples, smoothed_density, pooled_freedom, np.asarray(varies.any(axis=0))
+    )
     total_density, rounding = add_repeating_rounding(floor, samples)
     segments = tuple(
         SegmentNoise(
             period.index,
             period.segment.amplitude,
-            variance[k],
-            freedom[k],
-            tuple(is_pooled[k].tolist()),
-            tuple(varies[k].tolist()),
+            variance[row],
+            freedom[row],
+            tuple(is_pooled[row].tolist()),
+            tuple(varies[row].tolist()),
         )
-        for k, period in enumerate(periods)
+        for row, period in enumerate(periods)
     )
     return ChannelNoise(
         np.sqrt(total_density.mean(axis=0)),
         total_density,
-        freedom_pooled,
+        pooled_freedom,
         rounding,
         segments,
         tuple(above_rest.tolist()),
@@ -70,19 +75,19 @@ def estimate_repeat_noise(
 
 
 def add_repeating_rounding(density: FloatArray, samples: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The density (lines, channels) plus the part of the rounding error that repeats in each period, and that part
-    alone, (channels,)."""
-    parts = [
+    """Add the part of the rounding error that repeats in each period to the density (lines, channels). Returns the sum,
+    and that part alone, (channels,); it is 0 where the variance is not finite."""
+    repeating_variances = [
         undo_rounding(float(variance), find_rounding_step(channel)).repeating if np.isfinite(variance) else 0.0
         for variance, channel in zip(density.mean(axis=0), samples.T, strict=True)
     ]
-    rounding: FloatArray = np.array(parts)
+    rounding: FloatArray = np.array(repeating_variances)
     return density + rounding, rounding
 
 
 def mask_quietest(variance: FloatArray, freedom: FloatArray) -> Mask:
-    """Mask (rows, channels) of the variances that do not differ significantly from the smallest of their column (F
-    test). variance, freedom: (rows, channels), variances and their degrees of freedom."""
+    """Mask (rows, channels) of the variances that are not significantly larger than the smallest of their column (F
+    test, `_SIGNIFICANCE`). variance, freedom: (rows, channels), variances and their degrees of freedom."""
     smallest = np.argmin(variance, axis=0)
     columns = np.arange(variance.shape[1])
     bound = _compute_largest_ratio(freedom, freedom[smallest, columns])
@@ -90,14 +95,17 @@ def mask_quietest(variance: FloatArray, freedom: FloatArray) -> Mask:
 
 
 def count_equal_lines(density: FloatArray) -> FloatArray:
-    """(channels,): equivalent number of independent lines of equal power. density: (lines, channels)."""
-    equal: FloatArray = density.sum(axis=0) ** 2 / np.maximum(np.sum(density**2, axis=0), _TINY)
-    return np.maximum(equal, 1.0)
+    """Compute the equivalent number of independent lines of equal power, (channels,), at least 1: (sum P)² / sum P².
+    density: (lines, channels)."""
+    line_count: FloatArray = density.sum(axis=0) ** 2 / np.maximum(np.sum(density**2, axis=0), _SMALLEST_NORMAL)
+    return np.maximum(line_count, 1.0)
 
 
 def _estimate_spread(
     recording: Recording, samples: FloatArray, periods: Periods, lines_hz: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
+    """Estimate the density (lines, channels) of the variance between the periods of a segment, interpolated to
+    lines_hz, and its degrees of freedom, (channels,)."""
     density = compute_period_variance(compute_period_spectra(samples, periods)) * periods.length
     freedom = 2 * (periods.count - 1) * count_equal_lines(smooth_over_lines(density, _SMOOTHED_LINES))
     period_lines_hz = periods.compute_line_frequencies(recording.sample_rate_hz)
@@ -107,10 +115,11 @@ def _estimate_spread(
 
 
 def _find_moving_channels(samples: FloatArray, periods: Sequence[Periods]) -> Mask:
-    """(segments, channels): whether a channel moves over its rounding steps; True for all where it never does."""
-    steps = np.array([find_rounding_step(channel) for channel in samples.T])
+    """Mask (segments, channels) of the channels that move by at least `_LEAST_STEPS` rounding steps; True in all
+    segments for a channel that moves by less in all of them."""
+    rounding_steps = np.array([find_rounding_step(channel) for channel in samples.T])
     is_moving = np.array(
-        [stack_periods(samples, period).std(axis=(0, 1)) >= _LEAST_STEPS * steps for period in periods]
+        [stack_periods(samples, period).std(axis=(0, 1)) >= _LEAST_STEPS * rounding_steps for period in periods]
     )
     return np.asarray(is_moving | ~is_moving.any(axis=0), dtype=np.bool_)
 
@@ -118,12 +127,13 @@ def _find_moving_channels(samples: FloatArray, periods: Sequence[Periods]) -> Ma
 def _limit_to_rest_noise(
     recording: Recording, samples: FloatArray, density: FloatArray, freedom: FloatArray, varied: Mask
 ) -> tuple[FloatArray, Mask]:
-    """The density, limited to the noise at rest in channels that varied and exceed it, and the mask of these channels.
-    Lines at which the given density is significantly lower keep it. density: smoothed over lines."""
-    unchanged = np.zeros(len(varied), dtype=np.bool_)
+    """Replace the density by the noise at rest in channels with varying variance (`varied`) that significantly exceed
+    it, except at lines with a significantly lower density. Returns density (lines, channels) and mask (channels,) of
+    these channels. density: smoothed over lines; freedom: (channels,), of its mean over lines."""
+    no_channels = np.zeros(len(varied), dtype=np.bool_)
     fast_noise = estimate_fast_rest_noise(recording, samples)
     if fast_noise is None or not varied.any():
-        return density, unchanged
+        return density, no_channels
     at_rest = mask_quietest(fast_noise.variance, fast_noise.freedom)
     weights = np.where(at_rest, fast_noise.freedom, 0.0)
     rest_variance = np.sum(weights * fast_noise.variance, axis=0) / weights.sum(axis=0)
@@ -132,12 +142,13 @@ def _limit_to_rest_noise(
         & (density.mean(axis=0) > _compute_largest_ratio(freedom, weights.sum(axis=0)) * rest_variance)
         & (rest_variance > 0)
     )
-    # The smaller of two estimates of the same noise would be biased: a line keeps its density only if clearly lower.
+    # Taking the smaller of two estimates of the same noise would be biased: a line keeps only a much lower density.
     line_freedom = np.maximum(freedom * _SMOOTHED_LINES / len(density), 1.0)
-    lower = rest_variance > _compute_largest_ratio(weights.sum(axis=0), line_freedom) * density
-    return np.where(above_rest & ~lower, rest_variance, density), np.asarray(above_rest, dtype=np.bool_)
+    is_lower = rest_variance > _compute_largest_ratio(weights.sum(axis=0), line_freedom) * density
+    return np.where(above_rest & ~is_lower, rest_variance, density), np.asarray(above_rest, dtype=np.bool_)
 
 
 def _compute_largest_ratio(freedom: FloatArray, denominator_freedom: FloatArray) -> FloatArray:
-    """Ratio of two variances of equal noise, exceeded with probability `_SIGNIFICANCE`, by their degrees of freedom."""
+    """Compute the ratio of two variances of equal noise that is exceeded with probability `_SIGNIFICANCE`, from the
+    degrees of freedom of numerator and denominator."""
     return np.asarray(fdtri(freedom, denominator_freedom, 1 - _SIGNIFICANCE))

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.diagnosis.contrast.choose_fault import Decision, choose_fault
 from analysis.diagnosis.contrast.comparison import Comparison
-from analysis.diagnosis.contrast.decide import Decision, choose_fault
-from analysis.diagnosis.contrast.part import split_into_parts
 from analysis.diagnosis.contrast.rank_faults import rank_faults
+from analysis.diagnosis.contrast.recording_part import split_into_parts
 from analysis.diagnosis.contrast.signal_faults import SignalFault, find_hum, find_quantization, find_sensor_noise
 from analysis.diagnosis.errors.choose_measure import MeasureChoice
 from analysis.diagnosis.errors.hypothesis import Hypothesis

@@ -1,7 +1,7 @@
 """Assembles the findings of a finished search: the document (`Diagnosis`), and the data of figures and sentences.
 
 In this order: labels and re-tuned models, standard errors, mismatch maps of the given, re-tuned and completed model,
-examination of the fits (`post_search`), choice of the next recording, document. Called by `diagnose`.
+examination of the fits (`examine_fits`), choice of the next recording, document. Called by `diagnose`.
 """
 
 from collections.abc import Sequence
@@ -23,9 +23,9 @@ from analysis.diagnosis.localisation.mismatch_rows import list_mismatch_rows
 from analysis.diagnosis.localisation.model_error_floor import ModelErrorFloor, describe_model_error_floor
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.error_table import collect_channel_errors, compute_fit_errors, is_held_out_still
+from analysis.diagnosis.result.examine_fits import examine_fits
 from analysis.diagnosis.result.findings import Findings, TimeSeries
 from analysis.diagnosis.result.named_effects import Labels, make_labels, make_named_effects
-from analysis.diagnosis.result.post_search import examine_fits
 from analysis.diagnosis.result.unconfirmed_candidates import add_held_out_gains
 from analysis.diagnosis.result.unit_doubt import describe_unit_doubts, describe_unknown_units
 from analysis.diagnosis.search.explain import Explanation
@@ -59,7 +59,7 @@ def assemble_findings(
     proposal = context.guard.run("the next recording", "its choice", partial(_propose, context, fits, verdict), None)
     measure_remarks = (_describe_rest(measure), describe_model_error_floor(learned, channels), in_samples)
     return Findings(
-        diagnosis=_build_document(result, errors, (maps, examination.local), proposal),
+        diagnosis=_build_document(result, errors, (maps, examination.localisation), proposal),
         explanation=fits,
         given=tuning.model,
         improved=improved,
@@ -75,7 +75,7 @@ def assemble_findings(
         black_box=examination.black_box,
         remarks=_collect_remarks(measure_remarks, time_series, tuning, floors),
         maps=maps.cells,
-        localisation=examination.local,
+        localisation=examination.localisation,
         floor=floors[0],
         tuning=tuning,
         axes=tuple(shorten_axis_name(name, labels.inputs) for name in labels.inputs),

@@ -2,7 +2,7 @@
 
 A polynomial of the re-tuned model's own signals is added to each channel of its prediction, term by term, each time the
 one that explains most of the residual (orthogonal least squares; Chen, Billings and Luo 1989), as many terms per
-channel as the named effects have parameters. Called by `post_search`.
+channel as the named effects have parameters. Called by `examine_fits`.
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,8 @@
 """Sentences for the user about classes of laws that the data cannot distinguish, and about unconfirmed candidates.
 
-A class holds a named effect and the effects that explain the held-out data equally well; where all are of a family
-below, the family's name takes the place of the list. Called by `wording`, `candidates` and `diagnosis_tables`.
+A class contains a named effect and the effects that explain the held-out data equally well; where all of them belong to
+a family of `_LAW_FAMILIES`, the family's name replaces the list. Called by `wording`, `candidates`, `diagnosis_tables`,
+`real_answer.answer_of_findings` and `view_diagnosis`.
 """
 
 from collections.abc import Sequence
@@ -19,7 +20,7 @@ from analysis.diagnosis.unit_wording import format_share
 from analysis.wording import capitalise, end_sentence
 from equalizer.signals.unit_system import UnitSystem
 
-_FAMILIES = (
+_LAW_FAMILIES = (
     (
         "friction",
         "friction whose law these data do not determine",
@@ -53,30 +54,31 @@ _FAMILIES = (
         {"force_deadband", "coulomb_friction"},
     ),
 )  # fmt: skip
-"""Families of effects with similar forces or delays: short name, beginning of a sentence, and members."""
+"""Families of effects with similar forces or delays: (short name, beginning of a sentence, names of the members)."""
 
 REFINEMENT_REASON = (
     "it holds the named law as a special case, and what it allows beyond that brings nothing on held-out data"
 )
-"""Reason for which a law that refines the named one is not reported as a rival."""
+"""Reason, stored in `Rival.why_not`, for a law that contains the named law as a special case without a gain."""
 SENTENCE_COUNT = 3
-"""Number of candidates in the sentences; the document and the page's table list all."""
+"""Largest number of candidates that are described in sentences; the document and the page's table list all."""
 
 
 @dataclass(frozen=True, slots=True)
-class Device:
-    """Facts about the device and its recordings that the sentences need."""
+class DeviceWording:
+    """Properties of the device and its recordings on which the wording depends."""
 
     single: bool
-    """Whether it has a single axis, which is then not named."""
+    """Whether the device has a single axis, whose name is then left out."""
     system: UnitSystem
+    """Units of the recordings."""
     noise: str = ""
-    """`NoiseFloor.how`; empty where it is not known."""
+    """Origin of the noise estimate, `NoiseFloor.how`; empty where it is not known."""
 
 
 def format_class_noun(effect: NamedEffect) -> str:
-    """Format the name of an effect with its class, such as "friction (dry friction, or 2 laws like it)"; its own name
-    without a class."""
+    """Format the name of an effect with its class, such as "friction (dry friction, or 2 laws like it)"; the name of
+    the effect alone where it has no class, or no family contains the class."""
     names = _list_class_names(effect)
     rival_count = len(names) - 1
     family = _find_family(names)
@@ -88,7 +90,7 @@ def format_class_noun(effect: NamedEffect) -> str:
 
 
 def describe_class(effect: NamedEffect) -> str:
-    """Describe the effects that would explain the data as well; empty where the data distinguish it from all
+    """Describe the effects that explain the data as well as this effect; empty where the data distinguish it from all
     others."""
     inseparable = [rival.effect for rival in effect.rivals if rival.inseparable]
     names = tuple(dict.fromkeys((*_list_class_names(effect), *inseparable)))
@@ -103,7 +105,7 @@ def describe_class(effect: NamedEffect) -> str:
 
 
 def describe_refinements(effect: NamedEffect) -> str:
-    """Describe laws that contain the named law as a special case; empty where none was tested."""
+    """Describe the tested laws that contain the named law as a special case without a gain; empty without such laws."""
     names = [get_noun(rival.effect) for rival in effect.rivals if rival.why_not == REFINEMENT_REASON]
     if not names:
         return ""
@@ -115,8 +117,8 @@ def describe_refinements(effect: NamedEffect) -> str:
 
 
 def _list_class_names(effect: NamedEffect) -> tuple[str, ...]:
-    """List the names of the effect and its class; for a formula that simulates a law with a name, the names of the
-    class only."""
+    """List the names of the effect and its class, the effect first; where the effect is a formula that replaces a named
+    law in the simulation (`SIMULATED_AS_FORMULA`), the formula is left out."""
     names = effect.class_ or (effect.effect,)
     is_formula = effect.law is not None and len(names) > 1 and names[1] in SIMULATED_AS_FORMULA
     return names[1:] if is_formula else names
@@ -124,18 +126,19 @@ def _list_class_names(effect: NamedEffect) -> tuple[str, ...]:
 
 def _find_family(names: Sequence[str]) -> tuple[str, str] | None:
     """Find short name and title of the first family that contains all names; None where none does."""
-    return next(((name, title) for name, title, members in _FAMILIES if set(names) <= members), None)
+    return next(((name, title) for name, title, members in _LAW_FAMILIES if set(names) <= members), None)
 
 
-def format_candidate(candidate: Candidate, device: Device | None = None) -> str:
-    """Format a candidate: effect, place and parameters."""
+def format_candidate(candidate: Candidate, device: DeviceWording | None = None) -> str:
+    """Format a candidate: effect, place and, if there are any, parameters."""
     place_text = format_place(candidate.place, candidate.axis, device is not None and device.single)
     values_text = format_candidate_parameters(candidate, device)
     return f"{get_noun(candidate.effect)} {place_text}{f', {values_text}' if values_text else ''}"
 
 
-def format_candidate_parameters(candidate: Candidate, device: Device | None = None) -> str:
-    """Format the parameters of a candidate with units. device: None = not known, so that bare SI numbers are given."""
+def format_candidate_parameters(candidate: Candidate, device: DeviceWording | None = None) -> str:
+    """Format the parameters of a candidate with units; empty without parameters. device: None = not known: SI numbers
+    without units are given."""
     if device is None:
         text = ", ".join(
             f"{name.replace('_', ' ')} {value:.3g}".replace("e-0", "e-") for name, value in candidate.parameters.items()
@@ -145,9 +148,9 @@ def format_candidate_parameters(candidate: Candidate, device: Device | None = No
     return format_parameters(candidate.effect, {k: Estimate(v, units[k]) for k, v in candidate.parameters.items()})
 
 
-def describe_candidates(diagnosis: Diagnosis, device: Device | None = None) -> tuple[str, ...]:
-    """Describe each of the best `SENTENCE_COUNT` candidates in a sentence, without that of
-    `describe_best_candidate`."""
+def describe_candidates(diagnosis: Diagnosis, device: DeviceWording | None = None) -> tuple[str, ...]:
+    """Describe each of the best `SENTENCE_COUNT` candidates in a sentence; the first is left out where
+    `describe_best_candidate` describes it."""
     reported_count = 1 if describe_best_candidate(diagnosis, device) else 0
     return tuple(
         f"Not confirmed: {_describe_gain(candidate, device)}"
@@ -155,15 +158,16 @@ def describe_candidates(diagnosis: Diagnosis, device: Device | None = None) -> t
     )
 
 
-def describe_best_candidate(diagnosis: Diagnosis, device: Device | None = None) -> str:
-    """Describe the best candidate of an unexplained mismatch; empty for other verdicts, and without a candidate."""
+def describe_best_candidate(diagnosis: Diagnosis, device: DeviceWording | None = None) -> str:
+    """Describe the best candidate where the verdict is "unexplained"; empty for other verdicts, or without a
+    candidate."""
     if diagnosis.verdict != "unexplained" or not diagnosis.candidates:
         return ""
     return f"Best candidate, not confirmed: {_describe_gain(diagnosis.candidates[0], device)}"
 
 
-def _describe_gain(candidate: Candidate, device: Device | None) -> str:
-    """Describe a candidate, its gain on held-out data, and the reason why it is not named."""
+def _describe_gain(candidate: Candidate, device: DeviceWording | None) -> str:
+    """Describe a candidate, its gain on held-out data, and the reason not to name it."""
     return (
         f"{format_candidate(candidate, device)}. It would explain {format_share(candidate.held_out_gain)} of the "
         f"error's power on held-out data, {format_share(candidate.share_of_black_box)} of what all laws together "

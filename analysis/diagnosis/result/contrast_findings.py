@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from analysis.diagnosis.contrast.choose_fault import T_QUANTILE, Decision
 from analysis.diagnosis.contrast.comparison import Comparison, JudgedFault
-from analysis.diagnosis.contrast.decide import T_QUANTILE, Decision
 from analysis.diagnosis.contrast.fault import Fault
 from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, Fit, NamedEffect, Rival, Verdict
 from analysis.diagnosis.effect_words import get_parameter_unit

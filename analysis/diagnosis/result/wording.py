@@ -9,7 +9,7 @@ from analysis.diagnosis.document import Diagnosis, Mismatch, NamedEffect, format
 from analysis.diagnosis.effect_words import WHOLE_DEVICE_FAULTS, format_parameters, format_place, get_noun
 from analysis.diagnosis.result.candidate_wording import (
     REFINEMENT_REASON,
-    Device,
+    DeviceWording,
     describe_best_candidate,
     describe_candidates,
     describe_class,
@@ -65,7 +65,7 @@ def describe_effect(effect: NamedEffect, signature: str = "", single: bool = Fal
 
 
 def describe_verdict(
-    diagnosis: Diagnosis, moved_parameters: Sequence[MovedParameter] = (), device: Device | None = None
+    diagnosis: Diagnosis, moved_parameters: Sequence[MovedParameter] = (), device: DeviceWording | None = None
 ) -> str:
     """The answer, with which every output begins: verdict, named effects and held-out errors; where nothing is named,
     with the best candidate. moved_parameters: re-tuned, for the verdict "parameters"."""
@@ -108,9 +108,9 @@ def write_answer(findings: Findings) -> str:
     return describe_verdict(diagnosis, find_final_moves(findings) if diagnosis.verdict == "parameters" else (), device)
 
 
-def extract_device(findings: Findings) -> Device:
+def extract_device(findings: Findings) -> DeviceWording:
     """The facts about the device that sentences need, from the given model and the noise floor."""
-    return Device(
+    return DeviceWording(
         findings.given.inputs == 1, findings.given.system, "" if findings.floor is None else findings.floor.method
     )
 
@@ -152,7 +152,7 @@ def _describe_inseparable(effect: NamedEffect) -> str:
     )
 
 
-def describe_remainder(diagnosis: Diagnosis, device: Device | None = None) -> str:
+def describe_remainder(diagnosis: Diagnosis, device: DeviceWording | None = None) -> str:
     """Sentence on the remaining mismatch: its first `_PLACES_NAMED` significant rows in the document's order, which
     begins with the largest share of the signal, and the number of the others."""
     significant_rows = select_significant(diagnosis.remainder)
@@ -171,7 +171,7 @@ def select_significant(rows: Sequence[Mismatch]) -> tuple[Mismatch, ...]:
     return tuple(row for row in rows if row.p_value <= FALSE_DISCOVERY_RATE)
 
 
-def describe_place(mismatch: Mismatch, device: Device | None = None) -> str:
+def describe_place(mismatch: Mismatch, device: DeviceWording | None = None) -> str:
     """Where a mismatch occurs and its share, in words: "ax at 8 to 16 Hz, driven by fx at 0.5, near v = 0: 80 % of the
     mismatch (p < 0.0001)"."""
     low, high = mismatch.band_hz

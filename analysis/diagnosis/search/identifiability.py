@@ -14,14 +14,14 @@ import numpy as np
 
 from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.hypothesis import FreeParameter
-from analysis.diagnosis.errors.intervals import (
+from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit
+from analysis.diagnosis.errors.standard_errors import (
     STRETCH_S,
     compute_full_sensitivity,
     compute_segment_errors,
     compute_standard_errors,
     finish_fit,
 )
-from analysis.diagnosis.errors.output_error import Fitted, Sensitivity, evaluate_fit
 from analysis.diagnosis.search.compare_candidates import choose_plainest
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import is_equal_rival

@@ -1,9 +1,9 @@
-"""Score of a blind test: from the outcomes of a bank of cases, rates and medians with their 95 % intervals.
+"""Score of a blind test: rates and medians over the outcomes of a bank of cases, with 95 % confidence intervals.
 
 Detection and naming of single effects and of pairs, false alarms on devices without a missing effect, behaviour where
 the true effect is outside the catalogue (open set), and error and interval coverage of the parameters. Cases count only
-where the mismatch is detectable (`outcome.DETECTABLE`), except where a figure says otherwise. Intervals:
-`confidence_intervals`.
+where the mismatch is detectable (`outcome.DETECTABLE`), except where a figure states otherwise. Intervals:
+`confidence_intervals`. Called by `study.evaluation.bank.prove`.
 """
 
 import math
@@ -24,25 +24,25 @@ from analysis.evaluation.blind_test.follow_up import FollowUp, compute_follow_up
 from analysis.evaluation.blind_test.outcome import ConcealedEffect, Outcome
 from equalizer.plant.effect_vocabulary import EFFECTS_BY_NAME
 
-FULL_TURN = 2 * math.pi
-"""A full turn (rad): phases that differ by whole turns are equal."""
+FULL_TURN_RAD = 2 * math.pi
+"""A full turn (rad); phases that differ by whole turns are equal."""
 
 
 def find_nearest_true_value(name: str, estimate: float, values: Mapping[str, float]) -> float:
-    """True value of a parameter, for comparison with its estimate: of equivalent values (a phase modulo a full turn,
-    the position of either of two equal end stops), that nearest to the estimate. values: all true parameters of the
-    effect.
+    """Find the true value of a parameter for comparison with its estimate: of equivalent values (a phase modulo a full
+    turn, the position of either of two equal end stops), that nearest to the estimate. values: all true parameters of
+    the effect. Raises KeyError where they lack `name`.
     """
     true_value = values[name]
     if name == "phase":
-        return true_value + FULL_TURN * round((estimate - true_value) / FULL_TURN)
+        return true_value + FULL_TURN_RAD * round((estimate - true_value) / FULL_TURN_RAD)
     if name == "position" and values.get("opposite") == 1.0:
         return math.copysign(true_value, estimate)
     return true_value
 
 
-ADMITS_MISMATCH = ("unexplained", "partly_explained")
-"""Verdicts that admit a mismatch without an explanation: right where the true effect is outside the catalogue."""
+ADMITTING_VERDICTS = ("unexplained", "partly_explained")
+"""Verdicts that state an unexplained mismatch: right where the true effect is outside the catalogue."""
 
 
 def is_wrong_answer(outcome: Outcome) -> bool:
@@ -54,7 +54,7 @@ def is_wrong_answer(outcome: Outcome) -> bool:
     if outcome.kind in ("nothing", "without") or not outcome.detectable:
         return False
     if outcome.kind == "outside":
-        return outcome.verdict not in ADMITS_MISMATCH
+        return outcome.verdict not in ADMITTING_VERDICTS
     return not outcome.is_correct or is_on_other_axis(outcome)
 
 
@@ -91,10 +91,11 @@ class Score:
 
 
 def compute_score(outcomes: Sequence[Outcome], follow_ups: Sequence[FollowUp] = ()) -> Score:
-    """Score of a bank's outcomes. follow_ups: ambiguous answers that were diagnosed again with a further recording."""
+    """Compute the score of a bank's outcomes. follow_ups: ambiguous answers that were diagnosed again with a further
+    recording."""
     figures = (
         *_compute_single_figures(outcomes), *_compute_null_figures(outcomes), *_compute_open_set_figures(outcomes),
-        *_compute_pair_figures(outcomes), *compute_follow_up_figures(follow_ups), *_compute_number_figures(outcomes),
+        *_compute_pair_figures(outcomes), *compute_follow_up_figures(follow_ups), *_compute_estimate_figures(outcomes),
     )  # fmt: skip
     return Score(
         figures, compute_calibration(outcomes), tuple(outcome for outcome in outcomes if is_wrong_answer(outcome))
@@ -102,30 +103,32 @@ def compute_score(outcomes: Sequence[Outcome], follow_ups: Sequence[FollowUp] = 
 
 
 def _select_kind(outcomes: Sequence[Outcome], kind: str, bank: str = "") -> list[Outcome]:
-    """Outcomes of cases of this kind; bank: of that bank only, unless empty."""
+    """Select outcomes of cases of this kind; bank: of that bank only, unless empty."""
     return [outcome for outcome in outcomes if outcome.kind == kind and (not bank or outcome.bank == bank)]
 
 
 def _select_detectable(outcomes: Sequence[Outcome]) -> list[Outcome]:
+    """Select outcomes of cases whose mismatch is detectable, with failed diagnoses."""
     return [outcome for outcome in outcomes if outcome.detectable]
 
 
 def _compute_single_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEstimate]:
-    """Figures on cases with a single concealed effect: its name, place and axis, and the returned set of names."""
-    bank_words = {"main": "", "dirty": ", dirty bank", "engine": ", second engine"}
+    """Compute rates on cases with a single concealed effect: its name, place and axis, and the returned set of
+    names."""
+    bank_suffixes = {"main": "", "dirty": ", dirty bank", "engine": ", second engine"}
     for bank in BANKS:
         detectable = _select_detectable(_select_kind(outcomes, "single", bank))
-        yield compute_share(f"named right{bank_words[bank]}", detectable, lambda case: case.is_correct)
-    singles_detected = _select_detectable(_select_kind(outcomes, "single"))
+        yield compute_share(f"named right{bank_suffixes[bank]}", detectable, lambda case: case.is_correct)
+    detectable_singles = _select_detectable(_select_kind(outcomes, "single"))
     yield compute_share(
-        "named first, all banks", singles_detected, lambda case: case.named_effect_names[:1] == case.names
+        "named first, all banks", detectable_singles, lambda case: case.named_effect_names[:1] == case.names
     )
-    yield compute_share("in the returned set", singles_detected, lambda case: case.names[0] in case.returned)
-    named_cases = [case for case in singles_detected if case.named]
+    yield compute_share("in the returned set", detectable_singles, lambda case: case.names[0] in case.returned)
+    named_cases = [case for case in detectable_singles if case.named]
     yield compute_statistic(
         "names in the returned set, mean", [float(len(case.returned)) for case in named_cases], np.mean
     )
-    unambiguous = [case for case in singles_detected if len(case.returned) == 1]
+    unambiguous = [case for case in detectable_singles if len(case.returned) == 1]
     yield compute_share("right where one name is returned", unambiguous, lambda case: case.is_correct)
     yield compute_share("place", named_cases, lambda case: case.named[0].place == case.concealed[0].place)
     on_one_axis = [
@@ -133,15 +136,15 @@ def _compute_single_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEst
     ]
     yield compute_share("axis, of two or three", on_one_axis, lambda case: not is_on_other_axis(case))
     singles = _select_kind(outcomes, "single")
-    detectable = [single for single in singles if single.is_seen_by_ideal_observer]
+    observer_detected = [single for single in singles if single.is_seen_by_ideal_observer]
     yield compute_share("single effects that count as detectable", singles, lambda case: case.detectable)
-    yield compute_share("named right, of those that an oracle sees", detectable, lambda case: case.is_correct)
+    yield compute_share("named right, of those that an oracle sees", observer_detected, lambda case: case.is_correct)
     undetectable = [outcome for outcome in outcomes if outcome.kind != "nothing" and not outcome.detectable]
     yield compute_share("not detectable, yet a wrong name", undetectable, has_wrong_name)
 
 
 def _compute_null_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEstimate]:
-    """False alarms on cases without a concealed effect."""
+    """Compute the false-alarm rates on cases without a concealed effect."""
     yield compute_share("nothing missing, yet named", _select_kind(outcomes, "nothing"), lambda case: bool(case.named))
     nothing_missing = _select_kind(outcomes, "nothing")
     yield compute_share(
@@ -150,9 +153,11 @@ def _compute_null_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEstim
 
 
 def _compute_open_set_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEstimate]:
-    """Figures on cases whose true effect is outside the catalogue, or was excluded from it."""
+    """Compute rates on cases whose true effect is outside the catalogue, or was excluded from it."""
     outside = _select_detectable(_select_kind(outcomes, "outside"))
-    yield compute_share("outside the catalogue, not explained", outside, lambda case: case.verdict in ADMITS_MISMATCH)
+    yield compute_share(
+        "outside the catalogue, not explained", outside, lambda case: case.verdict in ADMITTING_VERDICTS
+    )
     yield compute_share("outside the catalogue, no name at all", outside, lambda case: not case.named)
     excluded = _select_detectable(_select_kind(outcomes, "without"))
     yield compute_share("without the true effect, any name", excluded, lambda case: bool(case.named))
@@ -160,28 +165,33 @@ def _compute_open_set_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalE
 
 
 def _compute_pair_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEstimate]:
-    """Figures on cases with two concealed effects."""
+    """Compute rates on cases with two concealed effects."""
     pairs = _select_detectable(_select_kind(outcomes, "pair"))
     yield compute_share("pairs, both and no other", pairs, lambda case: case.is_correct)
     yield compute_share("pairs, at least one", pairs, lambda case: bool(set(case.names) & set(case.named_effect_names)))
 
 
-def _compute_number_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEstimate]:
-    """Parameter errors and interval coverage of single effects named right, the remaining error, and run times."""
+def _compute_estimate_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEstimate]:
+    """Compute parameter errors and interval coverage of single effects named right, their held-out error after the
+    diagnosis, and the run time of all cases."""
     right_cases = [case for case in _select_detectable(_select_kind(outcomes, "single")) if case.is_correct]
     errors = [compute_main_error(case.concealed[0], case.named[0]) for case in right_cases]
     yield compute_statistic(
         "main parameter's error, median", [error for error in errors if error is not None], np.median
     )
-    covered = [list(compute_interval_coverage(case.concealed[0], case.named[0]).values()) for case in right_cases]
-    yield pool_share("true value in the 95 % interval", covered)
-    mains = [
+    coverage_by_case = [
+        list(compute_interval_coverage(case.concealed[0], case.named[0]).values()) for case in right_cases
+    ]
+    yield pool_share("true value in the 95 % interval", coverage_by_case)
+    cases_with_main_interval = [
         case
         for case in right_cases
         if EFFECTS_BY_NAME[case.names[0]].main.name in compute_interval_coverage(case.concealed[0], case.named[0])
     ]
     yield compute_share(
-        "the same, main parameters", mains, lambda case: is_main_covered(case.concealed[0], case.named[0])
+        "the same, main parameters",
+        cases_with_main_interval,
+        lambda case: is_main_covered(case.concealed[0], case.named[0]),
     )
     final_errors = [case.compute_worst_error("after") for case in right_cases]
     yield compute_statistic("held-out error over noise, worst channel, median", final_errors, np.median)
@@ -189,7 +199,8 @@ def _compute_number_figures(outcomes: Sequence[Outcome]) -> Iterator[IntervalEst
 
 
 def compute_main_error(concealed: ConcealedEffect, named_effect: NamedEffect) -> float | None:
-    """Relative error of the estimate of an effect's main parameter; None where its true value is unknown or 0."""
+    """Compute the relative error of the estimate of an effect's main parameter; None where its true value is unknown or
+    0."""
     name = EFFECTS_BY_NAME[concealed.effect].main.name
     if not concealed.values.get(name):
         return None
@@ -199,7 +210,8 @@ def compute_main_error(concealed: ConcealedEffect, named_effect: NamedEffect) ->
 
 
 def compute_interval_coverage(concealed: ConcealedEffect, named_effect: NamedEffect) -> dict[str, bool]:
-    """By parameter, whether its 95 % interval contains the true value; only parameters that have both."""
+    """Determine for each parameter whether its 95 % interval, ends included, contains the true value; only parameters
+    that have both."""
     coverage = {}
     for name, estimate in named_effect.parameters.items():
         if estimate.ci95 is not None and name in concealed.values:

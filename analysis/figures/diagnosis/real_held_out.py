@@ -1,7 +1,7 @@
 """Figure of a real recording: a held-out excerpt, measured and predicted, and the held-out errors of all models.
 
 Errors are rms errors relative to the signal, on a logarithmic axis; the noise is the lower limit of any model. Called
-by `write_real` and `real_report`.
+by `write_real`; `real_report` shows the same errors as a table.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from analysis.figures.picture import Picture
 from analysis.figures.style import BLACK, GREEN, GREY, ORANGE, create_figure, draw_no_data_note, style_axes
 
 _LEAST_ERROR = 1e-4
-"""Smallest error, relative to the signal, that is drawn; smaller ones are drawn at this value."""
+"""Smallest error, relative to the signal, that is drawn; smaller ones are drawn at this value. Chosen."""
 
 
 def make_real_picture(answer: RealAnswer) -> Picture:
@@ -62,7 +62,8 @@ def _draw_answer(excerpt: DrawnExcerpt | None, rows: list[tuple[str, float, str]
 
 
 def _draw_excerpt(axes: Axes, excerpt: DrawnExcerpt) -> None:
-    """Draw measured and predicted curves over time; the ordinate ends at 1.6 times the largest measured magnitude."""
+    """Draw measured and predicted curves over time. The ordinate is limited to 1.6 times the largest measured magnitude
+    (chosen), so that a diverging prediction does not compress the measured curve."""
     style_axes(axes)
     measured = np.array(excerpt.measured)
     scale = choose_scale(excerpt.unit, float(np.max(np.abs(measured), initial=0.0)))
@@ -79,16 +80,21 @@ def _draw_excerpt(axes: Axes, excerpt: DrawnExcerpt) -> None:
 
 
 def _draw_errors(axes: Axes, rows: list[tuple[str, float, str]]) -> None:
-    """Draw the errors as horizontal bars, labelled in per cent of the signal. rows: as from `list_error_rows`."""
+    """Draw the errors as horizontal bars, labelled in per cent of the signal. rows: from `list_error_rows`, at least
+    one."""
     style_axes(axes)
     positions = np.arange(len(rows))
     values = [max(value, _LEAST_ERROR) for _, value, _ in rows]
-    low = 0.5 * min(values)
+    bar_start = 0.5 * min(values)
     axes.barh(
-        positions, [value - low for value in values], left=low, height=0.6, color=[colour for _, _, colour in rows]
+        positions,
+        [value - bar_start for value in values],
+        left=bar_start,
+        height=0.6,
+        color=[colour for _, _, colour in rows],
     )
     axes.set_xscale("log")
-    axes.set_xlim(low, 3.0 * max(values))
+    axes.set_xlim(bar_start, 3.0 * max(values))
     for row, value in zip(positions, values, strict=True):
         axes.annotate(
             f"{100 * value:.3g} %", (value, row), xytext=(3, 0), textcoords="offset points", va="center", fontsize=8.5

@@ -21,12 +21,12 @@ from analysis.wording import conjoin, typeset
 from equalizer.signals.signal import FloatArray
 
 _VISIBLE_SHARE = 0.998
-"""Share of the samples within the limits of a panel, so that outliers do not compress all other samples."""
+"""Share of the samples within the limits of a panel, so that outliers do not compress all other samples. Chosen."""
 
 
 def make_state_map_pictures(maps: Sequence[StateMaps]) -> tuple[Picture, ...]:
-    """Make two pictures of the first axis, its states and its loops; empty without maps. Other axes are only mentioned
-    with their share of missing force."""
+    """Make two pictures of the first axis, of its states and its loops; empty without maps. The caption only states the
+    share of missing force of the other axes."""
     if not maps:
         return ()
     first = maps[0]
@@ -57,7 +57,7 @@ def make_state_map_pictures(maps: Sequence[StateMaps]) -> tuple[Picture, ...]:
 
 
 def _draw_states(maps: StateMaps) -> Figure:
-    """Draw four panels, one per state variable, with a common ordinate."""
+    """Draw the missing force over each of the four state variables, in panels with a common ordinate."""
     figure = create_figure(8.8, 5.6)
     scale = choose_scale(maps.unit, max(float(np.abs(view.mean).max(initial=0.0)) for view in maps.views))
     limits = _compute_ordinate_limits(
@@ -79,8 +79,8 @@ def _draw_states(maps: StateMaps) -> Figure:
 
 
 def _draw_view(axes: Axes, view: StateView, factor: float) -> None:
-    """Draw samples, means with two standard errors, and the completed model's residual. factor: from SI to the shown
-    unit."""
+    """Draw samples, means with two standard errors, and the residual of the completed model, if any, over one state
+    variable. factor: from SI to the shown unit of force."""
     x_scale = choose_scale(view.unit, float(np.abs(view.sample_abscissa).max(initial=0.0)))
     axes.plot(
         x_scale.factor * view.sample_abscissa,
@@ -103,8 +103,8 @@ def _draw_view(axes: Axes, view: StateView, factor: float) -> None:
 
 
 def _draw_loops(maps: StateMaps) -> Figure:
-    """Draw two panels with a common ordinate: measured force, and forces of the model before and after its
-    completion."""
+    """Draw the two loops in panels with a common ordinate: measured force, force of the given model, and force of the
+    model with the named effects, if any."""
     figure = create_figure(8.8, 3.9)
     forces = [force for loop in maps.loops for force in (loop.measured, loop.model_force, loop.completed_force)]
     scale = choose_scale(maps.unit, float(np.abs(np.concatenate(forces)).max(initial=0.0)))
@@ -136,7 +136,8 @@ def _draw_loop(axes: Axes, loop: Loop, factor: float) -> None:
 
 def _compute_ordinate_limits(values: Sequence[FloatArray], factor: float) -> tuple[float, float]:
     """Compute the limits of the ordinate in the shown unit: quantiles that contain the share `_VISIBLE_SHARE` of all
-    values, and 0, with a margin."""
+    values, and 0, with a margin of 6 % on both sides (chosen). values: forces in SI units; factor: to the shown
+    unit."""
     all_values = factor * np.concatenate(values)
     low, high = np.quantile(all_values, [(1 - _VISIBLE_SHARE) / 2, (1 + _VISIBLE_SHARE) / 2])
     margin = 0.06 * max(float(high - low), 1e-300)
@@ -144,7 +145,8 @@ def _compute_ordinate_limits(values: Sequence[FloatArray], factor: float) -> tup
 
 
 def _describe_view(view: StateView, unit: str) -> str:
-    """Describe the smallest and largest mean of the missing force and where they occur. unit: of the force, SI."""
+    """Describe the smallest and largest mean of the missing force and where they occur, for screen readers. unit: of
+    the force, SI."""
     if not len(view.mean):
         return f"Against {view.abscissa_name}: too few samples."
     low, high = int(np.argmin(view.mean)), int(np.argmax(view.mean))
@@ -156,8 +158,8 @@ def _describe_view(view: StateView, unit: str) -> str:
 
 
 def _describe_loop_errors(maps: StateMaps) -> str:
-    """Describe the rms error of the models' forces in the first loop, relative to the standard deviation of the
-    measured force."""
+    """Describe the rms errors of the forces of both models in the first loop, relative to the standard deviation of the
+    measured force, for screen readers."""
     loop = maps.loops[0]
     force_deviation = max(float(np.std(loop.measured)), 1e-300)
     labelled_forces = ((maps.model, loop.model_force), (maps.completed, loop.completed_force))

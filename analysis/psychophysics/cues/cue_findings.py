@@ -1,4 +1,4 @@
-"""Whether a cue other than the direction explains the answers, per frequency and cue, with warnings as sentences.
+"""Test per frequency whether a cue other than the direction explains the answers, and word the warnings.
 
 Two kinds of evidence: the d' that the cue alone would give a participant with a stated internal noise
 (`cue_sensitivity`), and whether the answers depended on the cue among trials of the same direction
@@ -24,7 +24,7 @@ from analysis.wording import conjoin, format_number, format_p_text, format_signe
 from protocols.trial import Trial
 
 SIGNIFICANCE_LEVEL = 0.05
-"""Level of significance."""
+"""Significance level of the regressions of answers on a cue, after Holm's correction. The conventional 5 %."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,33 +34,36 @@ class CueFinding:
     frequency_hz: float
     cue: Cue
     people: tuple[CueSensitivity, ...]
+    """Sensitivities of the participants by this cue; at least one."""
     difference_db: float
     """Median of the participants' differences, first direction minus second by angle."""
     largest_db: float
-    """The participants' difference of largest magnitude, with its sign."""
+    """Difference of the participant with the largest magnitude of it, with its sign."""
     spread_db: float
-    """Median of the standard deviations within a direction."""
+    """Median of the participants' standard deviations within a direction."""
     abilities: tuple[float, ...]
-    """Median d' of the cue alone, for each internal noise of `INTERNAL_NOISE_DB`."""
+    """Median over participants of the d' of the cue alone, for each internal noise of `INTERNAL_NOISE_DB`."""
     observed_d_prime: float | None
-    """Mean over participants of d' of the answers at this frequency, by all cues that were used; None where no
+    """Mean over participants of the d' of their answers at this frequency, whatever cues they used; None where no
     participant was shown both directions."""
     noticed_by: tuple[str, ...]
     """Participants for whom even the end of the difference's interval nearer to 0 gives a d' of 1 or more, with an
     internal noise of `TYPICAL_NOISE_DB`."""
     answers: AnswersOnDelivery
+    """Regression of the answers on the cue among trials of the same direction."""
     p_holm: float | None
     """p value of `answers` with Holm's correction over all cues and frequencies; None where no test was possible."""
 
     @property
-    def followed(self) -> bool:
-        """Whether answers depended on the cue, at `SIGNIFICANCE_LEVEL` after the correction; False where no test was
-        possible."""
+    def affects_answers(self) -> bool:
+        """Whether the answers followed the cue: a significant regression at `SIGNIFICANCE_LEVEL` after the correction;
+        False where no test was possible."""
         return self.p_holm is not None and self.p_holm < SIGNIFICANCE_LEVEL
 
 
 def compute_cue_findings(trials: Iterable[Trial]) -> tuple[CueFinding, ...]:
-    """Compute the findings by frequency and cue, over the measured test trials; empty without any."""
+    """Compute the findings by frequency and cue over the measured test trials; empty without any. A cue without the
+    sensitivity of any participant is left out, but its test counts in the correction."""
     regressions = [
         (group, estimate_cue_sensitivities(group), regression)
         for group in select_delivered_trials(trials)
@@ -79,29 +82,32 @@ def compute_cue_findings(trials: Iterable[Trial]) -> tuple[CueFinding, ...]:
 
 
 def _make_finding(
-    group: DeliveredTrials, people: tuple[CueSensitivity, ...], regression: AnswersOnDelivery, p_holm: float | None
+    group: DeliveredTrials,
+    sensitivities: tuple[CueSensitivity, ...],
+    regression: AnswersOnDelivery,
+    p_holm: float | None,
 ) -> CueFinding:
-    """Make the finding on the cue of `regression`. people: sensitivities of all participants by this cue, at least
+    """Make the finding on the cue of `regression`. sensitivities: those of the participants by this cue, at least
     one."""
     return CueFinding(
         frequency_hz=group.frequency_hz,
         cue=regression.cue,
-        people=people,
-        difference_db=median([sensitivity.difference_db for sensitivity in people]),
-        largest_db=max((sensitivity.difference_db for sensitivity in people), key=abs),
-        spread_db=median([sensitivity.spread_db for sensitivity in people]),
+        people=sensitivities,
+        difference_db=median([sensitivity.difference_db for sensitivity in sensitivities]),
+        largest_db=max((sensitivity.difference_db for sensitivity in sensitivities), key=abs),
+        spread_db=median([sensitivity.spread_db for sensitivity in sensitivities]),
         abilities=tuple(
-            median([sensitivity.d_prime(noise_db) for sensitivity in people]) for noise_db in INTERNAL_NOISE_DB
+            median([sensitivity.d_prime(noise_db) for sensitivity in sensitivities]) for noise_db in INTERNAL_NOISE_DB
         ),
         observed_d_prime=_average_d_prime(group),
-        noticed_by=tuple(sensitivity.subject for sensitivity in people if sensitivity.is_noticeable),
+        noticed_by=tuple(sensitivity.subject for sensitivity in sensitivities if sensitivity.is_noticeable),
         answers=regression,
         p_holm=p_holm,
     )
 
 
 def _average_d_prime(group: DeliveredTrials) -> float | None:
-    """Average d' over participants; None where no participant was shown both directions."""
+    """Average the d' of the answers over the participants; None where no participant was shown both directions."""
     d_primes = []
     for person in range(len(group.subjects)):
         is_of_person = group.person == person
@@ -115,14 +121,15 @@ def _average_d_prime(group: DeliveredTrials) -> float | None:
 
 
 def make_cue_warnings(findings: Sequence[CueFinding], gaps: Sequence[CueGap] = ()) -> tuple[str, ...]:
-    """Make warnings for the interpretation of the thresholds, one sentence each; empty where no cue is notable. A gap
-    is named only where some trials lack a measurement, not where all do, as in a study that measured no harmonics."""
+    """Make the warnings for the interpretation of the thresholds, at most three; empty where no participant notices a
+    cue, no answers follow one, and no measurement is missing. A gap is named only where some trials lack a measurement,
+    not where all do, as in a study that measured no harmonics."""
     noticed_texts = [_describe_noticed_cue(finding) for finding in findings if finding.noticed_by]
-    followed_texts = [
+    dependence_texts = [
         f"{finding.cue.value} at {finding.frequency_hz:g} Hz ({format_signed(finding.answers.slope or 0.0)} logits per "
         f"dB, Holm's {format_p_text(finding.p_holm)})"
         for finding in findings
-        if finding.followed
+        if finding.affects_answers
     ]
     sentences = []
     if noticed_texts:
@@ -131,10 +138,10 @@ def make_cue_warnings(findings: Sequence[CueFinding], gaps: Sequence[CueGap] = (
             f"noise of {TYPICAL_NOISE_DB:g} dB notices: {conjoin(noticed_texts)}. So those answers need not be "
             "about the direction."
         )
-    if followed_texts:
+    if dependence_texts:
         sentences.append(
             f"Within a direction, answers followed what was delivered, so direction was not the only cue: "
-            f"{conjoin(followed_texts)}."
+            f"{conjoin(dependence_texts)}."
         )
     if gap_sentence := describe_cue_gaps([gap for gap in gaps if gap.missing < gap.trials]):
         sentences.append(gap_sentence)
@@ -157,8 +164,8 @@ def describe_cue_gaps(gaps: Sequence[CueGap]) -> str:
 
 
 def _describe_noticed_cue(finding: CueFinding) -> str:
-    """Describe a noticed cue in a phrase, with its difference, the participants who notice it, and the share Phi(d' /
-    2) right by it."""
+    """Describe a noticed cue in a phrase, with its difference, the number of participants who notice it, and the
+    percentage 100 Phi(d' / 2) of correct answers by this cue alone (Phi: standard normal distribution)."""
     d_prime = finding.abilities[INTERNAL_NOISE_DB.index(TYPICAL_NOISE_DB)]
     percent_correct = 100.0 * NormalDist().cdf(d_prime / 2.0)
     return (

@@ -2,14 +2,20 @@
 (`simulated_study`).
 
 The rule and its grid are those of `protocols.procedure.psi`; tests verify that the levels equal those of
-`protocols.procedure.staircase.step`. It is some hundred times faster for two reasons. The logarithm of the posterior is
-updated after each answer instead of recomputed. And with p the posterior probability of a cell, s the probability of an
-answer in that cell, and c = sum over cells of s p that of the answer, the expected entropy (nats) of a level is
+`protocols.procedure.staircase.step`. The next level is the one whose answer is expected to leave the least entropy of
+the posterior over the cells of the grid (a cell: a pair of threshold and slope). With
 
-    H = - sum over cells and answers of p s log s  -  sum over cells of p log p  +  sum over answers of c log c
+    p_i    posterior probability of cell i
+    s_ia   probability of answer a (wrong, correct) at the level in cell i; sum over a of s_ia = 1
+    c_a    probability of answer a at the level, sum over i of p_i s_ia
 
-because the sum over answers of s is 1. The table of s log s does not depend on the run; the second sum is the same for
-all levels and is left out.
+the expected entropy after the answer, in nats, is by Bayes' rule
+
+    H = - sum over i, a of p_i s_ia log s_ia  -  sum over i of p_i log p_i  +  sum over a of c_a log c_a
+
+This is some hundred times faster than `protocols.procedure.psi`: the sum over a of s_ia log s_ia is tabulated, the
+second term is the same for all levels and is left out, and the logarithm of the posterior is updated after each answer
+instead of recomputed.
 """
 
 import math
@@ -47,7 +53,7 @@ class PackedPsi(NamedTuple):
     log_p_answer: FloatArray
     """(2, 1 + levels, cells): natural logarithms of the probabilities of a wrong and of a correct answer."""
     negative_entropy: FloatArray
-    """(1 + levels, cells): sum over both answers of s log s, with s the probability of the answer."""
+    """(1 + levels, cells): sum over a of s_ia log s_ia of the module's equation, nats."""
     trial_limit: int
     """Largest number of trials of a run."""
     stop_sd_db: float
@@ -56,7 +62,7 @@ class PackedPsi(NamedTuple):
 
 @cache
 def pack_psi(rule: StaircaseRule) -> PackedPsi:
-    """Compute the grid and the tables of a rule whose levels the Psi method chooses."""
+    """Compute the grid and the tables of a rule whose levels the Psi method chooses. Cached by rule."""
     cap_db = to_db(rule.cap_n)
     all_levels_db = np.array([to_db(rule.start_n), *list_levels_db(cap_db)])
     p_correct = compute_share_right(all_levels_db, cap_db).reshape(len(all_levels_db), -1)
@@ -86,14 +92,14 @@ def normalise_posterior(log_p: FloatArray) -> FloatArray:
 
 @njit(cache=True)
 def choose_level(psi: PackedPsi, probability: FloatArray) -> int:
-    """Choose the level with the least expected posterior entropy, the lowest of those within `ENTROPY_TOLERANCE_NATS`
-    of it; returns its index, at least 1. probability: (cells,), of the posterior."""
+    """Choose the lowest level whose expected posterior entropy is within `ENTROPY_TOLERANCE_NATS` of the least; returns
+    its index, at least 1, because the starting level is not one of the grid. probability: (cells,), posterior."""
     p_correct, expected_entropy = psi.p_correct @ probability, -(psi.negative_entropy @ probability)
     lowest_entropy = math.inf
     for level in range(1, len(expected_entropy)):
-        p_correct_here = p_correct[level]
-        expected_entropy[level] += p_correct_here * math.log(p_correct_here) + (1.0 - p_correct_here) * math.log(
-            1.0 - p_correct_here
+        level_p_correct = p_correct[level]
+        expected_entropy[level] += level_p_correct * math.log(level_p_correct) + (1.0 - level_p_correct) * math.log(
+            1.0 - level_p_correct
         )
         lowest_entropy = min(lowest_entropy, expected_entropy[level])
     for level in range(1, len(expected_entropy)):
@@ -104,8 +110,9 @@ def choose_level(psi: PackedPsi, probability: FloatArray) -> int:
 
 @njit(cache=True)
 def play_psi(psi: PackedPsi, person: Participant, seed: int, track: Track) -> SimulatedRun:
-    """Simulate a run until it ends, and fill the track except its reversals. The result has the mean of the threshold's
-    posterior (dB re 1 N), and the probability that the threshold lies above the cap. seed: of the answers."""
+    """Simulate a run until it ends, and fill the track except its reversals. The result has the number of trials, no
+    reversals, the mean of the threshold's posterior (dB re 1 N), and the probability that the threshold lies above the
+    cap. seed: of the random answers. At most `MOST_TRIALS` trials, the size of the track, are simulated."""
     np.random.seed(seed)
     log_p = np.zeros(len(psi.cells_db))
     probability = normalise_posterior(log_p)

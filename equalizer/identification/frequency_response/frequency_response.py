@@ -1,5 +1,5 @@
-"""A measured frequency response, per frequency line, with noise variance and coherence. `estimate_transfer` returns it;
-state-space models are fitted to it."""
+"""Measured frequency response, per frequency line, with noise variance and coherence. `transfer_estimate` estimates it;
+state-space and mechanical models are fitted to it."""
 
 from dataclasses import dataclass
 
@@ -14,11 +14,11 @@ BoolArray = npt.NDArray[np.bool_]
 @dataclass(frozen=True, slots=True, eq=False)
 class FrequencyResponse:
     """Frequency response G(f) from the samples of the total command to those of the response; response sample k is
-    taken just before command sample k is written. Raises ValueError if shapes are inconsistent or the frequencies do
-    not increase."""
+    taken just before command sample k is written. Raises ValueError where shapes are inconsistent or the frequencies do
+    not increase strictly."""
 
     frequency_hz: FloatArray
-    """(lines,): frequencies, increasing."""
+    """(lines,): frequencies (Hz), strictly increasing."""
     response: ComplexArray
     """(lines, outputs, inputs): complex gain at each line, in output_unit per input_unit."""
     noise_variance: FloatArray
@@ -29,6 +29,7 @@ class FrequencyResponse:
     reliable: BoolArray
     """(lines,): False where the estimate should not be used; `remarks` state the reasons."""
     sample_rate_hz: float
+    """Rate (Hz) of the samples of commands and responses."""
     input_channels: tuple[str, ...]
     output_channels: tuple[str, ...]
     input_unit: str = "N"
@@ -53,11 +54,11 @@ class FrequencyResponse:
         return len(self.frequency_hz)
 
     def select_band(self, low_hz: float, high_hz: float) -> "FrequencyResponse":
-        """The response at the lines of a band (Hz), band limits included."""
+        """Select the lines of a band (Hz), limits included."""
         return self.select_lines((self.frequency_hz >= low_hz) & (self.frequency_hz <= high_hz))
 
     def select_lines(self, mask: BoolArray) -> "FrequencyResponse":
-        """The response at the lines where `mask` (lines,) is true."""
+        """Select the lines where `mask` (lines,) is true."""
         return FrequencyResponse(
             self.frequency_hz[mask],
             self.response[mask],

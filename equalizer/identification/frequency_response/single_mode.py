@@ -1,7 +1,7 @@
-"""Least-squares fit of a single resonance to the lines around a peak, for many draws of the noise at once.
+"""Least-squares fit of a single mode to the frequency lines around a resonance peak, for many noise draws at once.
 
 All entries of a response matrix share the pole pair; each has its own numerator, a parabola in s, which also represents
-the modes outside the interval:  G(s) = (n0 + n1 s + n2 s²) / (s² + c1 s + c0),  with s = j f / f_m and f_m the
+the modes outside the lines:  G(s) = (n0 + n1 s + n2 s²) / (s² + c1 s + c0),  with s = j f / f_m and f_m the
 geometric mean of the first and the last line. Natural frequency f_m sqrt(c0), damping ratio c1 / (2 sqrt(c0)). Called
 by `resonances`.
 """
@@ -11,24 +11,26 @@ import numpy as np
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _LINEAR_ITERATIONS, _NEWTON_ITERATIONS = 3, 8
-"""Number of iteratively reweighted linear fits that give a starting value, and of Gauss-Newton steps from it."""
+"""Number of iteratively reweighted linear fits that give a starting value, and of Gauss-Newton steps from it.
+Chosen."""
 
 
 def fit_single_mode(frequency_hz: FloatArray, entries: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Fit a natural frequency (draws,), Hz, and a damping ratio (draws,); NaN where the fit is unstable or its natural
-    frequency is outside the lines. frequency_hz: (lines,), at least six. entries: (draws, lines, entries of the
-    matrix).
+    """Fit natural frequencies (draws,), Hz, and damping ratios (draws,); NaN where the fit is unstable or its natural
+    frequency is not between the first and the last line. frequency_hz: (lines,), ascending, at least six. entries:
+    (draws, lines, entries of the matrix).
 
-    Re-weighted linear equations (Sanathanan and Koerner) give starting values, whose damping is biased by noise;
-    Gauss-Newton steps on the least-squares error remove that bias (variable projection, Kaufman 1975).
+    Reweighted linear equations (Sanathanan and Koerner 1963) give starting values, whose damping is biased by noise;
+    Gauss-Newton steps on the least-squares error remove that bias (variable projection, Kaufman 1975). Each step of c1
+    and c0, of order 1 or less, is limited to 0.05 (chosen) against divergence.
     """
     centre_hz = float(np.sqrt(frequency_hz[0] * frequency_hz[-1]))
     s = np.asarray(1j * frequency_hz / centre_hz, dtype=np.complex128)
-    numerator = np.stack([np.ones_like(s), s, s**2], axis=1)
+    powers_of_s = np.stack([np.ones_like(s), s, s**2], axis=1)
     c1, c0 = np.zeros(len(entries)), np.ones(len(entries))
     inverse_denominator: ComplexArray = np.ones((len(entries), len(s)), dtype=np.complex128)
     for _ in range(_LINEAR_ITERATIONS):
-        basis = _compute_numerator_basis(numerator, inverse_denominator)
+        basis = _compute_numerator_basis(powers_of_s, inverse_denominator)
         fixed_part, c1_part, c0_part = (
             _project_out(basis, entries * (power_of_s * inverse_denominator)[:, :, None])
             for power_of_s in (s**2, s, 1.0)
@@ -36,7 +38,7 @@ def fit_single_mode(frequency_hz: FloatArray, entries: ComplexArray) -> tuple[Fl
         c1, c0 = _solve_two_unknowns(c1_part, c0_part, -fixed_part)
         inverse_denominator = _invert_denominator(s, c1, c0)
     for _ in range(_NEWTON_ITERATIONS):
-        basis = _compute_numerator_basis(numerator, inverse_denominator)
+        basis = _compute_numerator_basis(powers_of_s, inverse_denominator)
         residual = _project_out(basis, entries)
         scaled_model = (entries - residual) * inverse_denominator[:, :, None]
         step1, step0 = _solve_two_unknowns(
@@ -51,19 +53,19 @@ def fit_single_mode(frequency_hz: FloatArray, entries: ComplexArray) -> tuple[Fl
 
 
 def _invert_denominator(s: ComplexArray, c1: FloatArray, c0: FloatArray) -> ComplexArray:
-    """(draws, lines): 1 / (s² + c1 s + c0)."""
+    """Compute 1 / (s² + c1 s + c0), (draws, lines). s: (lines,); c1, c0: (draws,)."""
     inverse: ComplexArray = 1 / (s**2 + c1[:, None] * s + c0[:, None])
     return inverse
 
 
-def _compute_numerator_basis(numerator: ComplexArray, inverse_denominator: ComplexArray) -> ComplexArray:
-    """(draws, lines, 3): orthonormal basis of the functions (n0 + n1 s + n2 s²) / (s² + c1 s + c0)."""
-    basis: ComplexArray = np.linalg.qr(numerator * inverse_denominator[:, :, None])[0]
+def _compute_numerator_basis(powers_of_s: ComplexArray, inverse_denominator: ComplexArray) -> ComplexArray:
+    """Compute an orthonormal basis (draws, lines, 3) of the functions (n0 + n1 s + n2 s²) / (s² + c1 s + c0)."""
+    basis: ComplexArray = np.linalg.qr(powers_of_s * inverse_denominator[:, :, None])[0]
     return basis
 
 
 def _project_out(basis: ComplexArray, values: ComplexArray) -> ComplexArray:
-    """Residual of values (draws, lines, entries) after projection on the basis."""
+    """Project values (draws, lines, entries) onto the orthogonal complement of the basis."""
     residual: ComplexArray = values - basis @ (np.conj(basis.swapaxes(1, 2)) @ values)
     return residual
 
@@ -71,7 +73,8 @@ def _project_out(basis: ComplexArray, values: ComplexArray) -> ComplexArray:
 def _solve_two_unknowns(
     first: ComplexArray, second: ComplexArray, target: ComplexArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Real x and y, (draws,) each, that solve first x + second y = target in least squares, draw by draw."""
+    """Solve first x + second y = target for real x and y, (draws,) each, in least squares, draw by draw. All arrays:
+    (draws, lines, entries)."""
 
     def compute_inner_product(first_values: ComplexArray, second_values: ComplexArray) -> FloatArray:
         product: FloatArray = np.sum((np.conj(first_values) * second_values).real, axis=(1, 2))

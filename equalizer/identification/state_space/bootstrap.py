@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from equalizer.identification.state_space.refinement import FittedForm, refine
+from equalizer.identification.state_space.refinement import FittedForm, refine_form
 from equalizer.identification.state_space.relaxed_poles import SlowPole
 from equalizer.identification.state_space.stable_poles import Radius
 from equalizer.identification.state_space.weighted_lines import WeightedLines
@@ -42,7 +42,7 @@ def draw_bootstrap_parameters(
     for _ in range(draws):
         real, imaginary = generator.standard_normal((2, *modelled.shape))
         noisy_lines = replace(lines, response=modelled + noise_deviation * (real + 1j * imaginary))
-        refit = refine(fitted.form, noisy_lines, radius, REFIT_STEPS)
+        refit = refine_form(fitted.form, noisy_lines, radius, REFIT_STEPS)
         matrices = (refit.form.state_matrix, refit.B, refit.form.C, refit.D)
         refitted_parameters.append(np.concatenate([matrix.ravel() for matrix in matrices]))
     return np.array(refitted_parameters)

@@ -19,7 +19,7 @@ from equalizer.identification.state_space.canonical_variate import (
 )
 from equalizer.identification.state_space.canonical_variate import estimate_poles_and_shapes as from_records
 from equalizer.identification.state_space.modal_form import ModalForm
-from equalizer.identification.state_space.refinement import FittedForm, complete_form, refine
+from equalizer.identification.state_space.refinement import FittedForm, complete_form, refine_form
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.identification.state_space.stable_poles import Radius, compute_pole_radius
 from equalizer.identification.state_space.warped_subspace import (
@@ -125,9 +125,9 @@ def refine_candidate(
     """Refine a model on bins, formed anew about the result of each pass, then on all lines if the band is narrow.
     radius: largest magnitude of a pole."""
     for steps in MOST_BIN_STEPS:
-        fitted = refine(fitted.form, average_about_model(fitted, lines, settings), radius, steps)
+        fitted = refine_form(fitted.form, average_about_model(fitted, lines, settings), radius, steps)
     if not settings.wide:
-        fitted = refine(fitted.form, lines, radius, MOST_LINE_STEPS)
+        fitted = refine_form(fitted.form, lines, radius, MOST_LINE_STEPS)
     cost = lines.compute_cost(fitted.compute_response(lines.z)) / lines.response.size
     return Candidate(name, fitted, cost, compute_outside_gain(fitted, lines), radius)
 

@@ -19,7 +19,7 @@ from equalizer.identification.state_space.candidates import (
     choose_best,
     refine_candidate,
 )
-from equalizer.identification.state_space.refinement import FittedForm, complete_form, refine
+from equalizer.identification.state_space.refinement import FittedForm, complete_form, refine_form
 from equalizer.identification.state_space.settings import IdentificationSettings
 from equalizer.identification.state_space.stable_poles import Radius, compute_pole_radius, stabilise_blocks
 from equalizer.identification.state_space.weighted_lines import WeightedLines
@@ -136,7 +136,7 @@ def _is_bound_binding(
     bins = average_about_model(chosen.fitted, lines, settings)
     radii = np.where(at_bound, limit_radius, chosen.radius)
     relaxed_cost = bins.compute_cost(
-        refine(chosen.fitted.form, bins, radii, MOST_BIN_STEPS[-1]).compute_response(bins.z)
+        refine_form(chosen.fitted.form, bins, radii, MOST_BIN_STEPS[-1]).compute_response(bins.z)
     )
     if not _exceeds_noise(
         bins.compute_cost(chosen.fitted.compute_response(bins.z)) - relaxed_cost, relaxed_cost, bins, len(lines)
@@ -144,7 +144,7 @@ def _is_bound_binding(
         return False
     # A fall of the cost that further steps achieve with the bound, too, is not counted.
     bounded_cost = bins.compute_cost(
-        refine(chosen.fitted.form, bins, chosen.radius, MOST_BIN_STEPS[-1]).compute_response(bins.z)
+        refine_form(chosen.fitted.form, bins, chosen.radius, MOST_BIN_STEPS[-1]).compute_response(bins.z)
     )
     return _exceeds_noise(bounded_cost - relaxed_cost, relaxed_cost, bins, len(lines))
 

@@ -1,8 +1,8 @@
-"""Lines that a model is fitted to: measured responses with the inverse of their standard errors as weights.
+"""Frequency lines that a model is fitted to: measured responses, weighted by the inverse of their standard errors.
 
 With circular complex Gaussian noise of variance E|error|² = 1 / weight², the weighted sum of squares is the negative
-log-likelihood, up to a constant. `weight_lines` makes the data of `identify`; `average_bins` reduces them for
-`candidates`.
+log-likelihood, up to a constant. `weight_lines` prepares the data for `identify`; `average_bins` reduces them
+for `candidates`.
 """
 
 from collections.abc import Sequence
@@ -15,8 +15,8 @@ from equalizer.identification.frequency_response.frequency_response import Frequ
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 LEAST_RELATIVE_NOISE = 1e-9
-"""Least standard error, relative to the largest magnitude of all entries, so that noise-free data have finite
-weights."""
+"""Least standard error, relative to the largest magnitude of all entries, so that noise-free data have finite weights.
+Chosen: far below measured noise."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,14 +26,15 @@ class WeightedLines:
     frequency_hz: FloatArray
     """(lines,), Hz, in ascending order; a frequency that was measured twice occurs twice."""
     response: ComplexArray
-    """(lines, outputs, inputs)"""
+    """(lines, outputs, inputs), in output unit per input unit."""
     weight: FloatArray
     """(lines, outputs, inputs): 1 / standard error, with the standard error sqrt(E|error|²)."""
     sample_rate_hz: float
+    """Sample rate (Hz) of the model, which defines `z`."""
 
     @property
     def z(self) -> ComplexArray:
-        """exp(2 pi j f / sample rate) of each line, (lines,)."""
+        """(lines,): exp(2 pi j f / sample rate), at which a discrete-time model is evaluated."""
         return np.asarray(np.exp(2j * np.pi * self.frequency_hz / self.sample_rate_hz), dtype=np.complex128)
 
     def __len__(self) -> int:
@@ -51,8 +52,9 @@ class WeightedLines:
 
 
 def weight_lines(responses: Sequence[FrequencyResponse], band_hz: tuple[float, float]) -> WeightedLines:
-    """All reliable lines of the band (Hz, ends included) of all estimates, in ascending order. Where the noise of an
-    entry is not known, it is estimated from differences between neighbouring lines (`estimate_scatter_variance`)."""
+    """Join the reliable, finite lines of the band (Hz, limits included) of all estimates, one or more, in ascending
+    order with weights. Where the noise of an entry is not known, it is estimated from the scatter between lines
+    (`estimate_scatter_variance`)."""
     in_band = [estimate.select_band(*band_hz) for estimate in responses]
     reliable_estimates = [
         estimate.select_lines(estimate.reliable & np.isfinite(estimate.response).all(axis=(1, 2)))
@@ -74,7 +76,7 @@ def weight_lines(responses: Sequence[FrequencyResponse], band_hz: tuple[float, f
 
 
 def _complete_noise_variance(estimate: FrequencyResponse) -> FloatArray:
-    """(lines, p, m): noise variance; where it is not known, that of `estimate_scatter_variance`."""
+    """Return the noise variance (lines, p, m), with `estimate_scatter_variance` where it is not known."""
     variance = estimate.noise_variance
     return np.where(np.isfinite(variance), variance, estimate_scatter_variance(estimate.response))
 
@@ -94,9 +96,9 @@ def estimate_scatter_variance(response: ComplexArray) -> FloatArray:
 def average_bins(
     lines: WeightedLines, bins: Sequence[slice], modelled: ComplexArray, modelled_at_centres: ComplexArray
 ) -> WeightedLines:
-    """Weighted average of the lines of each bin, at its mean frequency. The difference from an approximate model is
-    averaged, so that averaging does not flatten resonances within a bin. modelled, modelled_at_centres: the model's
-    responses on `lines` and at the bins' mean frequencies."""
+    """Average the lines of each bin with their weights, at its mean frequency. The difference from an approximate model
+    is averaged, so that averaging does not flatten resonances within a bin. modelled (lines, p, m),
+    modelled_at_centres (bins, p, m): the model's responses on `lines` and at the bins' mean frequencies."""
     squared_weight = lines.weight**2
     difference = squared_weight * (lines.response - modelled)
     weight = np.array([squared_weight[bin_lines].sum(axis=0) for bin_lines in bins])
@@ -110,13 +112,13 @@ def average_bins(
 
 
 def compute_bin_centres_hz(lines: WeightedLines, bins: Sequence[slice]) -> FloatArray:
-    """(bins,): mean frequency of the lines of each bin."""
+    """Compute the mean frequency (Hz) of the lines of each bin, (bins,)."""
     return np.array([lines.frequency_hz[bin_lines].mean() for bin_lines in bins])
 
 
 def group_lines(lines: WeightedLines, least_lines: int, octave_share: float) -> tuple[slice, ...]:
-    """Slices of neighbouring lines: at least `least_lines` lines each, the last slice excepted, and all lines within
-    `octave_share` octaves of its first line."""
+    """Group neighbouring lines into consecutive slices: each of all lines less than `octave_share` octaves above its
+    first line, and of at least `least_lines` lines, the last slice excepted."""
     edges, frequency_hz = [0], lines.frequency_hz
     while edges[-1] < len(lines):
         start = edges[-1]

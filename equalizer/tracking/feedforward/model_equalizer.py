@@ -1,8 +1,8 @@
 """Equalizer by inversion of an identified linear model: forces that produce a reference acceleration at the handle.
 
-A repeated stimulus is inverted line by line in the frequency domain (`periodic_inverse`); its onset from rest is the
-solution of a finite-horizon linear-quadratic tracking problem (`lqr`) that ends in the state of the loop. A session
-uses it in place of `equalizer.Identity` when a model is given.
+The loop of a repeated stimulus is inverted line by line in the frequency domain (`periodic_inverse`); its onset from
+rest is the solution of a finite-horizon linear-quadratic tracking problem (`lqr`) that ends in the state of the loop.
+`study.workflows.session.equalize_stimuli` uses it instead of `feedforward.equalizer.Identity` where a model is given.
 """
 
 from dataclasses import dataclass
@@ -26,12 +26,14 @@ from equalizer.tracking.lqr.tracking_problem import TrackingWeights, make_tracki
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelEqualizer:
-    """Equalizer with one identified model, an implementation of `equalizer.Equalizer`. Raises ValueError for an
-    unstable model."""
+    """Equalizer with one identified model of m forces and p accelerations, an implementation of
+    `feedforward.equalizer.Equalizer`. Raises ValueError for an unstable model."""
 
     model: IdentifiedModel
+    """Model from forces (N) to accelerations (m/s²) at the handle."""
     spring: VirtualSpring = NO_SPRING
-    """Virtual spring whose force the device's loop adds to the commands; it is subtracted from them."""
+    """Virtual spring whose force the device's control loop adds to the commands, from which it is therefore
+    subtracted."""
     weight: float = WEIGHT
     """Weight of |force|² against |acceleration error|², (m/s² per N)²."""
 
@@ -51,19 +53,19 @@ class ModelEqualizer:
         return "acceleration"
 
     def compute_loop_commands(self, reference: Signal) -> Signal:
-        """Forces (N), (N, inputs), of one loop in the periodic steady state. reference: one loop, (N, p), m/s². Raises
-        OutsideBandError for a reference with content outside the model's band, ValueError for another sample rate or
-        unit."""
+        """Compute the forces (samples, m), in N, of one loop in the periodic steady state. reference: accelerations
+        (samples, p) of one loop, m/s². Raises OutsideBandError for a reference with content outside the model's band,
+        ValueError for a sample rate, number of channels or unit other than the model's."""
         return compute_periodic_command(self.model, reference, self.weight, self.spring)
 
     def compute_onset_commands(self, reference: Signal, envelope: FloatArray) -> Signal:
-        """Forces (N), (ticks, inputs), from rest into the loop with almost no transient afterwards: the deviation of
-        the final state from the loop's is weighted by the observability Gramian. envelope: (ticks,), factor on the
-        reference. Raises as `compute_loop_commands`."""
+        """Compute the forces (ticks, m), in N, from rest into the loop. Little transient follows, because the deviation
+        of the final state from the loop's is weighted by the observability Gramian. reference: one loop, as in
+        `compute_loop_commands`; envelope: (ticks,), factor on it. Raises as `compute_loop_commands`."""
         onset_ticks, loop_ticks = len(envelope), len(reference)
         gains = _compute_onset_gains(self.model, self.weight, onset_ticks)
         loop = compute_periodic_command(self.model, reference, self.weight)
-        # The loop as it continues after the onset, and the state of the model at that moment.
+        # Forces of the loop from the end of the onset on, and the model's state at that time.
         continued_loop = np.roll(loop.samples, -onset_ticks, axis=0)
         loop_state = compute_periodic_state(gains.problem, continued_loop)
         faded_reference = envelope[:, None] * reference.samples[np.arange(onset_ticks) % loop_ticks]
@@ -73,8 +75,8 @@ class ModelEqualizer:
         )
 
     def _compute_onset_spring_force(self, reference: Signal, loop: Signal, envelope: FloatArray) -> FloatArray:
-        """Spring force (N), (ticks, inputs), to subtract during the onset, approximated as its value in the loop times
-        the envelope. loop: forces of one loop without the spring."""
+        """Compute the spring force (ticks, m), in N, to subtract during the onset, approximated by its value in the
+        loop times the envelope. loop: forces of one loop without the spring."""
         spring_force = loop.samples - self.compute_loop_commands(reference).samples
         ticks = np.arange(len(envelope)) % len(reference)
         faded_force: FloatArray = envelope[:, None] * spring_force[ticks]
@@ -82,13 +84,13 @@ class ModelEqualizer:
 
 
 def _list_force_properties(loop: Signal) -> tuple[float, str | tuple[str, ...], str | tuple[str, ...], tuple[str, ...]]:
-    """Sample rate, quantity, unit and channels of a force signal, in the order of the fields of `Signal`."""
+    """List sample rate, quantity, unit and channels of a force signal, in the order of the fields of `Signal`."""
     return loop.sample_rate_hz, loop.quantity, loop.unit, loop.channels
 
 
 @lru_cache(maxsize=8)
 def _compute_onset_gains(model: IdentifiedModel, weight: float, samples: int) -> StoredGains:
-    """Gains of the tracking problem over `samples` steps; cached, because they take longer to compute than everything
-    else of an onset."""
+    """Compute the gains of the tracking problem over `samples` steps; cached, because this takes longer than all other
+    steps of an onset."""
     problem = make_tracking_problem(model, TrackingWeights(weight))
     return compute_stored_gains(problem, samples, compute_free_decay_weight(problem))

@@ -1,10 +1,10 @@
-"""Zero padding before and after a finite trajectory, and the error if only the trajectory's own rows are played.
+"""Zero padding before and after a finite trajectory, and the error if only the rows of the trajectory are played.
 
-The inverse of a device is non-causal: its forces start before the trajectory and end after it. Zeros on both sides make
-room for them. Where only the trajectory's own rows are played, from rest, the forces before the first row are lost, and
-the other forces were computed for an initial motion that does not exist. No padding before the trajectory (`CAUSAL`) is
-then best: it gives the optimal forces among those that start with the first row. Called by `feedforward`, `contact`,
-`bands` and `realtime`.
+A row is the sample of all channels at one time. The inverse of a device is non-causal: its forces start before the
+trajectory and end after it, within the padding. Where only the rows of the trajectory are played, from rest, the forces
+before the first row are lost, and the other forces were computed for an initial motion that does not exist. No padding
+before the trajectory (`CAUSAL`) is then best: it gives the optimal forces among those that start with the first row.
+Called by `feedforward`, `contact`, `narrow_and_wide_models` and `realtime_controller`.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from equalizer.tracking.lqr.tracking_problem import TrackingError, TrackingProbl
 @dataclass(frozen=True, slots=True)
 class Padding:
     """Durations (s) of the zeros before and after a trajectory. Raises TrackingError for a negative or non-finite
-    duration."""
+    duration. The default of 0.3 s is chosen."""
 
     before_s: float = 0.3
     after_s: float = 0.3
@@ -31,7 +31,7 @@ class Padding:
                 raise TrackingError(f"{name} is {value}; it must be a number that is not negative")
 
     def count_rows(self, rate_hz: float) -> tuple[int, int]:
-        """Numbers of rows before and after at a sample rate (Hz), rounded."""
+        """Count the rows before and after at a sample rate (Hz), rounded to whole rows."""
         return round(self.before_s * rate_hz), round(self.after_s * rate_hz)
 
 
@@ -47,7 +47,7 @@ class PaddedTrack:
     padded: TrackResult
     """Forces and response with padding."""
     rows: slice
-    """The trajectory's own rows in `padded`."""
+    """Rows of the trajectory in `padded`."""
     padded_error: float
     """Relative rms error in the model's band over the trajectory's rows, if all rows are played."""
     cut_error: float
@@ -55,15 +55,15 @@ class PaddedTrack:
 
     @property
     def forces(self) -> FloatArray:
-        """(N, m), N: forces of the trajectory's own rows."""
+        """(N, m), in N: forces in the rows of the trajectory."""
         return self.padded.forces[self.rows]
 
 
 def track_padded(
     problem: TrackingProblem, reference: FloatArray, padding: Padding | None = None, gains: StoredGains | None = None
 ) -> PaddedTrack:
-    """Track reference (N, p), m/s², from rest, with padding; None = `CAUSAL`. gains: for the length with padding; None
-    = computed here. Raises TrackingError for another shape, and for a reference without content in the model's band."""
+    """Track reference (N, p), m/s², from rest. padding: None = `CAUSAL`. gains: for the length with padding; None =
+    computed here. Raises TrackingError for another shape, and for a reference without content in the model's band."""
     r = require_trajectory(problem, reference)
     rows_before, rows_after = (padding or CAUSAL).count_rows(problem.sample_rate_hz)
     padded_reference = np.pad(r, ((rows_before, rows_after), (0, 0)))
@@ -76,7 +76,7 @@ def track_padded(
 
 
 def simulate_from_rest(problem: TrackingProblem, forces: FloatArray) -> FloatArray:
-    """(N, p), m/s²: the model's response to forces (N, m), in N, from rest."""
+    """Simulate the model's response (N, p), m/s², to forces (N, m), in N, from rest."""
     x, predicted = np.zeros(problem.order), np.empty((len(forces), problem.outputs))
     for k, force in enumerate(forces):
         next_state_and_output = np.concatenate((x, force)) @ problem.step
@@ -87,7 +87,7 @@ def simulate_from_rest(problem: TrackingProblem, forces: FloatArray) -> FloatArr
 def compute_band_error(
     reference: FloatArray, delivered: FloatArray, rate_hz: float, band_hz: tuple[float, float]
 ) -> float:
-    """Rms of (delivered - reference) over rms of the reference, both (N, p), of their spectra within the band (Hz).
+    """Compute the relative rms error of delivered against reference, (N, p) each, over their spectra in the band (Hz).
 
     Raises TrackingError for a reference without content in the band.
     """
@@ -104,9 +104,9 @@ def compute_band_error(
 
 
 def compute_band_spectrum(samples: FloatArray, rate_hz: float, band_hz: tuple[float, float]) -> FloatArray:
-    """(2 lines, channels): real parts, then imaginary parts, of the spectrum (FFT, not scaled) within the band (Hz).
-    Zero-padded to at least twice the length, so that the end does not wrap around, and to at least four lines per
-    bandwidth."""
+    """Compute the spectrum (2 lines, channels) within the band (Hz, limits included): real parts, then imaginary parts,
+    of the unscaled FFT. Samples (N, channels) are zero-padded to at least twice their length, so that the end does not
+    wrap around, and so that the lines are at most a quarter of the bandwidth apart."""
     fft_length = max(2 * len(samples), int(np.ceil(4 * rate_hz / (band_hz[1] - band_hz[0]))))
     line_hz = np.fft.rfftfreq(fft_length, 1 / rate_hz)
     spectrum = np.fft.rfft(samples, fft_length, axis=0)[(line_hz >= band_hz[0]) & (line_hz <= band_hz[1])]

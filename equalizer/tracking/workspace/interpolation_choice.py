@@ -1,8 +1,8 @@
 """Choice between blended and modal interpolation by cross-validation at held-out places.
 
 At each held-out place, the response that was identified there is equalized by the interpolation from the other places.
-The method with the smaller largest error is chosen; blended forces where nothing can be checked. Called by
-`study.workflows.equalizer.playback_models`.
+Modal interpolation is chosen if its largest error over the places is smaller than that of blended forces; blended
+forces where nothing can be checked. Called by `study.workflows.equalizer.playback_models`.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ from equalizer.tracking.workspace.workspace_models import Place, WorkspaceError,
 
 Interpolation = Literal["blended forces", "modal"]
 LINE_COUNT = 300
-"""Number of logarithmically spaced lines over the band on which interpolations are compared."""
+"""Number of logarithmically spaced frequencies over the band on which interpolations are compared. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +50,7 @@ class PlaceCheck:
     modal: Quality | None
     """Quality with modal interpolation; None where resonances could not be matched between the other places."""
     blended_error: float
-    """Error with blended forces: rms over the lines of the largest singular value of T - I, with T from reference to
+    """Error with blended forces: rms over the lines of the largest singular value of T - I, with T from target to
     delivered acceleration; 0.01 = 1 %. Not the largest over the lines, because at a resonance that no method models all
     methods have about the same error."""
     modal_error: float | None
@@ -64,7 +64,7 @@ class InterpolationChoice:
 
     interpolation: Interpolation
     reason: str
-    """A sentence for the user."""
+    """Reason for the choice, as a clause for the user."""
     checks: tuple[PlaceCheck, ...]
     """One per held-out place; empty where nothing was checked."""
     workspace: WorkspaceModels
@@ -72,8 +72,8 @@ class InterpolationChoice:
     """Interpolation by the modes of all models; None where it is not used."""
 
     def find_models_at(self, place_m: Place) -> ModelsAtPlace:
-        """Models and weights for a place (m) by the chosen interpolation. A place outside the convex hull of the models
-        gets those of the nearest place inside, with a remark."""
+        """Find the models and weights for a place (m) by the chosen interpolation. A place outside the convex hull of
+        the models gets those of the nearest place inside, with a remark."""
         return self.modal.at(place_m) if self.modal else blend_at(self.workspace, place_m)
 
 
@@ -143,8 +143,9 @@ def _check_distances(workspace: WorkspaceModels, held_out_places: Sequence[HeldO
 
 
 def _leave_one_out(workspace: WorkspaceModels) -> list[tuple[WorkspaceModels, ModalInterpolation | None, HeldOutPlace]]:
-    """For each model inside the convex hull of the others: the others, their modal interpolation (None where modes do
-    not match), and the model as reference. Empty for fewer than three models."""
+    """List the folds of the cross-validation, one per model inside the convex hull of the others: the others, their
+    modal interpolation (None where modes do not match), and the model as reference. Empty for fewer than three
+    models."""
     folds: list[tuple[WorkspaceModels, ModalInterpolation | None, HeldOutPlace]] = []
     for index, model in enumerate(workspace.models):
         if len(workspace) < 3:
@@ -163,7 +164,8 @@ def _leave_one_out(workspace: WorkspaceModels) -> list[tuple[WorkspaceModels, Mo
 def _check_place(
     workspace: WorkspaceModels, modal: ModalInterpolation | None, place: HeldOutPlace, weight: float
 ) -> PlaceCheck:
-    """Quality and error of both interpolations at a held-out place."""
+    """Compute quality and error of both interpolations at a held-out place; without modal ones where `modal` is
+    None."""
     blended_response = _compute_equalized_response(blend_at(workspace, place.place_m), place, weight)
     if modal is None:
         return PlaceCheck(
@@ -180,12 +182,12 @@ def _check_place(
 
 
 def _compute_equalized_response(place_models: ModelsAtPlace, place: HeldOutPlace, weight: float) -> ComplexArray:
-    """T, (lines, p, p): reference response times interpolated inverse, from reference to delivered acceleration."""
+    """Compute T (lines, p, p), from target to delivered acceleration: reference response times interpolated inverse."""
     return np.asarray(place.response @ place_models.compute_inverse(place.frequency_hz, weight))
 
 
 def _compute_rms_error(equalized_response: ComplexArray) -> float:
-    """Rms over the lines of the largest singular value of T - I. equalized_response: T, (lines, p, p)."""
+    """Compute the rms over the lines of the largest singular value of T - I. equalized_response: T, (lines, p, p)."""
     largest_singular_values = np.linalg.norm(
         equalized_response - np.eye(equalized_response.shape[1]), ord=2, axis=(1, 2)
     )

@@ -77,9 +77,9 @@ class Accelerometer:
         return self._newest.read_zeroed(time.monotonic())
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration:
-        """Accelerations at the ticks of a recording, as `study.devices.rig.OwnClockSensor` defines it. Waits until the
-        samples after the last tick have arrived. Without ticks: no accelerations, and facts about the samples since
-        since_s."""
+        """Accelerations at the ticks of a recording, as `study.devices.rig.AsynchronousAccelerometer` defines it. Waits
+        until the samples after the last tick have arrived. Without ticks: no accelerations, and facts about the samples
+        since since_s."""
         if len(tick_s):
             time.sleep(max(0.0, tick_s[-1] + HALF_LENGTH_PERIODS / rate_hz + LATENESS_S - time.monotonic()))
         resampled = self._resample_to_ticks(tick_s, rate_hz) if len(tick_s) else ResampledValues(np.zeros((0, 3)), None)

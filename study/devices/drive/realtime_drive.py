@@ -128,7 +128,7 @@ class RealtimeDrive:
         self._runner = runner
         self._governor = governor
         self._clock = clock
-        self._compiled_runner = runner if isinstance(runner, SteppedRunner) and runner.attends else None
+        self._compiled_runner = runner if isinstance(runner, SteppedRunner) and runner.can_attend else None
         self._loop_state: FloatArray = (
             runner.loop_state if isinstance(runner, SteppedRunner) else np.zeros(LOOP_STATE_SIZE)
         )

@@ -12,7 +12,7 @@ from equalizer.signals.signal import FloatArray, Signal
 from study.devices.device import DeviceInfo, Fault, Health, PlaybackResult
 from study.devices.governor.cells import ROW_SIZE
 from study.devices.governor.governor import Governor
-from study.devices.rig import OwnClockSensor
+from study.devices.rig import AsynchronousAccelerometer
 
 COMMAND, EXCITATION, POSITION, ACCELERATION, TRUTH = (slice(start, start + 3) for start in range(0, ROW_SIZE, 3))
 """Columns of a row, three components each: command and excitation (N), position (m), acceleration and true acceleration
@@ -20,7 +20,7 @@ COMMAND, EXCITATION, POSITION, ACCELERATION, TRUTH = (slice(start, start + 3) fo
 
 
 def record_held_stimulus(
-    governor: Governor, info: DeviceInfo, own_clock_sensor: OwnClockSensor | None = None
+    governor: Governor, info: DeviceInfo, own_clock_sensor: AsynchronousAccelerometer | None = None
 ) -> PlaybackResult:
     """Recording of a held stimulus: the end of its steady part, in whole loops unless a loop is longer than the ring.
     None where not even that much was recorded. own_clock_sensor: an accelerometer with its own clock, if any."""
@@ -36,7 +36,7 @@ def record_held_stimulus(
 
 
 def record_commands(
-    governor: Governor, info: DeviceInfo, own_clock_sensor: OwnClockSensor | None = None
+    governor: Governor, info: DeviceInfo, own_clock_sensor: AsynchronousAccelerometer | None = None
 ) -> PlaybackResult:
     """Recording of commands that were played once; None after a fault or where they ended early. It has no segments:
     the caller knows them."""
@@ -49,7 +49,7 @@ def record_commands(
 
 
 def _insert_acceleration(
-    rows: FloatArray, governor: Governor, info: DeviceInfo, own_clock_sensor: OwnClockSensor | None
+    rows: FloatArray, governor: Governor, info: DeviceInfo, own_clock_sensor: AsynchronousAccelerometer | None
 ) -> tuple[FloatArray, Health]:
     """Insert the acceleration at the tick of each row, missed ticks included, and its counters. rows: the newest rows
     of the governor."""

@@ -106,9 +106,9 @@ class SteppedRunner:
         return self._seen if reading is None else LastReading(reading, self._rig.buttons())
 
     @property
-    def attends(self) -> bool:
+    def can_attend(self) -> bool:
         """Whether `attend` may be called: ticks are compiled, and compiled code can read the clock."""
-        return self._compiled is not None and self._compiled.attends
+        return self._compiled is not None and self._compiled.can_attend
 
     def prepare(self) -> None:
         """Nothing to do for a real device."""
@@ -143,7 +143,7 @@ class SteppedRunner:
 
     def attend(self) -> int:
         """Run ticks in real time by `compiled_drive.attend`, and return its code; FINISHED where the rig was gone
-        before. To be called only where `attends`. Never raises for a failing rig, which `failure` reports."""
+        before. To be called only where `can_attend`. Never raises for a failing rig, which `failure` reports."""
         assert self._compiled is not None
         code = FINISHED
         if self._is_rig_gone:

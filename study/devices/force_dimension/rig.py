@@ -44,7 +44,7 @@ class Accelerometer(Protocol):
         ...
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration | None:
-        """Accelerations at past ticks: as `study.devices.rig.OwnClockSensor.sensed`."""
+        """Accelerations at past ticks: as `study.devices.rig.AsynchronousAccelerometer.sensed`."""
         ...
 
     def close(self) -> None:
@@ -119,7 +119,8 @@ class ForceDimensionRig:
         self._raise_for(tick_io.write_once(self._calls, self._cells, np.array(force_n, dtype=np.float64)))
 
     def sensed(self, since_s: float, tick_s: FloatArray, rate_hz: float) -> SensedAcceleration | None:
-        """Accelerations at past ticks, as `study.devices.rig.OwnClockSensor.sensed`; None without an accelerometer."""
+        """Accelerations at past ticks, as `study.devices.rig.AsynchronousAccelerometer.sensed`; None without an
+        accelerometer."""
         return None if self._accelerometer is None else self._accelerometer.sensed(since_s, tick_s, rate_hz)
 
     def withhold(self, seconds: float) -> float:

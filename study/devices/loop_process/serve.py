@@ -1,9 +1,9 @@
-"""Main program of the loop's process: a device behind its safety layer, with a thread for each pipe from the caller.
+"""Main program of the process of the device loop: opens a device behind its safety layer and executes the remote calls
+of another process, the caller, with a thread for each pipe. `start` starts the process with `run`.
 
-Signs of life always come from the caller: `keep_alive` runs only on its call, and `play` continues only while the
-caller answers its progress. When the caller's end of a pipe closes, for any reason, the force fades, the device is
-closed, and the process ends.
-"""
+Keep-alive calls always come from the caller: `keep_alive` runs only on its call, and `play` continues only while the
+caller answers each progress message. When the caller's end of a pipe closes, for any reason, the force fades, the
+device is closed, and the process ends."""
 
 import contextlib
 import gc
@@ -23,62 +23,62 @@ from study.devices.device import Device, PlaybackResult
 from study.devices.loop_process.line import CLOSE_TIMEOUT_S, ERROR, LINE_NAMES, PROGRESS, VALUE, PipeEnd
 from study.devices.opening import open_device, raise_thread_priority
 
-POLL_EVERY_S = 0.2
+POLL_INTERVAL_S = 0.2
 """Interval (s) at which the existence of the caller's process is checked, because a fork of the caller may keep its end
-of a pipe open."""
+of a pipe open. Chosen."""
 
-LAST_ANSWER_S = 1.0
-"""Longest wait for the thread that sends the last answer (s)."""
+LAST_ANSWER_TIMEOUT_S = 1.0
+"""Longest wait (s) for the thread that answers the call of `close`. Chosen."""
 
 OPENING_GRACE_S = 1.0
 """Time (s) that the process may still run after its caller has ended while the device is being opened: no stimulus has
-to be faded out then."""
+to be faded out then. Chosen."""
 
-OVERDUE_S = CLOSE_TIMEOUT_S + 3.0
+EXIT_GRACE_S = CLOSE_TIMEOUT_S + 3.0
 """Time (s) in addition to the fade after which a process that does not end is terminated: it hangs, in the driver or in
 an exit handler."""
 
 
-class BrokenOffError(Exception):
-    """The caller has cancelled the commands that are being played."""
+class PlaybackCancelledError(Exception):
+    """The caller has cancelled the playback: it answered a progress message with False."""
 
 
 class DeviceServer:
-    """Serves an opened device to the caller's process: a thread per pipe of `LINE_NAMES` calls the device's methods."""
+    """Executes the caller's remote calls on an opened device: a thread per pipe of `LINE_NAMES` calls the methods."""
 
     def __init__(
         self,
         device: Device,
         ends: tuple[PipeEnd, ...],
-        at_rest: Callable[[], object] = lambda: None,
+        after_stimulus: Callable[[], object] = lambda: None,
         raise_thread_priority: Callable[[], AbstractContextManager[object]] = contextlib.nullcontext,
     ) -> None:
-        """ends: ends of the pipes, in the order of `LINE_NAMES`. at_rest: called after each stimulus.
-        raise_thread_priority: context in which the threads for stops and signs of life run."""
+        """ends: this process's ends of the pipes, in the order of `LINE_NAMES`. after_stimulus: called after each
+        stimulus. raise_thread_priority: context in which the threads for stop and keep-alive calls run."""
         self._device = device
-        self._at_rest = at_rest
+        self._after_stimulus = after_stimulus
         self._raise_priority = raise_thread_priority
         self._closed = threading.Event()
         self.ended = threading.Event()
         """Set when the caller is gone or has asked to close the device."""
-        work, signs, look, stop, close = ends
-        tables: tuple[tuple[PipeEnd, dict[str, Callable[..., Any]]], ...] = (
+        playback_end, keep_alive_end, look_end, stop_end, close_end = ends
+        method_tables: tuple[tuple[PipeEnd, dict[str, Callable[..., Any]]], ...] = (
             (
-                work,
+                playback_end,
                 {
                     "hold": device.hold,
                     "release": device.release,
-                    "play": lambda commands: self._play_commands(work, commands),
+                    "play": lambda commands: self._play_commands(playback_end, commands),
                 },
             ),
-            (signs, {"keep_alive": device.keep_alive, "fault": device.fault, "health": device.health}),
-            (look, {"look": device.look}),
-            (stop, {"stop": device.stop}),
-            (close, {"close": self._await_closed}),
+            (keep_alive_end, {"keep_alive": device.keep_alive, "fault": device.fault, "health": device.health}),
+            (look_end, {"look": device.look}),
+            (stop_end, {"stop": device.stop}),
+            (close_end, {"close": self._await_closed}),
         )
         self._threads = [
-            threading.Thread(target=self._serve, args=table, name=f"serve {name}", daemon=True)
-            for name, table in zip(LINE_NAMES, tables, strict=True)
+            threading.Thread(target=self._serve, args=method_table, name=f"serve {name}", daemon=True)
+            for name, method_table in zip(LINE_NAMES, method_tables, strict=True)
         ]
 
     def start(self) -> None:
@@ -87,90 +87,93 @@ class DeviceServer:
             thread.start()
 
     def close(self) -> None:
-        """Close the device with a fade, then tell the caller that it is done. Never raises."""
+        """Close the device with a fade, then answer the caller's call of `close`, if any. Never raises."""
         self._device.close()
         self._closed.set()
-        self._threads[-1].join(LAST_ANSWER_S)
+        self._threads[-1].join(LAST_ANSWER_TIMEOUT_S)
 
-    def _serve(self, end: PipeEnd, table: dict[str, Callable[..., Any]]) -> None:
-        """Thread of a pipe: receive calls and send answers, until the caller is gone. table: functions by name."""
-        urgent = "stop" in table or "keep_alive" in table
+    def _serve(self, end: PipeEnd, methods: dict[str, Callable[..., Any]]) -> None:
+        """Receive the calls of a pipe, execute them and send the answers, until the caller is gone or the device is
+        closed; the function of the pipe's thread. methods: by the name that a call states."""
+        is_urgent = "stop" in methods or "keep_alive" in methods
         try:
-            with self._raise_priority() if urgent else contextlib.nullcontext():
+            with self._raise_priority() if is_urgent else contextlib.nullcontext():
                 while not self._closed.is_set():
                     name, arguments = end.recv()
-                    end.send(_call_function(table[name], arguments))
+                    end.send(_call_function(methods[name], arguments))
                     if name in ("release", "play"):
-                        self._at_rest()
+                        self._after_stimulus()
         except (EOFError, OSError):
             return
         finally:
             self.ended.set()
 
     def _play_commands(self, end: PipeEnd, commands: Signal) -> PlaybackResult:
-        """Play commands; after each progress, continue only with the caller's consent."""
+        """Play commands; after each progress message, continue only if the caller answers True. Raises
+        PlaybackCancelledError if it answers False."""
 
         def await_consent(share: float) -> None:
+            """Send the share that was played (0 to 1), and wait for the answer of the caller."""
             end.send((PROGRESS, share))
             if not end.recv():
-                raise BrokenOffError
+                raise PlaybackCancelledError
 
         return self._device.play(commands, await_consent)
 
     def _await_closed(self) -> Any:
-        """Ask the main thread to close the device, and wait for that. Returns the final counters."""
+        """Ask the main thread to close the device, and wait until it is closed. Returns the final counters."""
         self.ended.set()
         self._closed.wait()
         return self._device.health()
 
 
-def run(parent: int, *handles: int) -> None:
-    """The main function of the process. parent: process id of the caller; handles: of the ends of the pipes, in the
-    order of `LINE_NAMES`."""
-    told_to_end: list[int] = []
-    _leave_signals_to_the_caller(told_to_end)
-    lifetime = Lifetime(parent, told_to_end)
-    threading.Thread(target=lifetime.watch, name="lifetime", daemon=True).start()
+def run(caller_pid: int, *handles: int) -> None:
+    """Run the process. caller_pid: process id of the caller; handles: file descriptors or handles of this process's
+    ends of the pipes, in the order of `LINE_NAMES`."""
+    received_signals: list[int] = []
+    _install_signal_handlers(received_signals)
+    watchdog = CallerWatchdog(caller_pid, received_signals)
+    threading.Thread(target=watchdog.watch, name="lifetime", daemon=True).start()
     ends = tuple(PipeEnd(handle) for handle in handles)
     with contextlib.suppress(EOFError, OSError):  # the caller is gone: the device is closed all the same
-        _open_and_serve(lifetime, ends)
+        _open_and_serve(watchdog, ends)
 
 
-class Lifetime:
-    """Ensures that the process ends soon after its caller has ended or it was told to end. told_to_end: numbers of the
-    signals received."""
+class CallerWatchdog:
+    """Ends the process if it does not end itself soon after its caller has ended or after a SIGTERM. caller_pid:
+    process id of the caller. received_signals: numbers of the signals received, filled by the signal handler."""
 
-    def __init__(self, parent: int, told_to_end: list[int]) -> None:
-        self._parent = parent
-        self._told_to_end = told_to_end
-        self.patience_s = OPENING_GRACE_S
-        """Time (s) granted to the main thread from then on."""
+    def __init__(self, caller_pid: int, received_signals: list[int]) -> None:
+        self._caller_pid = caller_pid
+        self._received_signals = received_signals
+        self.exit_timeout_s = OPENING_GRACE_S
+        """Time (s) that the main thread may take to end the process, from the moment at which `must_exit` is True."""
 
-    def must_end(self) -> bool:
-        """Whether the process was told to end, or the one that started it is gone."""
-        return bool(self._told_to_end) or os.getppid() != self._parent
+    def must_exit(self) -> bool:
+        """Whether a SIGTERM was received, or the process that started this one is gone."""
+        return bool(self._received_signals) or os.getppid() != self._caller_pid
 
     def watch(self) -> None:
-        """Terminate the process where its main thread does not end it in time; the device's own watchdog then switches
-        the force off."""
-        while not self.must_end():
-            time.sleep(POLL_EVERY_S)
-        due_s = time.monotonic()
-        while time.monotonic() < due_s + self.patience_s:
-            time.sleep(POLL_EVERY_S)
+        """Wait until the process must exit, and terminate it if its main thread does not within `exit_timeout_s`; the
+        watchdog of the device's hardware then switches the force off. The function of a daemon thread."""
+        while not self.must_exit():
+            time.sleep(POLL_INTERVAL_S)
+        end_due_s = time.monotonic()
+        while time.monotonic() < end_due_s + self.exit_timeout_s:
+            time.sleep(POLL_INTERVAL_S)
         os._exit(1)
 
 
-def _open_and_serve(lifetime: Lifetime, ends: tuple[PipeEnd, ...]) -> None:
-    """Open the device that the first message names, serve it until the end is due, and close it with a fade. An error
-    while opening is sent to the caller."""
+def _open_and_serve(watchdog: CallerWatchdog, ends: tuple[PipeEnd, ...]) -> None:
+    """Open the device that the first message names, execute calls until the caller is gone, `close` is called or the
+    process must exit, and close the device with a fade. An error while opening is sent to the caller."""
     name, settings, seed, telemetry = ends[0].recv()[1]
     try:
         device = open_device(name, settings, RealClock(), seed, own_process=False, telemetry=telemetry)
     except BaseException as error:  # noqa: BLE001 - the caller raises it
         ends[0].send((ERROR, _make_sendable(error)))
         return
-    lifetime.patience_s = settings.limits.release_s + settings.limits.watchdog_s + OVERDUE_S
+    watchdog.exit_timeout_s = settings.limits.release_s + settings.limits.watchdog_s + EXIT_GRACE_S
     with contextlib.closing(device):
         # The garbage collector must not interrupt the loop: existing objects are exempted, new ones are collected
         # between stimuli.
@@ -178,28 +181,30 @@ def _open_and_serve(lifetime: Lifetime, ends: tuple[PipeEnd, ...]) -> None:
         gc.freeze()
         gc.disable()
         ends[0].send((VALUE, device.info))
-        server = DeviceServer(device, ends, at_rest=gc.collect, raise_thread_priority=raise_thread_priority)
+        server = DeviceServer(device, ends, after_stimulus=gc.collect, raise_thread_priority=raise_thread_priority)
         server.start()
-        while not (server.ended.wait(POLL_EVERY_S) or lifetime.must_end()):
+        while not (server.ended.wait(POLL_INTERVAL_S) or watchdog.must_exit()):
             pass
         server.close()
 
 
-def _leave_signals_to_the_caller(told_to_end: list[int]) -> None:
-    """Ignore Ctrl-C and the end of the terminal, which the caller handles with a fade. SIGTERM is noted in
-    `told_to_end` and ends the process with the same fade."""
+def _install_signal_handlers(received_signals: list[int]) -> None:
+    """Ignore Ctrl-C and the end of the terminal, which the caller handles with a fade. SIGTERM is appended to
+    `received_signals`, so that the main thread ends the process with a fade, too."""
 
-    def note(number: int, frame: FrameType | None) -> None:
-        told_to_end.append(number)
+    def record_signal(signal_number: int, frame: FrameType | None) -> None:
+        """Append the number of the signal."""
+        received_signals.append(signal_number)
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, note)
+    signal.signal(signal.SIGTERM, record_signal)
     if hasattr(signal, "SIGHUP"):
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
 
 
 def _call_function(function: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[int, Any]:
-    """Call a function. Returns its value or its exception as a message (kind, value)."""
+    """Call a function. Returns its value or its exception as a message (kind, value). Raises EOFError or
+    ConnectionError where the caller is gone."""
     try:
         return VALUE, function(*arguments)
     except (EOFError, ConnectionError):  # the caller ended during its answer to a progress
@@ -209,7 +214,7 @@ def _call_function(function: Callable[..., Any], arguments: tuple[Any, ...]) -> 
 
 
 def _make_sendable(error: BaseException) -> Exception:
-    """The exception itself if it can be pickled and restored, else a RuntimeError with its type and text."""
+    """Return the exception itself if it can be pickled and restored, else a RuntimeError with its type and text."""
     if isinstance(error, Exception):
         with contextlib.suppress(Exception):
             copy = pickle.loads(pickle.dumps(error))

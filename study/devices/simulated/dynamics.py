@@ -1,10 +1,11 @@
-"""Equations of motion of the simulated device, for a tick of 1 ms. Equations and their reasons:
-docs/simulated_omega3.md.
+"""Integrate the equations of motion of the simulated device over a tick of 1 ms. Called by `compiled`. Equations and
+their reasons: docs/simulated_omega3.md.
 
     M (dv/dt, d2r/dt2) = (J^T t + f + f_stop - I_a J^T (dJ/dt) v,  N^T f - K r - C dr/dt)
 
-v: velocity of the handle against the base; r: rocking of the base in the directions N; M: mass matrix (`inertia`); J:
-joint speed per handle velocity; t: torques of the cables (`drives`); f: force of hand and handle modes (`handle`).
+v: velocity of the handle against the base (3,); r: rocking of the base in the directions N (2,); M: mass matrix (5, 5)
+(`inertia`); J: joint speed per handle velocity; I_a: inertia of an arm; t: torques of the cables (`drives`); f: force
+of hand and handle modes (`handle`); f_stop: force of the end stop; K, C: stiffness and damping of the rocking modes.
 
 J and M are computed once per tick, at the predicted midpoint of the handle's path. The fast parts (cables, handle,
 base, friction) take `SUBSTEPS` steps of semi-implicit Euler, speeds before positions, so that energy stays bounded.
@@ -43,23 +44,25 @@ from study.devices.simulated.linkage import solve_inverse_kinematics
 
 
 @inlined
-def add_stops(state: FloatArray, parameters: FloatArray, pull: FloatArray) -> None:
-    """Add to pull[:3] the force (N) of the end stop, a spring and a damper beyond a sphere about the origin. It damps
-    outward motion only, so that its force never points outwards."""
+def add_stops(state: FloatArray, parameters: FloatArray, generalised_force: FloatArray) -> None:
+    """Add the force (N) of the end stop to generalised_force[:3]: a spring and a damper beyond a sphere about the
+    origin. The damper acts on outward motion only, so that the force never points outwards."""
     x, y, z = state[HANDLE_POSITION], state[HANDLE_POSITION + 1], state[HANDLE_POSITION + 2]
     radius = math.sqrt(x * x + y * y + z * z)
     depth = radius - parameters[STOP_RADIUS]
     if depth <= 0.0:
         return
-    outwards = (x * state[HANDLE_VELOCITY] + y * state[HANDLE_VELOCITY + 1] + z * state[HANDLE_VELOCITY + 2]) / radius
-    stop_force = parameters[STOP_STIFFNESS] * depth + parameters[STOP_DAMPING] * max(outwards, 0.0)
-    pull[0] -= stop_force * x / radius
-    pull[1] -= stop_force * y / radius
-    pull[2] -= stop_force * z / radius
+    outward_speed = (
+        x * state[HANDLE_VELOCITY] + y * state[HANDLE_VELOCITY + 1] + z * state[HANDLE_VELOCITY + 2]
+    ) / radius
+    stop_force = parameters[STOP_STIFFNESS] * depth + parameters[STOP_DAMPING] * max(outward_speed, 0.0)
+    generalised_force[0] -= stop_force * x / radius
+    generalised_force[1] -= stop_force * y / radius
+    generalised_force[2] -= stop_force * z / radius
 
 
-class TickConstants(NamedTuple):
-    """Quantities that stay constant during one tick, except `stretch`."""
+class TickQuantities(NamedTuple):
+    """Quantities computed once per tick; `cable_stretch` alone is then updated at each step."""
 
     command: FloatArray
     """(3,), commanded motor torques, N m."""
@@ -67,97 +70,103 @@ class TickConstants(NamedTuple):
     """(3, 3), joint speed per handle velocity at the midpoint, rad/m."""
     inverse_mass: FloatArray
     """(5, 5), inverse of `fill_mass_matrix` at the midpoint, 1/kg."""
-    stretch: FloatArray
-    """(3,), of the cables, rad; changes at each step."""
+    cable_stretch: FloatArray
+    """(3,), stretch of the cables: motor angle minus joint angle, rad."""
     centrifugal: FloatArray
-    """(3,), velocity products (centrifugal and Coriolis force) of the arms at the handle, -I_a J^T (dJ/dt) v, N."""
+    """(3,), centrifugal and Coriolis force of the arms at the handle, -I_a J^T (dJ/dt) v, N."""
 
 
 @inlined
 def integrate_tick(state: FloatArray, parameters: FloatArray, force_n: FloatArray) -> None:
-    """Advance `state` by a tick under a constant command. force_n: (3,), N, the intended force at the handle."""
-    constants = _compute_constants(state, parameters, force_n)
-    cables, pulls, force, change = np.empty(3), np.empty(HANDLE_MODES), np.empty(3), np.empty(MASS_MATRIX_SIZE)
+    """Integrate `state` over a tick under a constant command. force_n: (3,), N, the commanded force at the handle.
+    state, parameters: flat arrays, see `layout`."""
+    quantities = _compute_tick_quantities(state, parameters, force_n)
+    cable_torques, mode_forces, force, accelerations = (
+        np.empty(3),
+        np.empty(HANDLE_MODES),
+        np.empty(3),
+        np.empty(MASS_MATRIX_SIZE),
+    )
     for _ in range(SUBSTEPS):
-        step_drives(state, parameters, constants.command, constants.jacobian, constants.stretch, cables)
-        fill_handle_force(state, parameters, pulls, force)
-        _accelerations(state, parameters, constants, cables, force, change)
+        step_drives(state, parameters, quantities.command, quantities.jacobian, quantities.cable_stretch, cable_torques)
+        fill_handle_force(state, parameters, mode_forces, force)
+        _compute_accelerations(state, parameters, quantities, cable_torques, force, accelerations)
         for axis in range(3):
-            state[HANDLE_VELOCITY + axis] += STEP_S * change[axis]
+            state[HANDLE_VELOCITY + axis] += STEP_S * accelerations[axis]
             state[HANDLE_POSITION + axis] += STEP_S * state[HANDLE_VELOCITY + axis]
-        step_cables(state, constants.jacobian, constants.stretch)
+        step_cables(state, quantities.jacobian, quantities.cable_stretch)
         for mode in range(MOUNT_MODES):
-            state[MOUNT_SPEED + mode] += STEP_S * change[3 + mode]
+            state[MOUNT_SPEED + mode] += STEP_S * accelerations[3 + mode]
             state[MOUNT_DISPLACEMENT + mode] += STEP_S * state[MOUNT_SPEED + mode]
-        _convert_to_absolute(parameters, change)
-        step_handle_modes(state, parameters, pulls, change)
+        _convert_to_absolute(parameters, accelerations)
+        step_handle_modes(state, parameters, mode_forces, accelerations)
         step_sensor(state, parameters)
 
 
 @inlined
-def _compute_constants(state: FloatArray, parameters: FloatArray, force_n: FloatArray) -> TickConstants:
-    """Quantities of a tick. The torques are J^-T force_n with J at the present position, as of a controller; dJ/dt is
-    the difference between the midpoint and the present position over half a tick."""
+def _compute_tick_quantities(state: FloatArray, parameters: FloatArray, force_n: FloatArray) -> TickQuantities:
+    """Compute the quantities of a tick. The commanded torques are J^-T force_n with J at the start position, as a
+    controller computes them; dJ/dt is the difference of J between midpoint and start, divided by half a tick."""
     angles, midpoint, start_jacobian = np.empty(3), np.empty(3), np.empty((3, 3))
-    constants = TickConstants(
+    quantities = TickQuantities(
         np.empty(3), np.empty((3, 3)), np.empty((MASS_MATRIX_SIZE, MASS_MATRIX_SIZE)), np.empty(3), np.empty(3)
     )
     for axis in range(3):
         midpoint[axis] = state[HANDLE_POSITION + axis] + 0.5 * TICK_S * state[HANDLE_VELOCITY + axis]
-    solve_inverse_kinematics(parameters, midpoint, angles, constants.jacobian)
+    solve_inverse_kinematics(parameters, midpoint, angles, quantities.jacobian)
     solve_inverse_kinematics(parameters, state[HANDLE_POSITION : HANDLE_POSITION + 3], angles, start_jacobian)
-    solve_transposed(start_jacobian, force_n, constants.command)
-    constants.centrifugal[:] = 0.0
-    for number in range(3):
-        constants.stretch[number] = state[MOTOR_ANGLE + number] - angles[number]
-        rate_change = 0.0
+    solve_transposed(start_jacobian, force_n, quantities.command)
+    quantities.centrifugal[:] = 0.0
+    for drive in range(3):
+        quantities.cable_stretch[drive] = state[MOTOR_ANGLE + drive] - angles[drive]
+        joint_speed_change = 0.0
         for axis in range(3):
-            rate_change += (constants.jacobian[number, axis] - start_jacobian[number, axis]) * state[
+            joint_speed_change += (quantities.jacobian[drive, axis] - start_jacobian[drive, axis]) * state[
                 HANDLE_VELOCITY + axis
             ]
         for axis in range(3):
-            constants.centrifugal[axis] -= (
-                parameters[ARM_INERTIA] * constants.jacobian[number, axis] * rate_change * 2.0 / TICK_S
+            quantities.centrifugal[axis] -= (
+                parameters[ARM_INERTIA] * quantities.jacobian[drive, axis] * joint_speed_change * 2.0 / TICK_S
             )
-    fill_mass_matrix(parameters, constants.jacobian, constants.inverse_mass)
-    invert_in_place(constants.inverse_mass)
-    return constants
+    fill_mass_matrix(parameters, quantities.jacobian, quantities.inverse_mass)
+    invert_in_place(quantities.inverse_mass)
+    return quantities
 
 
 @inlined
-def _accelerations(
+def _compute_accelerations(
     state: FloatArray,
     parameters: FloatArray,
-    constants: TickConstants,
-    cables: FloatArray,
+    quantities: TickQuantities,
+    cable_torques: FloatArray,
     force: FloatArray,
-    change: FloatArray,
+    accelerations: FloatArray,
 ) -> None:
-    """Fill change (5,), m/s²: acceleration of the handle against the base, then of the two rocking modes. cables: (3,),
-    N m. force: (3,), N, on the handle."""
-    pull = np.empty(MASS_MATRIX_SIZE)
+    """Fill accelerations (5,), m/s²: of the handle against the base, then of the two rocking modes. cable_torques:
+    (3,), N m. force: (3,), N, of hand and handle modes on the handle."""
+    generalised_force = np.empty(MASS_MATRIX_SIZE)
     for axis in range(3):
-        pull[axis] = force[axis] + constants.centrifugal[axis]
-        for number in range(3):
-            pull[axis] += constants.jacobian[number, axis] * cables[number]
-    add_stops(state, parameters, pull)
+        generalised_force[axis] = force[axis] + quantities.centrifugal[axis]
+        for drive in range(3):
+            generalised_force[axis] += quantities.jacobian[drive, axis] * cable_torques[drive]
+    add_stops(state, parameters, generalised_force)
     for mode in range(MOUNT_MODES):
-        pull[3 + mode] = -(
+        generalised_force[3 + mode] = -(
             parameters[MOUNT_STIFFNESS + mode] * state[MOUNT_DISPLACEMENT + mode]
             + parameters[MOUNT_DAMPING + mode] * state[MOUNT_SPEED + mode]
         )
         for axis in range(3):
-            pull[3 + mode] += parameters[MOUNT_DIRECTION + 3 * mode + axis] * force[axis]
+            generalised_force[3 + mode] += parameters[MOUNT_DIRECTION + 3 * mode + axis] * force[axis]
     for row in range(MASS_MATRIX_SIZE):
-        total = 0.0
+        acceleration = 0.0
         for column in range(MASS_MATRIX_SIZE):
-            total += constants.inverse_mass[row, column] * pull[column]
-        change[row] = total
+            acceleration += quantities.inverse_mass[row, column] * generalised_force[column]
+        accelerations[row] = acceleration
 
 
 @inlined
-def _convert_to_absolute(parameters: FloatArray, change: FloatArray) -> None:
-    """Add the base's acceleration to change[:3], which then is the handle's acceleration in the room."""
+def _convert_to_absolute(parameters: FloatArray, accelerations: FloatArray) -> None:
+    """Add the acceleration of the base to accelerations[:3], which then is that of the handle in the room, m/s²."""
     for mode in range(MOUNT_MODES):
         for axis in range(3):
-            change[axis] += parameters[MOUNT_DIRECTION + 3 * mode + axis] * change[3 + mode]
+            accelerations[axis] += parameters[MOUNT_DIRECTION + 3 * mode + axis] * accelerations[3 + mode]

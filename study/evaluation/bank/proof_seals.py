@@ -1,9 +1,10 @@
-"""Seals of a blind test, a commitment by hash: the SHA-256 of every label is written before any case is answered, and
+"""Seals of a blind test (commitment by hash): the SHA-256 of every label is written before any case is answered, and
 compared at every later step.
 
-So neither a truth nor a recording can be changed to suit an answer: a label holds the hashes of the files of its case,
-and an answer must have been given to files with the same hashes. Called by `seal_cases`, `follow_up`, `sealed_bank` and
-`study.evaluation.real.inject_real`.
+A label states the true effect of a case and the hashes of its files; an answer must have been given to files with the
+same hashes. So neither label nor recording can be changed after an answer is known. Called by `seal_cases`,
+`sealed_bank`, `follow_up` and `study.evaluation.real.inject_real`; `ask_engine`, `prove` and `run_controls` read labels
+and answers with it.
 """
 
 import hashlib
@@ -19,14 +20,14 @@ from study.store.disk.strict_json import load_json
 from study.store.disk.text_file import read_text, write_text
 
 HASH_KEYS = ("recording_sha256", "model_sha256", "others_sha256")
-"""Keys of hashes in the label and in the answer; equal values show that the answer belongs to the sealed files."""
+"""Keys of the hashes in label and answer; with equal values, the answer belongs to the sealed files."""
 
 
 def seal(folder: ProofFolder) -> str:
     """Append the hashes of new labels to labels.sha256 after checking the existing ones. Returns the SHA-256 of that
     file.
 
-    Raises StudyError where a label has changed since it was sealed.
+    Raises StudyError where a sealed label is missing or changed, or the file is malformed.
     """
     sealed_hashes = read_seals(folder)
     if changed_names := [name for name, digest in sealed_hashes.items() if _hash_file(folder.path / name) != digest]:
@@ -40,24 +41,24 @@ def seal(folder: ProofFolder) -> str:
 
 
 def read_seals(folder: ProofFolder) -> dict[str, str]:
-    """SHA-256 by path of a label relative to the bank, from labels.sha256; empty if nothing is sealed yet. Raises
-    StudyError for a malformed file."""
+    """Read labels.sha256: SHA-256 (64 hexadecimal digits) by path of a label relative to the bank; empty if nothing is
+    sealed yet. Raises StudyError for a malformed file."""
     if not folder.seals_file.exists():
         return {}
-    parts = [line.split() for line in read_text(folder.seals_file).splitlines()]
-    if any(len(part) != 2 or len(part[0]) != 64 for part in parts):
+    rows = [line.split() for line in read_text(folder.seals_file).splitlines()]
+    if any(len(row) != 2 or len(row[0]) != 64 for row in rows):
         raise make_broken_seal_error([folder.seals_file.name], folder.path)
-    return {name: digest for digest, name in parts}
+    return {name: digest for digest, name in rows}
 
 
 def read_label(path: Path) -> dict[str, Any]:
-    """The sealed label at `path`, parsed. Raises StudyError where it cannot be read or is no JSON object."""
+    """Read and parse the sealed label at `path`. Raises StudyError where it cannot be read or is no JSON object."""
     return parse_json(path, read_text(path), "sealed label")
 
 
 def read_answer(case_folder: Path) -> dict[str, Any]:
-    """The answer.json in `case_folder`, parsed; it may contain NaN (an unknown error). Raises StudyError where
-    it cannot be read or is no JSON object."""
+    """Read and parse the answer.json in `case_folder`; NaN is allowed (an unknown error). Raises StudyError where it
+    cannot be read or is no JSON object."""
     try:
         document = load_json(read_text(case_folder / ANSWER_FILE), with_nan=True)
     except ValueError as problem:
@@ -70,8 +71,9 @@ def read_answer(case_folder: Path) -> dict[str, Any]:
 
 
 def is_answer_to_sealed_case(label: dict[str, Any], answer: dict[str, Any]) -> bool:
-    """Whether an answer belongs to the sealed files and comes from a process that had not imported the challenge. True
-    for the answer of a process that died, which contains no diagnosis. label: of the case, revealed."""
+    """Whether an answer was given to the sealed files by a process that had not imported the package `challenge`, which
+    contains the true effects. True for the answer written for a worker that died, which contains no diagnosis. label:
+    of the case, revealed."""
     if WORKER_DIED_KEY in answer:
         return True
     return answer.get("knows_the_challenge") is False and all(
@@ -80,8 +82,8 @@ def is_answer_to_sealed_case(label: dict[str, Any], answer: dict[str, Any]) -> b
 
 
 def make_broken_seal_error(names: list[str], path: Path) -> StudyError:
-    """The error for cases whose files differ from the sealed files. names: of the cases or labels; path:
-    folder of the bank."""
+    """Make the error for cases whose files differ from the sealed files. names: of the cases or labels; path: folder of
+    the bank."""
     return StudyError(
         "A seal is broken",
         f"Of {len(names)} cases ({', '.join(names[:5])}) in {path} the label, the recording or the model is not what "
@@ -92,5 +94,5 @@ def make_broken_seal_error(names: list[str], path: Path) -> StudyError:
 
 
 def _hash_file(path: Path) -> str:
-    """SHA-256 of a file; empty where there is none."""
+    """Compute the SHA-256 of a file; empty where there is none."""
     return compute_sha256(path) if path.exists() else ""

@@ -2,7 +2,8 @@
 
 `write_proof` writes into the folder of the test: `proof.json` (all figures), `proof.csv` (one row per case) and
 `report.html`. `write_table` writes the figures and the misses as small CSV tables that can be kept under version
-control. Both state the commit and the digests of the code that answered, so that figures can be traced to it.
+control. Both state the commit and the digests of the code that answered, so that figures can be traced to it. Called by
+`hapteq prove`; `write_law_proof` uses `FigureRow` and `read_current_commit`.
 """
 
 import json
@@ -29,7 +30,7 @@ from study.workflows.picture_files import write_pictures
 FORMAT, VERSION = "hapteq-proof", 1
 """Name and version of the format of `proof.json`."""
 DOCUMENT, TABLE, PAGE = "proof.json", "proof.csv", "report.html"
-"""Names of the files in the folder of the test."""
+"""Names of the three files in the folder of the test: all figures, a row per case, and the page."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +39,17 @@ class CaseRow:
     answered."""
 
     number: int
+    """Number of the case in the test."""
     seed: int
+    """Seed of its random draws."""
     kind: str
+    """Kind of the case: nothing, single, pair, outside or without (`outcome`)."""
     bank: str
+    """Part of the bank, see `study.evaluation.challenge.draw_bank`."""
     axes: str
+    """Driven and measured axes."""
     model: str
+    """Origin of the nominal model."""
     concealed: str
     """Names of the concealed effects. This and the other texts with several entries: separated by blanks."""
     at: str
@@ -52,7 +59,9 @@ class CaseRow:
     adds: float
     """Rms change of the readings by the concealed effects, over the rms noise, in the worst channel."""
     detectable: bool
+    """Whether the effects change the readings enough to be detected, by the limit of `outcome.DETECTABLE`."""
     verdict: str
+    """Verdict of the diagnosis."""
     named: str
     """Names of the effects that the diagnosis names."""
     named_at: str
@@ -62,7 +71,8 @@ class CaseRow:
     returned: str
     """The named effects and the rivals that the recordings do not distinguish from these."""
     main_error: float | None
-    """Relative error of the effect's main parameter; only where the right effect of a single one is named."""
+    """Relative error of the main parameter of the effect; only where a single effect is concealed and named
+    correctly."""
     retuned: float | None
     """Rms error on held-out samples over the rms noise, in the worst channel, with the model re-tuned."""
     after: float | None
@@ -86,7 +96,8 @@ class FigureRow:
 
 
 def write_proof(result: BlindTest) -> None:
-    """Write document, table, pictures and page into the test's folder, replacing earlier files. Raises StudyError."""
+    """Write document, table, pictures and page into the test's folder, replacing earlier files. Raises StudyError where
+    a file cannot be read or written."""
     folder, commit_hash = result.folder.path, read_answering_commit(result)
     score = result.score
     document = {
@@ -124,8 +135,9 @@ def write_proof(result: BlindTest) -> None:
 
 
 def write_table(path: Path, result: BlindTest) -> None:
-    """Write the figures to `path` and the misses to `misses_table_path(path)`. Comment lines at the head of the first
-    table state the cases, the code and the seal of the labels. Raises StudyError."""
+    """Write the figures to `path` and the misses to `derive_misses_path(path)`. Comment lines at the head of the first
+    table state the cases, the code and the seal of the labels. Raises StudyError where a file cannot be read or
+    written."""
     calibration = result.score.calibration
     figures = [
         FigureRow(figure.name, figure.value, figure.low, figure.high, figure.of) for figure in result.score.figures
@@ -150,17 +162,18 @@ def write_table(path: Path, result: BlindTest) -> None:
     ]
     write_text(path, "\n".join(lines) + "\n" + format_csv_table(figures, FigureRow), overwrite=True)
     misses = [_make_row(miss, True) for miss in result.score.misses]
-    write_text(misses_table_path(path), format_csv_table(misses, CaseRow), overwrite=True)
+    write_text(derive_misses_path(path), format_csv_table(misses, CaseRow), overwrite=True)
 
 
-def misses_table_path(path: Path) -> Path:
-    """Path of the table of misses, in the folder of the table of figures."""
+def derive_misses_path(path: Path) -> Path:
+    """Derive the path of the table of misses from that of the table of figures: `figures.csv` ->
+    `figures-misses.csv`."""
     return path.with_name(f"{path.stem}-misses{path.suffix}")
 
 
 def read_answering_commit(result: BlindTest) -> str:
-    """The commit in an earlier `proof.json` by the same code; else the current commit, where the current code gave the
-    answers; else "unknown: …"."""
+    """Read the commit of the code that answered: that in an earlier `proof.json` by the same code; else the current
+    commit, where the current code gave the answers or none were given; else "unknown: …"."""
     document = result.folder.path / DOCUMENT
     if document.exists():
         earlier = read_json(document, FORMAT, VERSION)
@@ -174,13 +187,13 @@ def read_answering_commit(result: BlindTest) -> str:
 
 
 def format_seed_range(result: BlindTest) -> str:
-    """First and last seed of the cases, as text: "1 to 500"."""
+    """Format the first and the last seed of the cases: "1 to 500"."""
     return f"{result.plan.seed} to {result.plan.seed + result.plan.cases - 1}"
 
 
 def read_current_commit() -> str:
-    """Commit of the running checkout, with "+" appended if files of its analysis or equalizer are changed; "unknown"
-    where git gives none."""
+    """Read the commit of the running checkout, with "+" appended if tracked files of its folders analysis or equalizer
+    are changed; "unknown" where git fails."""
     root = Path(analysis.diagnosis.__path__[0]).parent
     try:
         commit_hash = _run_git(root, "rev-parse", "HEAD")
@@ -192,13 +205,14 @@ def read_current_commit() -> str:
 
 
 def _run_git(folder: Path, *arguments: str) -> str:
-    """Output of a git command. Raises OSError, CalledProcessError; TimeoutExpired after 60 s."""
+    """Run a git command in a folder and return its output, stripped. Raises OSError where git cannot be run,
+    CalledProcessError where it fails, TimeoutExpired after 60 s."""
     completed = subprocess.run(["git", *arguments], cwd=folder, capture_output=True, text=True, check=True, timeout=60)
     return completed.stdout.strip()
 
 
 def _make_row(outcome: Outcome, counts_as_miss: bool) -> CaseRow:
-    """The row of a case. counts_as_miss: whether it counts as a miss in the score."""
+    """Make the row of a case. counts_as_miss: whether it counts as a miss in the score."""
     is_named_right = outcome.kind == "single" and outcome.is_correct and bool(outcome.concealed)
     return CaseRow(
         outcome.number, outcome.seed, outcome.kind, outcome.bank, " ".join(outcome.axes), outcome.model,
@@ -210,13 +224,13 @@ def _make_row(outcome: Outcome, counts_as_miss: bool) -> CaseRow:
         " ".join(effect.axis or "all" for effect in outcome.named),
         " ".join(f"{effect.probability:.3f}" for effect in outcome.named),
         " ".join(outcome.returned),
-        _round(compute_main_error(outcome.concealed[0], outcome.named[0]) if is_named_right else None),
-        _round(outcome.compute_worst_error("retuned")), _round(outcome.compute_worst_error("after")),
-        _round(outcome.seconds),
+        _round_cell(compute_main_error(outcome.concealed[0], outcome.named[0]) if is_named_right else None),
+        _round_cell(outcome.compute_worst_error("retuned")), _round_cell(outcome.compute_worst_error("after")),
+        _round_cell(outcome.seconds),
         counts_as_miss,
     )  # fmt: skip
 
 
-def _round(value: float | None) -> float | None:
-    """The value with four decimals; None for NaN."""
+def _round_cell(value: float | None) -> float | None:
+    """Round a value to four decimals for the table; None for None and NaN."""
     return None if value is None or value != value else round(value, 4)

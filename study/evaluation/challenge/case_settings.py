@@ -17,7 +17,7 @@ class CaseSettings:
     periods: int = 4
     """Number of periods of each multisine for the fit."""
     extras: float = 0.0
-    """Factor of the nuisance effects (`extras`), which no label names; 0 = none, 1 = about a tenth of the noise."""
+    """Factor of the effects of `nuisance_effects`, which no label names; 0 = none, 1 = about a tenth of the noise."""
 
     steps: int = 20
     """Integration steps per sample. With 20 the integration error equals a sensor gain error of 0.2 % on one axis

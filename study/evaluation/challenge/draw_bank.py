@@ -2,7 +2,7 @@
 
 A block of forty cases has ten with nothing missing, eighteen with one effect, four with two, four with an effect
 outside the catalogue, and four where the diagnosis may not name the true effect. Five of the forty have larger
-nuisance effects (`extras`), and five come from a second physics engine. The order within a block is random. All counts
+nuisance effects, and five come from a second physics engine. The order within a block is random. All counts
 and shares are chosen. Called by `study.evaluation.bank.seal_cases`.
 
 The random streams of a bank's seed have the keys 1 (order of a block), 2 (a case) and 3 (order of the effects).
@@ -21,8 +21,8 @@ CaseKind = Literal["nothing", "single", "pair", "outside", "without"]
 """How many effects are missing in the model: none, one or two; an effect outside the catalogue; or an effect that the
 diagnosis may not name."""
 BankPart = Literal["main", "dirty", "engine"]
-"""Part of a bank: nuisance effects (`extras`) of ordinary size (main), of twice that size (dirty), or the second
-physics engine without nuisance effects (engine)."""
+"""Part of a bank: nuisance effects (`nuisance_effects`) of ordinary size (main), of twice that size (dirty), or the
+second physics engine without nuisance effects (engine)."""
 
 CASE_COUNTS: dict[tuple[CaseKind, BankPart], int] = {
     ("nothing", "main"): 8, ("nothing", "dirty"): 1, ("nothing", "engine"): 1,

@@ -1,9 +1,8 @@
 """Draws a case of the blind test from a seed: a recording, a model that lacks some physics, and the truth.
 
-Steps: draw bench and excitation, add nuisance effects (`extras`), draw and build in the concealed effects, simulate and
-measure, make the model that a laboratory would have (`nominal`). Called by `draw_bank` and `controls`; the other
-simulations of this folder use its parts.
-"""
+Steps: draw bench and excitation, add nuisance effects (`nuisance_effects`), draw and build in the concealed effects,
+simulate and measure, make the model that a laboratory would have (`nominal_models`). Called by `draw_bank` and
+`controls`; the other simulations of this folder use its parts."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -21,8 +20,8 @@ from study.evaluation.challenge.concealed_effect import ConcealedEffect, EffectC
 from study.evaluation.challenge.device import Device, simulate_motion
 from study.evaluation.challenge.drive_plan import AXES, RATE_HZ, DrivePlan, draw_plan
 from study.evaluation.challenge.effects import actuator, decoys, friction, hand, inertia_and_drag, sensor, springs
-from study.evaluation.challenge.extras import with_extras
-from study.evaluation.challenge.nominal import as_model, draw_calibration, retune
+from study.evaluation.challenge.nominal_models import as_model, draw_calibration, retune
+from study.evaluation.challenge.nuisance_effects import add_nuisance_effects
 from study.evaluation.challenge.sensor import NOISE_MPS2, POSITION_NOISE_M, POSITION_STEP_M, RANGE_MPS2, read_sensor
 
 EFFECTS: dict[str, ConcealedEffect] = {
@@ -99,7 +98,7 @@ def draw_case(
         raise ValueError("a hand can be concealed from a calibrated model only: a re-tuned one contains it")
     random = np.random.default_rng([seed, len(chosen_effects)])
     bench, plan = draw_bench(random), draw_plan(random, settings)
-    baseline = with_extras(Device(bench, steps=settings.steps), settings.extras, seed)
+    baseline = add_nuisance_effects(Device(bench, steps=settings.steps), settings.extras, seed)
     strengths = _draw_strengths(strength, len(chosen_effects), random)
     base_motion = simulate_motion(baseline, plan.command)
     device, truth = _conceal_effects(baseline, base_motion, (chosen_effects, strengths), random, settings)

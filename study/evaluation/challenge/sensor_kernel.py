@@ -1,6 +1,6 @@
 """First-order low-pass and play hysteresis of a simulated accelerometer, sample by sample (compiled).
 
-Called by `sensor`; `nominal` uses the low-pass for the linear model of the sensor.
+Called by `sensor`; `nominal_models` uses the low-pass for the linear model of the sensor.
 """
 
 import numpy as np

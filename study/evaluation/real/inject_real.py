@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.diagnosis.real_answer.real_answer import RealAnswer
-from analysis.evaluation.blind_test.injected import InjectedOutcome, read_outcome
+from analysis.evaluation.blind_test.injected_faults import InjectedOutcome, read_outcome
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.recording import Recording
 from study.errors import StudyError

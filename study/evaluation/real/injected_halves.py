@@ -11,7 +11,7 @@ import numpy as np
 from analysis.diagnosis.contrast.bases import bases_of
 from analysis.diagnosis.contrast.compared_base import Base
 from analysis.diagnosis.contrast.joint_products import solve_residual_weights
-from analysis.diagnosis.contrast.part import Part, split_into_parts
+from analysis.diagnosis.contrast.recording_part import Part, split_into_parts
 from analysis.diagnosis.data.observed_parts import cut_part, find_parts
 from equalizer.signals.joining import concatenate, concatenate_if_all
 from equalizer.signals.recording import Recording, Segment

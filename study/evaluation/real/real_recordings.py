@@ -1,8 +1,9 @@
 """Diagnose all recordings of a folder of real devices (`hapteq real`).
 
-`diagnose_folder` takes the inventory, reuses the answers of an earlier run whose inputs are unchanged, diagnoses the
-other recordings here or on the workers of an executor, injects faults if `RealPlan.inject` is above 0, and writes page
-and table. Each answer is written as soon as it is known, so that an interrupted run can be resumed.
+`diagnose_folder` lists the recordings, reuses the answers of an earlier run whose inputs are unchanged, diagnoses the
+other recordings in this process or on the workers of an executor, injects faults if `RealPlan.inject` is above 0, and
+writes page and table. Each answer is written as soon as it is known, so that an interrupted run can be resumed. The
+last 2 % of the progress are for page and table.
 """
 
 import errno
@@ -18,7 +19,7 @@ from tempfile import TemporaryDirectory
 from analysis.diagnosis.real_answer.real_answer import RealAnswer
 from analysis.diagnosis.search.time_budget import CountedBudget
 from analysis.diagnosis.types import TimeBudget
-from analysis.evaluation.blind_test.injected import InjectedOutcome
+from analysis.evaluation.blind_test.injected_faults import InjectedOutcome
 from study.devices.clock import Clock, RealClock
 from study.errors import StudyError, UserInterruptError, WrongUseError, convert_interrupts
 from study.evaluation.bank.ask_engine import Workers
@@ -47,22 +48,21 @@ from study.workflows.forked_map import measure_processor_s, without_forking
 from study.workflows.run_on_executor import run_tasks
 
 RETUNED_NAME = "retuned.toml"
-"""Re-tuned model, in the folder of a recording's answer."""
+"""File name of the re-tuned model, in the folder of a recording's answer."""
 DIAGNOSIS_SHARE = 0.5
-"""Progress, 0 to 1, at which the diagnosis ends and the injection of faults begins."""
+"""Progress, 0 to 1, at which the injection of faults begins, if there is one. Chosen."""
 MAX_EVALUATIONS = 4000
-"""Limit of the search for one recording, counted in evaluations (a structure weighed, a law simulated or fitted). At
-the limit the search ends with its best result. Evaluations are counted instead of seconds, because answers would
-otherwise depend on the load of the machine."""
+"""Largest number of evaluations (structures compared, laws simulated or fitted) in the search for one recording, which
+then ends with its best result. Chosen. A limit in seconds would make answers depend on the load of the machine."""
 MAX_TASKS_IN_FLIGHT = 16
-"""Most recordings in flight on an executor: each is sent with all files of its sub-folder, which are in memory until
-then."""
+"""Largest number of recordings that are submitted to an executor at a time: each is sent with all files of its
+sub-folder, which are in memory until then. Chosen."""
 OVERHEAD_S = 25.0
-"""Processor time (s) subtracted from the time of a recording, where `RealPlan.seconds` is given: for all work other
-than the search (fit of a model, page, figures)."""
+"""Processor time (s) per recording for all work other than the search (fit of a model, page, figures), where
+`RealPlan.seconds` is given. Chosen."""
 
 Progress = Callable[[str, float], None]
-"""Called with the current step in words and the fraction that is done, 0 to 1."""
+"""Called with a description of the current step and the fraction that is done, 0 to 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,9 +83,9 @@ class RealPlan:
 def diagnose_folder(
     plan: RealPlan, on_progress: Progress, clock: Clock | None = None, executor: Executor | None = None
 ) -> WrittenReal:
-    """Diagnose all recordings of a folder, and write page and table. executor: diagnoses on its workers, which may
-    share no disk; None: here. Resumable after UserInterruptError. Raises StudyError; WrongUseError for an executor
-    together with `plan.seconds`."""
+    """Diagnose all recordings of a folder, and write page and table. executor: its workers, which may share no disk,
+    diagnose; None: this process diagnoses, and injected faults on two processes. Resumable after UserInterruptError.
+    Raises StudyError; WrongUseError for an executor together with `plan.seconds`."""
     if executor is not None and plan.seconds is not None:
         raise WrongUseError(
             "--seconds counts this computer's processor time",
@@ -93,27 +93,27 @@ def diagnose_folder(
             "Leave --seconds out: searches then end by a count of evaluations, the same on every machine.",
             saved="Nothing was written.",
         )
-    inventory = _take_inventory(plan)
+    real_folder = _list_recordings(plan)
     used_clock = clock or RealClock()
-    reused = find_reusable_answers(plan.out, inventory.recordings, plan.seconds)
-    _make_writable(plan.out)
+    reused = find_reusable_answers(plan.out, real_folder.recordings, plan.seconds)
+    _create_output_folder(plan.out)
     saved = f"What was answered so far is in {plan.out}."
     with convert_interrupts("Not all recordings were diagnosed.", saved, further_types=(UserInterruptError,)):
         if executor is None:
-            answers = _diagnose_here(plan, inventory, reused, on_progress, used_clock)
+            answers = _diagnose_here(plan, real_folder, reused, on_progress, used_clock)
         else:
-            answers = _diagnose_on_executor(plan, inventory, reused, on_progress, executor)
-        injected = _inject_faults(plan, inventory, answers, on_progress, executor or 2)
+            answers = _diagnose_on_executor(plan, real_folder, reused, on_progress, executor)
+        injected = _inject_faults(plan, real_folder, answers, on_progress, executor or 2)
         on_progress("writing the page", 0.98)
         return write_real(
             plan.out,
-            RealResults(answers, inventory.troubles, injected),
+            RealResults(answers, real_folder.troubles, injected),
             format_time_in_zone(used_clock.utc(), convert_to_machine_zone),
         )
 
 
-def _take_inventory(plan: RealPlan) -> RealFolder:
-    """Recordings of the folder. Raises WrongUseError for seconds that are not finite, StudyError without a
+def _list_recordings(plan: RealPlan) -> RealFolder:
+    """List the recordings of the folder. Raises WrongUseError for seconds that are not finite, StudyError without a
     recording."""
     if plan.seconds is not None and not math.isfinite(plan.seconds):
         raise WrongUseError(
@@ -133,8 +133,8 @@ def _take_inventory(plan: RealPlan) -> RealFolder:
     )
 
 
-def _make_writable(out: Path) -> None:
-    """Create the output folder before the work. Raises CannotWriteError."""
+def _create_output_folder(out: Path) -> None:
+    """Create the output folder before any diagnosis. Raises CannotWriteError, also where it is not writable."""
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
@@ -146,42 +146,48 @@ def _make_writable(out: Path) -> None:
 def _inject_faults(
     plan: RealPlan, inventory: RealFolder, answers: Sequence[RealAnswer], on_progress: Progress, workers: Workers
 ) -> tuple[InjectedOutcome, ...]:
-    """Inject `plan.inject` faults into diagnosed recordings and diagnose them; no outcomes where it is 0."""
+    """Inject `plan.inject` faults into diagnosed recordings and diagnose these; empty where it is 0."""
     if plan.inject == 0:
         return ()
     start_share = DIAGNOSIS_SHARE
     on_progress("injecting faults", start_share)
     carriers = load_carriers(plan.out, inventory.recordings, answers)
 
-    def show(done: int, total: int) -> None:
+    def report_progress(done: int, total: int) -> None:
+        """Report the number of finished injections."""
         on_progress(f"injected faults, {done} of {total}", start_share + (0.98 - start_share) * done / max(total, 1))
 
-    return run_injections(plan.out / INJECTED_NAME, carriers, (plan.inject, plan.seed), show, workers)
+    return run_injections(plan.out / INJECTED_NAME, carriers, (plan.inject, plan.seed), report_progress, workers)
 
 
 def _diagnose_here(
     plan: RealPlan, inventory: RealFolder, reused: Mapping[Path, RealAnswer], on_progress: Progress, clock: Clock
 ) -> tuple[RealAnswer, ...]:
-    """Answers of all recordings in order, diagnosed here one after another; those in `reused` are reused. With
-    `plan.seconds`, the remaining time of a sub-folder is divided evenly among its remaining recordings; each gets at
-    least a tenth of `plan.seconds`."""
-    # The last 2 % of the progress are for writing the page.
-    answers, count, end_share = [], max(len(inventory.recordings), 1), DIAGNOSIS_SHARE if plan.inject else 0.98
+    """Diagnose the recordings in order in this process, except those with an answer in `reused` (by answer folder);
+    returns all answers in order. With `plan.seconds`, the remaining time of a sub-folder is divided evenly among its
+    remaining recordings, less `OVERHEAD_S` each; each gets at least a tenth of `plan.seconds`."""
+    answers, recording_count, end_share = (
+        [],
+        max(len(inventory.recordings), 1),
+        DIAGNOSIS_SHARE if plan.inject else 0.98,
+    )
     limit_s = plan.seconds or 0.0
-    remaining_s = dict.fromkeys((listed.folder.name for listed in inventory.recordings), limit_s)
-    for number, recording in enumerate(inventory.recordings):
-        remaining_count = sum(candidate.folder == recording.folder for candidate in inventory.recordings[number:])
+    remaining_s = dict.fromkeys((listed_recording.folder.name for listed_recording in inventory.recordings), limit_s)
+    for index, recording in enumerate(inventory.recordings):
+        remaining_count = sum(candidate.folder == recording.folder for candidate in inventory.recordings[index:])
         start_s = measure_processor_s()
-        budget = max(remaining_s[recording.folder.name] / remaining_count - OVERHEAD_S, 0.1 * limit_s)
+        budget_s = max(remaining_s[recording.folder.name] / remaining_count - OVERHEAD_S, 0.1 * limit_s)
 
-        def show(step: str, share: float, number: int = number, real_recording: RealRecording = recording) -> None:
+        def report_progress(
+            step: str, share: float, index: int = index, real_recording: RealRecording = recording
+        ) -> None:
             on_progress(
                 f"{real_recording.folder.name}, {real_recording.name}: {step}",
-                end_share * (number + min(share, 1.0)) / count,
+                end_share * (index + min(share, 1.0)) / recording_count,
             )
 
         reused_answer = reused.get(locate_answer_folder(plan.out, recording))
-        answers.append(reused_answer or _diagnose_and_write(plan, recording, budget, show, clock))
+        answers.append(reused_answer or _diagnose_and_write(plan, recording, budget_s, report_progress, clock))
         remaining_s[recording.folder.name] -= measure_processor_s() - start_s
     return tuple(answers)
 
@@ -193,8 +199,8 @@ def _diagnose_on_executor(
     on_progress: Progress,
     executor: Executor,
 ) -> tuple[RealAnswer, ...]:
-    """Answers of all recordings in order; those not in `reused` are diagnosed on the workers of the executor, which
-    return the files of the results."""
+    """Diagnose the recordings without an answer in `reused` on the workers of the executor, which return the files of
+    the results; returns all answers in order."""
     answer_paths = [locate_answer_folder(plan.out, real_recording) for real_recording in inventory.recordings]
     unanswered = [
         (answer_path, real_recording)
@@ -206,16 +212,16 @@ def _diagnose_on_executor(
         for answer_path, real_recording in unanswered
     )
     answers, end_share = dict(reused), DIAGNOSIS_SHARE if plan.inject else 0.98
-    for answer_path, files in run_tasks(executor, answer_sent_recording, tasks, MAX_TASKS_IN_FLIGHT):
-        with _new_folder_in_parents(answer_path) as part:
-            write_files(part, files)
+    for answer_path, files in run_tasks(executor, diagnose_sent_recording, tasks, MAX_TASKS_IN_FLIGHT):
+        with _create_folder_with_parents(answer_path) as answer_folder:
+            write_files(answer_folder, files)
         answers[answer_path] = read_answer_and_provenance(answer_path / ANSWER_NAME)[0]
         on_progress(f"{len(answers)} of {len(answer_paths)} answered", end_share * len(answers) / len(answer_paths))
     return tuple(answers[answer_path] for answer_path in answer_paths)
 
 
-def answer_sent_recording(folder: str, name: str, files: FileContents) -> FileContents:
-    """Diagnose one recording on a worker, and return the files of its results. folder, files: name and content of its
+def diagnose_sent_recording(folder: str, name: str, files: FileContents) -> FileContents:
+    """Diagnose one recording on a worker, and return the files of its results. folder, files: name and files of its
     sub-folder; name: of the recording. Raises StudyError where the recording is not in these files."""
     with TemporaryDirectory() as temporary, without_forking():
         plan = RealPlan(Path(temporary) / "recordings", Path(temporary) / "out")
@@ -237,13 +243,15 @@ def answer_sent_recording(folder: str, name: str, files: FileContents) -> FileCo
 def _diagnose_and_write(
     plan: RealPlan, real_recording: RealRecording, budget_s: float, on_progress: Progress, clock: Clock
 ) -> RealAnswer:
-    """Diagnose one recording and write its results. budget_s: processor time for the search, used where `plan.seconds`
-    is given. A crash is written as an answer, unless the crash guard is off."""
+    """Diagnose one recording and write its results. budget_s: processor time (s) for the search, used where
+    `plan.seconds` is given. An unexpected exception is written as an answer, or raised where the crash guard is off;
+    StudyError is raised."""
     start_s, processor_start_s, guard = clock.now_s(), measure_processor_s(), make_crash_guard()
     time_budget: TimeBudget = lambda: measure_processor_s() - processor_start_s < budget_s  # noqa: E731
-    time_left = CountedBudget(MAX_EVALUATIONS) if plan.seconds is None else time_budget
+    has_time_left = CountedBudget(MAX_EVALUATIONS) if plan.seconds is None else time_budget
 
     def write_result(diagnosis: RealDiagnosis) -> RealAnswer:
+        """Write a result with the elapsed time (s), and return its answer."""
         answer = replace(diagnosis.answer, seconds=round(clock.now_s() - start_s, 1))
         _write_diagnosis(
             locate_answer_folder(plan.out, real_recording),
@@ -253,7 +261,7 @@ def _diagnose_and_write(
         return answer
 
     try:
-        return write_result(diagnose_real(real_recording, time_left, guard, on_progress))
+        return write_result(diagnose_real(real_recording, has_time_left, guard, on_progress))
     except StudyError:
         raise
     except Exception as crash:
@@ -263,22 +271,22 @@ def _diagnose_and_write(
 
 
 def _write_diagnosis(folder: Path, result: RealDiagnosis, origin: Provenance) -> None:
-    """Write the results of one recording atomically: the answer, and unless it was refused, diagnosis and re-tuned
-    model."""
-    with _new_folder_in_parents(folder) as part:
+    """Write the results of one recording atomically: the answer and, where a diagnosis was made, the diagnosis and the
+    re-tuned model."""
+    with _create_folder_with_parents(folder) as answer_folder:
         if result.findings is not None:
-            write_diagnosis_into(part, result.findings, result.parents)
+            write_diagnosis_into(answer_folder, result.findings, result.parents)
             assert result.findings.retuned is not None
-            write_mechanical_model(part / RETUNED_NAME, result.findings.retuned)
-        write_real_answer(part / ANSWER_NAME, result.answer, origin)
+            write_mechanical_model(answer_folder / RETUNED_NAME, result.findings.retuned)
+        write_real_answer(answer_folder / ANSWER_NAME, result.answer, origin)
 
 
 @contextmanager
-def _new_folder_in_parents(folder: Path) -> Iterator[Path]:
-    """Open a new folder as `create_new_folder` does, and create its parents. Raises StudyError."""
+def _create_folder_with_parents(folder: Path) -> Iterator[Path]:
+    """Create a new folder as `create_new_folder` does, and its parents. Raises StudyError."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
         raise CannotWriteError(folder, problem) from problem
-    with create_new_folder(folder) as part:
-        yield part
+    with create_new_folder(folder) as new_folder:
+        yield new_folder

@@ -2,7 +2,7 @@
 
 from analysis.diagnosis.real_answer.real_answer import RealAnswer
 from analysis.diagnosis.unit_wording import format_error
-from analysis.evaluation.blind_test.injected import score_injections
+from analysis.evaluation.blind_test.injected_faults import score_injections
 from analysis.reports.injected_section import format_rate
 from analysis.reports.real_report import VERDICT_WORDS
 from study.evaluation.real.write_real import WrittenReal

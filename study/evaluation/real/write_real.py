@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.diagnosis.real_answer.real_answer import RealAnswer
-from analysis.evaluation.blind_test.injected import InjectedOutcome
+from analysis.evaluation.blind_test.injected_faults import InjectedOutcome
 from analysis.figures.diagnosis.real_held_out import make_real_picture
 from analysis.reports.real_report import UnusableInput, render_real_report
 from study.store.disk.csv_rows import format_csv_table

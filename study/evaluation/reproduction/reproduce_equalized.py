@@ -1,5 +1,9 @@
-"""Reproduction of the paper's figure 5: simulated playback with and without equalization, one row per combination of
-model, place in the workspace, signal and device."""
+"""Reproduction of the paper's figure 5: playback on the simulated device with and without equalization.
+
+One row per combination of driver, place in the workspace, target signal and device: the rows are listed, played one by
+one (`reproduce_playback`), and split into those of the figure and those of the table only. Called by
+`reproduce_paper`; `reproduce_baselines` uses the drivers.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,19 +25,19 @@ from study.evaluation.reproduction.reproduction_plan import EDGE, ReproductionPl
 
 @dataclass(frozen=True, slots=True)
 class PlacedModels:
-    """Identified models by place; all include the spring that acts during playback."""
+    """Identified models by place and condition; all include the spring that acts during playback."""
 
     centre: IdentifiedModel
     intermediate: tuple[IdentifiedModel, ...]
     """Models identified at `INTERMEDIATE_PLACES`, none of which is the edge."""
     frictionless: IdentifiedModel
-    """Model at the centre, of the device without friction."""
+    """Model at the centre, of the simulated device without friction."""
     hand: IdentifiedModel
-    """Model at the centre, in a hand."""
+    """Model at the centre, with a simulated hand on the handle."""
 
     @property
     def workspace(self) -> WorkspaceModels:
-        """Models of the centre and of the intermediate places, for interpolation."""
+        """Models at the centre and at the intermediate places, for interpolation."""
         return WorkspaceModels((self.centre, *self.intermediate))
 
 
@@ -42,30 +46,33 @@ class EqualizedPlayback:
     """Responses measured with and without equalization, for the figure and its table."""
 
     rows: EqualizedRows
+    """Rows of the figure."""
     table_rows: tuple[PlayedResponse, ...]
     """Rows of the table only."""
     remarks: tuple[str, ...]
+    """Sentences on places outside the models, modes that do not match, and clipped forces."""
 
 
 def play_equalized(
     plan: ReproductionPlan, models: PlacedModels, on_share: Callable[[float], None]
 ) -> EqualizedPlayback:
-    """Play all rows on the simulated device. on_share: called with the progress, 0 to 1."""
+    """Play all rows on the simulated device. on_share: called after each row with the completed fraction, 0 to 1.
+    Raises DeviceError and StudyError as `play_row`."""
     blended = blend_at(models.workspace, EDGE)
     interpolated, remarks = _interpolate_modes(models.workspace)
     rows = _list_rows(models, blended) | interpolated
     responses: dict[str, PlayedResponse] = {}
     for number, (key, row) in enumerate(rows.items(), start=1):
         response = play_row(plan, row)
-        # A static gain would correct its level: only the shape of the response is compared.
-        unscaled = row.driver is drive_without_equalizer
-        responses[key] = replace(response, response=normalise_gain(response.response)) if unscaled else response
+        # Without an equalizer the level is arbitrary: only the shape of the response is compared.
+        is_unequalized = row.driver is drive_without_equalizer
+        responses[key] = replace(response, response=normalise_gain(response.response)) if is_unequalized else response
         on_share(number / len(rows))
     return _split_rows(responses, (*blended.remarks, *remarks, *_describe_clipping(responses)))
 
 
 def make_blending_driver(models: ModelsAtPlace) -> Driver:
-    """Driver with the weighted sum of the forces that each model computes (`ModelsAtPlace.forces`)."""
+    """Make the driver that plays the weighted sum of the forces of all models (`ModelsAtPlace.compute_forces`)."""
 
     def drive(target: Signal) -> FloatArray:
         return models.compute_forces(lambda model: compute_periodic_command(model, target).samples)
@@ -74,29 +81,29 @@ def make_blending_driver(models: ModelsAtPlace) -> Driver:
 
 
 def _list_rows(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, PlaybackRow]:
-    """Rows to play, by key (fields of `EqualizedRows` and further rows): driver, place, signal and device."""
-    centre = make_single_model_driver(models.centre)
-    frictionless = make_single_model_driver(models.frictionless)
+    """List the rows to play by key: the fields of `EqualizedRows`, and further rows of the table."""
+    centre_driver = make_single_model_driver(models.centre)
+    frictionless_driver = make_single_model_driver(models.frictionless)
     return {
         "plain": PlaybackRow("Not equalized, centre", drive_without_equalizer),
-        "equalized": PlaybackRow("Equalized, centre", centre),
+        "equalized": PlaybackRow("Equalized, centre", centre_driver),
         "edge_plain": PlaybackRow("Not equalized, edge", drive_without_equalizer, EDGE),
-        "edge": PlaybackRow("Edge, model of the centre", centre, EDGE),
+        "edge": PlaybackRow("Edge, model of the centre", centre_driver, EDGE),
         "edge_blended": PlaybackRow("Edge, models blended (ours)", make_blending_driver(blended), EDGE),
         "broad_plain": PlaybackRow(
             "Not equalized, centre, all frequencies", drive_without_equalizer, signal="multisine"
         ),
-        "broad": PlaybackRow("Equalized, centre, all frequencies", centre, signal="multisine"),
+        "broad": PlaybackRow("Equalized, centre, all frequencies", centre_driver, signal="multisine"),
         "edge_broad": PlaybackRow(
             "Edge, models blended (ours), all frequencies", make_blending_driver(blended), EDGE, signal="multisine"
         ),
         "slick_plain": PlaybackRow(
             "Not equalized, centre, without friction", drive_without_equalizer, device=FRICTIONLESS
         ),
-        "slick": PlaybackRow("Equalized, centre, without friction", frictionless, device=FRICTIONLESS),
+        "slick": PlaybackRow("Equalized, centre, without friction", frictionless_driver, device=FRICTIONLESS),
         "frictionless": PlaybackRow(
             "Equalized, centre, all frequencies, without friction",
-            frictionless,
+            frictionless_driver,
             device=FRICTIONLESS,
             signal="multisine",
         ),
@@ -104,22 +111,22 @@ def _list_rows(models: PlacedModels, blended: ModelsAtPlace) -> dict[str, Playba
 
 
 def make_single_model_driver(model: IdentifiedModel) -> Driver:
-    """Driver by the periodic inverse of a single model."""
+    """Make the driver that plays the forces of a single model, by its periodic inverse."""
     return lambda target: compute_periodic_command(model, target).samples
 
 
 def _interpolate_modes(workspace: WorkspaceModels) -> tuple[dict[str, PlaybackRow], tuple[str, ...]]:
-    """The row with modal interpolation, or a remark where the modes do not match."""
+    """Make the row with modal interpolation and its remarks; no row and a remark where the modes do not match."""
     try:
-        at_edge = build_modal_interpolation(workspace).at(EDGE)
+        edge_models = build_modal_interpolation(workspace).at(EDGE)
     except ModesDoNotMatchError as mismatch:
         return {}, (f"No modes were interpolated: {mismatch}.",)
-    row = PlaybackRow("Edge, modes interpolated (ours)", make_blending_driver(at_edge), EDGE)
-    return {"edge_modal": row}, at_edge.remarks
+    row = PlaybackRow("Edge, modes interpolated (ours)", make_blending_driver(edge_models), EDGE)
+    return {"edge_modal": row}, edge_models.remarks
 
 
 def _describe_clipping(responses: Mapping[str, PlayedResponse]) -> Sequence[str]:
-    """A remark for each row whose force was clipped."""
+    """Make a remark for each row whose force was clipped."""
     return [
         f"{row.name} ({row.signal}): a cap cut the force off at {row.clipped_ticks} ticks."
         for row in responses.values()
@@ -128,7 +135,7 @@ def _describe_clipping(responses: Mapping[str, PlayedResponse]) -> Sequence[str]
 
 
 def _split_rows(responses: Mapping[str, PlayedResponse], remarks: tuple[str, ...]) -> EqualizedPlayback:
-    """The responses as rows of the figure and rows of the table only."""
+    """Split the responses into rows of the figure and rows of the table only."""
     figure_names = EqualizedRows.__dataclass_fields__
     rows = EqualizedRows(**{name: responses[name] for name in figure_names})
     return EqualizedPlayback(rows, tuple(row for name, row in responses.items() if name not in figure_names), remarks)

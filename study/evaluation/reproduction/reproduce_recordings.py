@@ -11,7 +11,7 @@ from typing import Any
 
 from equalizer.signals.recording import Recording
 from protocols.definition.recording_protocol import RecordingProtocol
-from protocols.document.hashing import protocol_hash
+from protocols.document.hashing import hash_protocol
 from study.devices.opening import SIMULATED
 from study.errors import StudyError
 from study.evaluation.reproduction.reproduction_plan import CENTRE, Place, ReproductionPlan
@@ -75,7 +75,7 @@ def _load_cached_recording(
         raise _make_foreign_file_error(path, "it cannot be read") from problem
     meta = cached.meta
     provenance: dict[str, Any] = meta.get("provenance", {})
-    if provenance.get("protocol_hash") != protocol_hash(protocol):
+    if provenance.get("protocol_hash") != hash_protocol(protocol):
         raise _make_foreign_file_error(path, "it follows another protocol")
     if provenance.get("seeds") != {"device": plan.seed}:
         raise _make_foreign_file_error(path, "it was made with another seed")

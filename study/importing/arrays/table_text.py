@@ -2,8 +2,8 @@
 
 Called by `csv_arrays`. UTF-8 and UTF-16 are recognised by their structure. Legacy encodings accept nearly every byte
 sequence, so that the content decides: Windows-1252 if non-ASCII characters occur singly or in pairs within words, as in
-`µs`, `°` and `Größe`; else the only encoding in which the text contains a known word for a quantity. If there is none,
-or more than one, the error names the candidates.
+`µs`, `°` and `Größe`; else the only encoding in which the text contains a known word for a quantity (`FOREIGN_WORDS`).
+If there is none, or more than one, the error names the candidates.
 """
 
 import codecs
@@ -16,18 +16,21 @@ from study.regular_file import MAX_TABLE_BYTES, read_regular
 from study.store.disk.file_errors import CannotReadError
 
 _MAX_UTF16_SEARCH_BYTES = 4096
-"""Number of bytes searched for UTF-16 without a byte order mark, in which nearly every other byte of a table is
-zero."""
+"""Number of bytes from the beginning searched for UTF-16 without a byte order mark, in which nearly every other byte of
+a table is zero. Chosen."""
 _MAX_DETECTION_BYTES = 65536
-"""Approximate number of bytes, in non-ASCII lines, from which a legacy encoding is detected."""
+"""Approximate number of bytes, in non-ASCII lines, from which a legacy encoding is detected. Chosen."""
 _LEGACY_ENCODINGS = ("gb18030", "shift_jis", "euc_jp", "euc_kr", "big5", "cp1251", "koi8_r", "cp1250", "cp1253")
-"""Encodings that are tried if a text is neither UTF-8, UTF-16 nor Windows-1252."""
+"""Encodings, as Python names them, that are tried if a text is neither UTF-8, UTF-16 nor Windows-1252. If the bytes
+decode to the same text in several of them, the first is used."""
 _NON_ASCII_RUN = re.compile(r"[^\x00-\x7f]+")
 """A run of non-ASCII characters."""
 _NON_ASCII_BYTE = re.compile(rb"[\x80-\xff]")
+"""A byte of a non-ASCII character."""
 _LINE_END = re.compile(rb"[\r\n]|\Z")
+"""End of a line, or of the file."""
 _MAX_SAMPLE_CHARACTERS = 24
-"""Maximum number of characters in the sample of text that an error shows."""
+"""Maximum number of characters in the sample of text that an error shows. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,12 +39,13 @@ class TableText:
 
     text: str
     note: str
-    """A sentence for the user if the encoding was detected from words; else empty."""
+    """A sentence for the user that names the encoding if it was detected from words; else empty."""
 
 
 def read_text(path: Path, encoding: str) -> TableText:
-    """Read the text of a table. encoding: as stated by the map; empty = detect it. Raises CannotReadError, and
-    ValueError if the encoding is wrong, unknown or ambiguous (then with the map's key that would state it)."""
+    """Read the text of a table. encoding: Python's name of it, as stated by the map; empty = detect it. Raises
+    CannotReadError if the file cannot be read; ValueError if the encoding is wrong, unknown or ambiguous (then with the
+    map's key that would state it), or if the file has zero bytes but is no UTF-16 text."""
     try:
         data = read_regular(path, MAX_TABLE_BYTES)
     except OSError as error:
@@ -75,8 +79,8 @@ def _decode(data: bytes, encoding: str) -> str:
 
 
 def _decode_legacy_encoding(data: bytes) -> TableText:
-    """Detect a legacy encoding from the non-ASCII lines that are not comments (# or %), and decode all of `data`.
-    Raises ValueError if no encoding fits, or more than one."""
+    """Detect a legacy encoding from the non-ASCII lines that are not comments (# or %), and decode all of `data`; as
+    Windows-1252, undefined bytes become U+FFFD. Raises ValueError if no encoding fits, or more than one."""
     non_ascii = b"\n".join(_select_non_ascii_lines(data))
     if _is_western(non_ascii):
         return TableText(data.decode("cp1252", errors="replace"), "")
@@ -102,8 +106,8 @@ def _decode_legacy_encoding(data: bytes) -> TableText:
 
 
 def _select_non_ascii_lines(data: bytes) -> list[bytes]:
-    """The first non-ASCII lines that are not comments, up to about `_MAX_DETECTION_BYTES` bytes. Lines are complete: a
-    cut within a multi-byte character would make the right encoding invalid."""
+    """Select the first non-ASCII lines that are not comments, until they have `_MAX_DETECTION_BYTES` bytes together.
+    Lines are complete: a cut within a multi-byte character would make the right encoding invalid."""
     lines, byte_count, line_end = list[bytes](), 0, 0
     while byte_count < _MAX_DETECTION_BYTES and (match := _NON_ASCII_BYTE.search(data, line_end)):
         position = match.start()
@@ -119,7 +123,7 @@ def _select_non_ascii_lines(data: bytes) -> list[bytes]:
 
 def _is_western(data: bytes) -> bool:
     """Whether the bytes are plausible as Windows-1252: each run of non-ASCII characters is a single defined character,
-    or two letters within a word."""
+    or two letters next to another letter. True without non-ASCII bytes."""
     text = data.decode("cp1252", errors="replace")
     for match in _NON_ASCII_RUN.finditer(text):
         neighbours = text[match.start() - 1 : match.start()] + text[match.end() : match.end() + 1]
@@ -130,7 +134,7 @@ def _is_western(data: bytes) -> bool:
 
 
 def _decode_or_empty(data: bytes, encoding: str) -> str:
-    """The decoded text; empty if the bytes are not valid in this encoding."""
+    """Decode strictly; empty if the bytes are not valid in this encoding."""
     try:
         return data.decode(encoding)
     except UnicodeDecodeError:
@@ -138,5 +142,6 @@ def _decode_or_empty(data: bytes, encoding: str) -> str:
 
 
 def _make_sample(text: str) -> str:
-    """Sample of the text for an error: its first non-ASCII characters."""
+    """Make a sample of the text for an error: its first runs of non-ASCII characters, `_MAX_SAMPLE_CHARACTERS` at
+    most."""
     return " ".join(_NON_ASCII_RUN.findall(text))[:_MAX_SAMPLE_CHARACTERS]

@@ -1,5 +1,6 @@
-"""Values of names in an expression: arrays of a file, and definitions ([let]) of the map. `build_recording` makes a
-namespace for each file."""
+"""Look up the names in the expressions of an import map: arrays of a file, and definitions ([let]) of the map.
+`build_recording` and `map_library` make a namespace for each file; `part_signals`, `time_base` and `alignment` use
+it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -18,12 +19,12 @@ from study.importing.map_format.map_errors import ImportProblemError, suggest_na
 from study.importing.map_format.signal_words import split_bracketed_unit
 
 _MAX_LISTED_ARRAYS = 24
-"""Most arrays that a message names."""
+"""Maximum number of arrays that a message names. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
 class NoTime:
-    """Clock of the expressions that define a rate or time stamps, for which no time is known yet."""
+    """`Clock` for the expressions that define a rate or time stamps: no time is known yet."""
 
     def times_s(self, count: int) -> Value:
         """Raises ValueError, because no time is known."""
@@ -32,34 +33,38 @@ class NoTime:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Namespace:
-    """Names of one file, as seen from one part of the map."""
+    """Names that the expressions of one part of the map can use for one file. An array has precedence over a definition
+    of the same name."""
 
     arrays: Mapping[str, npt.NDArray[Any]]
+    """Arrays by name."""
     definitions: Mapping[str, str]
+    """Expressions of [let] by name."""
     file_name: str
-    """The file, for messages."""
+    """Name of the file, for messages."""
     budget: Budget
     """Limit of the cost of all expressions of an import together."""
     _open_definitions: set[str] = field(default_factory=set)
-    """Definitions that are being evaluated: a recursive definition is refused."""
+    """Names of the definitions that are being evaluated: a recursive definition is refused."""
 
     def compute_value(self, text: str, clock: Clock) -> Value:
-        """Value of an array by its name, which may contain any characters, or of an expression. Raises
-        ImportProblemError."""
+        """Compute the value of `text`: an array if it is the exact name of one, which may contain any characters; else
+        an expression. clock: gives the times for it. Raises ImportProblemError where it cannot be computed."""
         if text in self.arrays:
             return self._convert_to_float(text)
         return evaluate(text, lambda name: self.look_up_value(name, clock), clock, self.budget)
 
     def compute_number(self, text: str) -> float:
-        """Value of an expression that must be a single finite number. Raises ImportProblemError otherwise."""
+        """Compute the value of an expression that must be a single finite number, without a time. Raises
+        ImportProblemError otherwise."""
         value = self.compute_value(text, NoTime())
         if np.size(value) != 1 or not np.isfinite(value).all():
             raise ImportProblemError(f"'{text}' has the shape {np.shape(value)}; it must be one number")
         return float(np.ravel(value)[0])
 
     def look_up_value(self, name: str, clock: Clock) -> Value:
-        """Value of an array or a definition. clock: gives the times for the expression of a definition. Raises
-        ImportProblemError for an unknown name."""
+        """Look up the value of an array or a definition. clock: gives the times for the expression of a definition.
+        Raises ImportProblemError for an unknown name, and for a value that cannot be computed."""
         if name in self.arrays:
             return self._convert_to_float(name)
         if name in self.definitions:
@@ -76,7 +81,8 @@ class Namespace:
         return name in self.arrays or name in self.definitions
 
     def list_names(self) -> str:
-        """Names with their shapes, for messages."""
+        """List the names of the first `_MAX_LISTED_ARRAYS` arrays with their shapes, and how many more there are, for
+        messages."""
         array_texts = [
             f"{name} {_describe_shape(array)}" for name, array in list(self.arrays.items())[:_MAX_LISTED_ARRAYS]
         ]
@@ -84,7 +90,7 @@ class Namespace:
         return ", ".join(array_texts) + (f" and {unlisted_count} more" if unlisted_count > 0 else "")
 
     def _evaluate_definition(self, name: str, clock: Clock) -> Value:
-        """Value of a definition of the map. Raises ImportProblemError for a recursive definition."""
+        """Compute the value of a definition of the map. Raises ImportProblemError for a recursive definition."""
         if name in self._open_definitions:
             raise ImportProblemError(f"the definition of '{name}' refers to itself")
         self._open_definitions.add(name)
@@ -95,7 +101,8 @@ class Namespace:
             self._open_definitions.discard(name)
 
     def _convert_to_float(self, name: str) -> Value:
-        """An array as float64. Raises ImportProblemError where it holds no real numbers."""
+        """Convert an array to float64, at a cost of its size. Raises ImportProblemError where it holds no real
+        numbers."""
         array = self.arrays[name]
         problem = find_unread_reason(array)
         if isinstance(problem, FaultyColumn):
@@ -113,8 +120,10 @@ class Namespace:
 
 
 def make_namespace(arrays: Arrays, definitions: Mapping[str, str], prefix: str, budget: Budget) -> Namespace:
-    """Namespace of a file. Names that begin with the prefix are also known without it, and `fx [N]` as `fx`. Raises
-    ImportProblemError if a prefix is given and no name begins with it."""
+    """Make the namespace of a file. Names that begin with the prefix are also known without it, and `fx [N]` as `fx`.
+    Of equal names, that without the prefix has precedence, then the name in the file, then that without the unit. The
+    budget is extended by the number of values of the file. Raises ImportProblemError if a prefix is given and no name
+    begins with it."""
     unprefixed = {name.removeprefix(prefix): array for name, array in arrays.by_name.items() if name.startswith(prefix)}
     unitless = {split_bracketed_unit(name)[0]: array for name, array in arrays.by_name.items()}
     if prefix and not unprefixed:
@@ -125,7 +134,8 @@ def make_namespace(arrays: Arrays, definitions: Mapping[str, str], prefix: str, 
 
 
 def _describe_shape(array: npt.NDArray[Any]) -> str:
-    """Shape of an array in words."""
+    """Describe the shape of an array: "(100 x 3)", "(a number)", or "(no numbers)" for texts, complex numbers and
+    objects."""
     if array.dtype.kind not in "fiub":
         return "(no numbers)"
     return "(a number)" if array.ndim == 0 else f"({' x '.join(str(count) for count in array.shape)})"

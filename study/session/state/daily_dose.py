@@ -10,14 +10,14 @@ from dataclasses import replace
 
 from study.session.facts.log_time import Moment
 from study.session.facts.sitting_events import DoseElsewhere
-from study.session.state.sitting_state import NIGHT_S, SittingState, pass_time
+from study.session.state.sitting_state import DAILY_REST_S, SittingState, pass_time
 from study.session.state.vibration_dose import NO_DOSE, Dose, sum_doses
 
 
 def find_dose_elsewhere(
     sessions: Mapping[str, SittingState], own_session: str, utc: str, unread: tuple[str, ...] = ()
 ) -> DoseElsewhere | None:
-    """Vibration dose from the participant's other sessions since the last pause of at least `NIGHT_S` without
+    """Vibration dose from the participant's other sessions since the last pause of at least `DAILY_REST_S` without
     vibration.
 
     sessions: states of all sessions of the participant, by name; own_session: the session that continues at the time
@@ -34,10 +34,10 @@ def find_dose_elsewhere(
     began_s = 0.0
     for name, sitting in sorted(exposed.items(), key=lambda item: item[1].still_s or 0.0):
         still_s = sitting.still_s or 0.0
-        if still_s - began_s >= NIGHT_S:
+        if still_s - began_s >= DAILY_REST_S:
             break
         counted_sessions[name] = sitting
-        began_s = max(began_s, sitting.sat_s or still_s)
+        began_s = max(began_s, sitting.sitting_elapsed_s or still_s)
     counted_sessions.pop(own_session, None)
     if not counted_sessions:
         return DoseElsewhere((), 0.0, 0.0, 0.0, 0.0, unread) if unread else None

@@ -168,4 +168,4 @@ def _apply_preparation(
         case DemoPlayed():
             amplitude = estimate_amplitude_mps2(state.trials, event.frequency_hz, event.level_n)
             sitting = add_exposure(start_motion(state.sitting), event.frequency_hz, amplitude, event.seconds)
-            return replace(state, sitting=replace(sitting, demos=sitting.demos + 1))
+            return replace(state, sitting=replace(sitting, demo_count=sitting.demo_count + 1))

@@ -73,7 +73,7 @@ def find_next_preparation(state: SessionState) -> Preparation | None:
     forms = (
         (FormKind.CONSENT, sitting.consented),
         (FormKind.EXCLUSION, sitting.included),
-        (FormKind.QUESTIONNAIRE, sitting.questioned),
+        (FormKind.QUESTIONNAIRE, sitting.questionnaire_done),
         (FormKind.SETUP, sitting.setup_done),
     )
     for kind, is_done in forms:
@@ -111,7 +111,7 @@ def find_reached_limit(state: SessionState, utc: str, monotonic_s: float | None 
     are the duration of the sitting (minutes) and the daily vibration exposure A(8) of the hand (m/s²)."""
     limits = state.protocol.limits
     sitting = pass_time(state.sitting, Moment(utc, monotonic_s))
-    if (sitting.sat_s or 0.0) / 60.0 >= limits.longest_min:
+    if (sitting.sitting_elapsed_s or 0.0) / 60.0 >= limits.longest_min:
         return f"the longest sitting of {limits.longest_min:g} minutes is reached; go on another day"
     a8_mps2 = compute_a8_mps2(compute_daily_dose(sitting))
     if a8_mps2 >= limits.dose_a8_mps2:

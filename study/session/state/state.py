@@ -91,7 +91,9 @@ def begin_session(opened: SessionOpened, protocol: StudyProtocol) -> SessionStat
         trials=(),
         rest_due_s=0.0,
         closed=False,
-        sitting=set_dose_elsewhere(SittingState(last=Moment(opened.utc, opened.monotonic_s)), opened.dose_elsewhere),
+        sitting=set_dose_elsewhere(
+            SittingState(last_moment=Moment(opened.utc, opened.monotonic_s)), opened.dose_elsewhere
+        ),
     )
     return replace(state, staircase=begin_staircase(make_current_rule(state)))
 

@@ -153,7 +153,7 @@ def _compute_exposure(watched: FollowedSession, live: Live | None, status: Sitti
     state, limits = watched.state, watched.state.protocol.limits
     sitting = _advance_to_now(state.sitting, live, now_utc) if status in RUNNING_STATUSES else state.sitting
     return Exposure(
-        elapsed_min=(sitting.sat_s or 0.0) / 60.0,
+        elapsed_min=(sitting.sitting_elapsed_s or 0.0) / 60.0,
         limit_min=limits.longest_min,
         dose_a8_mps2=compute_a8_mps2(compute_daily_dose(sitting)),
         dose_limit_mps2=limits.dose_a8_mps2,
@@ -163,7 +163,7 @@ def _compute_exposure(watched: FollowedSession, live: Live | None, status: Sitti
 def _advance_to_now(sitting: SittingState, live: Live | None, now_utc: str) -> SittingState:
     """The sitting advanced to now, by the session's monotonic clock if its live state has it, otherwise by this
     computer's clock."""
-    stamped = live is not None and live.monotonic_s is not None and sitting.last.monotonic_s is not None
+    stamped = live is not None and live.monotonic_s is not None and sitting.last_moment.monotonic_s is not None
     if live is not None and stamped:
         return pass_time(sitting, Moment(live.utc, live.monotonic_s))
     return pass_time(sitting, Moment(now_utc))

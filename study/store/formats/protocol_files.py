@@ -1,6 +1,7 @@
-"""Protocols on the disk: shipped protocols are read by name, others by path; and the locks of protocols.
+"""Read protocols, shipped ones by name and others by path; write and check the locks of protocols.
 
-A lock (`NAME.lock.json`) fixes a protocol before data are collected: a protocol that differs from its lock is refused.
+A lock (`NAME.lock.json`) fixes a protocol before data are collected (preregistration): a protocol that differs from its
+lock is refused. Called by the commands that take a protocol (`study.cli`) and by `study.workflows`.
 """
 
 import os
@@ -37,7 +38,7 @@ class ProtocolFile(Generic[P]):
     path: Path | None
     """Path of the file; None for a shipped protocol."""
     lock: ProtocolLock | None
-    """The lock that the protocol was checked against; None without a lock."""
+    """Lock with which the protocol agrees; None without a lock."""
 
     @property
     def locked(self) -> bool:
@@ -71,7 +72,7 @@ class LockedProtocolChangedError(StudyError):
 
 
 def list_shipped_protocols() -> tuple[str, ...]:
-    """Names of the protocols that come with hapteq."""
+    """List the names of the protocols that are part of hapteq, sorted."""
     return tuple(
         sorted(entry.name.removesuffix(".toml") for entry in files("protocols").iterdir() if _is_toml(entry.name))
     )
@@ -101,7 +102,7 @@ def read_study_protocol(name: str, data: Path | None = None) -> ProtocolFile[Stu
     """Read a study protocol. Raises as `read_protocol`, and WrongUseError for a recording protocol."""
     file = read_protocol(name, data)
     if not isinstance(file.protocol, StudyProtocol):
-        raise _wrong_kind_error(file.protocol, "a participant can take", "hapteq record")
+        raise _make_wrong_kind_error(file.protocol, "a participant can take", "hapteq record")
     return ProtocolFile(file.protocol, file.text, file.path, file.lock)
 
 
@@ -109,37 +110,37 @@ def read_recording_protocol(name: str, data: Path | None = None) -> ProtocolFile
     """Read a recording protocol. Raises as `read_protocol`, and WrongUseError for a study protocol."""
     file = read_protocol(name, data)
     if not isinstance(file.protocol, RecordingProtocol):
-        raise _wrong_kind_error(file.protocol, "a device can record", "hapteq study")
+        raise _make_wrong_kind_error(file.protocol, "a device can record", "hapteq study")
     return ProtocolFile(file.protocol, file.text, file.path, file.lock)
 
 
-def lock_protocol(file: ProtocolFile[Protocol], folder: Path, locked_utc: str, hapteq: str) -> Path:
-    """Write NAME.lock.json into `folder`, beside the data or the protocol. hapteq: its version.
+def lock_protocol(file: ProtocolFile[Protocol], folder: Path, locked_utc: str, hapteq_version: str) -> Path:
+    """Write NAME.lock.json into `folder`, that of the data or of the protocol. locked_utc: ISO 8601 time.
 
     Locking the same protocol again changes nothing. Raises LockedProtocolChangedError if another version is locked
-    there, CannotWriteError, UnusableFileError (an existing lock).
+    there, CannotWriteError, CannotReadError or UnusableFileError for an existing lock.
     """
-    path = lock_path(file.protocol, folder)
+    path = locate_lock(file.protocol, folder)
     if _read_lock(path, file.protocol) is None:
-        write_text(path, lock_to_json(make_lock(file.protocol, locked_utc, hapteq)))
+        write_text(path, lock_to_json(make_lock(file.protocol, locked_utc, hapteq_version)))
     return path
 
 
-def lock_path(protocol: Protocol, folder: Path) -> Path:
-    """Path of the lock of this protocol in the folder."""
+def locate_lock(protocol: Protocol, folder: Path) -> Path:
+    """Path of the lock of this protocol in the folder; it need not exist."""
     return folder / f"{protocol.name}.lock.json"
 
 
 def _find_lock(protocol: Protocol, path: Path | None, data: Path | None) -> ProtocolLock | None:
-    """Lock of the protocol, in `data` or else beside its file; both are checked. Raises as `_read_lock`."""
+    """Find the lock of the protocol in `data`, or else beside its file; both are checked. Raises as `_read_lock`."""
     folders = [folder for folder in (data, path.parent if path else None) if folder is not None]
-    locks = [_read_lock(lock_path(protocol, folder), protocol) for folder in folders]
+    locks = [_read_lock(locate_lock(protocol, folder), protocol) for folder in folders]
     return next((lock for lock in locks if lock is not None), None)
 
 
 def _read_lock(path: Path, protocol: Protocol) -> ProtocolLock | None:
-    """The lock at this path; None if there is none. Raises CannotReadError, UnusableFileError, and
-    LockedProtocolChangedError where the protocol differs."""
+    """Read and check the lock at this path; None if there is none. Raises CannotReadError, UnusableFileError for a
+    malformed lock, and LockedProtocolChangedError where the protocol differs."""
     if not os.path.lexists(path):  # a dangling link is an unreadable lock, not a missing one
         return None
     text = read_text(path, MAX_DOCUMENT_BYTES)
@@ -155,7 +156,8 @@ def _read_lock(path: Path, protocol: Protocol) -> ProtocolLock | None:
 
 
 def _resolve_path(name: str) -> Path:
-    """The name as a path. Raises WrongUseError where it is neither a path nor a shipped protocol."""
+    """Interpret the name as a path: it ends in .toml, contains a folder, or exists. Raises WrongUseError for any
+    other."""
     path = Path(name)
     if _is_toml(name) or path.parent != Path() or path.exists():
         return path
@@ -169,11 +171,13 @@ def _resolve_path(name: str) -> Path:
 
 
 def _is_toml(name: str) -> bool:
+    """Whether a file name is that of a TOML file."""
     return name.endswith(".toml")
 
 
-def _wrong_kind_error(protocol: Protocol, purpose: str, command: str) -> WrongUseError:
-    """The error for a protocol of another kind. command: the command that takes it."""
+def _make_wrong_kind_error(protocol: Protocol, purpose: str, command: str) -> WrongUseError:
+    """Make the error for a protocol of another kind. purpose: use for which it was given; command: that which takes
+    it."""
     return WrongUseError(
         title="This protocol is of another kind",
         happened=f"'{protocol.name}' is a {protocol.kind} protocol, not one that {purpose}.",

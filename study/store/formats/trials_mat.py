@@ -1,7 +1,8 @@
 """Export the trials of a study as a MATLAB file (MAT-file version 5), for analysis in MATLAB or Octave.
 
 The file contains a structure `trials` with one field per column, structures `units` and `descriptions` with the same
-fields, the answers to questionnaires, and the protocol and the provenance as text.
+fields, the answers to questionnaires, the study's name, the protocol as text, and the provenance as JSON text. Called
+by `study.workflows.results.export_study` for the form "mat".
 """
 
 import io
@@ -19,7 +20,7 @@ from study.store.disk.csv_rows import list_columns
 from study.store.formats.answer_table import AnswerTable
 from study.store.formats.trial_columns import TRIAL_COLUMNS
 
-NAME = "trials.mat"
+TRIALS_MAT_NAME = "trials.mat"
 """Name of the exported file."""
 
 
@@ -28,12 +29,13 @@ def write_trials_mat(
     name: str,
     trials: Sequence[Trial],
     protocol_text: str,
-    facts: Mapping[str, Any],
+    provenance: Mapping[str, Any],
     answers: AnswerTable = AnswerTable(),  # noqa: B008  frozen
 ) -> tuple[Path, ...]:
     """Write `trials.mat` into the folder and return a tuple with its path. Numbers and booleans become column vectors
-    of double (NaN for a missing value), text becomes cell arrays. name: of the study; facts: its provenance. Raises
-    AlreadyThereError for an existing file, and CannotWriteError."""
+    of double (NaN for a missing value), text becomes cell arrays. name: of the study; protocol_text: its file;
+    provenance: JSON values. Raises AlreadyThereError for an existing file, CannotWriteError where it cannot be
+    written."""
     from scipy.io import savemat
 
     buffer = io.BytesIO()
@@ -48,18 +50,18 @@ def write_trials_mat(
             "descriptions": {column: TRIAL_COLUMNS[column][0] for column in list_columns(Trial)},
             **_convert_answers(answers),
             "protocol": protocol_text,
-            "provenance": json.dumps(dict(facts), ensure_ascii=False),
+            "provenance": json.dumps(dict(provenance), ensure_ascii=False),
         },
         oned_as="column",
-        long_field_names=True,  # up to 63 characters, not 31: the key of a question may have 40
+        long_field_names=True,  # up to 63 characters instead of 31: the key of a question may have 40
     )
-    write_atomically(folder / NAME, buffer.getvalue(), overwrite=False)
-    return (folder / NAME,)
+    write_atomically(folder / TRIALS_MAT_NAME, buffer.getvalue(), overwrite=False)
+    return (folder / TRIALS_MAT_NAME,)
 
 
 def _convert_answers(table: AnswerTable) -> dict[str, Any]:
-    """Variables `answers` (cell arrays with a row per session) and `questions` (descriptions); none if the table has no
-    columns."""
+    """Convert the answers to the variables `answers` (a cell array per column, with a row per session) and `questions`
+    (descriptions); no variables if the table has no columns."""
     if not table.columns:
         return {}
     rows = [(subject, session, *answers) for subject, session, answers in table.rows]
@@ -71,7 +73,7 @@ def _convert_answers(table: AnswerTable) -> dict[str, Any]:
 
 
 def _convert_column(values: Sequence[Any]) -> Any:
-    """(n,) array of float, None as NaN; of cells if any value is text, None as empty text."""
+    """Convert a column to an (n,) array of float, None as NaN; to cells if any value is text, None as empty text."""
     cell_values = [value.value if isinstance(value, Enum) else value for value in values]
     if any(isinstance(value, str) for value in cell_values):
         return _make_cells(["" if value is None else value for value in cell_values])
@@ -79,7 +81,7 @@ def _convert_column(values: Sequence[Any]) -> Any:
 
 
 def _make_cells(values: Sequence[str]) -> Any:
-    """(n,) array of objects, which scipy writes as a MATLAB cell array."""
+    """Make an (n,) array of objects, which scipy writes as a MATLAB cell array."""
     cells = np.empty(len(values), dtype=object)
     cells[:] = values
     return cells

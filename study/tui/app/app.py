@@ -114,7 +114,7 @@ class HapteqApp(App[None]):
         resumed."""
         self._started_from_terminal = self._started_from_terminal and first is self._start.first_sitting
         self.outcome = self._stop_panel = None
-        self._archive.clear()
+        self._archive.close_screens()
         self._sitting = SittingScreens(self, self._engine.send, self._start.keys, self._keys.discard_earlier_keys)
         await self._sitting.show_preparing()
         self._engine.send(first)
@@ -145,7 +145,7 @@ class HapteqApp(App[None]):
             self.exit()
             return
         self._watching.close()
-        self._archive.clear()
+        self._archive.close_screens()
         self._show_outcome(outcome, end.path)
 
     def _show_outcome(self, outcome: Outcome, path: str) -> OutcomeScreen:
@@ -259,7 +259,7 @@ class HapteqApp(App[None]):
         self._engine.send(event.command)
 
     async def on_diagnose_requested(self, event: home_messages.DiagnoseRequested) -> None:
-        await self._archive.diagnose(event.command)
+        await self._archive.start_diagnosis(event.command)
 
     def on_watch_requested(self, event: home_messages.WatchRequested) -> None:
         self._watching.open_after_confirmation(

@@ -1,8 +1,8 @@
 """Messages from the engine process to the screen's process, sent pickled through a pipe.
 
 The engine process conducts sessions and reads results (`engine_commands`, `remote_display`); the screen's process shows
-the terminal interface (`study.tui.app`). Messages are plain values, and the module imports no heavy package, so that
-the first frame appears soon. `to_engine` defines the messages in the other direction.
+the terminal interface (`study.tui.app`). Messages are plain values, and the module imports no package with a slow
+import, so that the interface appears quickly. `to_engine` defines the messages in the other direction.
 """
 
 from dataclasses import dataclass
@@ -15,8 +15,8 @@ from study.session.views.participant_views import HandleView
 
 
 class DisplayCall(Enum):
-    """Methods of the display port (`study.workflows.trial.display.Display`) that need a screen and its reply; the
-    values are their names."""
+    """Methods of the interface `study.workflows.trial.display.Display` that need a screen and its reply; the values are
+    their names."""
 
     FILL_IN = "fill_in"
     DEVICE_CHECKED = "device_checked"
@@ -40,7 +40,7 @@ class ScreenRequest:
     """Number of the request, from 1 within a sitting; the reply has the same number."""
     call: DisplayCall
     content: Any
-    """Argument of the method of the display port."""
+    """Argument of the method."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ class HandleUpdate:
 
 @dataclass(frozen=True, slots=True)
 class CloseRequest:
-    """The request of this number has ended: no reply is needed, and its screen can be closed."""
+    """Closes the screen of the request of this number, which needs no reply any more."""
 
     number: int
 
@@ -102,7 +102,7 @@ class ParticipantWords:
 
 @dataclass(frozen=True, slots=True)
 class PreparationStarted:
-    """A preparation that takes some time has begun; the sentence describes it."""
+    """A slow preparation has begun; the sentence describes it."""
 
     sentence: str
 
@@ -117,7 +117,8 @@ class DiagnosisProgress:
 
 @dataclass(frozen=True, slots=True)
 class PlacementRequest:
-    """Request to the user in a calibration: lay the accelerometer down in this position, then send a `Reply`."""
+    """Request to the user in a calibration: lay the accelerometer down in this position; the screen then sends a
+    `Reply`."""
 
     number: int
     """Number of the position, from 1; the reply has the same number."""
@@ -146,7 +147,7 @@ class CalibrationStored:
 
 @dataclass(frozen=True, slots=True)
 class SessionReady:
-    """The session and its device are open: its log has its first line and is locked."""
+    """The session and its device are open; the log contains its first event and is locked against other processes."""
 
     session: str
     """Name of the session, as in P01_001."""
@@ -170,11 +171,12 @@ class ErrorText:
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """Results of a session, as the command line prints them."""
+    """Results of a session, as printed on the command line."""
 
     table: tuple[str, ...]
     """Lines of the table of thresholds."""
     warnings: tuple[str, ...]
+    """Sentences on irregularities; empty without any."""
     report: str
     """Path of the report."""
     document: str
@@ -183,9 +185,10 @@ class Results:
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """All runs of a session are done, the device is closed, and the report is written."""
+    """All runs of a session are complete, the device is closed, and the report is written."""
 
     path: str
+    """Path of the session's folder."""
     answers: int
     """Number of answers on disk."""
     results: Results

@@ -1,5 +1,7 @@
-"""Keys that answer 1 and 2 in addition to the digits themselves, as chosen by the option `--keys f,j`. Used by the app
-and by line mode."""
+"""Keyboard keys for the answers 1 and 2 in addition to the digits, as chosen by the option `--keys f,j`.
+
+The commands parse the option; the full-screen app and line mode use the keys for prompts and to parse answers.
+"""
 
 from dataclasses import dataclass
 
@@ -7,12 +9,12 @@ from protocols.wording.words import ENGLISH_WORDS, Words
 from study.errors import WrongUseError
 
 RESERVED_KEYS = "pqrn?"
-"""Keys that have another meaning in every trial: p pause, q leave, r repeat, n note, ? help."""
+"""Keys with another meaning in every trial: p pause, q leave, r repeat, n note, ? help."""
 
 
 @dataclass(frozen=True, slots=True)
 class AnswerKeys:
-    """The keys that answer 1 and 2, as lower-case characters."""
+    """The additional keys for the answers 1 and 2, as case-folded characters; the digits themselves by default."""
 
     first: str = "1"
     second: str = "2"
@@ -56,7 +58,7 @@ def parse_keys(text: str) -> AnswerKeys:
 
 
 def _make_keys_error(reason: str) -> WrongUseError:
-    """The error for invalid keys. reason: the reason, a sentence without capital letter and full stop."""
+    """Make the error for invalid keys. reason: a sentence without initial capital and full stop."""
     return WrongUseError(
         "These answer keys cannot be used",
         f"{reason[0].upper()}{reason[1:]}.",

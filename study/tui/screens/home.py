@@ -169,8 +169,8 @@ class HomeScreen(Screen[None]):
         if has_sessions and self.query_one("#empty").has_focus:  # F3 was pressed before the list was loaded
             table.focus()
 
-    @on(SessionTable.Looked)
-    def _describe(self, event: SessionTable.Looked) -> None:
+    @on(SessionTable.CursorMoved)
+    def _describe(self, event: SessionTable.CursorMoved) -> None:
         self.query_one("#detail", Static).update(describe_session(event.line))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:

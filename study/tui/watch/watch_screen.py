@@ -29,74 +29,75 @@ from study.tui.watch.watch_source import WatchSource
 from study.tui.watch.watch_words import format_staircase_title
 
 BELL_INTERVAL_S = 4.0
-"""Interval at which the bell repeats while an urgent alarm is not acknowledged (s)."""
+"""Interval (s) at which the bell repeats while an urgent alarm is not acknowledged. Chosen."""
 SAME_ALARM_WITHIN_S = 10.0
-"""An alarm that recurs within this time (s) counts as the same alarm; later it is new."""
+"""Time (s) within which a recurring alarm counts as the same alarm; later it is new. Chosen."""
 
 AlarmKey = tuple[str, str]
 """An alarm's kind and, for an event, its start time (UTC); the start time of a lasting state is not used: empty."""
 
 
 class AlarmBook:
-    """Which alarms were acknowledged, and whether the bell must ring. Times are arguments, by a monotonic clock (s)."""
+    """Records which alarms were acknowledged, and whether the bell is due. now_s: time by a monotonic clock (s)."""
 
     def __init__(self) -> None:
         self._alarms: tuple[Alarm, ...] = ()
         self._acknowledged: dict[AlarmKey, float] = {}
         """Acknowledged alarms, and when each was last present (s)."""
-        self._rung: dict[AlarmKey, float] = {}
+        self._announced: dict[AlarmKey, float] = {}
         """Alarms for which the bell has rung, and when each was last present (s)."""
         self._last_ring_s = float("-inf")
 
     @property
     def new_alarms(self) -> tuple[Alarm, ...]:
         """Current alarms that are not acknowledged."""
-        return tuple(alarm for alarm in self._alarms if _identify_alarm(alarm) not in self._acknowledged)
+        return tuple(alarm for alarm in self._alarms if _make_key(alarm) not in self._acknowledged)
 
     @property
     def acknowledged_alarms(self) -> tuple[Alarm, ...]:
         """Current alarms that are acknowledged."""
-        return tuple(alarm for alarm in self._alarms if _identify_alarm(alarm) in self._acknowledged)
+        return tuple(alarm for alarm in self._alarms if _make_key(alarm) in self._acknowledged)
 
     def update(self, alarms: Sequence[Alarm], now_s: float) -> bool:
         """Replace the current alarms. Returns whether the bell rings: for a new alarm, or again for an urgent one."""
         self._alarms = tuple(alarms)
-        present_keys = {_identify_alarm(alarm) for alarm in alarms}
-        for last_present_s in (self._acknowledged, self._rung):
+        present_keys = {_make_key(alarm) for alarm in alarms}
+        for last_present_s in (self._acknowledged, self._announced):
             last_present_s.update({key: now_s for key in last_present_s if key in present_keys})
             for key in [key for key, last_s in last_present_s.items() if now_s - last_s > SAME_ALARM_WITHIN_S]:
                 del last_present_s[key]
-        new_keys = [_identify_alarm(alarm) for alarm in self.new_alarms if _identify_alarm(alarm) not in self._rung]
+        new_keys = [_make_key(alarm) for alarm in self.new_alarms if _make_key(alarm) not in self._announced]
         is_bell_due = any(alarm.urgent for alarm in self.new_alarms) and now_s - self._last_ring_s >= BELL_INTERVAL_S
         if not new_keys and not is_bell_due:
             return False
-        self._rung.update(dict.fromkeys(new_keys, now_s))
+        self._announced.update(dict.fromkeys(new_keys, now_s))
         self._last_ring_s = now_s
         return True
 
     def acknowledge(self, now_s: float) -> int:
         """Acknowledge all current alarms. Returns how many were new."""
         new_alarms = self.new_alarms
-        self._acknowledged.update({_identify_alarm(alarm): now_s for alarm in new_alarms})
+        self._acknowledged.update({_make_key(alarm): now_s for alarm in new_alarms})
         return len(new_alarms)
 
 
-def _identify_alarm(alarm: Alarm) -> AlarmKey:
+def _make_key(alarm: Alarm) -> AlarmKey:
+    """Make the key by which a recurring alarm is recognised."""
     return alarm.kind, alarm.since if alarm.event else ""
 
 
 POLL_EVERY_S = 0.1
-"""Interval at which the session's files are read (s)."""
+"""Interval (s) at which the session's files are read. Chosen."""
 STOP_TIMEOUT_S = 2.0
-"""Time (s) after which a requested stop without effect is an alarm; a session reads requests twenty times a second."""
+"""Time (s) after which a stop without effect is an alarm. Chosen: a session reads requests twenty times a second."""
 STALE_AFTER_S = 3.0
-"""Time without a new view (s) after which an alarm says that the view is out of date."""
+"""Time (s) without a new view after which an alarm states that the view is out of date. Chosen."""
 MESSAGE_DURATION_S = 8.0
-"""Time for which a message is shown (s)."""
+"""Time (s) for which a message is shown. Chosen."""
 
 
 class WatchMessage(Message):
-    """A new view; the screen shows the latest."""
+    """A new view of the session, to be shown."""
 
     def __init__(self, view: WatchView) -> None:
         super().__init__()
@@ -104,9 +105,8 @@ class WatchMessage(Message):
 
 
 class WatchScreen(Screen[None]):
-    """The experimenter's view: status and alarms, the staircase, last trials, runs, exposure and device; redrawn with
-    each new view. S or F8 stops the session, p pauses it, n and e write a note and an adverse event, a acknowledges
-    alarms, d shows details, q closes the view."""
+    """The experimenter's view: status, alarms, staircase, last trials, runs, exposure and device; redrawn with each new
+    view. `BINDINGS` lists its keys."""
 
     HELP = HELP
     HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (126, "-wide")]  # noqa: RUF012 - as in the base class
@@ -124,7 +124,7 @@ class WatchScreen(Screen[None]):
     view: reactive[WatchView | None] = reactive(None)
 
     class Left(Message):
-        """The experimenter closes the view; the session continues."""
+        """Sent when the experimenter closes the view; the session continues."""
 
     def __init__(
         self, source: WatchSource, deliver: Callable[[Request], object], clock_s: Callable[[], float] = time.monotonic
@@ -138,7 +138,7 @@ class WatchScreen(Screen[None]):
         self._latest_view: WatchView | None = None
         self._last_update_s = self._clock_s()
         self._stop_sent_s: float | None = None
-        self._stopped_here = False
+        self._stopped_by_request = False
         self._message_shown_s = float("-inf")
 
     def compose(self) -> ComposeResult:
@@ -166,7 +166,7 @@ class WatchScreen(Screen[None]):
         self.poll()
 
     def poll(self) -> None:
-        """Called every `POLL_EVERY_S`: check for a new view, for alarms, and whether a stop was executed."""
+        """Check for a new view, for alarms, and whether a stop was executed. Called every `POLL_EVERY_S`."""
         view = self._source.latest()
         if view is not None and view is not self._latest_view:
             self._latest_view = view
@@ -176,7 +176,7 @@ class WatchScreen(Screen[None]):
 
     def on_watch_message(self, message: WatchMessage) -> None:
         self._last_update_s = self._clock_s()
-        self._stopped_here = self._stopped_here and message.view.standing not in RUNNING_STATUSES
+        self._stopped_by_request = self._stopped_by_request and message.view.standing not in RUNNING_STATUSES
         self.view = message.view
 
     def watch_view(self, view: WatchView | None) -> None:
@@ -211,16 +211,16 @@ class WatchScreen(Screen[None]):
             self._update_guide(KEY_GUIDE, reply=False)
 
     def _filter_session_alarms(self) -> tuple[Alarm, ...]:
-        """Alarms of the view, except for an end that was requested here."""
+        """Filter the session's alarms: an end of the session that was requested on this screen is no alarm."""
         alarms = self.view.alarms if self.view is not None else ()
-        return tuple(alarm for alarm in alarms if not (self._stopped_here and alarm.kind == "ended"))
+        return tuple(alarm for alarm in alarms if not (self._stopped_by_request and alarm.kind == "ended"))
 
     def _find_view_alarms(self, now_s: float) -> list[Alarm]:
-        """Alarms about this view itself: no new data, or a requested stop that had no effect."""
+        """Find alarms about this view: no new data, or a stop without effect. Shows a message for an executed stop."""
         since_utc = self.view.utc if self.view is not None else ""
         alarms = []
         if self._stop_sent_s is not None and self.view is not None and self.view.standing not in RUNNING_STATUSES:
-            self._stop_sent_s, self._stopped_here = None, True
+            self._stop_sent_s, self._stopped_by_request = None, True
             self._show_message(f"The session has stopped: {self.view.reason}.")
         if self._stop_sent_s is not None and now_s - self._stop_sent_s > STOP_TIMEOUT_S:
             sentence = "The session has not answered the stop. Hand off the handle; switch the device off."

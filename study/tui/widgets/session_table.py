@@ -1,7 +1,7 @@
-"""Table of the sessions of a data folder, a row for each, with keys to open, resume or watch a session. Part of the
-start screen (`study.tui.screens.home`).
+"""Table of the sessions of a data folder, a row for each, with keys to open, resume or watch a session.
 
-Long lists are added in parts, and columns are dropped in narrow terminals.
+Part of the start screen (`study.tui.screens.home`), which acts on the messages that the keys post. Rows of long lists
+are added in batches, and columns are left out in narrow terminals.
 """
 
 from collections.abc import Mapping
@@ -31,15 +31,15 @@ _NAME_TITLE, _STATUS_TITLE, _START_TITLE, _RUNS_TITLE, _ANSWERS_TITLE, _PROTOCOL
 )
 """Titles of the columns, by which their widths are looked up."""
 _FIXED_WIDTHS = {_STATUS_TITLE: 12, _RUNS_TITLE: 5, _ANSWERS_TITLE: 7}
-"""Fixed column widths in cells: measuring every entry of a long list would take time. The protocol gets the remaining
-width, and is wrapped."""
+"""Fixed widths (character cells) of columns with short entries: measuring every entry of a long list would take time.
+The protocol's column gets the remaining width, and its entries are wrapped."""
 _MIN_PROTOCOL_WIDTH, _CELL_PADDING = 10, 2
 """Least width of the protocol's column, and padding of a cell, in character cells."""
 
 BATCH_ROWS = 60
-"""Number of rows that are added at once; more than a terminal usually shows."""
+"""Number of rows that are added at once; more than a terminal usually shows. Chosen."""
 _BATCH_PAUSE_S = 0.01
-"""Pause (s) between two batches of rows, in which keys are handled."""
+"""Pause (s) between two batches of rows, in which keys are handled. Chosen."""
 
 
 class SessionTable(DataTable[Content | str]):
@@ -52,8 +52,8 @@ class SessionTable(DataTable[Content | str]):
         Binding("w", "watch", "Watch"),
     ]
 
-    class Looked(Message):
-        """The cursor moved to another session."""
+    class CursorMoved(Message):
+        """Message: the cursor moved to the session `line`, or the list was replaced with the cursor on it."""
 
         def __init__(self, line: SessionLine) -> None:
             super().__init__()
@@ -67,7 +67,7 @@ class SessionTable(DataTable[Content | str]):
         self._fitted_width = 0
 
     def show(self, lines: tuple[SessionLine, ...]) -> None:
-        """Replace the sessions; the cursor stays on its session if that is still listed."""
+        """Replace the listed sessions; the cursor stays on its session if that is still listed."""
         selected_line = self._selected_line
         self._lines = lines
         offset, self._start_times = format_times_in_zone([line.begun_utc for line in lines], convert_to_machine_zone)
@@ -76,15 +76,16 @@ class SessionTable(DataTable[Content | str]):
         for title, width in self._widths.items():
             self.add_column(title, width=width)
         self._add_rows(lines, selected_line.name if selected_line is not None else "")
-        self._post_looked()
+        self._post_cursor_moved()
 
     def on_resize(self, event: Resize) -> None:
         if self._lines and event.size.width != self._fitted_width:
             self.show(self._lines)
 
     def _fit_columns(self, start_title: str) -> dict[str, int]:
-        """Column widths (cells) by title. Where the protocol has too little room, the column of answers, then that of
-        runs, is left out: the sentence below the list states both. start_title: title of the column of times."""
+        """Compute the column widths (cells) by title. The column of answers is left out where the protocols do not fit
+        on one line, that of runs where less than `_MIN_PROTOCOL_WIDTH` remains: the start screen states both below the
+        list. start_title: title of the column of times."""
         self._fitted_width = self.size.width
         names, protocols = ([getattr(line, attribute) for line in self._lines] for attribute in ("name", "protocol"))
         widths = {_NAME_TITLE: max(map(len, (_NAME_TITLE, *names))), _STATUS_TITLE: _FIXED_WIDTHS[_STATUS_TITLE]}
@@ -102,7 +103,8 @@ class SessionTable(DataTable[Content | str]):
         }
 
     def _compute_protocol_width(self, widths: Mapping[str, int]) -> int:
-        """Width (cells) that the given columns and the scroll bar leave for the protocol."""
+        """Compute the width (cells) that the given columns and the scroll bar leave for the protocol; may be
+        negative."""
         scroll_bar_width = self.styles.scrollbar_size_vertical if len(self._lines) >= self.size.height else 0
         return self.size.width - scroll_bar_width - sum(widths.values()) - _CELL_PADDING * (len(widths) + 1)
 
@@ -114,9 +116,8 @@ class SessionTable(DataTable[Content | str]):
         start = self.row_count
         batch = lines[start : start + BATCH_ROWS]
         for index, line in enumerate(batch, start=start):
-            protocol_lines = wrap(
-                line.protocol, self._widths[_PROTOCOL_TITLE]
-            )  # the table would cut it instead of wrapping it
+            # Wrapped here, because the table truncates an entry that is too wide.
+            protocol_lines = wrap(line.protocol, self._widths[_PROTOCOL_TITLE])
             self.add_row(
                 *self._format_row(line, self._start_times[index], "\n".join(protocol_lines)),
                 height=max(1, len(protocol_lines)),
@@ -132,39 +133,39 @@ class SessionTable(DataTable[Content | str]):
         return self._lines[self.cursor_row] if 0 <= self.cursor_row < len(self._lines) else None
 
     def on_data_table_row_highlighted(self) -> None:
-        self._post_looked()
+        self._post_cursor_moved()
 
     def on_data_table_row_selected(self) -> None:
-        """Ask for the session under the cursor to be shown."""
+        """Request to show the session under the cursor."""
         if self._selected_line is not None:
             self.post_message(CommandRequested(ShowSession(self._selected_line.path)))
 
     def action_resume(self) -> None:
-        """Ask for the session under the cursor to be resumed."""
+        """Request to resume the session under the cursor."""
         if self._selected_line is not None:
             self.post_message(ResumeRequested(self._selected_line.path))
 
     def action_watch(self) -> None:
-        """Ask for the session under the cursor to be watched."""
+        """Request to watch the session under the cursor."""
         if self._selected_line is not None:
             self.post_message(WatchRequested(self._selected_line.path))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """The footer shows only actions that apply to the session under the cursor."""
+        """Show in the footer only actions that apply to the session under the cursor."""
         needed_status = {"resume": "unfinished", "watch": "running"}.get(action)
         return needed_status is None or (
             self._selected_line is not None and self._selected_line.standing == needed_status
         )
 
-    def _post_looked(self) -> None:
-        """Update the footer and post `Looked` for the session under the cursor."""
+    def _post_cursor_moved(self) -> None:
+        """Update the footer and post `CursorMoved` for the session under the cursor."""
         self.refresh_bindings()
         if self._selected_line is not None:
-            self.post_message(self.Looked(self._selected_line))
+            self.post_message(self.CursorMoved(self._selected_line))
 
     def _format_row(self, line: SessionLine, start_time: str, protocol: str) -> tuple[Content | str, ...]:
-        """Cells of a row, for the columns in `_widths`; counts only of sessions that can be read. start_time: local
-        time at which the session began; protocol: its name, wrapped into lines."""
+        """Format the cells of a row, for the columns in `_widths`; counts only of sessions that can be read.
+        start_time: local time at which the session began; protocol: its name, wrapped into lines."""
         has_counts = line.standing in ("finished", "unfinished", "running")
         runs = (f"{line.runs_done}/{line.runs}" if has_counts else "",) if _RUNS_TITLE in self._widths else ()
         answers = (f"{line.answers:>7}" if has_counts else "",) if _ANSWERS_TITLE in self._widths else ()

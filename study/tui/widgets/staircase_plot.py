@@ -1,4 +1,5 @@
-"""Widget with the staircase of a run of a past session: title, plot, and a sentence that summarises the run.
+"""Widget with the staircase of a run of a past session: title, plot, and a sentence that summarises the run. Used by
+`study.tui.screens.session`.
 
 The staircase of a running session is drawn by `study.tui.watch.level_history`.
 """
@@ -54,8 +55,8 @@ class StaircasePlot(Widget):
 
 
 def _apply_styles(line: str) -> Content:
-    """A line of the plot with the styles of its marks. Neighbouring characters of equal style form one span, because
-    fewer spans are drawn faster."""
+    """Apply to a line of the plot the styles of labels and marks. Neighbouring characters of equal style form one span,
+    because fewer spans are drawn faster."""
     styled_parts: list[Content | str | tuple[str, str]] = [(line[:LABEL_COLUMNS], MUTED_STYLE)]
     for style, characters in itertools.groupby(line[LABEL_COLUMNS:], key=_STYLES.get):
         text = "".join(characters)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from equalizer.signals.recording import Recording
 from protocols.definition.recording_protocol import RecordingProtocol
-from protocols.document.hashing import protocol_hash
+from protocols.document.hashing import hash_protocol
 from study.devices.clock import RealClock
 from study.devices.device import Device, DeviceInfo
 from study.devices.opening import find_accepted_baseline, get_device_folder, needs_real_time, open_device
@@ -247,7 +247,7 @@ def _read_baseline(info: DeviceInfo, protocol: RecordingProtocol) -> tuple[Recor
             "There is nothing to compare with", f"{path} is gone, or is not what was accepted.", acceptance_advice
         )
     baseline = read_recording(path)
-    if baseline.meta["provenance"]["protocol_hash"] != protocol_hash(protocol):
+    if baseline.meta["provenance"]["protocol_hash"] != hash_protocol(protocol):
         explanation = f"{path} was played by another version of the protocol {protocol.name!r}."
         raise DeviceError("There is nothing to compare with", explanation, acceptance_advice)
     return baseline, digest

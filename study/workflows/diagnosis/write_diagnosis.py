@@ -1,6 +1,7 @@
-"""Writes the result folder of a diagnosis: document (JSON), improved model, figures and page (HTML).
+"""Writes the result folder of a diagnosis: document (JSON), improved model, figures and report (HTML), in this order.
 
-Figures are drawn in parallel. A figure that crashes is left out, and a remark on the page says so.
+Figures are drawn in parallel. A figure whose drawing crashes is left out, with a remark in the report. Called by
+`diagnose_recordings` and `study.evaluation.real.real_recordings`.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,22 +25,22 @@ from study.workflows.picture_files import DrawnPicture, draw_picture, write_draw
 
 def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Path]) -> Findings:
     """Write all files into an existing `folder`. parents: input files, for the provenance. Returns the findings with a
-    remark for each figure that could not be drawn. Raises StudyError."""
-    origin = gather_provenance(parents=parents)
-    write_diagnosis(folder / DIAGNOSIS_NAME, findings.diagnosis, origin)
-    improved = replace(findings.improved, provenance=origin.as_dict())
+    remark for each figure that could not be drawn. Raises StudyError where a file exists or cannot be written."""
+    provenance = gather_provenance(parents=parents)
+    write_diagnosis(folder / DIAGNOSIS_NAME, findings.diagnosis, provenance)
+    improved = replace(findings.improved, provenance=provenance.as_dict())
     write_mechanical_model(folder / MODEL_NAME, improved)
     guard = make_crash_guard()
-    parts = [replace(part, work=partial(_draw_pictures, part.work)) for part in list_drawings(findings)]
+    drawing_parts = [replace(part, work=partial(_draw_pictures, part.work)) for part in list_drawings(findings)]
     drawn_pictures = [
-        drawn_picture for part_pictures in guard.run_parts(map_forked, parts) for drawn_picture in part_pictures
+        drawn_picture for part_pictures in guard.run_parts(map_forked, drawing_parts) for drawn_picture in part_pictures
     ]
     findings = replace(findings, remarks=(*guard.sentences, *findings.remarks))
     write_drawn_pictures(folder / "figures", drawn_pictures)
     page = render_diagnosis_report(
         findings,
         [drawn_picture.picture for drawn_picture in drawn_pictures],
-        _origin_entries(origin),
+        _format_provenance(provenance),
         format_local_now(),
     )
     write_text(folder / PAGE_NAME, page)
@@ -47,13 +48,15 @@ def write_diagnosis_into(folder: Path, findings: Findings, parents: Sequence[Pat
 
 
 def _draw_pictures(draw: Callable[[], Sequence[Picture]]) -> list[DrawnPicture]:
+    """Draw the pictures of one drawing part."""
     return [draw_picture(picture) for picture in draw()]
 
 
-def _origin_entries(origin: Provenance) -> dict[str, str]:
-    """Provenance for the page: input files with the beginning of their SHA-256, command line, versions."""
+def _format_provenance(provenance: Provenance) -> dict[str, str]:
+    """Format the provenance for the report: input files with the first 12 digits of their SHA-256, command line,
+    versions."""
     return {
-        "made from": ", ".join(f"{parent.file} ({parent.sha256[:12]})" for parent in origin.parents),
-        "command": " ".join(origin.command),
-        "versions": ", ".join(f"{name} {version}" for name, version in origin.versions.items()),
+        "made from": ", ".join(f"{parent.file} ({parent.sha256[:12]})" for parent in provenance.parents),
+        "command": " ".join(provenance.command),
+        "versions": ", ".join(f"{name} {version}" for name, version in provenance.versions.items()),
     }

@@ -21,22 +21,21 @@ from study.workflows.equalizer.playback_models import PlaybackModels
 from study.workflows.equalizer.spring_to_compensate import find_spring_to_compensate
 
 DEFAULT_SPRING_HZ = 3.5
-"""Natural frequency (Hz) of the centring spring in the shipped recording protocols, for a model that does not state its
-spring."""
+"""Natural frequency (Hz) of the centring spring in the shipped recording protocols, for a model that does not state
+that of its spring."""
 SPRING_RESERVE_N = 1.5
-"""Force (N) that the centring spring may add to the cap of the commanded forces."""
+"""Force (N) that the centring spring may add to the cap of the commanded forces. Chosen."""
 LONGEST_HOLD_S = 600.0
-"""Longest duration (s) of a stimulus, the largest allowed (`admission.MAX_SETTINGS`): played forces have an end of
-their own."""
+"""Longest duration (s) of a stimulus: the largest value that is accepted (`admission.MAX_SETTINGS`), because computed
+forces are of finite length."""
 WATCHDOG_S = 0.5
-"""Time (s) without a keep-alive call from this program after which the device releases the force."""
-RELEASE_S = 0.05
-"""Duration (s) of the fade-out when the device releases the force, the default of `[safety]` in a protocol."""
+"""Time (s) without a keep-alive call from this program after which the force is faded out. Chosen."""
+FORCE_RELEASE_S = 0.05
+"""Duration (s) of that fade-out, the default of `[safety]` in a protocol."""
 
 
 def require_device_alone(models: PlaybackModels) -> None:
-    """Raise StudyError for a model that was identified with a hand on the handle: it is not valid for the free
-    handle."""
+    """Raise StudyError where a model was identified with a hand on the handle: it is not valid for the free handle."""
     if any("held" in model.provenance.get("hand", ()) for model in models.all_models):
         raise _make_refusal(
             "The model was recorded with a hand on the handle: its forces are valid only for that hand at that moment.",
@@ -45,8 +44,8 @@ def require_device_alone(models: PlaybackModels) -> None:
 
 
 def find_acting_spring(models: PlaybackModels) -> VirtualSpring:
-    """The virtual spring that acts in addition to the commanded forces and is not part of the model. Raises StudyError
-    where the model does not state it."""
+    """Find the virtual spring that acts in addition to the commanded forces and is not part of the nearest model.
+    Raises StudyError where the model does not state its spring."""
     feedback = _read_recorded_spring(models)
     spring = VirtualSpring(float(feedback.get("stiffness_n_per_m", 0.0)), float(feedback.get("damping_n_s_per_m", 0.0)))
     if not feedback:
@@ -59,18 +58,18 @@ def find_acting_spring(models: PlaybackModels) -> VirtualSpring:
 
 
 def _read_recorded_spring(models: PlaybackModels) -> dict[str, Any]:
-    """Parameters of the virtual spring under which the nearest model was recorded, from its provenance:
+    """Read the parameters of the virtual spring under which the nearest model was recorded, from its provenance:
     stiffness_n_per_m, damping_n_s_per_m, natural_frequency_hz. Empty where it states none."""
     feedback = models.nearest.provenance.get("feedback")
     return feedback if isinstance(feedback, dict) else {}
 
 
 def make_playback_settings(cap_n: float, models: PlaybackModels) -> DeviceSettings:
-    """Settings of the device for forces with a peak of `cap_n` (N): the spring under which the model was recorded, and
-    limits.
+    """Make the settings of the device for forces with a peak of `cap_n` (N): the spring under which the model was
+    recorded, and the safety limits.
 
-    The slew limit is twice the steepest slope, 2 pi f cap_n, of a sine at the upper end f of the band, because a sum of
-    sines and learned corrections are steeper than one sine; the slew of the spring is added.
+    The slew limit (N/s) is twice the largest slope, 2 pi f cap_n, of a sine at the upper end f of the band, because
+    sums of sines and learned corrections are steeper than one sine; the slew of the spring is added.
     """
     feedback = _read_recorded_spring(models)
     steepest_n_per_s = 2 * math.pi * models.band_hz[1] * cap_n
@@ -81,7 +80,7 @@ def make_playback_settings(cap_n: float, models: PlaybackModels) -> DeviceSettin
             slew_n_per_s=2 * steepest_n_per_s + SPRING_SLEW_N_PER_S,
             longest_hold_s=LONGEST_HOLD_S,
             watchdog_s=WATCHDOG_S,
-            release_s=RELEASE_S,
+            release_s=FORCE_RELEASE_S,
             # Without a hand the handle moves further than in a trial, which stretches the spring more.
             feedback_cap_n=cap_n + SPRING_RESERVE_N,
         ),
@@ -95,8 +94,8 @@ def make_playback_settings(cap_n: float, models: PlaybackModels) -> DeviceSettin
 
 
 def announce_motion(device: Device, peak_n: float, total_s: float, before_moving: BeforeMoving) -> None:
-    """Ask for a free handle before the first force on a real device; does nothing for a simulated one. peak_n: cap of
-    the forces (N). total_s: duration of all playbacks (s)."""
+    """Call `before_moving` with the notice to leave the handle free, before the first force on a real device; does
+    nothing for a simulated one. peak_n: cap of the forces (N). total_s: duration of all playbacks (s)."""
     if not device.info.simulated:
         before_moving(format_free_handle_notice(device.info.name, peak_n, total_s))
 
@@ -109,9 +108,9 @@ def play_forces(device: Device, forces: FloatArray, on_progress: Callable[[float
 
 
 def read_measured_acceleration(play_result: PlaybackResult) -> FloatArray:
-    """Measured acceleration, (samples, 3) in m/s². Raises DeviceError where it is not the response to the forces: a
-    fault ended the playback, the accelerometer clipped, a force was limited, or ticks of the control loop were
-    missed."""
+    """Read the measured acceleration, (samples, 3) in m/s². Raises DeviceError where it is not the response to the
+    forces: a fault ended the playback, the accelerometer clipped, a force was limited, or ticks of the control loop
+    were missed."""
     health = play_result.health
     if play_result.recording is None or health.fault is not Fault.NONE:
         raise DeviceError("The device let go", f"While playing: {health.fault.value}.", "Check the device.")
@@ -133,5 +132,5 @@ def read_measured_acceleration(play_result: PlaybackResult) -> FloatArray:
 
 
 def _make_refusal(explanation: str, advice: str) -> StudyError:
-    """Error for a playback that is not started, because the forces would not be valid."""
+    """Make the error for a playback that is not started, because the forces would not be valid."""
     return StudyError("Nothing was played", explanation, advice, saved="Nothing moved.")

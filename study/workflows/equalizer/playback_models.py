@@ -28,13 +28,13 @@ from study.store.disk.provenance import compute_sha256
 from study.store.formats.identified_model_file import read_identified_model
 
 SAME_PLACE_M = 0.001
-"""Largest distance (m) of two places that count as the same: files of the same place may differ by rounding."""
+"""Largest distance (m) of two places that count as the same: files of the same place may differ by rounding. Chosen."""
 GAIN_FREQUENCY_COUNT = 100
-"""Number of frequencies in the band, in a geometric series, at which the largest gain is searched."""
+"""Number of frequencies in the band, in a geometric series, at which the largest gain is searched. Chosen."""
 MAX_PLAUSIBLE_GAIN = 1e6
 """Largest plausible gain (m/s^2 per N): that of a mass of 1 mg, less than any handle has."""
 WARNING_DISTANCE_M = 0.005
-"""Distance (m) from the place of a single model beyond which the user is warned."""
+"""Distance (m) between the place of playback and that of a single model beyond which the user is warned. Chosen."""
 
 Vector = tuple[float, float, float]
 """Components x, y, z; in metres for a place."""
@@ -74,7 +74,7 @@ class PlaybackModels:
 
     @property
     def band_hz(self) -> tuple[float, float]:
-        """Band for which an error is predicted: common to all models used."""
+        """Frequency band (Hz) for which an error is predicted: that common to all models with a weight above 0."""
         return select_used_models(self.at_place)[0][1].band_hz
 
     @property
@@ -84,8 +84,10 @@ class PlaybackModels:
 
 
 def read_playback_models(paths: tuple[Path, ...], at_m: Vector | None, weight: float) -> PlaybackModels:
-    """Read and combine the models. at_m: place of playback (m), needed for models of several places. weight: of the
-    forces in the cost. Raises StudyError for files that are not models, cannot play a table, or do not fit together."""
+    """Read and combine the models of at least one file. at_m: place of playback (m), needed for models of several
+    places. weight: of the forces in the cost of the LQR. Raises StudyError for files that are not models, that cannot
+    play a table of accelerations, or that do not fit together; WrongUseError for a place that is missing or not
+    finite."""
     if at_m is not None and not all(map(math.isfinite, at_m)):
         raise WrongUseError(
             "There is no such place",
@@ -108,7 +110,7 @@ def read_playback_models(paths: tuple[Path, ...], at_m: Vector | None, weight: f
 
 
 def _combine_single_model(paths: tuple[Path, ...], model: IdentifiedModel, at_m: Vector | None) -> PlaybackModels:
-    """Playback models of one file; the place defaults to that of the model, then to the centre."""
+    """Make the playback models of one file. The place of playback defaults to that of the model, then to the centre."""
     models_at_place = ModelsAtPlace(at_m or model.place_m or (0.0, 0.0, 0.0), (model,), (1.0,))
     return PlaybackModels(
         (model,), models_at_place, None, None, _warn_of_distance(paths[0], model, at_m), (), _compute_sha256(paths)
@@ -118,7 +120,7 @@ def _combine_single_model(paths: tuple[Path, ...], model: IdentifiedModel, at_m:
 def _combine_two_bands(
     paths: tuple[Path, ...], models: tuple[IdentifiedModel, ...], at_m: Vector | None
 ) -> PlaybackModels:
-    """Playback models of a narrow and a wide model of the same place; the wide one has the higher upper band edge.
+    """Combine a narrow and a wide model of the same place; the wide one has the higher upper band edge.
     Raises StudyError for more than two models, different sample rates, or models that do not fit together."""
     if len(models) > 2:
         raise _make_unfit_error(
@@ -146,7 +148,7 @@ def _combine_two_bands(
 def _combine_places(
     paths: tuple[Path, ...], workspace: WorkspaceModels, at_m: Vector | None, weight: float
 ) -> PlaybackModels:
-    """Playback models of several places: the method of interpolation is chosen by cross-validation. Raises
+    """Combine models of several places: whether forces or models are interpolated is chosen by cross-validation. Raises
     WrongUseError without a place of playback, WorkspaceError for models that do not fit together."""
     if at_m is None:
         places = "; ".join(
@@ -178,8 +180,7 @@ def _combine_places(
 
 
 def _describe_held_out_error(check: PlaceCheck) -> str:
-    """Sentence on the errors at a place whose model was left out, with interpolated forces and with interpolated
-    modes."""
+    """Describe the errors at a place whose model was left out, with interpolated forces and with interpolated modes."""
     modal = "not possible" if check.modal_error is None else f"{100 * check.modal_error:.1f} %"
     return (
         f"Held out {_format_place_mm(check.place_m)}: error {100 * check.blended_error:.1f} % (rms over lines) with "
@@ -222,14 +223,15 @@ def _are_axes_in_order(names: tuple[str, ...]) -> bool:
 
 
 def compute_peak_gain(model: IdentifiedModel) -> float:
-    """Largest magnitude of the response of an output to an input in the band (m/s² per N), over `GAIN_FREQUENCY_COUNT`
-    frequencies; NaN or infinity where the response overflows."""
+    """Compute the largest magnitude of the response of any output to any input (m/s² per N), over
+    `GAIN_FREQUENCY_COUNT` frequencies of the band; NaN or infinity where the response overflows."""
     with np.errstate(over="ignore", invalid="ignore"):
         return float(np.abs(compute_model_response(model, np.geomspace(*model.band_hz, GAIN_FREQUENCY_COUNT))).max())
 
 
 def _are_at_same_place(models: tuple[IdentifiedModel, ...]) -> bool:
-    """Whether all models are of the same place within `SAME_PLACE_M`; also True where no model states its place."""
+    """Whether all models are within `SAME_PLACE_M` of the place of the first; also True where no model states its
+    place, False where only some do."""
     places = [model.place_m for model in models]
     if all(place is None for place in places):
         return True
@@ -240,8 +242,8 @@ def _are_at_same_place(models: tuple[IdentifiedModel, ...]) -> bool:
 
 
 def _warn_of_distance(path: Path, model: IdentifiedModel, at_m: Vector | None) -> tuple[str, ...]:
-    """A warning where the place of playback is further than `WARNING_DISTANCE_M` from that of the model, or the model
-    states no place; else empty."""
+    """Warn where the place of playback is further than `WARNING_DISTANCE_M` from that of the model, or the model states
+    no place; empty otherwise, and without a place of playback."""
     if at_m is None:
         return ()
     if model.place_m is None:
@@ -257,8 +259,8 @@ def _warn_of_distance(path: Path, model: IdentifiedModel, at_m: Vector | None) -
 
 
 def _compute_sha256(paths: tuple[Path, ...], at_m: Vector | None = None) -> str:
-    """SHA-256 of the files in any order, and of the place of playback. Of a single file it is the plain hash of the
-    file, without the place, so that it can be compared with the output of other programs."""
+    """Compute the SHA-256, as hexadecimal text, of the files in any order and of the place of playback. For a single
+    file it is the hash of the file alone, so that it can be compared with the output of other programs."""
     digests = [compute_sha256(path) for path in paths]
     if len(digests) == 1:
         return digests[0]
@@ -266,7 +268,7 @@ def _compute_sha256(paths: tuple[Path, ...], at_m: Vector | None = None) -> str:
 
 
 def _format_place_mm(place_m: Vector | None) -> str:
-    """The place in millimetres, as text."""
+    """Format the place in millimetres: "(20, 0, 0) mm"."""
     return (
         "(place not known)"
         if place_m is None
@@ -275,5 +277,5 @@ def _format_place_mm(place_m: Vector | None) -> str:
 
 
 def _make_unfit_error(explanation: str, advice: str) -> StudyError:
-    """Error for models that cannot be used for the table of accelerations."""
+    """Make the error for models that cannot be used for the table of accelerations."""
     return StudyError("These models cannot equalize the table", explanation, advice, saved="Nothing was written.")

@@ -1,7 +1,8 @@
-"""Generates docs/formats.md, docs/importing.md and docs/schemas/*.json from the code that reads and writes the files.
+"""Generate docs/formats.md, docs/importing.md and docs/schemas/*.json from the code that reads and writes the files.
 
-`python -m study.workflows.files.format_docs docs` updates them; `tests/study/workflows/files/test_format_docs.py` fails
-where they differ from the code.
+A program: `python -m study.workflows.files.format_docs docs`, which the Makefile calls, updates them;
+`tests/study/workflows/files/test_format_docs.py` fails where they differ from the code. Fixed texts of the pages are in
+`format_text` and `importing_docs`.
 """
 
 import json
@@ -38,8 +39,8 @@ from study.workflows.files.importing_docs import compose_importing_page
 
 
 def make_event_schema() -> dict[str, Any]:
-    """JSON schema of an event of the session log. Each event may have the field `chain`, the checksum that the log
-    adds."""
+    """Make the JSON schema of an event of the session log. Each event may have the field `chain`, the checksum that the
+    log adds."""
     schema = EVENTS.json_schema()
     for event in schema["$defs"].values():
         if "event" in event.get("properties", {}):
@@ -48,23 +49,26 @@ def make_event_schema() -> dict[str, Any]:
 
 
 def format_session_log() -> Iterable[str]:
-    """Heading and paragraphs of docs/formats.md on the session log and its seal."""
+    """Yield heading and paragraphs of docs/formats.md on the session log and its seal."""
     yield "## Session log (`events.jsonl`) and its seal (`seal.json`)"
     yield from format_text.SESSION_LOG
 
 
 @dataclass(frozen=True, slots=True)
 class Schema:
-    """A file of docs/schemas: its name, the document that it describes, and the function that generates the schema."""
+    """A file of docs/schemas."""
 
     file: str
+    """Name of the file."""
     describes: str
+    """The document that the schema describes, in Markdown."""
     make: Callable[[], dict[str, Any]]
+    """Makes the schema."""
 
 
 def make_document_schema(payload: Mapping[str, Any], format_name: str, version: int) -> dict[str, Any]:
-    """JSON schema of a complete JSON document. payload: schema of its own fields; format, version and provenance are
-    added."""
+    """Make the JSON schema of a complete JSON document. payload: schema of the fields apart from format, version and
+    provenance, which are added."""
     format_fields = {"format": {"const": format_name}, "version": {"const": version}}
     return {
         **payload,
@@ -74,7 +78,7 @@ def make_document_schema(payload: Mapping[str, Any], format_name: str, version: 
 
 
 def make_request_schema() -> dict[str, Any]:
-    """JSON schema of a request to a running session, with one alternative for each kind of request."""
+    """Make the JSON schema of a request to a running session, with one alternative for each kind of request."""
     schemas = {kind: TypeAdapter(request_type).json_schema() for kind, request_type in KINDS.items()}
     for kind, schema in schemas.items():
         schema["properties"]["request"] = {"const": kind}
@@ -126,11 +130,11 @@ SCHEMAS: tuple[Schema, ...] = (
     ),
     Schema("request.json", format_text.REQUEST, make_request_schema),
 )
-"""Schemas of all JSON formats and protocols. Each new JSON format must be added."""
+"""Schemas of all JSON formats and protocols. Every new JSON format must be added here."""
 
 
 def compose_formats_page() -> str:
-    """Text of docs/formats.md, in Markdown."""
+    """Compose the text of docs/formats.md, in Markdown."""
     parts = [
         "# File formats",
         *format_text.INTRODUCTION,
@@ -155,7 +159,7 @@ def compose_formats_page() -> str:
 
 
 def generate_documents() -> dict[str, str]:
-    """Text of every generated file, by its path relative to docs."""
+    """Generate the text of every file, by its path relative to docs."""
     schemas = {f"schemas/{schema.file}": json.dumps(schema.make(), indent=2) + "\n" for schema in SCHEMAS}
     return {"formats.md": compose_formats_page(), "importing.md": compose_importing_page(), **schemas}
 
@@ -169,7 +173,7 @@ def write_documents(folder: Path) -> None:
 
 
 def _format_recordings() -> Iterable[str]:
-    """Section on the HDF5 file of a recording."""
+    """Yield the section on the HDF5 file of a recording."""
     yield "## Recording (`.h5`)"
     yield _format_layout(recording_layout.LAYOUT)
     yield format_text.SIGNAL_ATTRIBUTES
@@ -180,23 +184,24 @@ def _format_recordings() -> Iterable[str]:
 
 
 def _format_mechanical_models() -> Iterable[str]:
-    """Section on the TOML file of a mechanical model."""
+    """Yield the section on the TOML file of a mechanical model."""
     yield "## Mechanical model (`.toml`)"
     yield format_text.MECHANICAL_MODEL_NOTES
     yield _format_layout(mechanical_model_file.LAYOUT)
 
 
 _RESPONSE_UNIT = "the response's unit"
+"""Text for a unit that is that of the response, in the table of effects."""
 
 
 def _format_parameter(parameter: EffectParameter) -> str:
-    """Name and unit of an effect's parameter, for devices with linear axes."""
+    """Format name and unit of an effect's parameter, for devices with linear axes."""
     unit = parameter.find_unit(LINEAR, _RESPONSE_UNIT)
     return f"`{parameter.name}` ({unit}, optional)" if parameter.optional else f"`{parameter.name}` ({unit})"
 
 
 def _format_effects() -> str:
-    """Markdown table of the effects of a mechanical model, with the units of their parameters."""
+    """Format the Markdown table of the effects of a mechanical model, with the units of their parameters."""
     rows = []
     for effect in EFFECT_NAMES:
         parameters_text = ", ".join(_format_parameter(parameter) for parameter in effect.parameters)
@@ -209,10 +214,11 @@ _CSV_TABLES: tuple[tuple[str, type[Trial] | type[Threshold], str], ...] = (
     ("trials.csv", Trial, format_text.TRIALS),
     ("thresholds.csv", Threshold, format_text.THRESHOLDS),
 )
+"""CSV tables with a row per dataclass instance: file name, dataclass, description."""
 
 
 def _format_csv_tables() -> Iterable[str]:
-    """Sections on the CSV tables: trajectories and forces, trials, thresholds."""
+    """Yield the sections on the CSV tables: trajectories and forces, trials, thresholds."""
     yield "## Trajectory and forces (`.csv`)"
     yield _format_markdown_table(
         ("header", "holds"), [(f"`{','.join(kind.header)}`", f"{kind.quantity}, {kind.unit}") for kind in TABLE_KINDS]
@@ -229,7 +235,7 @@ def _format_csv_tables() -> Iterable[str]:
 
 
 def _format_layout(entries: Iterable[Entry]) -> str:
-    """Markdown table of the entries of a file."""
+    """Format the Markdown table of the entries of a file."""
     rows = [
         (f"`{entry.name}`", entry.type_and_shape, entry.meaning, "yes" if entry.required else "no") for entry in entries
     ]
@@ -237,7 +243,7 @@ def _format_layout(entries: Iterable[Entry]) -> str:
 
 
 def _format_markdown_table(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
-    """A Markdown table. The cells must not contain a bar, which would end them."""
+    """Format a Markdown table. The cells must not contain a vertical bar, which would end them."""
     rows_with_header = [header, tuple("---" for _ in header), *rows]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in rows_with_header)
 

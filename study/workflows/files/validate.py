@@ -1,7 +1,8 @@
-"""Validation of one file or session folder (`hapteq validate`): its kind and all its problems, in words.
+"""Validation of one file or session folder (`hapteq validate`): determines its kind and lists its problems.
 
 The recognisers are tried in turn on the content. A file that none of them recognises, and that may be a recording of
-another program, is read as an import would read it.
+another program, is read as `hapteq import` would read it. Remarks on access rights and on idle commands are added.
+Called by `validate_together` and `validate_apart`.
 """
 
 import tomllib
@@ -46,7 +47,7 @@ class Validation:
 
 
 def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = SESSION_RECOGNISERS + RECOGNISERS) -> Validation:
-    """Validate one file or session folder. Wrong content and a missing file are reported as problems, never raised."""
+    """Validate one file or session folder. Wrong content and a missing file are returned as problems, not raised."""
     validation = _validate(path, recognisers)
     folders = (path, path.absolute().parent) if FOLDER_PATTERN.fullmatch(path.absolute().name) else (path,)
     warnings = (format_privacy_warning(folder) for folder in folders if _is_folder(folder))
@@ -54,8 +55,7 @@ def validate_file(path: Path, recognisers: tuple[Recogniser, ...] = SESSION_RECO
 
 
 def _find_idle_commands(validation: Validation) -> tuple[str, ...]:
-    """Return a remark on the commands of a valid recording that are zero or missing in every sample; empty without
-    any."""
+    """Find the commands of a valid recording that are zero or missing in every sample; returns one remark, or none."""
     if validation.problems or not validation.kind.startswith("recording, "):
         return ()
     command = read_recording(validation.path).command
@@ -76,7 +76,7 @@ def _is_folder(path: Path) -> bool:
 
 
 def _validate(path: Path, recognisers: tuple[Recogniser, ...]) -> Validation:
-    """Validation by the recognisers, then as a foreign recording; without remarks on access rights and commands."""
+    """Validate by the recognisers, then as a foreign recording; without remarks on access rights and commands."""
     if _is_foreign(path):
         return _validate_foreign(path)
     try:
@@ -107,7 +107,7 @@ def _is_foreign(path: Path) -> bool:
 
 
 def _validate_foreign(path: Path, kind: str = "", unknown_problems: tuple[str, ...] = ()) -> Validation:
-    """Validation as a recording of another program, read as an import would read it. kind, unknown_problems: kind
+    """Validate as a recording of another program, read as `hapteq import` would read it. kind, unknown_problems: kind
     and problems to report if the import refuses the file, because it may be a damaged hapteq file."""
     # Imported here: the import takes longer to load than most files take to check.
     from study.workflows.recording.import_recording import read_foreign
@@ -122,7 +122,8 @@ def _validate_foreign(path: Path, kind: str = "", unknown_problems: tuple[str, .
 
 
 def _describe_unknown(content: FileContent) -> tuple[str, str]:
-    """Kind of a file that no recogniser knows, and the problem as a clause without a capital letter or full stop."""
+    """Describe a file that no recogniser accepted: its kind, and the problem as a clause without initial capital and
+    full stop."""
     if content.is_folder:
         return "folder", "this folder is not a session: it holds no events.jsonl"
     if content.hdf5_format is not None:
@@ -141,7 +142,7 @@ def _describe_unknown(content: FileContent) -> tuple[str, str]:
 
 
 def _explain_json(content: FileContent) -> str:
-    """Why a JSON document is not recognised."""
+    """Explain, as a clause, why a JSON document is not recognised."""
     try:
         load_json((content.text or "")[: MAX_DOCUMENT_BYTES + 1])
     except ValueError as error:
@@ -152,7 +153,7 @@ def _explain_json(content: FileContent) -> str:
 
 
 def _explain_toml(content: FileContent) -> str:
-    """Why a TOML file is not recognised."""
+    """Explain, as a clause, why a TOML file is not recognised."""
     text = content.text or ""
     if len(text) > MAX_TOML_BYTES:
         return f"it has {len(text)} characters; up to {MAX_TOML_BYTES} are read"

@@ -12,7 +12,7 @@ from typing import Any
 
 from equalizer.signals.joining import join
 from protocols.definition.recording_protocol import RecordingProtocol
-from protocols.document.hashing import protocol_hash
+from protocols.document.hashing import hash_protocol
 from study.devices.clock import RealClock, VirtualClock
 from study.devices.device import Device, DeviceSettings, Fault
 from study.devices.opening import needs_real_time, open_device
@@ -170,6 +170,6 @@ def _make_metadata(plan: RecordingPlan, device: Device, takes: list[RecordedTake
         "interrupted": interrupted,
         "segments": [describe_segment(take) for take in takes],
         "provenance": gather_provenance(
-            protocol_hash=protocol_hash(protocol), seeds={"device": plan.seed}, parents=()
+            protocol_hash=hash_protocol(protocol), seeds={"device": plan.seed}, parents=()
         ).as_dict(),
     }

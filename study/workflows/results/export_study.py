@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from protocols.definition.study_protocol import StudyProtocol
 from protocols.document.dumping import dump_protocol
-from protocols.document.hashing import protocol_hash
+from protocols.document.hashing import hash_protocol
 from protocols.document.loading import ProtocolError, load_protocol
 from protocols.trial import Trial
 from study.errors import StudyError
@@ -158,7 +158,7 @@ def collect_exported(folder: Path) -> CollectedTrials:
         raise UnusableFileError(path, kind, tuple(str(problem) for problem in error.problems)) from error
     if not isinstance(protocol, StudyProtocol):
         raise UnusableFileError(path, kind, ("it is no protocol of a study",))
-    if dataset.facts.get("protocol_hash", protocol_hash(protocol)) != protocol_hash(protocol):
+    if dataset.facts.get("protocol_hash", hash_protocol(protocol)) != hash_protocol(protocol):
         raise UnusableFileError(
             path, kind, (f"it was changed since the export: its hash is not that of {facts_path.name}",), EXPORT_AGAIN
         )
@@ -167,7 +167,7 @@ def collect_exported(folder: Path) -> CollectedTrials:
     sessions = tuple(dict.fromkeys(trial.session for trial in dataset.trials))
     return CollectedTrials(
         protocol=protocol,
-        protocol_hash=protocol_hash(protocol),
+        protocol_hash=hash_protocol(protocol),
         trials=dataset.trials,
         sessions=tuple(SessionFolder(folder / name) for name in sessions),
         seeds=tuple(seeds.get(name, 0) for name in sessions),

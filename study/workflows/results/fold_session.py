@@ -7,7 +7,7 @@ call `fold_session`, so that damage is always detected."""
 from dataclasses import dataclass
 
 from protocols.definition.study_protocol import StudyProtocol
-from protocols.document.hashing import protocol_hash
+from protocols.document.hashing import hash_protocol
 from protocols.document.loading import ProtocolError, load_protocol
 from study.errors import StudyError
 from study.session.facts.events import SessionOpened
@@ -110,7 +110,7 @@ def load_logged_protocol(session_opened: SessionOpened, folder: SessionFolder) -
         raise StudyError(
             "This is no study session", f"The protocol in the log of {folder.name} is a recording.", "Check the folder."
         )
-    if protocol_hash(protocol) != session_opened.protocol_hash:
+    if hash_protocol(protocol) != session_opened.protocol_hash:
         raise StudyError(
             "The protocol in the log was changed",
             f"The protocol text of {folder.name} does not match the hash written beside it.",

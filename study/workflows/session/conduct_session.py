@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.clock import Clock
 from study.devices.device import Device, DeviceInfo, Fault
-from study.devices.opening import find_onset_line, open_device
+from study.devices.opening import open_lab_onset_line, open_device
 from study.errors import DeviceError
 from study.session.state.state import SessionState
 from study.store.sessions.archive import SessionFolder
@@ -126,7 +126,7 @@ def _check_sensor(protocol: StudyProtocol, info: DeviceInfo) -> None:
 @contextlib.contextmanager
 def _pulses(clock: Clock) -> Iterator[Callable[[], Pulse | None]]:
     """Trigger line of the lab; none in virtual time, which passes faster than a recorder's."""
-    line = None if clock.virtual else find_onset_line()
+    line = None if clock.virtual else open_lab_onset_line()
     try:
         yield send_no_pulse if line is None else line.send_pulse
     finally:

@@ -19,7 +19,7 @@ from study.workflows.results.session_results import REPORT_NAME, finish_tables, 
 from study.workflows.results.write_results import write_results
 from study.workflows.results.written_analysis import WrittenAnalysis
 from study.workflows.session.conduct_session import ConductedSitting
-from study.workflows.session.prepare_sitting import does_not_take_part
+from study.workflows.session.prepare_sitting import make_ineligible_error
 from study.workflows.session.resume_session import make_finished_error
 from study.workflows.session.withdraw_participant import list_remaining_copies, plan_withdrawal, withdraw
 
@@ -39,7 +39,7 @@ def end_sitting(sitting: ConductedSitting, utc: str) -> WrittenAnalysis:
         raise _erase_participant(sitting, utc)
     if sitting.state.is_finally_ineligible:
         write_tables(sitting.folder)
-        raise does_not_take_part(sitting.state)
+        raise make_ineligible_error(sitting.state)
     if sitting.end_reason:
         raise _make_unfinished_error(sitting)
     return write_results(sitting.folder)
@@ -51,7 +51,7 @@ def write_missing_results(folder: SessionFolder, folded_session: FoldedSession) 
     excluded, or if results cannot be written."""
     if folded_session.state.is_finally_ineligible:
         finish_tables(folder, folded_session)
-        raise does_not_take_part(folded_session.state)
+        raise make_ineligible_error(folded_session.state)
     due_report = () if is_analysis_of(folder.path / ANALYSIS_NAME, folder.log) else (REPORT_NAME,)
     due_files = (*list_due_results(folder, folded_session), *due_report)
     if not due_files:

@@ -1,9 +1,9 @@
 """Equalizer of a session: load its model, check it against protocol and device, and copy it into the session folder.
 
 With the protocol's quantity "delivered_acceleration", forces are computed from required accelerations by a periodic
-inverse of the identified model (`ModelEqualizer`). Levels stay forces in N: `compute_level_scales` returns for each
-frequency the level that corresponds to 1 m/s² (see `study.session.facts.level_scale`). Called by `conduct_session`, and
-before a device is opened by `plan_sitting` and `hapteq rehearse`.
+inverse of the identified model (`ModelEqualizer`). Levels are still stated as forces in N: `compute_level_scales`
+returns for each frequency the level that corresponds to 1 m/s² (see `study.session.facts.level_scale`). Called by
+`conduct_session` and `open_session`, and before a device is opened by `plan_sitting` and `hapteq rehearse`.
 """
 
 import math
@@ -34,21 +34,21 @@ from study.workflows.equalizer.spring_to_compensate import find_spring_to_compen
 MODEL_NAME = "model.h5"
 """File name of the copy of the model in the session folder."""
 LARGEST_PLACE_DISTANCE_M = 0.02
-"""Largest distance (m) of the place of identification from the centre of the workspace, where a study takes place.
-Models identified farther away leave as much coupling between the axes as was published without an equalizer."""
+"""Largest distance (m) of the place of identification from the centre of the workspace, where stimuli are played.
+Chosen: models identified farther away leave a coupling between the axes as large as that without an equalizer."""
 
 REQUIRED_CHANNELS = (("fx", "fy", "fz"), ("ax", "ay", "az"))
 """Channels that a model of a study needs: forces, then accelerations, in this order."""
-IDENTIFY_AGAIN = "Identify it again with hapteq identify."
+IDENTIFICATION_REMEDY = "Identify it again with hapteq identify."
 """Remedy for an unusable model, for messages."""
 LARGEST_RESPONSE_ERROR = 0.1
-"""Largest relative error of the acceleration that the model predicts for the equalized force of a stimulus: a level
-must correspond to its acceleration."""
+"""Largest error, relative to the required acceleration, of the acceleration that the model predicts for the equalized
+force of a stimulus. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SessionEqualizer:
-    """Equalizer of a session's stimuli, with its description for the log."""
+    """Equalizer of a session's stimuli, with the model and level scales for the log."""
 
     equalizer: Equalizer
     facts: EqualizedFacts | None
@@ -62,7 +62,8 @@ NO_EQUALIZER = SessionEqualizer(Identity(), None)
 
 
 def check_model_for_protocol(protocol: StudyProtocol, model: Path | None) -> None:
-    """Raise StudyError where protocol and model do not match. Called before a device is opened."""
+    """Raise StudyError where a model is missing, not needed, or unusable for the protocol (`_check_model`). Called
+    before a device is opened."""
     needs_model = protocol.stimulus.quantity == "delivered_acceleration"
     if needs_model and model is None:
         raise StudyError(
@@ -82,14 +83,14 @@ def check_model_for_protocol(protocol: StudyProtocol, model: Path | None) -> Non
 
 
 def load_equalizer() -> None:
-    """Import the equalizer module before a device is opened: the import is slow, and the device's loop must not wait.
+    """Import the equalizer module, which is slow, before a device is opened, so that its control loop is not delayed.
     Called only where stimuli are equalized."""
     import equalizer.tracking.feedforward.model_equalizer  # noqa: F401
 
 
 def equalize_stimuli(protocol: StudyProtocol, model: Path | None, info: DeviceInfo) -> SessionEqualizer:
-    """Equalizer for a protocol and a model that passed `check_model_for_protocol`. Raises StudyError where the model
-    does not match the device (another sample rate or spring), or the onset of a stimulus cannot be computed."""
+    """Make the equalizer for a protocol and a model that passed `check_model_for_protocol`. Raises StudyError where the
+    model does not match the device (another sample rate or spring), or the onset of a stimulus cannot be computed."""
     if model is None:
         return NO_EQUALIZER
     identified = read_identified_model(model)
@@ -97,20 +98,21 @@ def equalize_stimuli(protocol: StudyProtocol, model: Path | None, info: DeviceIn
     try:
         scales = compute_level_scales(protocol, equalizer, info.sample_rate_hz)
     except (ValueError, ArithmeticError) as error:  # numerical failure on an invalid model
-        raise _make_refusal(f"The onset of a stimulus cannot be computed ({error}).", IDENTIFY_AGAIN) from error
+        raise _make_refusal(f"The onset of a stimulus cannot be computed ({error}).", IDENTIFICATION_REMEDY) from error
     facts = EqualizedFacts(MODEL_NAME, compute_sha256(model), scales, write_quality_sentence(identified.quality))
     return SessionEqualizer(equalizer, facts, model)
 
 
 def copy_model(equalized: SessionEqualizer, folder: SessionFolder) -> None:
-    """Copy the model into the session folder, before the log refers to it. No effect without a file to copy."""
+    """Copy the model into the session folder as `MODEL_NAME`, before the log refers to it; does nothing where
+    `equalized.source` is None."""
     if equalized.source is not None:
         write_atomically(folder.path / MODEL_NAME, read_regular(equalized.source))
 
 
 def reload_equalizer(folder: SessionFolder, state: SessionState, info: DeviceInfo) -> SessionEqualizer:
-    """Equalizer of a resumed session, from the model in its folder. Raises StudyError where the model is missing or its
-    SHA-256 differs from the log."""
+    """Make the equalizer of a resumed session from the model in its folder. Raises StudyError where the model is
+    missing or its SHA-256 differs from the log."""
     facts = state.opened.equalized
     if facts is None:
         return NO_EQUALIZER
@@ -126,8 +128,8 @@ def reload_equalizer(folder: SessionFolder, state: SessionState, info: DeviceInf
 
 
 def compute_level_scales(protocol: StudyProtocol, equalizer: Equalizer, rate_hz: float) -> tuple[LevelScale, ...]:
-    """Scale at each frequency: the level (N) for 1 m/s^2, which is the larger of those of the two directions, and the
-    acceleration at the staircase's cap."""
+    """Compute the scale at each frequency of the protocol: the level (N) for 1 m/s², the larger of the two directions'
+    values, and the acceleration (m/s²) at the staircase's cap."""
     cap_n = protocol.staircase.cap_n
     scales = []
     for frequency_hz in protocol.all_frequencies_hz:
@@ -142,8 +144,8 @@ def compute_level_scales(protocol: StudyProtocol, equalizer: Equalizer, rate_hz:
 def _compute_level_per_acceleration(
     protocol: StudyProtocol, equalizer: Equalizer, direction: int, frequency_hz: float, rate_hz: float
 ) -> float:
-    """Level (N) for 1 m/s^2 in a direction: the peak F of the force for 1 m/s^2, onset included, or, if larger,
-    S / S_max x (highest level).
+    """Compute the level (N) for 1 m/s² in direction 1 or 2: the peak of the force for 1 m/s², onset included, or, if
+    larger, S / S_max x (highest level).
 
     S is the largest slope (N/s) of that force, and S_max the slew limit less the allowance for the spring. The second
     value keeps the stimulus at the highest level within the slew limit.
@@ -163,13 +165,13 @@ def _compute_level_per_acceleration(
 
 
 def _find_largest_norm(vectors: FloatArray) -> float:
-    """Largest Euclidean norm of the rows (n, 3)."""
+    """Find the largest Euclidean norm of the rows (n, 3)."""
     return float(np.linalg.norm(vectors, axis=1).max())
 
 
 def _make_equalizer(model: IdentifiedModel, protocol: StudyProtocol, info: DeviceInfo) -> Equalizer:
-    """Equalizer of a model, compensated for the spring of the protocol unless the model contains it. Raises StudyError
-    for another sample rate than the device's, or another spring in the model."""
+    """Make the equalizer of a model; it compensates the spring of the protocol unless the model contains it. Raises
+    StudyError for another sample rate than the device's, or another spring in the model."""
     from equalizer.tracking.feedforward.model_equalizer import ModelEqualizer
 
     if model.sample_rate_hz != info.sample_rate_hz:
@@ -177,25 +179,27 @@ def _make_equalizer(model: IdentifiedModel, protocol: StudyProtocol, info: Devic
             f"It runs at {model.sample_rate_hz:g} Hz, the device at {info.sample_rate_hz:g} Hz.",
             "Identify it from recordings of this device.",
         )
-    stiffness = info.effective_mass_kg * (2 * math.pi * protocol.spring.natural_frequency_hz) ** 2
-    spring = VirtualSpring(stiffness, protocol.spring.damping_n_s_per_m)
+    stiffness_n_per_m = info.effective_mass_kg * (2 * math.pi * protocol.spring.natural_frequency_hz) ** 2
+    spring = VirtualSpring(stiffness_n_per_m, protocol.spring.damping_n_s_per_m)
     return ModelEqualizer(model, find_spring_to_compensate(model, spring))
 
 
 def _check_model(model: IdentifiedModel, protocol: StudyProtocol, path: Path) -> None:
     """Raise StudyError for wrong units or channels, an unstable model, a band that lacks a frequency of the protocol, a
-    place of identification far from the centre, or a poor prediction."""
-    shape = (model.D.shape, model.input_unit, model.output_unit)
-    if shape != ((3, 3), "N", "m/s^2"):
+    place of identification beyond `LARGEST_PLACE_DISTANCE_M`, or a prediction error above `LARGEST_RESPONSE_ERROR`."""
+    shape_and_units = (model.D.shape, model.input_unit, model.output_unit)
+    if shape_and_units != ((3, 3), "N", "m/s^2"):
         raise _make_refusal(
             f"{path} goes from {model.D.shape[1]} inputs in {model.input_unit} to {model.D.shape[0]} outputs in "
             f"{model.output_unit}; a stimulus needs three forces in N and three accelerations in m/s^2.",
             "Identify a model from a recording of all three axes.",
         )
     if model.spectral_radius >= 1:
-        raise _make_refusal(f"The model in {path} is not stable.", IDENTIFY_AGAIN)
+        raise _make_refusal(f"The model in {path} is not stable.", IDENTIFICATION_REMEDY)
     low_hz, high_hz = model.band_hz
-    uncovered_hz = [f"{f:g}" for f in protocol.all_frequencies_hz if not low_hz <= f <= high_hz]
+    uncovered_hz = [
+        f"{frequency_hz:g}" for frequency_hz in protocol.all_frequencies_hz if not low_hz <= frequency_hz <= high_hz
+    ]
     if uncovered_hz:
         raise _make_refusal(
             f"{path} was made for {low_hz:g} to {high_hz:g} Hz; the protocol also plays {', '.join(uncovered_hz)} Hz.",
@@ -231,22 +235,23 @@ def _check_predicted_response(model: IdentifiedModel, protocol: StudyProtocol, p
     frequency_hz = np.array(protocol.all_frequencies_hz)
     unit_vectors = np.stack([compute_direction_vector(protocol.directions, direction) for direction in (1, 2)], axis=1)
     with np.errstate(all="ignore"):
-        predicted = (
+        predicted_acceleration = (
             compute_model_response(model, frequency_hz)
             @ compute_regularised_inverse(model, frequency_hz)
             @ unit_vectors
         )
-        errors = np.linalg.norm(predicted - unit_vectors, axis=1).max(axis=1)
-    unreachable = [
+        errors = np.linalg.norm(predicted_acceleration - unit_vectors, axis=1).max(axis=1)
+    unreachable_hz = [
         f"{f:g}" for f, error in zip(frequency_hz, errors, strict=True) if not error <= LARGEST_RESPONSE_ERROR
     ]
-    if unreachable:
+    if unreachable_hz:
         raise _make_refusal(
-            f"According to {path}, no reasonable force gives the wanted acceleration at {', '.join(unreachable)} Hz.",
+            f"According to {path}, no reasonable force gives the wanted acceleration at "
+            f"{', '.join(unreachable_hz)} Hz.",
             "Check units and axes of the recording it was made from, and identify it again.",
         )
 
 
 def _make_refusal(explanation: str, advice: str) -> StudyError:
-    """Error for a model that cannot equalize the study, raised before anything moves."""
+    """Make the error for a model that cannot equalize the study; raised before any motion."""
     return StudyError("This model cannot equalize the study", explanation, advice, saved="Nothing moved.")

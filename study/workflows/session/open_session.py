@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from protocols.definition.study_protocol import StudyProtocol
-from protocols.document.hashing import protocol_hash
+from protocols.document.hashing import hash_protocol
 from study.devices.clock import Clock
 from study.devices.device import DeviceInfo
 from study.session.facts.events import SESSION_FORMAT, SESSION_VERSION, DeviceFacts, SessionOpened
@@ -86,7 +86,7 @@ def open_session(
         participant_number=participant_number,
         observer=plan.observer,
         protocol_text=plan.protocol_text,
-        protocol_hash=protocol_hash(plan.protocol),
+        protocol_hash=hash_protocol(plan.protocol),
         protocol_locked=plan.protocol_locked,
         seed=plan.seed,
         device=collect_device_facts(device),

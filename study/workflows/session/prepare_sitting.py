@@ -75,8 +75,8 @@ def turn_away(state: SessionState, sitting: Sitting) -> SessionState:
     return log_and_apply(state, SessionClosed(utc=sitting.clock.utc(), outcome=outcome), sitting)
 
 
-def does_not_take_part(state: SessionState) -> StudyError:
-    """The error at the end of the sitting of a person who refused or was excluded, and on an attempt to resume it."""
+def make_ineligible_error(state: SessionState) -> StudyError:
+    """Make the error for a person who refused or was excluded: at the end of the sitting, and on resuming it."""
     return StudyError(
         "This person does not take part",
         f"{state.opened.session} is over: {INELIGIBILITY_REASONS[state.sitting.ineligibility or 'refused']}.",

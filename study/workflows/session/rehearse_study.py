@@ -144,7 +144,7 @@ def _rehearse_sitting(rehearsal: Rehearsal, number: int) -> None:
         finish_tables(begun_session, folded_session)
         return
     else:
-        clock = VirtualClock.resume_at(folded_session.state.sitting.last.utc)
+        clock = VirtualClock.resume_at(folded_session.state.sitting.last_moment.utc)
         conducted = conduct_resumed(begun_session, DEVICE, make_observer_participant(observer, seed, clock))
     write_tables(conducted.folder)
     _require_finished(conducted.folder.name, conducted.end_reason)

@@ -40,18 +40,21 @@ from study.workflows.results.fold_session import FoldedSession, fold_session
 from study.workflows.results.session_results import write_tables
 from study.workflows.session.open_session import OpenedSession, collect_device_facts
 from study.workflows.session.other_session_dose import compute_other_session_dose
-from study.workflows.session.prepare_sitting import does_not_take_part
+from study.workflows.session.prepare_sitting import make_ineligible_error
 from study.workflows.trial.judge_trial import Judgement, judge_trial
 from study.workflows.trial.trial_events import restore_health
 
 RECORDING_LOST = "its recording was lost when the program ended"
-"""Remark on a trial that counts without one, or reason why it is void."""
+"""Remark on a trial that counts without its recording, or reason why the trial is void."""
 
 
 @contextmanager
 def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> Iterator[OpenedSession]:
-    """Context with an existing session, repaired, and locked while the context lasts. Raises StudyError where it cannot
-    be resumed: a damaged log, a finished session, another kind of device, a participant who does not take part."""
+    """Open an existing session and repair its log; the session is locked while the context lasts.
+
+    Raises StudyError where it cannot be resumed: it is running in another program, finished or withdrawn, its log is
+    damaged, it was begun on another kind of device (real or simulated), or the participant refused or was excluded.
+    """
     close_data_folder(folder.path.parent)
     close_to_others(folder.path, recursive=True)  # earlier versions wrote files that other accounts could read
     with hold_session_lock(folder.path):
@@ -64,7 +67,7 @@ def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> I
             folded_session = fold_session(folder)
             if folded_session.state.is_finally_ineligible:
                 _close_ineligible_session(folded_session, folder, log, clock)
-                raise does_not_take_part(folded_session.state)
+                raise make_ineligible_error(folded_session.state)
             _check_resumable(folded_session.state, device, folder)
             remove_incomplete_line(folder.log, folded_session.log_contents)
             utc, observer = clock.utc(), folded_session.state.opened.observer
@@ -78,8 +81,8 @@ def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> I
             )
             log.append(resumed)
             # An interruption by Ctrl-C, which a participant may press too, has another cause than a crash.
-            interrupted = isinstance(folded_session.log_contents.events[-1], SessionInterrupted)
-            state = _close_open_trial(apply_event(folded_session.state, resumed), folder, log, clock, interrupted)
+            was_interrupted = isinstance(folded_session.log_contents.events[-1], SessionInterrupted)
+            state = _close_open_trial(apply_event(folded_session.state, resumed), folder, log, clock, was_interrupted)
             yield OpenedSession(folder, log, state)
         finally:
             log.close()
@@ -88,8 +91,8 @@ def resume_session(folder: SessionFolder, device: DeviceInfo, clock: Clock) -> I
 def _close_ineligible_session(
     folded_session: FoldedSession, folder: SessionFolder, log: EventLog, clock: Clock
 ) -> None:
-    """Close the session of a participant who refused or was excluded: append the last event if a crash prevented it,
-    and write seal and tables."""
+    """Close the session of a participant who refused or was excluded: append the closing event if a crash prevented
+    it, and write seal and tables."""
     if not folded_session.state.closed:
         remove_incomplete_line(folder.log, folded_session.log_contents)
         outcome = folded_session.state.sitting.ineligibility or "refused"
@@ -98,7 +101,8 @@ def _close_ineligible_session(
 
 
 def _check_resumable(state: SessionState, device: DeviceInfo, folder: SessionFolder) -> None:
-    """Raise StudyError for a closed session, and for a simulated device in place of a real one or the reverse."""
+    """Check that the session is open and the device of the same kind. Raises StudyError for a closed session, and for a
+    simulated device in place of a real one or the reverse."""
     if state.closed:
         raise make_finished_error(state, folder)
     if device.simulated != state.opened.device.simulated:
@@ -112,7 +116,7 @@ def _check_resumable(state: SessionState, device: DeviceInfo, folder: SessionFol
 
 
 def make_finished_error(state: SessionState, folder: SessionFolder) -> StudyError:
-    """Error for a closed session, which cannot be resumed."""
+    """Make the error for a closed session, which cannot be resumed."""
     return StudyError(
         "This session is finished",
         f"{folder.name} has all its runs.",
@@ -122,11 +126,11 @@ def make_finished_error(state: SessionState, folder: SessionFolder) -> StudyErro
 
 
 def _close_open_trial(
-    state: SessionState, folder: SessionFolder, log: EventLog, clock: Clock, interrupted: bool
+    state: SessionState, folder: SessionFolder, log: EventLog, clock: Clock, was_interrupted: bool
 ) -> SessionState:
-    """Close the trial that was open when the program ended: an answered trial is judged now; an unanswered trial is
-    void, because the participant may have felt the stimulus. Returns the new state. interrupted: the program was ended
-    by Ctrl-C."""
+    """Close the trial that was open when the program ended, if any, and return the new state. An answered trial is
+    judged now; an unanswered trial is void, because the participant may have felt the stimulus. was_interrupted:
+    whether Ctrl-C ended the program."""
     presented = state.presented
     if presented is None:
         return state
@@ -138,23 +142,22 @@ def _close_open_trial(
             attempt=presented.attempt,
             reason="the program ended before the answer",
             monotonic_s=clock.now_s(),
-            cause=VoidCause.LEFT if interrupted else VoidCause.PROGRAM_ENDED,
+            cause=VoidCause.LEFT if was_interrupted else VoidCause.PROGRAM_ENDED,
         )
     else:
-        event = _judge_late(state, presented, folder, clock)
+        event = _judge_after_restart(state, presented, folder, clock)
     log.append(event)
     return apply_event(state, event)
 
 
-def _judge_late(
+def _judge_after_restart(
     state: SessionState, presented: TrialPresented, folder: SessionFolder, clock: Clock
 ) -> TrialMeasured | TrialSpoiled:
-    """Judge a trial where the program ended between answer and measurement.
+    """Judge an answered trial that the program did not judge before it ended; returns its event.
 
-    A recording exists only if the trial was judged to count. Without a usable recording, the trial is judged by the
-    device's counters that were logged with the answer. Without these (older logs) the answer counts as unmeasured:
-    dropping answers after they are known would bias the result. If the protocol requires the accelerometer, a trial
-    without a usable recording is void.
+    With a usable recording, which is saved only for a trial that counts, the trial is measured from it. Otherwise the
+    trial is judged by the device's counters that were logged with the answer, and counts as unmeasured if they are
+    missing (older logs); if the protocol requires the accelerometer, it is void.
     """
     try:
         measured_event = _measure_from_recording(state, presented, folder, clock)
@@ -166,30 +169,31 @@ def _judge_late(
 def _judge_without_recording(
     state: SessionState, presented: TrialPresented, clock: Clock
 ) -> TrialMeasured | TrialSpoiled:
-    """Event of an answered trial without a recording, judged by the counters that were logged with the answer."""
+    """Judge an answered trial without a usable recording by the counters that were logged with the answer; returns its
+    event."""
     counters = state.answered.health if state.answered is not None else None
     health = restore_health(counters) if counters is not None else None
-    verdict = Judgement("", ())
+    judgement = Judgement("", ())
     if health is not None and counters is not None:
-        verdict = judge_trial(health, state.protocol.measurement, counters.felt_whole)
-    if state.protocol.measurement.accelerometer_needed and not verdict.void_reason:
-        verdict = Judgement(RECORDING_LOST, (), VoidCause.NO_ACCELERATION)
+        judgement = judge_trial(health, state.protocol.measurement, counters.felt_whole)
+    if state.protocol.measurement.accelerometer_needed and not judgement.void_reason:
+        judgement = Judgement(RECORDING_LOST, (), VoidCause.NO_ACCELERATION)
     missed_ticks = health.missed_ticks if health is not None else None
     late_ticks, latest_s = (counters.late_ticks, counters.latest_s) if counters is not None else (None, None)
     vibrated_s = health.ticks / state.opened.device.sample_rate_hz if health is not None else None
-    if verdict.void_reason:
+    if judgement.void_reason:
         return TrialSpoiled(
             utc=clock.utc(),
             run=presented.run,
             trial=presented.trial,
             attempt=presented.attempt,
-            reason=verdict.void_reason,
+            reason=judgement.void_reason,
             missed_ticks=missed_ticks,
             late_ticks=late_ticks,
             latest_s=latest_s,
             vibrated_s=vibrated_s,
             monotonic_s=clock.now_s(),
-            cause=verdict.cause,
+            cause=judgement.cause,
         )
     return TrialMeasured(
         utc=clock.utc(),
@@ -197,7 +201,7 @@ def _judge_without_recording(
         trial=presented.trial,
         attempt=presented.attempt,
         status="unmeasured",
-        flags=(RECORDING_LOST, *verdict.flags),
+        flags=(RECORDING_LOST, *judgement.flags),
         missed_ticks=missed_ticks,
         late_ticks=late_ticks,
         latest_s=latest_s,
@@ -209,14 +213,14 @@ def _judge_without_recording(
 def _measure_from_recording(
     state: SessionState, presented: TrialPresented, folder: SessionFolder, clock: Clock
 ) -> TrialMeasured | None:
-    """Event of an answered trial, measured from its recording; None if there is none. Raises StudyError or ValueError
-    if the recording cannot be used."""
+    """Measure an answered trial from its recording; returns its event, or None if there is no recording. Raises
+    StudyError or ValueError if the recording cannot be used."""
     trial_recording = find_trial_recording(folder, recording_name(presented.run, presented.trial, presented.attempt))
     if trial_recording is None:
         return None
     saved_file, recording = trial_recording
     counters = state.answered.health if state.answered is not None else None
-    # The angle that was played: of a detection trial, `direction` is the number of the interval.
+    # By the angle, because `direction` of a detection trial is the number of the interval.
     unit_vector = compute_vector_at_angle(state.protocol.directions, presented.angle_deg)
     is_trusted = recording.meta.get("acceleration_trusted", True)
     delivered = measure_delivered(recording, unit_vector, presented.frequency_hz) if is_trusted else None
@@ -243,6 +247,6 @@ def _measure_from_recording(
 
 
 def _read_sensor_facts(stored_facts: object) -> SensorFacts | None:
-    """Facts about the accelerometer in the metadata of a recording; None without them. Raises ValueError for other
-    content."""
+    """Validate the facts about the accelerometer from the metadata of a recording; None without them. Raises ValueError
+    (pydantic's ValidationError) for other content."""
     return None if stored_facts is None else TypeAdapter(SensorFacts).validate_python(stored_facts)

@@ -1,4 +1,6 @@
-"""Main loop of a session: gets the next action from the state machine, performs and logs it, until none is left.
+"""Main loop of a session: gets the next action from the state machine, performs and logs it, until the session is
+finished or the sitting ends. A sitting is the time from the start or resumption of a session to its end or
+interruption.
 
 `conduct_session` calls it for new and resumed sessions. The state machine is `study.session.state.machine`.
 """
@@ -25,7 +27,7 @@ from study.store.sessions.log_seal import seal_log
 from study.workflows.results.fold_session import fold_session
 from study.workflows.session.participant_number import assign_place
 from study.workflows.session.prepare_sitting import prepare_sitting, present_form, turn_away
-from study.workflows.trial.after_trial import AfterTrial
+from study.workflows.trial.action_result import ActionResult
 from study.workflows.trial.demonstrate import demonstrate
 from study.workflows.trial.masking import check_masking, start_masking, stop_masking
 from study.workflows.trial.play_probe import play_probe, play_reference
@@ -34,8 +36,8 @@ from study.workflows.trial.sitting import Sitting, log_and_apply, notify_experim
 from study.workflows.trial.take_pause import take_pause
 
 MAX_VOIDS_IN_A_ROW = 3
-"""After this many unrequested void presentations the sitting ends: the participant has left, or the device is
-faulty. A stimulus must not play on an unattended handle."""
+"""Number of consecutive void presentations, not requested by the participant, after which the sitting ends: the
+participant has left, or the device is faulty. A stimulus must not play on an unattended handle. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,17 +48,18 @@ class SessionEnd:
     end_reason: str
     """Why the sitting ended before the session was finished; empty if it is finished."""
     fault: Fault = Fault.NONE
-    """The device fault, if that was why."""
+    """Fault of the device that ended the sitting; NONE otherwise."""
     fault_text: str = ""
-    """The driver's words about it, where there are any."""
+    """Description of the fault by the driver; empty where it gives none."""
     withdrawn: bool = False
-    """The participant withdrew consent: the data are to be erased."""
+    """Whether the participant withdrew consent, so that the data must be erased."""
 
 
 def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
     """Run one sitting: until the session is finished, or the sitting ends early.
 
-    KeyboardInterrupt (Ctrl-C, a closed terminal) releases the device at once and is raised as UserInterruptError. Any
+    KeyboardInterrupt (Ctrl-C, a closed terminal) stops the device at once and is raised as UserInterruptError, or as
+    DeviceError where the force may still be on; a session that is finished in the log ends normally instead. A
     StudyError is extended by the number of saved answers and the command that continues.
     """
     try:
@@ -85,11 +88,11 @@ def run_session(state: SessionState, sitting: Sitting) -> SessionEnd:
 
 def _run_sitting(state: SessionState, sitting: Sitting) -> SessionEnd:
     """Prepare the sitting (forms, device check), show the instructions and perform the actions."""
-    state, refused = prepare_sitting(state, sitting)
+    state, end_reason = prepare_sitting(state, sitting)
     if state.is_finally_ineligible:
-        return SessionEnd(turn_away(state, sitting), refused)
-    if refused:
-        return _end_sitting(AfterTrial(state, end_reason=refused), sitting)
+        return SessionEnd(turn_away(state, sitting), end_reason)
+    if end_reason:
+        return _end_sitting(ActionResult(state, end_reason=end_reason), sitting)
     state = start_masking(assign_place(state, sitting), sitting)
     sitting.supervisor.start_activity("instructions")
     sitting.display.welcome(_make_welcome(state, sitting))
@@ -97,15 +100,15 @@ def _run_sitting(state: SessionState, sitting: Sitting) -> SessionEnd:
 
 
 def _close_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> SessionEnd:
-    """End of a sitting after an interruption. A session whose last event is in the log is finished, and its end is
-    returned. Otherwise the interruption is logged, and UserInterruptError is raised; DeviceError where the force may
-    still be on."""
+    """End a sitting after an interruption. If the participant does not take part, or the session is closed in the log
+    and the force is off, its end is returned. Otherwise the interruption is logged, and UserInterruptError is raised;
+    DeviceError where the force may still be on."""
     state = fold_session(sitting.folder).state
-    is_force_left = sitting.device.fault() is Fault.FORCE_LEFT
+    may_force_remain = sitting.device.fault() is Fault.FORCE_LEFT
     if state.is_finally_ineligible:  # nothing was played; its last line may be missing
         state = state if state.closed else turn_away(state, sitting)
         return SessionEnd(state, INELIGIBILITY_REASONS[state.sitting.ineligibility or "refused"])
-    if state.closed and not is_force_left:
+    if state.closed and not may_force_remain:
         return SessionEnd(state, end_reason="")
     # A full disk must not hide why the sitting ended.
     with contextlib.suppress(StudyError):
@@ -118,7 +121,7 @@ def _close_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> Ses
         )
     resume_advice = f"Continue with: {format_resume_command(str(sitting.folder.path), sitting.device_name)}"
     saved = f"{format_answer_count(state.answers)} on disk."
-    if is_force_left:
+    if may_force_remain:
         raise DeviceError(
             "The force may still be on", Fault.FORCE_LEFT.sentence, resume_advice, saved
         ) from interruption
@@ -126,7 +129,8 @@ def _close_interrupted(sitting: Sitting, interruption: KeyboardInterrupt) -> Ses
 
 
 def _add_resume_advice(error: StudyError, sitting: Sitting) -> StudyError:
-    """The same error, extended by the number of saved answers and the command that continues the session."""
+    """Extend the error, in place, by the number of saved answers and the command that continues the session; unchanged
+    where the log cannot be read or the participant does not take part."""
     with contextlib.suppress(StudyError):
         state = fold_session(sitting.folder).state
         if not state.is_finally_ineligible:
@@ -139,7 +143,7 @@ def _add_resume_advice(error: StudyError, sitting: Sitting) -> StudyError:
 def _run_actions(state: SessionState, sitting: Sitting) -> SessionEnd:
     """Perform the actions of the state machine, pauses and stop requests until the session is finished or the sitting
     ends."""
-    voids: tuple[str, ...] = ()
+    void_reasons: tuple[str, ...] = ()
     while True:
         state = write_notes(state, sitting)
         action = find_next_action(state, sitting.clock.utc(), sitting.clock.now_s())
@@ -151,9 +155,9 @@ def _run_actions(state: SessionState, sitting: Sitting) -> SessionEnd:
             return SessionEnd(state, end_reason="")
         outcome = _perform_action(state, action, sitting)
         if not isinstance(action, Probe | Reference):  # these neither void anything nor end a row of void trials
-            voids = (*voids, outcome.void) if outcome.void else ()
-        if len(voids) >= MAX_VOIDS_IN_A_ROW:
-            outcome = replace(outcome, end_reason=outcome.end_reason or explain_many_voids(voids))
+            void_reasons = (*void_reasons, outcome.void) if outcome.void else ()
+        if len(void_reasons) >= MAX_VOIDS_IN_A_ROW:
+            outcome = replace(outcome, end_reason=outcome.end_reason or explain_many_voids(void_reasons))
         pause_reason = _find_pause_reason(outcome, sitting)
         if pause_reason and not outcome.end_reason:
             pause_outcome = take_pause(stop_masking(outcome.state, sitting), pause_reason, sitting)
@@ -169,15 +173,15 @@ def _run_actions(state: SessionState, sitting: Sitting) -> SessionEnd:
         state = outcome.state
 
 
-def _perform_action(state: SessionState, action: Action, sitting: Sitting) -> AfterTrial:
+def _perform_action(state: SessionState, action: Action, sitting: Sitting) -> ActionResult:
     """Perform one action of the state machine; returns the new state and the reasons to pause or end."""
     match action:
         case EndSitting(reason=reason):
-            return AfterTrial(state, end_reason=reason)
+            return ActionResult(state, end_reason=reason)
         case TakeRest(seconds=seconds):
-            return AfterTrial(_take_rest(state, seconds, sitting))
+            return ActionResult(_conduct_rest(state, seconds, sitting))
         case FillIn(form=form):
-            return AfterTrial(present_form(state, form, sitting))
+            return ActionResult(present_form(state, form, sitting))
         case Demonstrate():
             return demonstrate(state, sitting)
         case PresentTrial() as due_trial:
@@ -192,11 +196,11 @@ def _perform_action(state: SessionState, action: Action, sitting: Sitting) -> Af
         case Reference():
             return play_reference(state, sitting)
         case Finish():
-            return AfterTrial(state)
+            return ActionResult(state)
 
 
-def _end_sitting(outcome: AfterTrial, sitting: Sitting) -> SessionEnd:
-    """Log why the sitting ended before the session was finished."""
+def _end_sitting(outcome: ActionResult, sitting: Sitting) -> SessionEnd:
+    """Log why the sitting ended before the session was finished, and return its end."""
     state = stop_masking(_report_busy_voids(write_notes(outcome.state, sitting), sitting), sitting)
     ending_event = SessionInterrupted(utc=sitting.clock.utc(), reason=outcome.end_reason)
     fault_text = sitting.device.health().why if outcome.fault is not Fault.NONE else ""
@@ -211,14 +215,16 @@ def _report_busy_voids(state: SessionState, sitting: Sitting) -> SessionState:
     return write_notes(state, sitting)
 
 
-def _find_pause_reason(outcome: AfterTrial, sitting: Sitting) -> str:
-    """Why the sitting pauses: the reason of the last action, or a request; empty if there is none."""
+def _find_pause_reason(outcome: ActionResult, sitting: Sitting) -> str:
+    """Find why the sitting pauses: the reason of the last action, or a request; empty if it does not pause."""
     sitting.supervisor.listen()
     requester = sitting.supervisor.pause_requester
     return outcome.pause or (f"the {requester} asked for a pause" if requester else "")
 
 
-def _finish_trial(outcome: AfterTrial, due_trial: PresentTrial, previous_state: SessionState, sitting: Sitting) -> None:
+def _finish_trial(
+    outcome: ActionResult, due_trial: PresentTrial, previous_state: SessionState, sitting: Sitting
+) -> None:
     """Show feedback, the result of a finished practice, or why the trial was void; then wait until the next trial."""
     if outcome.void:
         sitting.display.await_return(outcome.void)
@@ -231,7 +237,7 @@ def _finish_trial(outcome: AfterTrial, due_trial: PresentTrial, previous_state: 
 
 
 def _make_practice_result(previous_state: SessionState, correct: bool) -> PracticeResult:
-    """Result of a practice run, of which the last answer was right (`correct`) or wrong."""
+    """Make the result of a practice run. correct: whether its last answer was right, which previous_state lacks."""
     settings, practice = previous_state.protocol.practice, add_answer(previous_state.practice, correct)
     question_count = min(settings.of_last, len(practice.correct))
     return PracticeResult(
@@ -239,13 +245,13 @@ def _make_practice_result(previous_state: SessionState, correct: bool) -> Practi
     )
 
 
-def _take_rest(state: SessionState, seconds: float, sitting: Sitting) -> SessionState:
-    """Conduct a rest between runs and log it. A rest that a pause or stop request shortened does not count and is due
-    again."""
+def _conduct_rest(state: SessionState, duration_s: float, sitting: Sitting) -> SessionState:
+    """Conduct a rest of duration_s (s) between trials or runs, and log it. A rest that a pause or stop request
+    shortened is not logged, and is due again."""
     sitting.supervisor.start_activity("rest")
-    notice = RestNotice(seconds, len(state.runs) - state.run, estimate_progress(state))
+    notice = RestNotice(duration_s, len(state.runs) - state.run, estimate_progress(state))
     rested_s = max(0.0, sitting.display.rest(notice, sitting.supervisor.keep_alive))
-    if rested_s < seconds and (sitting.supervisor.stop_requester or sitting.supervisor.pause_requester):
+    if rested_s < duration_s and (sitting.supervisor.stop_requester or sitting.supervisor.pause_requester):
         return state
     event = RestTaken(utc=sitting.clock.utc(), run=state.run, trial=state.trial, rested_s=rested_s)
     return log_and_apply(state, event, sitting)
@@ -262,7 +268,7 @@ def _is_feedback_due(state: SessionState, due_trial: PresentTrial) -> bool:
 
 
 def _make_welcome(state: SessionState, sitting: Sitting) -> Welcome:
-    """Content of the instructions at the beginning of a sitting."""
+    """Make the content of the instructions at the beginning of a sitting."""
     training_run_count = sum(run.phase is Phase.TRAINING for run in state.runs)
     return Welcome(
         title=state.protocol.title,

@@ -1,6 +1,7 @@
-"""Simulation of one whole session by one call: a simulated participant on the simulated device, in virtual time.
+"""Simulate one complete session: a simulated participant on the simulated device, in virtual time.
 
-`rehearse_study` simulates the sessions of a whole study.
+A function of the Python interface (`study.simulate_session`); no other module calls it. `rehearse_study` simulates the
+sessions of a complete study.
 """
 
 from pathlib import Path
@@ -26,9 +27,9 @@ def simulate_session(
 ) -> SessionFolder:
     """Run a session in virtual time and write its log and tables below `data`; returns the session folder.
 
-    observer: a name that `hapteq study --observer` takes; subject: participant code of the session; model: identified
-    model that equalizes the stimuli. The same seed gives the same answers. Raises StudyError, also where the simulated
-    participant does not finish.
+    observer: name of a simulated observer, as for `hapteq study --observer`; subject: participant code of the session;
+    model: file of an identified model that equalizes the stimuli. The same seed gives the same answers. Raises
+    StudyError where the session cannot be begun or the simulated participant does not finish it.
     """
     plan = SessionPlan(
         protocol=protocol.protocol,

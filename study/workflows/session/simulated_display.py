@@ -30,7 +30,7 @@ from study.session.views.participant_views import (
     Unanswered,
     Welcome,
 )
-from study.workflows.session.simulated_touch import SimulatedTouch
+from study.workflows.session.stimulus_sampler import StimulusSampler
 from study.workflows.trial.display import SignOfLife
 
 KEEPALIVE_INTERVAL_S = 0.1
@@ -53,20 +53,20 @@ class SimulatedDisplay:
         seed: int,
         clock: Clock,
         on_question: Callable[[Question], None] | None = None,
-        touch: SimulatedTouch | None = None,
+        sampler: StimulusSampler | None = None,
     ) -> None:
         """observer: model of the participant; seed: of the session, for the observer's draws; on_question: called with
-        each question; touch: measures the delivered acceleration, for an observer who depends on it."""
+        each question; sampler: measures the delivered acceleration, for an observer who depends on it."""
         self._observer = observer
         self._seed = seed
         self._clock = clock
         self._on_question = on_question
-        self._touch = touch
+        self._sampler = sampler
         self._perceived: PerceivedStimulus | None = None
         self._stimulus: PresentTrial | None = None
 
     def feel(self, stimulus: PresentTrial, answers_before: int) -> None:
-        """Store the stimulus, for the answer and for `SimulatedTouch`."""
+        """Store the stimulus, for the answer and for `StimulusSampler`."""
         self._stimulus = stimulus
         self._perceived = PerceivedStimulus(
             run=stimulus.run,
@@ -136,14 +136,14 @@ class SimulatedDisplay:
         self, perceived: PerceivedStimulus, seconds: float, sign_of_life: SignOfLife
     ) -> PerceivedStimulus | None:
         """Wait for `seconds`; returns the stimulus, with the delivered acceleration of its last periods where there is
-        a `SimulatedTouch`. None where `sign_of_life` ended the wait. In a detection trial the stimulus ended before the
-        question."""
-        touch, stimulus = self._touch, self._stimulus
-        if touch is None or stimulus is None or perceived.phase is Phase.DETECTION:
+        a `StimulusSampler`. None where `sign_of_life` ended the wait. In a detection trial the stimulus ended before
+        the question."""
+        sampler, stimulus = self._sampler, self._stimulus
+        if sampler is None or stimulus is None or perceived.phase is Phase.DETECTION:
             return perceived if self._wait(seconds, sign_of_life) else None
-        if not self._wait(max(0.0, seconds - touch.seconds(stimulus)), sign_of_life):
+        if not self._wait(max(0.0, seconds - sampler.compute_duration_s(stimulus)), sign_of_life):
             return None
-        delivered = touch.feel(stimulus, sign_of_life)
+        delivered = sampler.measure_stimulus(stimulus, sign_of_life)
         return replace(perceived, delivered=delivered) if sign_of_life() else None
 
     def feedback(self, correct: bool) -> None:

@@ -1,6 +1,6 @@
 """Make a simulated participant of a sitting: an observer model that implements the ports for display and hand.
 
-An observer that depends on the delivered acceleration (`DeliveredFeeler`) also gets a `SimulatedTouch`, which measures
+An observer that depends on the delivered acceleration (`DeliveredFeeler`) also gets a `StimulusSampler`, which measures
 that acceleration. Called by `simulate_session`, `rehearse_study` and `study.cli.conduct`.
 """
 
@@ -13,7 +13,7 @@ from study.participants.observer_catalogue import find_observer
 from study.session.views.participant_views import Question
 from study.workflows.session.conduct_session import Participant
 from study.workflows.session.simulated_display import SimulatedDisplay
-from study.workflows.session.simulated_touch import SimulatedTouch
+from study.workflows.session.stimulus_sampler import StimulusSampler
 
 
 def make_simulated_participant(
@@ -32,6 +32,6 @@ def make_observer_participant(
     if not isinstance(observer, DeliveredFeeler):
         display = SimulatedDisplay(observer, seed, clock, on_question)
         return Participant(display=display, hand=display, clock=clock)
-    touch = SimulatedTouch(clock)
-    display = SimulatedDisplay(observer, seed, clock, on_question, touch)
-    return Participant(display=display, hand=display, clock=clock, on_session_opened=touch.on_session_opened)
+    sampler = StimulusSampler(clock)
+    display = SimulatedDisplay(observer, seed, clock, on_question, sampler)
+    return Participant(display=display, hand=display, clock=clock, on_session_opened=sampler.on_session_opened)

@@ -1,9 +1,9 @@
-"""Withdrawal of a participant: all data are erased permanently, and a tombstone replaces each session.
+"""Withdraw a participant: erase all data permanently, and replace each session by a tombstone.
 
-Called by `hapteq withdraw`, by the screen, and by `end_sitting` after a participant withdrew in a pause. The tombstone
-contains the names of session and protocol and the participant number, but no measured data. The list of what will be
-erased is written to the disk first, and the log of each session is erased last, so that the same command continues an
-interrupted withdrawal.
+Called by `hapteq withdraw`, by the screen, and by `end_sitting` after a participant withdrew in a pause. A tombstone is
+a file with the names of session and protocol and the participant number, but without measured data. The list of what
+will be erased is written to the disk first, and the log of each session is erased last, so that the same command
+continues an interrupted withdrawal.
 """
 
 import errno
@@ -31,22 +31,24 @@ class Withdrawal:
     """Plan of a withdrawal: the data that are erased in the data folder, and those that a person must check."""
 
     subject: str
+    """Code of the participant."""
     sessions: tuple[str, ...]
-    """All sessions of the participant in this data folder, earlier withdrawn ones included."""
+    """Names of all sessions of the participant in this data folder, earlier withdrawn ones included."""
     derived: tuple[str, ...]
-    """Analyses and unfinished files with the participant's data, relative to the data folder."""
+    """Paths of analyses and unfinished files with the participant's data, relative to the data folder."""
     doubtful: tuple[str, ...]
     """Sentences on data that may be the participant's; they are kept and must be checked by a person."""
 
     @property
     def derived_roots(self) -> tuple[str, ...]:
-        """First part of each path in `derived`: the folders or files of the data folder that contain it."""
+        """First part of each path in `derived`, without repetition: the entries of the data folder that contain
+        them."""
         return tuple(dict.fromkeys(PurePosixPath(name).parts[0] for name in self.derived))
 
 
 def find_session_to_withdraw(session: str, data: Path) -> SessionFolder:
-    """The session by the path of its folder or by its name in `data`. Raises WrongUseError for an unknown session, and
-    for a symbolic link, which is not followed."""
+    """Find the session by the path of its folder or by its name in `data`; it may be withdrawn already. Raises
+    WrongUseError for an unknown session, and for a symbolic link, which is not followed."""
     path = Path(session) if Path(session).is_dir() else data / session
     folder = SessionFolder(path.absolute().parent.resolve() / path.absolute().name)
     if folder.path.is_symlink():
@@ -65,8 +67,9 @@ def find_session_to_withdraw(session: str, data: Path) -> SessionFolder:
 
 
 def plan_withdrawal(session: SessionFolder) -> Withdrawal:
-    """Plan of the withdrawal: every session of the session's participant, and the analyses made from them. Nothing is
-    changed. Raises StudyError where no data are proved to be the participant's and no withdrawal was begun."""
+    """Plan the withdrawal of the session's participant: all sessions, and the analyses made from them; includes the
+    plan of a withdrawal that was interrupted. Nothing is changed. Raises StudyError where no data are proved to be the
+    participant's and no withdrawal was begun."""
     data, subject = session.path.parent.resolve(), session.subject
     intent = read_intent(data, subject)
     traces = find_traces(data, subject, intent.sessions if intent else ())
@@ -82,8 +85,9 @@ def plan_withdrawal(session: SessionFolder) -> Withdrawal:
 
 
 def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
-    """Erase the data of the plan and write the tombstones. utc: time of the withdrawal. Raises StudyError: before any
-    change if a session is running; at any time where the system does not allow to erase a file."""
+    """Erase the data of the plan and write the tombstones. utc: time of the withdrawal, not used if an interrupted one
+    is continued. Raises StudyError: before any data are erased if a session is running; at any time where the operating
+    system does not allow to erase or write a file."""
     data, subject = data.resolve(), withdrawal.subject
     folders = tuple(SessionFolder(data / name) for name in withdrawal.sessions)
     try:
@@ -107,8 +111,8 @@ def withdraw(data: Path, withdrawal: Withdrawal, utc: str) -> None:
 
 
 def list_remaining_copies(data: Path, withdrawal: Withdrawal) -> tuple[str, ...]:
-    """Sentences on analyses and exports outside the data folder that name or may name the participant, as far as they
-    were noted when they were written, and a reminder of copies that are not noted."""
+    """List the analyses and exports outside the data folder that name or may name the participant, a sentence each, as
+    far as their folders were recorded when they were written; the last sentence is a reminder of other copies."""
     noted_paths = [path for path in read_written_folders(data) if path.exists()]
     naming_paths = [path for path in noted_paths if is_subject_in_analysis(path, withdrawal.subject) is not False]
     return (*(f"Written with --out, and not erased: {path}" for path in naming_paths), COPIES_REMINDER)
@@ -156,7 +160,8 @@ def _erase_derived(data: OpenedFolder, name: str) -> None:
 
 
 def _make_incomplete_error(data: Path, withdrawal: Withdrawal, problem: OSError) -> StudyError:
-    """Error for a withdrawal that the system did not allow to complete, with the command that continues it."""
+    """Make the error for a withdrawal that the operating system did not allow to complete, with the command that
+    continues it."""
     file_text = f" ({problem.filename})" if problem.filename else ""
     session_name = withdrawal.sessions[0] if withdrawal.sessions else f"{withdrawal.subject}_001"
     return StudyError(

@@ -16,11 +16,16 @@ from study.session.views.participant_views import (
     Unanswered,
     make_direction_picture,
 )
-from study.workflows.trial.after_trial import AfterTrial, check_end_request, find_leaving_reason, make_early_end_result
+from study.workflows.trial.action_result import (
+    ActionResult,
+    check_end_request,
+    find_leaving_reason,
+    make_early_end_result,
+)
 from study.workflows.trial.sitting import Sitting, log_and_apply
 
 
-def demonstrate(state: SessionState, sitting: Sitting) -> AfterTrial:
+def demonstrate(state: SessionState, sitting: Sitting) -> ActionResult:
     """Run the demonstration until the participant ends it, leaves, or a pause is requested. It can be run again."""
     felt_stimuli: tuple[tuple[int, int], ...] = ()
     vibration = 1
@@ -31,7 +36,7 @@ def demonstrate(state: SessionState, sitting: Sitting) -> AfterTrial:
         if ended is not None:
             return ended
         if isinstance(choice, DemoDone):
-            return AfterTrial(log_and_apply(state, DemoFinished(utc=sitting.clock.utc()), sitting))
+            return ActionResult(log_and_apply(state, DemoFinished(utc=sitting.clock.utc()), sitting))
         vibration = choice.vibration
         outcome = _play_demonstration(state, choice, sitting)
         state = outcome.state
@@ -54,11 +59,11 @@ def _menu(state: SessionState, felt_stimuli: tuple[tuple[int, int], ...], vibrat
     )
 
 
-def _play_demonstration(state: SessionState, choice: PlayDemo, sitting: Sitting) -> AfterTrial:
+def _play_demonstration(state: SessionState, choice: PlayDemo, sitting: Sitting) -> ActionResult:
     """Log and play one stimulus at its roved level (`draw_demo_level_n`); returns how the demonstration continues."""
     protocol = state.protocol
     frequency_hz = protocol.all_frequencies_hz[choice.vibration - 1]
-    level_n = draw_demo_level_n(protocol.demo, state.opened.seed, state.sitting.demos)
+    level_n = draw_demo_level_n(protocol.demo, state.opened.seed, state.sitting.demo_count)
     direction = label_direction(choice.number, has_swapped_labels(protocol, state.opened))
     demo_played = DemoPlayed(
         utc=sitting.clock.utc(),
@@ -84,11 +89,11 @@ def _play_demonstration(state: SessionState, choice: PlayDemo, sitting: Sitting)
     reply = sitting.display.show_playing(notice, sitting.supervisor.keep_alive)
     fault = sitting.device.release().health.fault
     if end_reason := find_leaving_reason(fault):
-        return AfterTrial(state, end_reason=end_reason, fault=fault)
+        return ActionResult(state, end_reason=end_reason, fault=fault)
     resolved = sitting.supervisor.resolve(reply or Unanswered("", ends_sitting=False, repeat_requested=True))
     if isinstance(resolved, Unanswered):
         outcome = make_early_end_result(state, resolved)
         return (
-            outcome if fault is Fault.NONE or outcome.end_reason else AfterTrial(state, void=fault.value, fault=fault)
+            outcome if fault is Fault.NONE or outcome.end_reason else ActionResult(state, void=fault.value, fault=fault)
         )
-    return AfterTrial(state)
+    return ActionResult(state)

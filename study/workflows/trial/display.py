@@ -1,8 +1,9 @@
-"""Interfaces from a session to the participant: display (notices, forms, questions) and hand (the felt stimulus).
+"""Interfaces from a session to the participant: display (notices, forms, questions) and hand (receives the stimulus).
 
-The display is implemented by line mode (`study.tui.line_mode`), by the screen (`study.tui.engine.remote_display`) and
-by a simulated participant (`workflows.session.simulated_display`). Any method of a display may raise KeyboardInterrupt
-to leave: the force is released at once, and the session can be resumed.
+Called by `study.workflows.trial` and `study.workflows.session` during a sitting. The display is implemented by line
+mode (`study.tui.line_mode`), by the screen (`study.tui.engine.remote_display`) and by a simulated participant
+(`workflows.session.simulated_display`). Any method of a display may raise KeyboardInterrupt to leave: the force is
+released at once, and the session can be resumed.
 """
 
 from __future__ import annotations
@@ -32,20 +33,21 @@ if TYPE_CHECKING:
     from study.session.state.due_trial import PresentTrial
 
 SignOfLife = Callable[[], bool]
-"""Keep-alive callback that a display calls at least every 100 ms while it waits: it resets the device's watchdog and
-takes requests to stop or pause. Where it returns False (a fault, a request, a device button), the display returns
-at once, with any reply."""
+"""Keep-alive callback, which a display calls at least every 100 ms while it waits: it resets the device's watchdog and
+reads requests to stop or pause. Where it returns False (a fault, a request, a device button), the display returns at
+once, with any reply."""
 
 
 class Display(Protocol):
     """Interface of the participant's screen: shows notices, forms and questions, and waits for the replies."""
 
     def fill_in(self, form: Form) -> FormReply:
-        """Show a form. Returns when every required field has an answer that is one of its choices."""
+        """Show a form and return its answers, when every required field has a valid one."""
         ...
 
     def device_checked(self, report: DeviceReport) -> bool:
-        """Show the findings of the device check, and wait. Returns True to continue, False to repeat the check."""
+        """Show the findings of the device check and wait for the choice: True to continue, False to repeat the
+        check."""
         ...
 
     def welcome(self, notice: Welcome) -> None:
@@ -57,16 +59,17 @@ class Display(Protocol):
         ...
 
     def show_playing(self, notice: PlayingNotice, sign_of_life: SignOfLife) -> Unanswered | None:
-        """Wait while a stimulus or interval of fixed length passes. None when its time is over; else why the wait
-        ended."""
+        """Show a notice during a stimulus or interval of fixed duration. Returns None when its time is over, else the
+        reason for the early end."""
         ...
 
     def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
-        """Wait until `look().ready`, checked about every 100 ms. Returns None then; else why the wait ended early."""
+        """Wait until the handle is in position: `look().ready`, checked about every 100 ms. Returns None then, else the
+        reason for the early end."""
         ...
 
     def ask(self, question: Question, sign_of_life: SignOfLife) -> Reply:
-        """Show the question and wait for the answer, 1 or 2; returns it, or why there is none."""
+        """Show the question and wait for the answer, 1 or 2. Returns it, or the reason why there is none."""
         ...
 
     def feedback(self, correct: bool) -> None:
@@ -74,7 +77,7 @@ class Display(Protocol):
         ...
 
     def practice_over(self, result: PracticeResult) -> None:
-        """Show the result of a practice. Returns when the participant has read it."""
+        """Show the result of a practice. Returns when the participant confirms."""
         ...
 
     def rest(self, notice: RestNotice, sign_of_life: SignOfLife) -> float:
@@ -88,7 +91,7 @@ class Display(Protocol):
         ...
 
     def await_return(self, reason: str) -> None:
-        """Show why a trial was void, and wait until the participant is ready."""
+        """Show the reason for a void trial, and wait until the participant is ready."""
         ...
 
     def goodbye(self, notice: Goodbye) -> None:
@@ -101,8 +104,8 @@ class Display(Protocol):
 
 
 class Hand(Protocol):
-    """Interface of the hand on the handle. A person feels the device itself; a simulated hand receives the stimulus as
-    data."""
+    """Interface of the hand on the handle: a simulated hand receives the stimulus as data, a person through the
+    device."""
 
     def feel(self, stimulus: PresentTrial, answers_before: int) -> None:
         """Receive the stimulus: called as soon as it is held; in a detection trial before the first interval.
@@ -111,7 +114,7 @@ class Hand(Protocol):
 
 
 class PersonsHand:
-    """Hand of a person, who feels the device itself: `feel` does nothing."""
+    """Hand of a person, who feels the device: `feel` does nothing."""
 
     def feel(self, stimulus: PresentTrial, answers_before: int) -> None:
         return None

@@ -1,5 +1,4 @@
-"""Judgement from the device's counters of whether an answered trial counts; `present_trial` and `resume_session` call
-it.
+"""Judge from the device's counters whether an answered trial counts. Called by `present_trial` and `resume_session`.
 
 A trial is void if the participant did not feel the stimulus as planned (a fault of the device, or missed or late ticks
 of its control loop), or if a measurement that the protocol requires is missing. A void trial is repeated; its answer
@@ -21,18 +20,20 @@ class Judgement:
     void_reason: str
     """Why the trial is void; empty if it counts."""
     flags: tuple[str, ...]
-    """Remarks on a trial that counts, in words."""
+    """Remarks on a trial that counts, as clauses; empty for a void trial."""
     cause: VoidCause = VoidCause.FAULT
-    """Cause of a void trial; without meaning for a trial that counts."""
-    measured: bool = True
-    """Whether enough of the acceleration was received to measure the stimulus."""
+    """Cause of a void trial; meaningless for a trial that counts."""
+    is_measurable: bool = True
+    """Whether enough of the acceleration was received to measure the stimulus, of a trial that counts; meaningless for
+    a void trial."""
 
 
 def judge_trial(
     health: Health, settings: MeasurementSettings, felt_whole: bool, health_at_answer: Health | None = None
 ) -> Judgement:
-    """Judge an answered trial. health: counters until the release; health_at_answer: counters at the answer, None if
-    both are equal. felt_whole: whether the stimulus was complete until the answer; a later fault is then only a remark.
+    """Judge an answered trial. health: counters until the release, or until the answer where later ones are not known;
+    health_at_answer: counters at the answer, None if they equal `health`. felt_whole: whether the stimulus was complete
+    until the answer, as in the log; a later fault is then only a remark.
 
     Late ticks are judged until the answer, because later ones were not felt before it. Missed ticks are judged until
     the release, because they also falsify the recorded spectrum.
@@ -56,12 +57,12 @@ def judge_trial(
         (health.sensor_clipped > 0, "accelerometer clipped"),
         (bool(missing_text), f"no trustworthy acceleration: {missing_text}"),
     )
-    return Judgement("", tuple(remark for applies, remark in remarks if applies), measured=not missing_text)
+    return Judgement("", tuple(remark for is_true, remark in remarks if is_true), is_measurable=not missing_text)
 
 
 def _describe_lateness(health: Health, settings: MeasurementSettings) -> str:
-    """Which limit for late ticks was exceeded (share of late and missed ticks, or delay of the latest in ms), as text;
-    empty if none was."""
+    """Describe the limit for late ticks that was exceeded: the share of late and missed ticks (%), or the delay of the
+    latest tick (ms); empty if none was."""
     late_share = (health.missed_ticks + health.late_ticks) / max(health.ticks, 1)
     if late_share > settings.late_ticks_limit:
         return f"{100 * late_share:.1f} % {TICKS_LATE}"
@@ -70,7 +71,7 @@ def _describe_lateness(health: Health, settings: MeasurementSettings) -> str:
 
 
 def _describe_missing_acceleration(health: Health, settings: MeasurementSettings) -> str:
-    """Missing share of the acceleration, as text; empty within the protocol's limit, or where the device has no
+    """Describe the missing share (%) of the acceleration; empty within the protocol's limit, or where the device has no
     accelerometer that sends packets."""
     if health.sensor is None or health.sensor.missing <= settings.lost_packets_limit:
         return ""
@@ -78,5 +79,5 @@ def _describe_missing_acceleration(health: Health, settings: MeasurementSettings
 
 
 def get_void_cause(fault: Fault) -> VoidCause:
-    """Cause of a trial that is void because of this fault: a stalled program counts as a late screen."""
+    """Get the cause of a trial that is void because of this fault: a stalled program counts as a late screen."""
     return VoidCause.SCREEN_LATE if fault is Fault.STALLED else VoidCause.FAULT

@@ -22,22 +22,28 @@ from study.session.views.forms import judge_form, make_form, make_take_handle_fo
 from study.session.views.participant_views import PlayingNotice, Unanswered
 from study.store.disk.provenance import list_versions
 from study.store.sessions.trial_recordings import probe_name, save_trial_recording
-from study.workflows.trial.after_trial import AfterTrial, check_end_request, find_leaving_reason, make_early_end_result
+from study.workflows.trial.action_result import (
+    ActionResult,
+    check_end_request,
+    find_leaving_reason,
+    make_early_end_result,
+)
 from study.workflows.trial.present_trial import await_handle
 from study.workflows.trial.sitting import Sitting, log_and_apply, notify_experimenter, release_device
 
 MAX_FREE_MASS_RATIO = 0.9
-"""Largest ratio of the apparent mass of a free handle to that with the hand; chosen by hand."""
+"""Largest ratio of the apparent mass of the handle without the hand to that with the hand at which the handle counts as
+free. Chosen."""
 
 NO_QUESTION = "Nothing to answer: the device is measured"
-"""Shown while a probe or the reference plays."""
+"""Text shown while a probe plays."""
 
 ProbeKind = Literal["hand", "free", "reference"]
 """Probe with the hand on the handle; probe that tests whether the handle is free; reference without a hand."""
 
 
 class _EndedEarlyError(Exception):
-    """Raised in the progress callback of the reference after a stop request, a pause request or a fault, to end the
+    """A stop request, a pause request or a fault during the reference; raised in its progress callback to end the
     playback."""
 
 
@@ -53,28 +59,28 @@ class _MeasuredProbe:
     """Apparent mass of the handle; None without a recording."""
 
 
-def play_probe(state: SessionState, probe: Probe, sitting: Sitting) -> AfterTrial:
-    """Play a probe with the hand on the handle, after waiting for the hand as a trial does."""
-    hindrance = await_handle(state, sitting)
-    if hindrance is not None:
-        return make_early_end_result(state, hindrance)
+def play_probe(state: SessionState, probe: Probe, sitting: Sitting) -> ActionResult:
+    """Wait for the handle as before a trial, then play, measure and log a probe with the hand on the handle."""
+    early_reply = await_handle(state, sitting)
+    if early_reply is not None:
+        return make_early_end_result(state, early_reply)
     if (early_end := check_end_request(state, sitting)) is not None:
         return early_end
     measured = _play_and_measure(state, "hand", probe.level_n, sitting)
     return _conclude_probe(measured.state, measured.reply, measured.play_result, sitting)
 
 
-def play_reference(state: SessionState, sitting: Sitting) -> AfterTrial:
-    """Ask for a free handle, test with a probe whether it is free, and only then play the reference. Without it, log
-    the reason."""
+def play_reference(state: SessionState, sitting: Sitting) -> ActionResult:
+    """Ask for a free handle, test with a probe whether it is free, and only then play the reference; afterwards ask the
+    participant to take the handle. If the reference is not played, the reason is logged."""
     form = make_form(state.protocol, FormKind.HANDLE)
     assert form is not None, "a reference is due only where the protocol has one"
     hand_mass_kg = state.sitting.probing.hand_mass_kg
     if hand_mass_kg is None:
-        return AfterTrial(_skip_reference(state, "what the handle weighs in the hand could not be measured", sitting))
+        return ActionResult(_skip_reference(state, "what the handle weighs in the hand could not be measured", sitting))
     sitting.supervisor.start_activity("form")
     if not judge_form(state.protocol, form, sitting.display.fill_in(form)).passed:
-        return AfterTrial(_skip_reference(state, "the handle was not free", sitting))
+        return ActionResult(_skip_reference(state, "the handle was not free", sitting))
     if (early_end := check_end_request(state, sitting)) is not None:
         return early_end
     sitting.device.simulate_hand(False)
@@ -88,16 +94,16 @@ def play_reference(state: SessionState, sitting: Sitting) -> AfterTrial:
     return outcome
 
 
-def _test_and_play_reference(state: SessionState, hand_mass_kg: float, sitting: Sitting) -> AfterTrial:
+def _test_and_play_reference(state: SessionState, hand_mass_kg: float, sitting: Sitting) -> ActionResult:
     """Play a probe without the hand; play the reference if the apparent mass is at most `MAX_FREE_MASS_RATIO` times
     `hand_mass_kg`, the apparent mass (kg) with the hand."""
-    # At the level of the probe that it is compared with: the influence of friction and springs depends on the level.
+    # At the level of the probe with the hand: the influence of friction and springs depends on the level.
     free_probe = _play_and_measure(state, "free", state.sitting.probing.hand_level_n, sitting)
     outcome = _conclude_probe(free_probe.state, free_probe.reply, free_probe.play_result, sitting)
     if outcome.end_reason or outcome.pause or outcome.fault is not Fault.NONE:
         return outcome
     if free_probe.mass_kg is None:
-        return AfterTrial(
+        return ActionResult(
             _skip_reference(free_probe.state, "whether the handle is free could not be measured", sitting)
         )
     if free_probe.mass_kg > MAX_FREE_MASS_RATIO * hand_mass_kg:
@@ -105,19 +111,19 @@ def _test_and_play_reference(state: SessionState, hand_mass_kg: float, sitting: 
             f"the handle seems to be held: it answers like {free_probe.mass_kg:.2f} kg, and {hand_mass_kg:.2f} kg in "
             "the hand"
         )
-        return AfterTrial(_skip_reference(free_probe.state, reason, sitting))
+        return ActionResult(_skip_reference(free_probe.state, reason, sitting))
     return _play_reference_commands(free_probe.state, sitting)
 
 
 def _skip_reference(state: SessionState, reason: str, sitting: Sitting) -> SessionState:
-    """Tell the experimenter and log that no reference is played, and why."""
+    """Report to the experimenter and log that no reference is played, and why. reason: a clause."""
     notify_experimenter(f"No reference was played: {reason}.", sitting)
     number = state.sitting.probing.probe_count
     event = ProbeMeasured(utc=sitting.clock.utc(), number=number, vibrated_s=0.0, trouble=reason)
     return log_and_apply(state, event, sitting)
 
 
-def _play_reference_commands(state: SessionState, sitting: Sitting) -> AfterTrial:
+def _play_reference_commands(state: SessionState, sitting: Sitting) -> ActionResult:
     """Play the reference, measure and log it. A stop request, a pause request or a fault ends it early."""
     probes, rate_hz = state.protocol.probes, sitting.device.info.sample_rate_hz
     commands, segments = make_reference_commands(probes, rate_hz)
@@ -125,29 +131,30 @@ def _play_reference_commands(state: SessionState, sitting: Sitting) -> AfterTria
     sitting.supervisor.start_activity("reference")
     sitting.display.trouble(f"Hands off: the reference plays for {commands.duration_s:.0f} s.")
 
-    def attend(share: float) -> None:
+    def keep_alive(share: float) -> None:
+        """Progress callback: keep the device alive, or end the playback. share: played share, not used."""
         if not sitting.supervisor.keep_alive():
             raise _EndedEarlyError
 
     try:
-        play_result = sitting.device.play(commands, attend)
+        play_result = sitting.device.play(commands, keep_alive)
     except _EndedEarlyError:
         fault = sitting.device.fault()
         state = _save_and_log_measurement(state, None, 0.0, "it was cut short", sitting).state
         reply = sitting.supervisor.resolve(
             Unanswered("the reference was cut short", ends_sitting=False, repeat_requested=True)
         )
-        outcome = make_early_end_result(state, reply) if isinstance(reply, Unanswered) else AfterTrial(state)
+        outcome = make_early_end_result(state, reply) if isinstance(reply, Unanswered) else ActionResult(state)
         return replace(outcome, end_reason=outcome.end_reason or find_leaving_reason(fault), fault=fault)
     recording = None if play_result.recording is None else replace(play_result.recording, segments=segments)
     trouble = "" if recording is not None else play_result.health.fault.value
     state = _save_and_log_measurement(state, recording, commands.duration_s, trouble, sitting).state
-    return AfterTrial(state, end_reason=find_leaving_reason(play_result.health.fault), fault=play_result.health.fault)
+    return ActionResult(state, end_reason=find_leaving_reason(play_result.health.fault), fault=play_result.health.fault)
 
 
 def _play_and_measure(state: SessionState, kind: ProbeKind, level_n: float, sitting: Sitting) -> _MeasuredProbe:
-    """Log a probe, play it with the same keep-alive calls as a demonstration, and save its recording. level_n: peak
-    force (N)."""
+    """Play a probe, save its recording, and log it. The probe is not used after a fault, or with more missed ticks than
+    a trial may have. level_n: peak force (N)."""
     stimulus = make_probe_stimulus(state.protocol.probes, level_n, sitting.device.info.sample_rate_hz)
     state = _log_probe_start(state, kind, level_n, sitting)
     sitting.supervisor.start_activity("probe")
@@ -167,7 +174,7 @@ def _play_and_measure(state: SessionState, kind: ProbeKind, level_n: float, sitt
 
 
 def _log_probe_start(state: SessionState, kind: ProbeKind, level_n: float, sitting: Sitting) -> SessionState:
-    """Log that a probe or reference of this peak force (N) is played."""
+    """Log the start of a probe or reference of this peak force (N)."""
     number = state.sitting.probing.probe_count
     return log_and_apply(state, ProbePlayed(sitting.clock.utc(), number, kind, level_n), sitting)
 
@@ -176,7 +183,7 @@ def _save_and_log_measurement(
     state: SessionState, recording: Recording | None, duration_s: float, trouble: str, sitting: Sitting
 ) -> _MeasuredProbe:
     """Save the recording, if there is one, and log duration, rms acceleration (m/s²) and apparent mass (kg). trouble:
-    why the probe is not used, empty if it is used."""
+    why the probe is not used, empty if no reason is known yet."""
     probing = state.sitting.probing
     assert probing.open is not None, "a probe is measured after it was played"
     saved_file, mass_kg, rms_mps2 = None, None, None
@@ -206,19 +213,19 @@ def _save_and_log_measurement(
 
 
 def _estimate_mass_kg(recording: Recording, trouble: str) -> tuple[float | None, str]:
-    """Apparent mass of the handle, None where it cannot be estimated; and why the probe is not used, empty if it is
-    used."""
+    """Estimate the apparent mass (kg) of the handle; None where it cannot be estimated. Returns also why the probe is
+    not used: `trouble`, or why there is no estimate."""
     # Imported here: most sessions have no probes and begin sooner without it.
     from analysis.device_change.probe_lines import compute_probe_lines, estimate_apparent_mass_kg
 
     try:
         return estimate_apparent_mass_kg(compute_probe_lines(recording, PERIOD_S)), trouble
-    except ValueError as problem:
-        return None, str(problem)
+    except ValueError as error:
+        return None, str(error)
 
 
 def _list_conditions(probe: ProbePlayed, sitting: Sitting) -> dict[str, Any]:
-    """Metadata of the recording of a probe: session, number and kind, level (N), hand, versions."""
+    """List the metadata of the recording of a probe: session, number and kind, peak force (N), hand, versions."""
     return {
         "session": sitting.folder.name,
         "probe": {"number": probe.number, "kind": probe.kind, "period_s": PERIOD_S},
@@ -230,12 +237,13 @@ def _list_conditions(probe: ProbePlayed, sitting: Sitting) -> dict[str, Any]:
 
 def _conclude_probe(
     state: SessionState, reply: Unanswered | None, play_result: PlaybackResult, sitting: Sitting
-) -> AfterTrial:
-    """Result of a probe for the session. It ends a sitting only where a trial would too: on request, or when the device
-    is lost."""
+) -> ActionResult:
+    """Make the result of a probe for the sitting. A probe ends the sitting only where a trial would, too: on request,
+    or after a fault that requires to open the device again. reply: why the playback ended early; None where it was
+    complete."""
     fault = play_result.health.fault
     if end_reason := find_leaving_reason(fault):
-        return AfterTrial(state, end_reason=end_reason, fault=fault)
+        return ActionResult(state, end_reason=end_reason, fault=fault)
     resolved = sitting.supervisor.resolve(reply or Unanswered("", ends_sitting=False, repeat_requested=True))
-    outcome = make_early_end_result(state, resolved) if isinstance(resolved, Unanswered) else AfterTrial(state)
+    outcome = make_early_end_result(state, resolved) if isinstance(resolved, Unanswered) else ActionResult(state)
     return replace(outcome, void="", fault=fault)

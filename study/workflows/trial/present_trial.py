@@ -21,7 +21,7 @@ from study.session.state.state import SessionState, count_repeats_left
 from study.session.stimulus.delivered import has_hardly_moved, measure_delivered
 from study.session.stimulus.stimulus import PLANE_AXES, compute_direction_vector
 from study.session.views.participant_views import HandleView, Question, Task, Unanswered, make_direction_picture
-from study.workflows.trial.after_trial import AfterTrial, find_leaving_reason, make_early_end_result
+from study.workflows.trial.action_result import ActionResult, find_leaving_reason, make_early_end_result
 from study.workflows.trial.ask_participant import StimulusReply, ask_participant
 from study.workflows.trial.judge_trial import get_void_cause, judge_trial
 from study.workflows.trial.masking import was_masked
@@ -112,7 +112,7 @@ def _make_handle_reader(gate: GateSettings, plane: Plane, sitting: Sitting) -> C
     return read_handle
 
 
-def present_trial(state: SessionState, due_trial: PresentTrial, sitting: Sitting) -> AfterTrial:
+def present_trial(state: SessionState, due_trial: PresentTrial, sitting: Sitting) -> ActionResult:
     """Run and log one trial: presentation, answer and measurement, or the reason why it is void."""
     early_end = await_handle(state, sitting)
     if early_end is not None:
@@ -166,7 +166,7 @@ def _log_answered_trial(
     play_result: PlaybackResult,
     stimulus_reply: StimulusReply,
     sitting: Sitting,
-) -> AfterTrial:
+) -> ActionResult:
     """Judge an answered trial by the health of device and control loop, and log it as measured (with flags, if any) or
     as void. play_result: recording and health of the stimulus, from its onset to its release."""
     correct = state.answered is not None and state.answered.answer == due_trial.label
@@ -174,7 +174,7 @@ def _log_answered_trial(
     verdict = judge_trial(
         play_result.health, state.protocol.measurement, stimulus_reply.felt_whole, stimulus_reply.health
     )
-    recording = play_result.recording if verdict.measured else None
+    recording = play_result.recording if verdict.is_measurable else None
     values = measure_delivered(recording, vector, due_trial.frequency_hz) if recording is not None else None
     fault = play_result.health.fault
     end_reason = find_leaving_reason(fault)
@@ -184,20 +184,20 @@ def _log_answered_trial(
             make_void_event(due_trial, (verdict.void_reason, verdict.cause), play_result.health, sitting),
             sitting,
         )
-        return AfterTrial(state, end_reason=end_reason, void=verdict.void_reason, fault=fault)
+        return ActionResult(state, end_reason=end_reason, void=verdict.void_reason, fault=fault)
     friction_n = state.protocol.safety.plausibility.friction_n
     measured = recording if values is not None else None
     device_kg = sitting.device.info.effective_mass_kg
     if measured is not None and has_hardly_moved(measured, vector, due_trial.frequency_hz, friction_n, device_kg):
         verdict = replace(verdict, flags=(*verdict.flags, TOO_LITTLE_MOTION))
-    outcome = TrialOutcome(play_result, values, verdict.flags, vector, verdict.measured)
+    outcome = TrialOutcome(play_result, values, verdict.flags, vector, verdict.is_measurable)
     state = log_and_apply(state, record_measured_trial(due_trial, outcome, state, sitting), sitting)
-    return AfterTrial(state, correct, end_reason=end_reason, fault=fault)
+    return ActionResult(state, correct, end_reason=end_reason, fault=fault)
 
 
 def _log_void_trial(
     state: SessionState, due_trial: PresentTrial, stimulus_reply: StimulusReply, reply: Unanswered, sitting: Sitting
-) -> AfterTrial:
+) -> ActionResult:
     """Release the force, log a trial without a valid answer as void, and return how the sitting continues."""
     play_result = release_device(sitting) if stimulus_reply.holding else stimulus_reply.play_result
     health = play_result.health if play_result is not None else None
@@ -208,13 +208,13 @@ def _log_void_trial(
     cause = get_void_cause(fault) if has_fault else _find_void_cause(reply, sitting)
     state = log_and_apply(state, make_void_event(due_trial, (reason, cause), health, sitting), sitting)
     if reply.ends_sitting:
-        return AfterTrial(state, end_reason=reply.reason, fault=Fault.NONE if fault is Fault.STOPPED else fault)
+        return ActionResult(state, end_reason=reply.reason, fault=Fault.NONE if fault is Fault.STOPPED else fault)
     if end_reason := find_leaving_reason(fault):
-        return AfterTrial(state, end_reason=end_reason, void=reason, fault=fault)
+        return ActionResult(state, end_reason=end_reason, void=reason, fault=fault)
     if reply.pause:
-        return AfterTrial(state, pause=reply.reason)
+        return ActionResult(state, pause=reply.reason)
     is_requested = reply.repeat_requested and fault is Fault.NONE
-    return AfterTrial(state, void="" if is_requested else reason, fault=fault)
+    return ActionResult(state, void="" if is_requested else reason, fault=fault)
 
 
 def _find_void_cause(reply: Unanswered, sitting: Sitting) -> VoidCause:

@@ -1,7 +1,7 @@
 """Streaming of a session's events as markers of the lab streaming layer (LSL), with the time at which they happened.
 Called by `hapteq stream`.
 
-A separate program follows the log, so that streaming cannot delay or end the session. Every event in the log carries
+A separate process follows the log, so that streaming cannot delay or end the session. Every event in the log carries
 the time t by the session's monotonic clock; its marker gets the time t + offset on LSL's clock. The offset between the
 two clocks is measured every `OFFSET_INTERVAL_S` and is streamed as a marker too.
 """
@@ -19,27 +19,27 @@ from study.regular_file import MAX_TABLE_BYTES, open_regular
 from study.workflows.views.lsl_outlets import make_unreadable_log_error
 
 POLL_INTERVAL_S = 0.02
-"""Interval (s) between two readings of the log: markers are sent up to this much later, with correct times."""
+"""Interval (s) between two readings of the log: the largest delay of a marker, whose time is correct. Chosen."""
 OFFSET_INTERVAL_S = 10.0
-"""Interval at which the offset of the two clocks is measured (s)."""
+"""Interval (s) at which the offset of the two clocks is measured. Chosen."""
 OFFSET_READINGS = 10
-"""Number of pairs of clock readings in a measurement of the offset. The pair read in the shortest time is used: longer
-ones were interrupted between the readings."""
+"""Number of readings of both clocks in a measurement of the offset, of which that taken in the shortest time is used:
+longer ones were interrupted. Chosen."""
 REPORTED_CHANGE_S = 0.001
-"""Smallest change of the offset (s) for which `SideTasks.on_offset` is called again."""
+"""Least change of the offset (s) for which `SideTasks.on_offset` is called again. Chosen."""
 LARGEST_EVENT_AGE_S = 5.0
-"""Largest age (s) of an event by this computer's monotonic clock. An event outside 0 to this age is on another clock
-(of a simulated session, or before a restart of the computer): its marker gets the time of sending and states so."""
+"""Largest age (s) of an event by this computer's monotonic clock. Chosen. An event outside 0 to this age has the time
+of another clock (simulated session, or before a restart): its marker gets the time of sending and states so."""
 
 STREAMED_FIELDS = (
     "event", "run", "trial", "attempt", "phase", "frequency_hz", "level_n", "direction", "angle_deg", "polarity",
     "answer", "response_time_s", "status", "cause", "missed_ticks", "late_ticks", "latest_s", "delivered_mps2",
     "outcome",
 )  # fmt: skip
-"""Fields of an event that are streamed: no information about the person, no notes, no forms."""
+"""Fields of an event that are streamed; none contains personal data, notes or forms."""
 
 LAST_EVENT = "session_closed"
-"""Last event of a session: streaming ends after it."""
+"""Event after which streaming ends: the last of a session."""
 
 
 class Outlet(Protocol):
@@ -56,18 +56,18 @@ class Outlet(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class SideTasks:
-    """Tasks between two readings of the log."""
+    """Functions that are called between two readings of the log."""
 
     on_offset: Callable[[float], None]
     """Called with the offset, LSL's clock minus the session's (s), at first and when it has changed by
     `REPORTED_CHANGE_S`."""
     push_signals: Callable[[float], int]
-    """Called with the offset (s) at every reading: sends the new signals of the device's loop, and returns the number
-    of ticks that were lost."""
+    """Called with the offset (s) at every reading: sends the new signals of the device's control loop, and returns the
+    number of lost ticks."""
 
 
 NO_SIDE_TASKS = SideTasks(lambda offset_s: None, lambda offset_s: 0)
-"""No other tasks: no signals are sent, and no ticks are lost."""
+"""Side tasks that do nothing: no signals are sent, and no ticks are lost."""
 
 
 class LogFollower:
@@ -100,9 +100,10 @@ def stream_session(
     sleep: Callable[[float], None] = time.sleep,
     side_tasks: SideTasks = NO_SIDE_TASKS,
 ) -> int:
-    """Follow the log until the session is closed, and send the events that are logged after the start. Of a session
-    that is already closed nothing is sent. now_s: the session's monotonic clock (s). Returns the number of events sent.
-    Raises StudyError where the log cannot be read."""
+    """Follow the log until the session is closed, and send the events that are logged after the call; nothing is sent
+    for a session that is already closed. on_marker: called with each event's marker that was sent. now_s: monotonic
+    clock of the session's computer (s). Returns the number of events sent. Raises StudyError where the log cannot be
+    read."""
     reported_offset_s = math.inf
     try:
         follower, sent_count, offset_s, next_offset_s = LogFollower(log), 0, 0.0, now_s()
@@ -132,8 +133,8 @@ def stream_session(
 
 
 def measure_offset_s(outlet: Outlet, now_s: Callable[[], float]) -> float:
-    """Measure the offset (s): LSL's clock minus the session's, from the pair of readings that took the least time.
-    LSL's reading is compared with the mean of the session's clock before and after it."""
+    """Measure the offset (s), LSL's clock minus `now_s`, by the quickest of `OFFSET_READINGS` readings: LSL's clock
+    minus the mean of `now_s` before and after it."""
     readings = []
     for _ in range(OFFSET_READINGS):
         before_s = now_s()
@@ -154,8 +155,8 @@ def _parse_event(line: bytes) -> dict[str, Any]:
 def _send_event(
     event: dict[str, Any], outlet: Outlet, offset_s: float, now_s: float, on_marker: Callable[[str], None]
 ) -> None:
-    """Send the streamed fields of an event, with its time if it is at most `LARGEST_EVENT_AGE_S` old, else with the
-    time of sending."""
+    """Send the streamed fields of an event, with its time if its age is 0 to `LARGEST_EVENT_AGE_S`, else with the time
+    of sending and the field `stamped`."""
     fields = {name: event[name] for name in STREAMED_FIELDS if event.get(name) is not None}
     event_s = event.get("monotonic_s")
     if isinstance(event_s, float) and 0 <= now_s - event_s <= LARGEST_EVENT_AGE_S:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from analysis.diagnosis.document import Diagnosis, Errors, Mismatch, NamedEffect
 from analysis.diagnosis.effect_words import get_noun
-from analysis.diagnosis.result.candidate_wording import Device, describe_candidates
+from analysis.diagnosis.result.candidate_wording import DeviceWording, describe_candidates
 from analysis.diagnosis.result.wording import (
     describe_effect,
     describe_equivalents,
@@ -51,14 +51,14 @@ def make_diagnosis_view(path: Path) -> DiagnosisView:
     return make_printable(view)
 
 
-def _read_device(path: Path) -> Device | None:
+def _read_device(path: Path) -> DeviceWording | None:
     """Number of axes and units of the improved model in this file, for the wording of parameters; None if it cannot be
     read."""
     try:
         model = read_mechanical_model(path)
     except StudyError:
         return None
-    return Device(model.inputs == 1, model.system)
+    return DeviceWording(model.inputs == 1, model.system)
 
 
 def _describe_named_effect(effect: NamedEffect) -> tuple[str, ...]:

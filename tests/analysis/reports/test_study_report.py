@@ -10,8 +10,8 @@ from analysis.figures.study_pictures import study_pictures
 from analysis.psychophysics.ellipsoid import EllipsoidResult, compute_moment_ellipsoid, compute_phasor_ellipse
 from analysis.psychophysics.study_analysis import analyse_study
 from analysis.psychophysics.thresholds import RunEnd
-from analysis.reports.side_tables import make_detection_table, make_practice_table
 from analysis.reports.study_report import render_study_report
+from analysis.reports.supplementary_tables import make_detection_table, make_practice_table
 from protocols.definition.declared_analysis import AnalysisSettings
 from protocols.definition.staircase_rule import BayesianPlacement
 from protocols.trial import Phase

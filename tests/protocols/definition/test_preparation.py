@@ -9,7 +9,7 @@ from protocols.definition.participant_text import TextSettings
 from protocols.definition.preparation import MaskingSettings, PracticeSettings
 from protocols.definition.probes import ProbeSettings
 from protocols.definition.session_settings import CatchSettings, DetectionSettings
-from protocols.document.hashing import TABLES_SINCE, protocol_hash
+from protocols.document.hashing import TABLE_ADDITIONS, hash_protocol
 from protocols.document.loading import ProtocolError, load_protocol
 from protocols.procedure.practice import (
     PracticeState,
@@ -92,14 +92,14 @@ def test_the_primary_contrast_is_between_two_frequencies_that_are_played(small_t
 
 def test_absent_tables_leave_an_old_fingerprint_alone(small_protocol):
     """The fingerprint of this very protocol before any of these tables existed."""
-    assert protocol_hash(small_protocol) == "3dbd332b83f609b7a013ed32f20036f1da9285a990ec04a93c54899674a16b9a"
+    assert hash_protocol(small_protocol) == "3dbd332b83f609b7a013ed32f20036f1da9285a990ec04a93c54899674a16b9a"
 
 
-@pytest.mark.parametrize("table", sorted(TABLES_SINCE))
+@pytest.mark.parametrize("table", sorted(TABLE_ADDITIONS))
 def test_a_table_that_is_used_counts(small_protocol, table, threshold):
     kept = replace(small_protocol, measurement=threshold.measurement)
     used = replace(kept, **{table: _other(table, threshold)})
-    assert protocol_hash(used) != protocol_hash(kept)
+    assert hash_protocol(used) != hash_protocol(kept)
 
 
 def _other(table, threshold):

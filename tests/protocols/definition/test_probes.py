@@ -3,7 +3,7 @@
 import pytest
 
 from protocols.definition.probes import ProbeSettings
-from protocols.document.hashing import protocol_hash
+from protocols.document.hashing import hash_protocol
 from protocols.document.loading import ProtocolError, load_protocol
 from study.session.views.form_views import FormKind
 from study.session.views.forms import make_form
@@ -22,8 +22,8 @@ def text_of(small_text: str, addition: str) -> str:
 def test_a_table_that_is_not_written_changes_no_fingerprint_and_plays_nothing(small_text, small_protocol):
     assert not small_protocol.probes.is_enabled
     written_out = load_protocol(f"{small_text}\n[probes]\nlevels_n = []\n", "small.toml")
-    assert protocol_hash(written_out) == protocol_hash(small_protocol)
-    assert protocol_hash(load_protocol(text_of(small_text, PROBES), "small.toml")) != protocol_hash(small_protocol)
+    assert hash_protocol(written_out) == hash_protocol(small_protocol)
+    assert hash_protocol(load_protocol(text_of(small_text, PROBES), "small.toml")) != hash_protocol(small_protocol)
 
 
 @pytest.mark.parametrize(

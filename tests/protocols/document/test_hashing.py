@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from protocols.document.dumping import dump_protocol, protocol_to_values
-from protocols.document.hashing import protocol_hash
+from protocols.document.hashing import hash_protocol
 from protocols.document.loading import load_protocol, protocol_from_values
 
 NAMES = tuple(sorted(path.name.removesuffix(".toml") for path in files("protocols").iterdir() if ".toml" in path.name))
@@ -22,7 +22,7 @@ def shipped(request):
 def test_a_protocol_survives_text_and_values(shipped):
     assert load_protocol(dump_protocol(shipped), "again") == shipped
     assert protocol_from_values(protocol_to_values(shipped), "again") == shipped
-    assert protocol_hash(load_protocol(dump_protocol(shipped), "again")) == protocol_hash(shipped)
+    assert hash_protocol(load_protocol(dump_protocol(shipped), "again")) == hash_protocol(shipped)
 
 
 def test_comments_order_and_written_defaults_make_no_difference(threshold, threshold_text):
@@ -30,18 +30,18 @@ def test_comments_order_and_written_defaults_make_no_difference(threshold, thres
     without_a_default = "\n".join(line for line in lines if not line.startswith(("fade_in_s", "watchdog_s")))
     head, tail = without_a_default.split("[rests]")
     reordered = head.replace('plane = "yz"', "") + "[rests]" + tail
-    assert protocol_hash(load_protocol(reordered, "mine.toml")) == protocol_hash(threshold)
+    assert hash_protocol(load_protocol(reordered, "mine.toml")) == hash_protocol(threshold)
 
 
 def test_whole_and_real_numbers_hash_alike(threshold, threshold_text):
     text = threshold_text.replace("start_n = 1.0", "start_n = 1").replace("symmetry_deg = 90.0", "symmetry_deg = 90")
-    assert protocol_hash(load_protocol(text, "mine.toml")) == protocol_hash(threshold)
+    assert hash_protocol(load_protocol(text, "mine.toml")) == hash_protocol(threshold)
 
 
 def test_equal_protocols_hash_alike_also_with_a_minus_before_zero(threshold):
     plus, minus = (replace(threshold, directions=replace(threshold.directions, symmetry_deg=z)) for z in (0.0, -0.0))
     assert plus == minus
-    assert protocol_hash(plus) == protocol_hash(minus)
+    assert hash_protocol(plus) == hash_protocol(minus)
 
 
 @pytest.mark.parametrize(
@@ -56,12 +56,12 @@ def test_equal_protocols_hash_alike_also_with_a_minus_before_zero(threshold):
 )
 def test_any_changed_value_changes_the_fingerprint(threshold, threshold_text, old, new):
     assert old in threshold_text
-    assert protocol_hash(load_protocol(threshold_text.replace(old, new, 1), "mine.toml")) != protocol_hash(threshold)
+    assert hash_protocol(load_protocol(threshold_text.replace(old, new, 1), "mine.toml")) != hash_protocol(threshold)
 
 
 def test_the_fingerprint_of_the_published_study_is_known(threshold):
     """Locks and sessions in the field hold it: if this fails, a value or a default was changed, knowingly or not."""
-    assert protocol_hash(threshold) == "8bed16e78d40c24d36b274e752a906412fe52398c45e85575f1cc3392ff6c0ee"
+    assert hash_protocol(threshold) == "8bed16e78d40c24d36b274e752a906412fe52398c45e85575f1cc3392ff6c0ee"
 
 
 def test_the_published_study_of_before_levels_were_roved_keeps_its_fingerprint(threshold_text):
@@ -69,9 +69,9 @@ def test_the_published_study_of_before_levels_were_roved_keeps_its_fingerprint(t
     since = ("rove_db", "repeats_per_run")
     older = "\n".join(line for line in threshold_text.splitlines() if not line.startswith(since))
     known = "acd7b086777d3ab2a13d6d3ac8ca8f763093621a92033bd07c5eb0613ff4478a"
-    assert protocol_hash(load_protocol(older, "older.toml")) == known
+    assert hash_protocol(load_protocol(older, "older.toml")) == known
     fewer = threshold_text.replace("repeats_per_run = 3", "repeats_per_run = 2")
-    assert protocol_hash(load_protocol(fewer, "fewer.toml")) != protocol_hash(load_protocol(threshold_text, "t.toml"))
+    assert hash_protocol(load_protocol(fewer, "fewer.toml")) != hash_protocol(load_protocol(threshold_text, "t.toml"))
 
 
 OLD = {
@@ -88,7 +88,7 @@ def text_of(name: str) -> str:
 
 @pytest.mark.parametrize("name", OLD)
 def test_fields_that_came_later_leave_old_fingerprints_alone(name):
-    assert protocol_hash(load_protocol(text_of(name), name)) == OLD[name]
+    assert hash_protocol(load_protocol(text_of(name), name)) == OLD[name]
 
 
 @pytest.mark.parametrize(
@@ -107,7 +107,7 @@ def test_fields_that_came_later_leave_old_fingerprints_alone(name):
 )
 def test_a_field_that_came_later_counts_only_where_it_changes_something(old, new, same):
     assert old in text_of("sweep")
-    changed = protocol_hash(load_protocol(text_of("sweep").replace(old, new), "mine.toml"))
+    changed = hash_protocol(load_protocol(text_of("sweep").replace(old, new), "mine.toml"))
     assert (changed == OLD["sweep"]) is same
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from protocols.definition.declared_analysis import AnalysisSettings
-from protocols.document.hashing import protocol_hash
+from protocols.document.hashing import hash_protocol
 from protocols.document.loading import ProtocolError, load_protocol
 from protocols.document.lock import LockError, ProtocolLock, check_lock, lock_from_json, lock_to_json, make_lock
 
@@ -21,7 +21,7 @@ def lock(threshold) -> ProtocolLock:
 
 def test_a_lock_fits_its_protocol(lock, threshold):
     check_lock(lock, threshold, LOCAL)
-    assert lock == ProtocolLock("direction_threshold", protocol_hash(threshold), WHEN, "0.1.0")
+    assert lock == ProtocolLock("direction_threshold", hash_protocol(threshold), WHEN, "0.1.0")
 
 
 def test_a_changed_protocol_is_refused_with_the_date_and_both_fingerprints(lock, threshold):
@@ -30,7 +30,7 @@ def test_a_changed_protocol_is_refused_with_the_date_and_both_fingerprints(lock,
         check_lock(lock, changed, LOCAL)
     assert str(caught.value) == (
         f"protocol direction_threshold was locked on {LOCAL} and has changed since: "
-        f"its fingerprint is {protocol_hash(changed)[:12]}…, the locked one {lock.hash[:12]}…"
+        f"its fingerprint is {hash_protocol(changed)[:12]}…, the locked one {lock.hash[:12]}…"
     )
 
 

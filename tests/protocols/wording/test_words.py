@@ -6,7 +6,7 @@ from importlib.resources import files
 import pytest
 
 from protocols.document.dumping import dump_protocol
-from protocols.document.hashing import protocol_hash
+from protocols.document.hashing import hash_protocol
 from protocols.document.loading import ProtocolError, load_protocol, protocol_from_values
 from protocols.wording.english import ENGLISH, LANGUAGES, list_placeholders
 from protocols.wording.english_facts import FACTS
@@ -114,7 +114,7 @@ def test_a_study_in_another_language_is_the_same_study(name, code):
         protocol_from_values(values, name),
         protocol_from_values(translate_protocol(values, table_of(code), code), name),
     )
-    assert protocol_hash(english) != protocol_hash(other)
+    assert hash_protocol(english) != hash_protocol(other)
     assert not {other.title, *other.consent.statements, *other.consent.exclusions} & set(PROTOCOL_TEXTS.values())
     for asked, told in zip(english.debrief, other.debrief, strict=True):
         assert (told.key, told.codes) == (asked.key, asked.choices)
@@ -130,12 +130,12 @@ def test_a_text_of_ones_own_wins_and_counts():
     assert own.text.words["rest_title"] == "Kaffee"
     assert own.text.words["pause_free"] == table_of("de")["pause_free"]
     plain = protocol_from_values(translate_protocol({**values, "text": {}}, table_of("de"), "de"), "mine")
-    assert protocol_hash(own) != protocol_hash(plain)
+    assert hash_protocol(own) != hash_protocol(plain)
 
 
 def test_english_written_out_is_the_default():
     text = text_of("direction_training")
-    assert protocol_hash(load_protocol(text + '\n[text]\nlanguage = "en"\n', "mine")) == protocol_hash(
+    assert hash_protocol(load_protocol(text + '\n[text]\nlanguage = "en"\n', "mine")) == hash_protocol(
         load_protocol(text, "mine")
     )
 

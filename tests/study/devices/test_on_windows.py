@@ -68,7 +68,7 @@ def test_a_stimulus_is_held_on_the_driver_with_the_calls_that_are_made_there(win
     stub.set("stiffness", 150)
     stub.set("stretch_in_use", 20)  # the computer of the tests is busier than that of a lab
     with contextlib.closing(SafeDevice(stub.rig(), rigs.SETTINGS, RealClock())) as device:
-        assert not device._runner.attends
+        assert not device._runner.can_attend
         device.hold(rigs.sine(1.0))
         for _ in range(20):
             time.sleep(0.02)
@@ -107,7 +107,7 @@ def test_signals_that_are_not_there_are_not_asked_for(monkeypatch):
     asked: list[int] = []
     monkeypatch.delattr(serve.signal, "SIGHUP")
     monkeypatch.setattr(serve.signal, "signal", lambda number, action: asked.append(number))
-    serve._leave_signals_to_the_caller([])
+    serve._install_signal_handlers([])
     assert asked == [signal.SIGINT, signal.SIGTERM]
 
 
@@ -117,7 +117,7 @@ def test_where_the_parent_s_number_stays_after_its_end_the_closed_pipe_ends_the_
 
     parent = os.getppid()
     monkeypatch.setattr(serve.os, "getppid", lambda: parent)
-    assert not serve.Lifetime(parent, []).must_end()
+    assert not serve.CallerWatchdog(parent, []).must_exit()
     device = SafeDevice(rigs.ScriptedRig(), rigs.SETTINGS, RealClock())
     here = served_device.ServedHere(device)
     assert not here.server.ended.wait(0.2)

@@ -11,7 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from study.devices import onset_line as module
 from study.devices.onset_line import OnsetLine, PulseSettings, open_onset_line, open_port
-from study.devices.opening import find_onset_line
+from study.devices.opening import open_lab_onset_line
 from study.errors import DeviceError
 
 BYTE = PulseSettings("serial-byte", "/dev/ttyUSB0", code=7)
@@ -104,7 +104,7 @@ def patient(monkeypatch):
 
 
 def wait_until_free(pulses: OnsetLine) -> None:
-    while pulses._busy.locked():
+    while pulses._pulse_lock.locked():
         time.sleep(0.002)
 
 
@@ -192,9 +192,9 @@ def test_a_line_that_is_not_there_stops_before_the_session(tmp_path, kind, monke
     file.write_text(f'[pulse]\nkind = "{kind}"\nport = "{tmp_path}/none"\n')
     monkeypatch.setenv("HAPTEQ_DEVICE_FILE", str(file))
     with pytest.raises(DeviceError, match="onset pulses cannot be opened"):
-        find_onset_line()
+        open_lab_onset_line()
     file.write_text("")
-    assert find_onset_line() is None
+    assert open_lab_onset_line() is None
 
 
 @pytest.mark.parametrize("wrong", [{"code": 0}, {"code": 256}, {"width_s": 0.0}, {"kind": "usb"}, {"volts": 5}])

@@ -29,19 +29,21 @@ def felt(level_n=THRESHOLD_N, along=1.0, across=0.0, harmonics=0.0, trial=0):
 
 
 def test_a_flawless_delivery_is_felt_as_commanded(observer):
-    assert observer.compute_right_share(felt()) == pytest.approx(TARGET)
+    assert observer.compute_proportion_correct(felt()) == pytest.approx(TARGET)
     answers = [observer.reply(replace(felt(), trial=0, run=run), 7) for run in range(50)]
     plain = [observer.feeler.reply(replace(felt(), trial=0, run=run), 7) for run in range(50)]
     assert answers == plain
 
 
 def test_half_the_strength_needs_twice_the_level(observer):
-    assert observer.compute_right_share(felt(along=0.5)) < 0.65
-    assert observer.compute_right_share(felt(2 * THRESHOLD_N, along=0.5)) == pytest.approx(TARGET)
+    assert observer.compute_proportion_correct(felt(along=0.5)) < 0.65
+    assert observer.compute_proportion_correct(felt(2 * THRESHOLD_N, along=0.5)) == pytest.approx(TARGET)
 
 
 def test_motion_across_takes_the_direction_away_and_a_circle_has_none(observer):
-    shares = [observer.compute_right_share(felt(3.0, across=across)) for across in (0.0, 0.5, 0.9, 0.99, 1.0, 1.5)]
+    shares = [
+        observer.compute_proportion_correct(felt(3.0, across=across)) for across in (0.0, 0.5, 0.9, 0.99, 1.0, 1.5)
+    ]
     assert shares[0] > 0.999 and shares == sorted(shares, reverse=True)
     assert shares[-2:] == [0.5, 0.5]
 
@@ -49,15 +51,15 @@ def test_motion_across_takes_the_direction_away_and_a_circle_has_none(observer):
 def test_harmonics_as_strong_as_the_threshold_raise_it_by_3_db(observer):
     """Independent noises add in squares: sqrt(2)."""
     raised = felt(THRESHOLD_N * 2**0.5, harmonics=0.5**0.5)
-    assert observer.compute_right_share(raised) == pytest.approx(TARGET)
+    assert observer.compute_proportion_correct(raised) == pytest.approx(TARGET)
     deaf = replace(observer, masking=0.0)
-    assert deaf.compute_right_share(felt(harmonics=3.0)) == pytest.approx(TARGET)
+    assert deaf.compute_proportion_correct(felt(harmonics=3.0)) == pytest.approx(TARGET)
 
 
 def test_a_long_run_numbs_by_a_decibel_and_a_new_one_begins_afresh(observer):
     late = felt(THRESHOLD_N * 10 ** (1 / 20), trial=2000)
-    assert observer.compute_right_share(replace(late, trials_before=0)) == pytest.approx(TARGET, abs=1e-6)
-    assert observer.compute_right_share(replace(felt(trial=0), trials_before=300)) == pytest.approx(TARGET)
+    assert observer.compute_proportion_correct(replace(late, trials_before=0)) == pytest.approx(TARGET, abs=1e-6)
+    assert observer.compute_proportion_correct(replace(felt(trial=0), trials_before=300)) == pytest.approx(TARGET)
 
 
 def test_the_delivered_population_has_the_thresholds_of_the_population(observer):

@@ -76,7 +76,7 @@ def test_the_lapsing_observer_stays_below_certainty_where_the_ideal_one_is_certa
 @pytest.mark.parametrize(("criterion", "expected"), [(0.0, 0.7937), (0.25, 0.786), (0.5, 0.766), (1.0, 0.697)])
 def test_a_bias_to_one_answer_lowers_the_share_of_right_ones_as_detection_theory_says(criterion, expected):
     biased = DirectionFeeler("biased", TYPICAL_THRESHOLDS_N, criterion=criterion)
-    both = [biased.compute_right_share(replace(FELT, direction_shown=direction)) for direction in (1, 2)]
+    both = [biased.compute_proportion_correct(replace(FELT, direction_shown=direction)) for direction in (1, 2)]
     assert np.mean(both) == pytest.approx(expected, abs=0.0006)
     assert share_right(biased, trials()) == pytest.approx(expected, abs=FOUR_ERRORS)
 
@@ -131,14 +131,16 @@ def test_the_drifting_observers_threshold_rises_by_a_decibel_in_100_trials():
     assert isinstance(drifting, DirectionFeeler)
     assert isinstance(ideal, DirectionFeeler)
     late = replace(FELT, trials_before=300, level_n=0.6 * 10 ** (3 / 20))
-    assert drifting.compute_right_share(late) == pytest.approx(ideal.compute_right_share(FELT))
-    assert drifting.compute_right_share(FELT) == ideal.compute_right_share(FELT)
+    assert drifting.compute_proportion_correct(late) == pytest.approx(ideal.compute_proportion_correct(FELT))
+    assert drifting.compute_proportion_correct(FELT) == ideal.compute_proportion_correct(FELT)
 
 
 def test_between_frequencies_thresholds_lie_between_and_beyond_the_ends_they_stay():
     ideal = find_observer("ideal", 0)
     assert isinstance(ideal, DirectionFeeler)
-    shares = [ideal.compute_right_share(replace(FELT, frequency_hz=f)) for f in (1.0, 5.0, 10.0, 15.0, 45.0, 200.0)]
+    shares = [
+        ideal.compute_proportion_correct(replace(FELT, frequency_hz=f)) for f in (1.0, 5.0, 10.0, 15.0, 45.0, 200.0)
+    ]
     assert shares[0] == shares[1] > shares[2] > shares[3] > shares[4] == shares[5]
 
 
@@ -190,8 +192,11 @@ def test_a_drift_raises_the_detection_threshold_too():
     assert isinstance(drifting, DirectionFeeler)
     early = replace(FELT, phase=Phase.DETECTION, level_n=0.08)
     late = replace(early, trials_before=300, level_n=0.08 * 10 ** (3 / 20))
-    assert drifting.compute_right_share(late) == pytest.approx(drifting.compute_right_share(early))
-    assert drifting.compute_right_share(replace(early, trials_before=300)) < drifting.compute_right_share(early) - 0.05
+    assert drifting.compute_proportion_correct(late) == pytest.approx(drifting.compute_proportion_correct(early))
+    assert (
+        drifting.compute_proportion_correct(replace(early, trials_before=300))
+        < drifting.compute_proportion_correct(early) - 0.05
+    )
 
 
 @pytest.mark.parametrize("name", OBSERVER_DESCRIPTIONS)

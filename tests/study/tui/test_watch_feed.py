@@ -21,14 +21,14 @@ ROOT = Path(__file__).parents[3]
 @pytest.fixture
 def session(tmp_path, small_protocol, small_text) -> Path:
     """A session that was just opened."""
-    from protocols.document.hashing import protocol_hash
+    from protocols.document.hashing import hash_protocol
 
     folder = tmp_path / "P01_001"
     folder.mkdir()
     utc = datetime.now(UTC).isoformat(timespec="milliseconds")
     device = DeviceFacts("a device", simulated=True, sample_rate_hz=1000.0)
     opened = SessionOpened(
-        utc, "hapteq-session", 1, "P01_001", "P01", 0, None, small_text, protocol_hash(small_protocol), False, 7,
+        utc, "hapteq-session", 1, "P01_001", "P01", 0, None, small_text, hash_protocol(small_protocol), False, 7,
         device, "none", {"hapteq": "0"},
     )  # fmt: skip
     (folder / "events.jsonl").write_bytes(encode_event(opened))

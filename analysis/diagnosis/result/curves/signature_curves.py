@@ -2,7 +2,7 @@
 
 For forces of the mechanism and the actuator the residual is the missing force, for sensors the error of a channel. The
 fitted law is drawn with it: simulated, and averaged over bins of the same kind. Effects without such a variable are
-shown as the spectrum of the residual. Called by `post_search`.
+shown as the spectrum of the residual. Called by `examine_fits`.
 """
 
 from collections.abc import Mapping

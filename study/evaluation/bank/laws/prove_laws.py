@@ -1,8 +1,9 @@
 """Run a bank of concealed laws, a blind test of the diagnosis: seal, diagnose in separate processes, reveal, score.
 
-Each case is a simulated device with a law of motion or signals outside the catalogue of effects. The labels (the
-truths) are hashed before any diagnosis and checked when they are revealed. A found law is compared with the true one on
-a fresh test motion that the diagnosis never had (`compute_law_error`).
+Each case is a simulated device with a law of motion or signals outside the catalogue of effects, or without one. The
+labels, which state the true laws, are hashed before any diagnosis and checked when they are revealed. A found law is
+compared with the true one on fresh test motions that were no input of the diagnosis (`compute_law_error`). Called by
+`study.cli.prove`; `write_law_proof` writes the result.
 """
 
 from collections.abc import Mapping
@@ -28,8 +29,8 @@ from study.evaluation.bank.sealed_bank import (
 )
 from study.store.disk.provenance import compute_sha256
 
-LAWS = "laws"
-"""Kind of bank in bank.json: laws are concealed."""
+LAW_BANK_KIND = "laws"
+"""Value of the kind of bank in bank.json for concealed laws."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,16 +42,18 @@ class LawBlindTest:
     seal: str
     """SHA-256 of labels.sha256, taken before any diagnosis."""
     outcomes: tuple[LawOutcome, ...]
+    """One per answered case."""
     score: LawScore
     engines: tuple[str, ...]
+    """Digests of the code that gave the answers, sorted; several if it changed during the run."""
 
 
 def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> LawBlindTest:
     """Run a bank of laws in the folder `path`, or continue it after an interruption. Raises StudyError.
 
-    on_progress: called with the step ("sealing" or "diagnosing"), the number of cases done and of all cases.
+    on_progress: called with the step ("sealing" or "diagnosing"), the number of finished cases, and of all cases.
     """
-    folder = open_proof_folder(path, plan.seed, plan.brief, LAWS)
+    folder = open_proof_folder(path, plan.seed, plan.brief, LAW_BANK_KIND)
     with convert_interrupts("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
         seal = seal_laws(folder, plan, options.workers, lambda done: on_progress("sealing", done, plan.cases))
         names = read_case_names(folder, range(plan.cases))
@@ -70,21 +73,23 @@ def prove_laws(path: Path, plan: BankPlan, options: BankOptions, on_progress: Pr
 
 
 def reveal_laws(folder: ProofFolder, cases: int) -> tuple[LawOutcome, ...]:
-    """Outcomes of the answered cases among the first `cases` numbers. Raises StudyError where a label or a fresh test
-    motion differs from its seal."""
+    """Reveal the answered cases among the first `cases` numbers, and return their outcomes. Raises StudyError where a
+    label or a fresh test motion differs from its seal."""
 
     def is_unchanged(label: Mapping[str, Any]) -> bool:
+        """Whether the file of the fresh test motions has the hash that is stated in the label."""
         return compute_sha256(fresh_motions_path(folder, label["number"])) == str(label["fresh_sha256"])
 
-    def outcome_of(label: Mapping[str, Any], answer: Mapping[str, Any]) -> LawOutcome:
+    def make_outcome(label: Mapping[str, Any], answer: Mapping[str, Any]) -> LawOutcome:
+        """Make the outcome of a case from its label and answer."""
         return _make_outcome(label, answer, fresh_motions_path(folder, label["number"]))
 
-    return reveal_bank(folder, cases, outcome_of, is_unchanged)
+    return reveal_bank(folder, cases, make_outcome, is_unchanged)
 
 
 def _make_outcome(label: Mapping[str, Any], answer: Mapping[str, Any], fresh_path: Path) -> LawOutcome:
-    """One case with its true law (None where the case has none), and the error of the found laws on
-    each fresh test motion in the file `fresh_path`."""
+    """Make the outcome of one case: its true law (None where the case has none), the answer and, where there are both a
+    true and a found law, the error of the found laws on each fresh test motion in the file `fresh_path`."""
     truth = None if label["truth"] is None else _read_true_law(label["truth"])
     outcome = LawOutcome(concealed=label["concealed"], truth=truth, **collect_answered_fields(label, answer))
     if truth is None or not outcome.laws:
@@ -94,7 +99,7 @@ def _make_outcome(label: Mapping[str, Any], answer: Mapping[str, Any], fresh_pat
 
 
 def _read_true_law(label: Mapping[str, Any]) -> TrueLaw:
-    """The true law from the values of its label."""
+    """Read the true law from the entry `truth` of a label."""
     return TrueLaw(
         label["law"],
         label["formula"],

@@ -9,7 +9,7 @@
 
 Each range goes from an effect that hardly shows in the recordings of the challenge to a gross fault; the strength (0 to
 1) interpolates geometrically. The ranges were chosen by hand for commands with peaks of 0.5 to 3 N (`LEVELS_N`).
-`actuator_kernel.drive` computes the force.
+`draw_case` draws and builds in the effects; `actuator_kernel.drive_actuators` computes the force.
 """
 
 from study.evaluation.challenge.actuator_kernel import DEAD_BAND, DELAY_S, FORCE_LIMIT, GAIN, LAG_S, SLEW_RATE
@@ -19,56 +19,62 @@ from study.evaluation.challenge.drive_plan import LEVELS_N
 
 
 def _draw_saturation(context: EffectContext) -> dict[str, float]:
-    """Limit (N) that cuts 2 % to 70 % off the strongest command."""
+    """Draw the limit (N) that cuts 2 % to 70 % off the peak of the strongest command."""
     return {"limit": LEVELS_N[-1] * (1.0 - context.interpolate_log(0.02, 0.7))}
 
 
 def _build_saturation(device: Device, axis: int, values: Values) -> Device:
+    """Build in the saturation of the force at an axis."""
     return with_amplifier(device, axis, {FORCE_LIMIT: values["limit"]})
 
 
 def _draw_deadband(context: EffectContext) -> dict[str, float]:
-    """Half width (N) of the dead band, 0.003 to 0.2."""
+    """Draw the half width (N) of the dead band, 0.003 to 0.2."""
     return {"width": context.interpolate_log(0.003, 0.2)}
 
 
 def _build_deadband(device: Device, axis: int, values: Values) -> Device:
+    """Build in the dead band of the command at an axis."""
     return with_amplifier(device, axis, {DEAD_BAND: values["width"]})
 
 
 def _draw_slew(context: EffectContext) -> dict[str, float]:
-    """Slew rate (N/s), 4000 (weakest) down to 150."""
+    """Draw the slew rate (N/s), 4000 (weakest) down to 150."""
     return {"rate": context.interpolate_log(4000.0, 150.0)}
 
 
 def _build_slew(device: Device, axis: int, values: Values) -> Device:
+    """Build in the slew limit at all axes; `axis` is not used."""
     return with_amplifier(device, None, {SLEW_RATE: values["rate"]})
 
 
 def _draw_lag(context: EffectContext) -> dict[str, float]:
-    """Time constant (s), 0.06 ms to 3 ms."""
+    """Draw the time constant (s), 0.06 ms to 3 ms."""
     return {"time_constant": context.interpolate_log(6e-5, 3e-3)}
 
 
 def _build_lag(device: Device, axis: int, values: Values) -> Device:
+    """Build in the lag at all axes; `axis` is not used."""
     return with_amplifier(device, None, {LAG_S: values["time_constant"]})
 
 
 def _draw_delay(context: EffectContext) -> dict[str, float]:
-    """Delay (s), 0.02 ms to 4 ms."""
+    """Draw the delay (s), 0.02 ms to 4 ms."""
     return {"delay": context.interpolate_log(2e-5, 4e-3)}
 
 
 def _build_delay(device: Device, axis: int, values: Values) -> Device:
+    """Build in the delay at all axes; `axis` is not used."""
     return with_amplifier(device, None, {DELAY_S: values["delay"]})
 
 
 def _draw_gain(context: EffectContext) -> dict[str, float]:
-    """Gain of 0.7 to 0.995, or of 1.005 to 1.3."""
+    """Draw the gain: 0.995 (weakest) to 0.7, or 1.005 to 1.3, with equal probability."""
     return {"gain": 1.0 + context.draw_sign() * context.interpolate_log(0.005, 0.3)}
 
 
 def _build_gain(device: Device, axis: int, values: Values) -> Device:
+    """Build in the gain at an axis."""
     return with_amplifier(device, axis, {GAIN: values["gain"]})
 
 
@@ -80,4 +86,5 @@ EFFECTS = (
     ConcealedEffect("transport_delay", "actuator", False, _draw_delay, _build_delay),
     ConcealedEffect("force_gain", "actuator", True, _draw_gain, _build_gain),
 )
-"""Each: name, place, whether it acts on one axis (else on all), how its parameters are drawn, how it is built."""
+"""The effects of the actuator: name, place, whether it acts on one axis (else on all), functions that draw its
+parameters and build it in."""

@@ -1,4 +1,4 @@
-"""Faults of sensor, clock and line injected into a recording of a real device: real noise, known truth. Faults of
+"""Faults of sensor, clock and mains injected into a recording of a real device, so that the fault is known. Faults of
 mechanism and actuator are in `force_injections`.
 
 The size of a fault is drawn relative to the response (rms, peak, median frequency), because nothing else is known of
@@ -37,7 +37,7 @@ from study.evaluation.challenge.injection.reading_faults import (
 )
 
 MAINS_HZ = (50.0, 60.0)
-"""Nominal frequencies of the mains (Hz); hum has either of them."""
+"""Nominal frequencies of the mains (Hz); injected hum has either, with equal probability."""
 MAX_CLOCK_ERROR_PPM = 2e4
 """Largest drawn clock error (ppm): that of oscillators without a crystal."""
 
@@ -66,14 +66,14 @@ ApplyFault = Callable[[FloatArray, float, Mapping[str, float], np.random.Generat
 
 @dataclass(frozen=True, slots=True)
 class Injection:
-    """A fault of sensor, clock or line that can be injected."""
+    """A fault of sensor, clock or mains that can be injected."""
 
     effect: str
     """Name in the vocabulary of effects."""
     draw: Draw
     apply: ApplyFault
-    axes: int = 1
-    """Number of response channels that it needs."""
+    least_channels: int = 1
+    """Least number of response channels."""
     memory: bool = False
     """Whether the fault depends on earlier readings, so that it is applied to each take separately."""
 
@@ -93,15 +93,15 @@ class FaultyRecording:
     """(p,): rms change per response channel; for a fault of mechanism or actuator, per command channel."""
 
 
-def _interpolate_log(low: float, high: float, strength: float) -> float:
-    """Geometric interpolation between two values by the strength."""
-    return float(low * (high / low) ** strength)
+def _interpolate_log(weakest: float, strongest: float, strength: float) -> float:
+    """Interpolate geometrically between two values by the strength, 0 to 1."""
+    return float(weakest * (strongest / weakest) ** strength)
 
 
 def _draw_misalignment(
     statistics: ResponseStatistics, strength: float, random: np.random.Generator
 ) -> dict[str, float]:
-    """Misalignment: angle of 1 to 20 degrees about a random axis, a unit vector."""
+    """Draw a misalignment: angle of 1 to 20 degrees about a random axis, a unit vector."""
     x, y, z = (direction := random.normal(size=3)) / np.linalg.norm(direction)
     return {
         "degrees": _interpolate_log(1.0, 20.0, strength),
@@ -112,7 +112,7 @@ def _draw_misalignment(
 
 
 def _draw_sign(random: np.random.Generator) -> float:
-    """+1 or -1 with equal probability."""
+    """Draw +1 or -1 with equal probability."""
     return float(random.choice((-1.0, 1.0)))
 
 
@@ -195,18 +195,18 @@ INJECTIONS: tuple[Injection, ...] = (
         "cross_axis_sensitivity",
         lambda statistics, s, r: {"from_next": _interpolate_log(0.02, 0.8, s)},
         mix_channels,
-        axes=2,
+        least_channels=2,
     ),
-    Injection("sensor_misalignment", _draw_misalignment, rotate_readings, axes=3),
+    Injection("sensor_misalignment", _draw_misalignment, rotate_readings, least_channels=3),
 )
-"""Faults of sensor, clock and line: name in the vocabulary, draw of the parameters, and change of the response. In the
-draws, s is the strength and r the random generator."""
+"""Faults of sensor, clock and mains: name in the vocabulary, draw of the parameters, and change of the response. In the
+draws, s is the strength and r the random generator; the ranges were chosen by hand."""
 
 
 def inject(recording: Recording, effect: str, strength: float, random: np.random.Generator) -> FaultyRecording:
-    """Inject a fault of a strength from 0 to 1. effect: a name from INJECTIONS or FORCE_INJECTIONS; empty = none.
-    Raises ValueError for an unknown name, a strength outside 0..1, or a fault for which the recording lacks channels or
-    a motion."""
+    """Inject a fault of a strength from 0 to 1. effect: a name from INJECTIONS or FORCE_INJECTIONS; empty = none, with
+    the strength ignored. Raises ValueError for an unknown name, a strength outside 0 to 1, or a fault for which the
+    recording lacks channels or a motion."""
     if not effect:
         return FaultyRecording(recording, "", {}, 0.0, np.zeros(recording.response.samples.shape[1]))
     if not 0.0 <= strength <= 1.0:
@@ -221,8 +221,10 @@ def inject(recording: Recording, effect: str, strength: float, random: np.random
         )
         raise ValueError(f"there is no way to inject '{effect}'; known are {known_names}")
     samples = recording.response.samples
-    if samples.shape[1] < injection.axes:
-        raise ValueError(f"{effect} needs {injection.axes} response channels, and there are {samples.shape[1]}")
+    if samples.shape[1] < injection.least_channels:
+        raise ValueError(
+            f"{effect} needs {injection.least_channels} response channels, and there are {samples.shape[1]}"
+        )
     values = injection.draw(measure_response(recording), strength, random)
     takes = find_takes(recording) if injection.memory else ((0, len(recording)),)
     rate_hz = recording.sample_rate_hz
@@ -235,8 +237,8 @@ def inject(recording: Recording, effect: str, strength: float, random: np.random
 def _inject_force(
     recording: Recording, injection: ForceInjection, strength: float, random: np.random.Generator
 ) -> FaultyRecording:
-    """Inject a fault of mechanism or drive at a random axis: the recorded command is changed instead of the response.
-    Raises ValueError where the recording has no motion along the command."""
+    """Inject a fault of mechanism or actuator at a random axis: the recorded command is changed instead of the
+    response. Raises ValueError where the recording has no motion along the command."""
     samples = recording.command.samples.copy()
     axis = int(random.integers(samples.shape[1]))
     motion = compute_axis_motion(recording, axis)
@@ -251,37 +253,37 @@ def _inject_force(
 
 
 def list_applicable_injections(recording: Recording) -> tuple[str, ...]:
-    """Names of the faults that can be injected into this recording. A cross-axis sensitivity needs two channels; mains
-    hum needs a sample rate above four times its frequency; a misalignment needs the three channels x, y, z of a sensor;
-    a fault of the mechanism needs a measured motion along each command; a fault of the drive needs in addition that the
-    motion is not imposed."""
+    """List the faults that can be injected into this recording. A cross-axis sensitivity needs two response channels;
+    mains hum a sample rate above 4 x 60 Hz; a misalignment channels whose names end in x, y and z, and no others; a
+    fault of the mechanism a measured motion along each command; a fault of the actuator in addition a motion that is
+    not imposed."""
     rate_hz = recording.sample_rate_hz
     sensor_axes = 3 if {name[-1:] for name in recording.response.channels} == {"x", "y", "z"} else 1
-    can_hum = rate_hz > 4 * max(MAINS_HZ)
-    has_channels = len(recording.response.channels) > 1
+    is_hum_resolved = rate_hz > 4 * max(MAINS_HZ)
+    has_two_channels = len(recording.response.channels) > 1
     sensor_effects = [
         injection.effect
         for injection in INJECTIONS
-        if (injection.axes in (1, sensor_axes) or (injection.axes == 2 and has_channels))
-        and (can_hum or injection.effect != "mains_hum")
+        if (injection.least_channels in (1, sensor_axes) or (injection.least_channels == 2 and has_two_channels))
+        and (is_hum_resolved or injection.effect != "mains_hum")
     ]
     axes = range(recording.command.samples.shape[1])
     force_injections = [
         injection for injection in FORCE_INJECTIONS if not (injection.actuator and "imposed" in recording.meta)
     ]
-    is_measured = all(compute_axis_motion(recording, axis) is not None for axis in axes)
-    return (*sensor_effects, *(injection.effect for injection in force_injections if is_measured))
+    is_motion_measured = all(compute_axis_motion(recording, axis) is not None for axis in axes)
+    return (*sensor_effects, *(injection.effect for injection in force_injections if is_motion_measured))
 
 
 def find_place(effect: str) -> Place:
-    """Place where the fault acts: mechanism, actuator or sensor; sensor for an unknown name."""
+    """Find the place where the fault acts: mechanism, actuator or sensor; sensor for an unknown name."""
     injection = next((candidate for candidate in FORCE_INJECTIONS if candidate.effect == effect), None)
     return "sensor" if injection is None else "actuator" if injection.actuator else "mechanism"
 
 
 def measure_response(recording: Recording) -> ResponseStatistics:
     """Measure rate, rms, peak, median frequency and duration of the response; samples with NaN in any channel are left
-    out, except in the duration."""
+    out (at least one must remain), except in the duration."""
     samples = recording.response.samples
     finite_rows = samples[np.isfinite(samples).all(axis=1)]
     centred = finite_rows - finite_rows.mean(axis=0)

@@ -24,11 +24,11 @@ from study.evaluation.challenge.draw_case import (
     make_recording,
 )
 from study.evaluation.challenge.drive_plan import RATE_HZ, DrivePlan, draw_multisine, draw_plan
-from study.evaluation.challenge.extras import with_extras
 from study.evaluation.challenge.laws.build_law import LawTruth, build_law
 from study.evaluation.challenge.laws.concealed_laws import LAW_KINDS, LAWS_BY_NAME
 from study.evaluation.challenge.mechanism_kernel import Motion
-from study.evaluation.challenge.nominal import as_model, draw_calibration, retune
+from study.evaluation.challenge.nominal_models import as_model, draw_calibration, retune
+from study.evaluation.challenge.nuisance_effects import add_nuisance_effects
 from study.evaluation.challenge.sensor import read_sensor
 
 LawBankKind = Literal["law", "nothing", "decoy", "mode"]
@@ -125,7 +125,7 @@ def generate_law_case(law_draw: LawDraw, name: str) -> LawCase:
         return LawCase(draw_case(law_draw.seed, effects, law_draw.model, strengths, name, law_draw.settings), None, ())
     random, settings = np.random.default_rng([law_draw.seed, 44]), law_draw.settings
     bench, plan = draw_bench(random), draw_plan(random, settings)
-    baseline = with_extras(Device(bench, steps=settings.steps), settings.extras, law_draw.seed)
+    baseline = add_nuisance_effects(Device(bench, steps=settings.steps), settings.extras, law_draw.seed)
     base_motion = simulate_full_motion(baseline, plan.command)
     device, true_motion, truth = _build_law_scaled(law_draw, baseline, (base_motion, plan), random)
     response, position = read_sensor(device.sensor, true_motion.acceleration, true_motion.position, RATE_HZ, random)

@@ -23,7 +23,7 @@ from study.evaluation.challenge.draw_case import (
     make_truth,
 )
 from study.evaluation.challenge.drive_plan import RATE_HZ, draw_plan
-from study.evaluation.challenge.nominal import as_model, draw_calibration, retune
+from study.evaluation.challenge.nominal_models import as_model, draw_calibration, retune
 from study.evaluation.challenge.second_engine.mujoco_bench import (
     MujocoBench,
     linearise,

@@ -19,7 +19,7 @@ from equalizer.tracking.realtime.realtime_controller import (
     RealtimeSettings,
     make_realtime_controller,
 )
-from study.devices.opening import HAND_STIMULUS_CAP_N, STRONGEST_N
+from study.devices.opening import HAND_STIMULUS_CAP_N, LARGEST_DEVICE_FORCE_N
 from study.errors import StudyError
 from study.store.disk.provenance import compute_sha256
 from study.store.disk.text_file import write_text
@@ -75,9 +75,10 @@ def export_controller(plan: ControllerPlan) -> ExportedController:
     """Compute the controller and write its sources. Raises StudyError for a cap above the force of the strongest
     supported device, and for a model or transient from which no controller can be made; nothing is written then."""
     require_new_outputs(plan.out, title=TITLE, kind="controllers")
-    if plan.settings.cap_n > STRONGEST_N:
+    if plan.settings.cap_n > LARGEST_DEVICE_FORCE_N:
         raise _make_refusal(
-            f"The cap is {plan.settings.cap_n:g} N; the strongest device gives {STRONGEST_N:g} N.", EXAMPLE_SETTINGS
+            f"The cap is {plan.settings.cap_n:g} N; the strongest device gives {LARGEST_DEVICE_FORCE_N:g} N.",
+            EXAMPLE_SETTINGS,
         )
     model = read_identified_model(plan.model)
     try:

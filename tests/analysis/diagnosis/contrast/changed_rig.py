@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from analysis.diagnosis.contrast.decide import Decision, choose_fault
+from analysis.diagnosis.contrast.choose_fault import Decision, choose_fault
 from analysis.diagnosis.contrast.rank_faults import rank_faults
 from analysis.diagnosis.reference.compare_with_reference import Contrast, find_contrast
 from equalizer.signals.recording import Recording

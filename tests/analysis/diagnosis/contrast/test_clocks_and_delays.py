@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 from analysis.diagnosis.contrast.actuator_faults import SIZE_RANGE, choose_trial_delays_s
 from analysis.diagnosis.contrast.autoregressive_base import AutoregressiveBase
 from analysis.diagnosis.contrast.bases import bases_of, compute_unexplained_share
+from analysis.diagnosis.contrast.choose_fault import choose_fault
 from analysis.diagnosis.contrast.compared_base import (
     FEWEST_ROWS,
     REACH,
@@ -17,12 +18,11 @@ from analysis.diagnosis.contrast.compared_base import (
     compare_base,
     undo_fault_in_rows,
 )
-from analysis.diagnosis.contrast.decide import choose_fault
 from analysis.diagnosis.contrast.fault import Rows
 from analysis.diagnosis.contrast.interpolation import compute_noise_gain, resample, shift_samples
 from analysis.diagnosis.contrast.likely_delays import suggest_clock_rates, suggest_delays_s
-from analysis.diagnosis.contrast.part import split_into_parts
 from analysis.diagnosis.contrast.rank_faults import rank_faults
+from analysis.diagnosis.contrast.recording_part import split_into_parts
 from analysis.diagnosis.contrast.sensor_faults import make_sensor_faults
 from analysis.diagnosis.settings import LEAST_FAULT_GAIN
 from equalizer.signals.recording import Recording

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.contrast.part import split_into_parts
+from analysis.diagnosis.contrast.recording_part import split_into_parts
 from analysis.diagnosis.contrast.signal_faults import find_hum, find_quantization, find_sensor_noise
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal

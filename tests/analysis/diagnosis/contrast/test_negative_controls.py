@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.contrast.decide import choose_fault
+from analysis.diagnosis.contrast.choose_fault import choose_fault
 from analysis.diagnosis.contrast.rank_faults import rank_faults
 from equalizer.signals.recording import Recording
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.contrast.actuator_faults import make_actuator_faults
-from analysis.diagnosis.contrast.decide import choose_fault
+from analysis.diagnosis.contrast.choose_fault import choose_fault
 from analysis.diagnosis.contrast.fault import Rows
-from analysis.diagnosis.contrast.part import split_into_parts
 from analysis.diagnosis.contrast.rank_faults import rank_faults
+from analysis.diagnosis.contrast.recording_part import split_into_parts
 from analysis.diagnosis.settings import BALANCE_HOLDS, CONTRAST_BLOCKS
 from equalizer.signals.signal import FloatArray
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.contrast.bases import bases_of
+from analysis.diagnosis.contrast.choose_fault import choose_fault
 from analysis.diagnosis.contrast.compared_base import REACH, ComparedBase, UndoneRows, compare_base
-from analysis.diagnosis.contrast.decide import choose_fault
-from analysis.diagnosis.contrast.part import split_into_parts
+from analysis.diagnosis.contrast.recording_part import split_into_parts
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def test_a_side_with_too_few_rows_is_not_compared(rig):
 def test_what_undoing_a_fault_loses_stays_as_it_was(compared_base):
     rows = tuple(np.zeros_like(part) for part in compared_base.faulty.rows)
     half = tuple(np.arange(len(part)) < len(part) // 2 for part in rows)
-    blocks = compared_base.compute_grams(compared_base.faulty, [UndoneRows(rows, half)]).undo_sizes(np.ones(1))
+    blocks = compared_base.compute_grams(compared_base.faulty, [UndoneRows(rows, half)]).undo_fault(np.ones(1))
     plain = compared_base.compute_grams(compared_base.faulty, []).blocks
     assert np.allclose(blocks[:8], plain[:8])
     assert np.abs(blocks[-8:]).max() < 1e-3 * np.abs(plain[-8:]).max()

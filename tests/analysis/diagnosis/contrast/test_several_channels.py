@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from analysis.diagnosis.contrast.decide import choose_fault
+from analysis.diagnosis.contrast.choose_fault import choose_fault
 from analysis.diagnosis.contrast.rank_faults import rank_faults
 from analysis.diagnosis.result.contrast_findings import _name_fault
 from equalizer.signals.recording import Recording

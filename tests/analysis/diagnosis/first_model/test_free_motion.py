@@ -8,7 +8,7 @@ import pytest
 from analysis.diagnosis.data.input_checks import NothingToDiagnose
 from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.first_model.choose_structure import choose_structure
-from analysis.diagnosis.first_model.free_motion import is_free_motion, read_free_motion
+from analysis.diagnosis.first_model.free_motion import convert_free_motion, is_undriven_motion
 from analysis.diagnosis.first_model.model_structures import StructureRefused
 from analysis.diagnosis.first_model.one_motion_per_force import convert_to_driven_motions
 from equalizer.signals.recording import Recording
@@ -127,7 +127,7 @@ def test_a_standing_command_with_accelerations_alone_is_refused_with_a_way_on():
 def test_commands_that_differ_between_recordings_drive():
     swing = make_recording(simulate_decay(linear_acceleration, 1.0, 8, 1))
     pushed = replace(swing, command=replace(swing.command, samples=swing.command.samples + 2.0))
-    assert is_free_motion((swing, swing)) and not is_free_motion((swing, pushed))
+    assert is_undriven_motion((swing, swing)) and not is_undriven_motion((swing, pushed))
 
 
 def test_a_command_that_is_missing_where_the_motion_is_drives_nothing():
@@ -135,12 +135,12 @@ def test_a_command_that_is_missing_where_the_motion_is_drives_nothing():
     swing = make_recording(simulate_decay(linear_acceleration, 1.0, 8, 1))
     gaps = swing.command.samples.copy()
     gaps[100:103] = np.nan
-    read, said = read_free_motion((replace(swing, command=replace(swing.command, samples=gaps)),))
+    read, said = convert_free_motion((replace(swing, command=replace(swing.command, samples=gaps)),))
     assert said and np.isfinite(read[0].command.samples).all()
 
 
 def test_a_first_model_of_a_decay_has_damping_and_spring_per_unit_of_mass():
-    read, _ = read_free_motion((make_recording(simulate_decay(linear_acceleration, 1.0, 12, 1)),))
+    read, _ = convert_free_motion((make_recording(simulate_decay(linear_acceleration, 1.0, 12, 1)),))
     choice = choose_structure(read, None, lambda share: None)
     assert choice.fit.kind == "mass-spring"
     numbers = {number.name: number.value for number in choice.fit.parameters}
@@ -151,7 +151,7 @@ def test_a_first_model_of_a_decay_has_damping_and_spring_per_unit_of_mass():
 
 def test_a_rotor_that_runs_down_is_a_motor():
     noise = NOISE_RAD * np.random.default_rng(1).standard_normal(int(8 * RATE_HZ))
-    read, _ = read_free_motion((make_recording(rotor_angle() + noise),))
+    read, _ = convert_free_motion((make_recording(rotor_angle() + noise),))
     assert choose_structure(read, None, lambda share: None).fit.kind == "motor"
 
 

@@ -6,7 +6,7 @@ from analysis.diagnosis.document import Candidate, Diagnosis, Errors, Estimate, 
 from analysis.diagnosis.effect_words import EFFECT_WORDS, LAW_WORDS, get_noun, get_parameter_unit
 from analysis.diagnosis.result.candidate_wording import (
     SENTENCE_COUNT,
-    Device,
+    DeviceWording,
     describe_best_candidate,
     describe_candidates,
     describe_class,
@@ -18,7 +18,7 @@ from analysis.diagnosis.result.wording import describe_equivalents, describe_ver
 from equalizer.signals.unit_system import LINEAR, ROTATIONAL
 
 ERRORS = Errors(0.5, 0.36, 0.36, 0.02)
-DEVICE = Device(single=True, system=LINEAR)
+DEVICE = DeviceWording(single=True, system=LINEAR)
 DRY = Candidate("coulomb_friction", "mechanism", "x", {"level": 0.211}, 0.4, 0.62, "the main part is another")
 STICKY = Candidate(
     "viscoelastic_relaxation", "mechanism", "x", {"stiffness": 120.0, "time_constant": 0.02}, 0.2, 0.3,
@@ -69,7 +69,7 @@ def test_sentences_are_few_however_many_candidates_there_are():
 
 
 def test_numbers_have_units_only_where_the_device_is_known():
-    assert format_candidate(DRY, Device(False, ROTATIONAL)) == "dry friction on the x drive, 211 mN m"
+    assert format_candidate(DRY, DeviceWording(False, ROTATIONAL)) == "dry friction on the x drive, 211 mN m"
     assert format_candidate(DRY) == "dry friction on the x drive, level 0.211 (SI)"
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from analysis.diagnosis.document import Diagnosis, Errors, Estimate, Fit, Mismatch, NamedEffect, NextExperiment, Rival
 from analysis.diagnosis.effect_words import EFFECT_WORDS, format_parameters, format_place, get_noun
-from analysis.diagnosis.result.candidate_wording import Device
+from analysis.diagnosis.result.candidate_wording import DeviceWording
 from analysis.diagnosis.result.ceiling_wording import describe_black_box
 from analysis.diagnosis.result.findings import BlackBox
 from analysis.diagnosis.result.retuned_parameters import MovedParameter, describe_raised_error
@@ -147,11 +147,11 @@ def test_no_mismatch_remains_where_none_is_reported():
 
 
 def test_an_error_is_not_counted_in_noise_that_no_repeats_show():
-    device = Device(True, LINEAR, "quiet band")
+    device = DeviceWording(True, LINEAR, "quiet band")
     said = describe_verdict(make_diagnosis("partly_explained", (DRY,), remainder=(PLACE,)), device=device)
     assert "times" not in said
     assert "noise at the level measured above the driven band would leave 2.65 %" in said
-    unknown = describe_verdict(make_diagnosis("unexplained"), device=Device(True, LINEAR, "unknown"))
+    unknown = describe_verdict(make_diagnosis("unexplained"), device=DeviceWording(True, LINEAR, "unknown"))
     assert "what noise alone would leave is not known" in unknown
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from analysis.diagnosis.errors.hypothesis import Claim, make_claim_hypothesis
-from analysis.diagnosis.errors.intervals import compute_full_sensitivity, compute_standard_errors
 from analysis.diagnosis.errors.output_error import evaluate_fit
+from analysis.diagnosis.errors.standard_errors import compute_full_sensitivity, compute_standard_errors
 from analysis.diagnosis.search.compare_candidates import refine
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.effects.effect import PlacedEffect

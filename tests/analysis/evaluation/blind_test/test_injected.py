@@ -2,7 +2,7 @@
 
 import pytest
 
-from analysis.evaluation.blind_test.injected import DETECTABLE, make_tallies, read_outcome, score_injections
+from analysis.evaluation.blind_test.injected_faults import DETECTABLE, make_tallies, read_outcome, score_injections
 from analysis.reports.injected_section import classify_injection, format_rate, make_injected_section
 
 PLACES = {"sensor_lag": "sensor", "sensor_gain": "sensor", "amplifier_lag": "actuator", "added_mass": "mechanism"}
@@ -51,7 +51,7 @@ def test_of_two_faults_one_may_be_left_open():
 
 
 def test_nothing_injected_is_right_where_nothing_is_named():
-    assert make_outcome(effects=(), named=()).right
+    assert make_outcome(effects=(), named=()).is_correct
     assert make_outcome(effects=()).answer_class == "wrong"
 
 
@@ -59,7 +59,7 @@ def test_an_answer_that_failed_is_no_right_answer():
     label = {"recording": "rig", "effects": [], "places": [], "strength": 0.0, "values": {}, "change": 1.0}
     failed = read_outcome(label, {"failed": "it broke"})
     assert failed.verdict == "failed"
-    assert not failed.right
+    assert not failed.is_correct
 
 
 def test_only_detectable_faults_are_asked_for():

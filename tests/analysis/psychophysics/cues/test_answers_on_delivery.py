@@ -99,7 +99,7 @@ def simulate_roved_answers(template, seed, by_strength):
                 harmonics_mps2=0.3 * 10 ** (random.normal(0.0, 0.3) / 20),
             )
         )  # fmt: skip
-    return {found.cue: found.followed for found in compute_cue_findings(trials)}
+    return {found.cue: found.affects_answers for found in compute_cue_findings(trials)}
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -40,7 +40,7 @@ def reference_run(delivery, threshold_n, seed, rule=PUBLISHED, rove_db=0.0):
         flawless = PER_NEWTON * level_n
         measured = Delivered(along * flawless, across * flawless, 0.1, harmonics * flawless)
         felt = PerceivedStimulus(0, trial, 0, Phase.TEST, HZ, level_n, direction, trial, delivered=measured)
-        right = random.random_sample() < observer.compute_right_share(felt)
+        right = random.random_sample() < observer.compute_proportion_correct(felt)
         found.append((level_db, direction, right))
         state = step(rule, state, bool(right))
     return found

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from equalizer.identification.state_space.modal_form import ModalForm, compute_modal_form
-from equalizer.identification.state_space.refinement import complete_form, refine, solve_input_matrices
+from equalizer.identification.state_space.refinement import complete_form, refine_form, solve_input_matrices
 from equalizer.identification.state_space.stable_poles import compute_pole_radius
 from equalizer.identification.state_space.weighted_lines import weight_lines
 
@@ -42,7 +42,7 @@ def test_input_matrices_are_exact_where_poles_and_outputs_are(measuring, plant):
 def test_a_general_optimizer_finds_nothing_cheaper(plant, lines):
     """Oracle: all of a, b, C, B and D at once, by scipy, from where the search ended and from where it began."""
     start = disturbed(plant, 1, 0.02)
-    found = refine(start, lines, RADIUS)
+    found = refine_form(start, lines, RADIUS)
 
     def residuals(numbers):
         a, b, C, B, D = np.split(numbers, [3, 6, 24, 42])
@@ -62,7 +62,8 @@ def test_a_general_optimizer_finds_nothing_cheaper(plant, lines):
 def test_a_step_is_taken_only_if_it_lowers_the_cost(plant, lines):
     start = disturbed(plant, 2, 0.05)
     costs = [
-        lines.compute_cost(refine(start, lines, RADIUS, steps).compute_response(lines.z)) for steps in (1, 2, 4, 8, 30)
+        lines.compute_cost(refine_form(start, lines, RADIUS, steps).compute_response(lines.z))
+        for steps in (1, 2, 4, 8, 30)
     ]
     assert costs == sorted(costs, reverse=True)
     assert costs[-1] < 0.5 * lines.compute_cost(complete_form(start, lines).compute_response(lines.z))
@@ -72,7 +73,7 @@ def test_the_bound_holds_where_the_data_ask_for_a_slower_pole(measuring, plant):
     lines = weight_lines([measuring.exact(plant, np.arange(5, 35, 0.2))], (5.0, 35.0))
     radius = compute_pole_radius(0.02, 1000.0)
     assert np.abs(np.linalg.eigvals(plant.A)).max() > radius
-    found = refine(compute_modal_form(0.9 * plant.A, plant.C), lines, radius)
+    found = refine_form(compute_modal_form(0.9 * plant.A, plant.C), lines, radius)
     assert np.abs(found.form.poles).max() <= radius * (1 + 1e-7)
 
 
@@ -81,6 +82,6 @@ def test_states_that_nothing_shows_do_not_stop_the_search(plant, lines):
     twice = ModalForm(
         np.append(known.a, known.a[0]), np.append(known.b, known.b[0]), np.hstack([known.C, 0 * known.C[:, :2]])
     )
-    found = refine(twice, lines, RADIUS)
+    found = refine_form(twice, lines, RADIUS)
     assert np.isfinite(found.B).all()
     assert lines.compute_cost(found.compute_response(lines.z)) / lines.response.size < 1.05

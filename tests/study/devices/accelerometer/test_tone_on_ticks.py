@@ -9,7 +9,7 @@ import pytest
 from equalizer.signals.lockin import estimate_phasors
 from study.devices.accelerometer.sensor import Accelerometer
 from study.devices.accelerometer.serial_reader import open_serial
-from study.devices.rig import OwnClockSensor
+from study.devices.rig import AsynchronousAccelerometer
 from tests.study.devices.accelerometer.pty_board import AT_REST, IDEAL, RAW_RANGE, Board, table_of, within
 
 # The board is a thread of this process behind a pseudo-terminal: with all cores full it may send late.
@@ -57,7 +57,7 @@ def test_a_tone_comes_out_with_its_phase_on_the_ticks(rate_hz, drift_ppm):
         sensed = sensor.sensed(tick_s[0], tick_s, 1000.0)
         # Late on a busy computer: its thread and the board's share this process.
         newest = next((found for _ in range(200) if np.isfinite(found := newest_of(sensor)).all()), newest_of(sensor))
-    assert isinstance(sensor, OwnClockSensor) and np.isfinite(newest).all()
+    assert isinstance(sensor, AsynchronousAccelerometer) and np.isfinite(newest).all()
     health = sensed.health
     assert (health.ticks, health.unplaced_ticks, health.lost, health.restarts) == (1500, 0, 0, 0)
     assert health.packets == pytest.approx(1.5 * rate_hz, rel=0.4)

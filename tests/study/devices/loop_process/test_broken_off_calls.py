@@ -185,7 +185,7 @@ def hang(*arguments, **named):
 calls = dict.fromkeys(("hold", "release", "play", "keep_alive", "fault", "health", "look", "stop"))
 device = SimpleNamespace(info=None, close=hang if where == "close" else lambda: None, **calls)
 serve.open_device = hang if where == "open" else lambda *arguments, **named: device
-serve.OVERDUE_S = 0.5
+serve.EXIT_GRACE_S = 0.5
 if where == "exit":
     atexit.register(hang)
 pairs = [Pipe() for _ in serve.LINE_NAMES]

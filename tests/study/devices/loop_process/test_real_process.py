@@ -283,7 +283,7 @@ def ask() -> None:
 
 asking = threading.Thread(target=ask)
 asking.start()
-serve._open_and_serve(serve.Lifetime(os.getppid(), []), tuple(end for _, end in pairs))
+serve._open_and_serve(serve.CallerWatchdog(os.getppid(), []), tuple(end for _, end in pairs))
 asking.join()
 """
 

@@ -10,7 +10,7 @@ from study.evaluation.challenge.bench import draw_bench
 from study.evaluation.challenge.device import Device, simulate_motion
 from study.evaluation.challenge.draw_case import draw_case
 from study.evaluation.challenge.drive_plan import DrivePlan, draw_plan
-from study.evaluation.challenge.nominal import RETUNED_TOLERANCE, draw_calibration, retune, shift_diagonals
+from study.evaluation.challenge.nominal_models import RETUNED_TOLERANCE, draw_calibration, retune, shift_diagonals
 from study.evaluation.challenge.sensor_kernel import filter_first_order
 
 

@@ -9,7 +9,7 @@ from study.evaluation.challenge.bench import Bench, Oscillators
 from study.evaluation.challenge.device import Device, simulate_motion
 from study.evaluation.challenge.drive_plan import DrivePlan
 from study.evaluation.challenge.effects.actuator import EFFECTS as ACTUATOR
-from study.evaluation.challenge.nominal import retune
+from study.evaluation.challenge.nominal_models import retune
 from study.evaluation.challenge.sensor import NOISE_MPS2
 from study.evaluation.challenge.sensor_kernel import filter_first_order
 from study.store.formats.mechanical_model_file import read_mechanical_model

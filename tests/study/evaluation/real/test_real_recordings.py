@@ -8,7 +8,7 @@ from scipy.signal import cont2discrete, lfilter
 
 from study.errors import StudyError, UserInterruptError
 from study.evaluation.real.real_folder import read_real_folder
-from study.evaluation.real.real_recordings import RealPlan, answer_sent_recording, diagnose_folder
+from study.evaluation.real.real_recordings import RealPlan, diagnose_folder, diagnose_sent_recording
 from study.evaluation.real.real_summary import real_lines
 from study.evaluation.real.write_real import INJECTED_NAME, RealResults, write_real
 from study.importing.model_library import list_shipped_models, model_for
@@ -76,7 +76,7 @@ def test_recordings_that_are_links_are_sent_to_workers_too(folder: Path, tmp_pat
 
 def test_a_recording_that_did_not_come_to_its_worker_is_named() -> None:
     with pytest.raises(StudyError, match="did not come") as told:
-        answer_sent_recording("axis", "run", {"notes.txt": b"nothing"})
+        diagnose_sent_recording("axis", "run", {"notes.txt": b"nothing"})
     assert told.value.happened.startswith("axis, run: it is not among the files")
 
 

@@ -11,7 +11,7 @@ from study.session.facts.events import DemoPlayed, NoteTaken, SessionInterrupted
 from study.session.facts.log_time import ClockStep, Moment, compute_elapsed_s, find_clock_step
 from study.session.state.fold import apply_event
 from study.session.state.machine import find_reached_limit
-from study.session.state.sitting_state import NIGHT_H, compute_daily_dose, pass_time
+from study.session.state.sitting_state import DAILY_REST_H, compute_daily_dose, pass_time
 from study.session.state.state import begin_session
 
 H = 3600.0
@@ -94,7 +94,7 @@ def test_a_clock_set_forward_in_a_sitting_is_no_night_and_no_time(begun):
 def test_a_clock_set_back_in_a_sitting_takes_no_time_away(begun):
     computer = begun().vibrate().wait(30 * 60).set_by(-10 * H).vibrate().wait(29 * 60)
     assert computer.limit() == ""
-    assert computer.state.sitting.sat_s == 30 * 60
+    assert computer.state.sitting.sitting_elapsed_s == 30 * 60
     assert computer.wait(60).limit() != ""
     assert computer.steps_h == [-10.0]
 
@@ -107,7 +107,7 @@ def test_what_the_clock_was_set_by_after_the_last_movement_is_no_rest_either(beg
 
 
 def test_between_sittings_a_night_counts_and_a_clock_set_back_is_no_time(begun):
-    assert begun().vibrate().leave().wait(NIGHT_H * H).resume().vibrated_s == 0.0
+    assert begun().vibrate().leave().wait(DAILY_REST_H * H).resume().vibrated_s == 0.0
     back = begun().vibrate().leave().wait(60).set_by(-2 * H).resume()
     assert back.vibrated_s == VIBRATION_S
     assert back.state.sitting.still_s == 0.0
@@ -134,11 +134,11 @@ def test_a_step_forward_that_was_known_and_is_taken_back_leaves_a_true_night_alo
 
 
 def test_a_log_without_monotonic_times_folds_by_the_wall_clock_but_never_backwards(begun):
-    forward = begun(monotonic=False).vibrate().wait(NIGHT_H * H)
+    forward = begun(monotonic=False).vibrate().wait(DAILY_REST_H * H)
     assert forward.vibrated_s == 0.0
     back = begun(monotonic=False).vibrate().wait(600).vibrate().set_by(-5 * H).vibrate()
     assert back.vibrated_s == 3 * VIBRATION_S
-    assert back.state.sitting.sat_s == 600.0
+    assert back.state.sitting.sitting_elapsed_s == 600.0
     assert back.steps_h == [-5.0]
 
 
@@ -183,6 +183,6 @@ def test_however_the_clock_is_set_within_sittings_the_dose_and_the_time_are_the_
                 computer.leave().wait(draw.uniform(0.0, 0.2 * H)).resume()
                 sat_s = None
         sitting = pass_time(computer.state.sitting, Moment(computer.utc, computer.stamp))
-        assert sitting.sat_s == (None if sat_s is None else pytest.approx(sat_s)), f"seed {seed}"
+        assert sitting.sitting_elapsed_s == (None if sat_s is None else pytest.approx(sat_s)), f"seed {seed}"
         assert sitting.still_s is None or sitting.still_s >= 0.0
         assert computer.vibrated_s == vibrations * VIBRATION_S, f"seed {seed}"

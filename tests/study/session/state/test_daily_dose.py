@@ -17,7 +17,7 @@ def at(hours: float) -> str:
 
 def session(began_h: float, ended_h: float, vibrated_s: float) -> SittingState:
     """The handle moved at its begin and at its end."""
-    begun = start_motion(SittingState(last=Moment(at(began_h))))
+    begun = start_motion(SittingState(last_moment=Moment(at(began_h))))
     over = start_motion(pass_time(begun, Moment(at(ended_h))))
     return replace(over, dose=Dose(10.0 * vibrated_s, vibrated_s, 0.0))
 
@@ -48,7 +48,7 @@ def test_after_a_night_nothing_counts_and_a_clock_set_back_is_no_night():
 
 def test_what_was_found_counts_until_the_hand_has_rested_for_a_night():
     found = find_dose_elsewhere({"P01_001": session(0, 1, 20.0)}, "P01_002", at(2))
-    fresh = set_dose_elsewhere(SittingState(last=Moment(at(2))), found)
+    fresh = set_dose_elsewhere(SittingState(last_moment=Moment(at(2))), found)
     assert compute_daily_dose(fresh).vibrated_s == 20.0
     shaken = replace(start_motion(fresh), dose=Dose(5.0, 5.0, 0.0))
     assert compute_daily_dose(shaken).vibrated_s == 25.0

@@ -174,7 +174,7 @@ def test_elapsed_time_and_dose_follow_the_monotonic_clock_of_the_session_not_a_c
 
 def _stamped_sitting(story, monotonic_s: float):
     sitting = story.watched.state.sitting
-    return replace(sitting, last=replace(sitting.last, monotonic_s=monotonic_s))
+    return replace(sitting, last_moment=replace(sitting.last_moment, monotonic_s=monotonic_s))
 
 
 def test_a_clock_set_back_below_the_sittings_begin_silences_no_alarm(story):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from protocols.document.hashing import protocol_hash
+from protocols.document.hashing import hash_protocol
 from protocols.document.loading import load_protocol
 from study.cli.main import main
 from study.store.formats.bids_behaviour import write_bids
@@ -33,7 +33,7 @@ def test_seeds_hash_and_device_are_exported(tmp_path, small_text):
     assert main(["export", str(data), "--format", "bids", "--out", str(out)]) == 0
     facts = json.loads((out / "code" / "facts.json").read_text("utf-8"))
     exported = load_protocol((out / "code" / "protocol.toml").read_text("utf-8"), "protocol.toml")
-    assert facts["protocol_hash"] == protocol_hash(exported)
+    assert facts["protocol_hash"] == hash_protocol(exported)
     assert list(facts["seeds"].values()) == [7]
     (session,) = facts["seeds"]
     assert (data / session).is_dir()

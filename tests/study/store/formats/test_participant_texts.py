@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from protocols.document.hashing import protocol_hash
+from protocols.document.hashing import hash_protocol
 from protocols.wording.english import ENGLISH, LANGUAGES
 from study.store.disk.file_errors import CannotReadError, UnusableFileError
 from study.store.formats.participant_texts import make_language_template, read_language
@@ -54,13 +54,13 @@ def test_a_protocol_in_german_has_german_texts_and_says_so_in_its_text(mine, tmp
     assert found.protocol.title == "Übungsdurchgang bei 5 Hz"
     again = tmp_path / "again.toml"
     again.write_text(found.text, encoding="utf-8")
-    assert protocol_hash(read_study_protocol(str(again)).protocol) == protocol_hash(found.protocol)
+    assert hash_protocol(read_study_protocol(str(again)).protocol) == hash_protocol(found.protocol)
 
 
 def test_a_protocol_without_the_table_keeps_its_text_and_hash(mine):
     assert read_protocol("direction_training").text.startswith("# Practice alone")
-    shipped = protocol_hash(read_protocol("direction_training").protocol)
-    assert protocol_hash(read_protocol(mine("")).protocol) == shipped
+    shipped = hash_protocol(read_protocol("direction_training").protocol)
+    assert hash_protocol(read_protocol(mine("")).protocol) == shipped
 
 
 def test_a_language_by_one_file_beside_the_protocol(mine, french):

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from protocols.document.hashing import protocol_hash
+from protocols.document.hashing import hash_protocol
 from protocols.document.lock import lock_from_json
 from study.errors import ExitCode, StudyError, WrongUseError
 from study.local_clock import convert_to_machine_zone
@@ -121,7 +121,7 @@ def test_a_lock_says_which_protocol_when_and_by_which_version(data):
     path = lock_protocol(found, data, WHEN, "0.1.0")
     assert path == data / "direction_threshold.lock.json"
     lock = lock_from_json(path.read_text("utf-8"))
-    assert (lock.name, lock.hash) == ("direction_threshold", protocol_hash(found.protocol))
+    assert (lock.name, lock.hash) == ("direction_threshold", hash_protocol(found.protocol))
     assert (lock.locked_utc, lock.hapteq) == (WHEN, "0.1.0")
     assert read_study_protocol("direction_threshold", data).lock == lock
     assert not read_study_protocol("direction_training", data).locked

@@ -9,7 +9,7 @@ from analysis.diagnosis.diagnose_values import diagnose_values
 from analysis.diagnosis.document import Mismatch
 from analysis.diagnosis.errors.choose_measure import make_measure
 from analysis.diagnosis.errors.error_measure_rule import IN_SAMPLES, UNTIMED
-from analysis.diagnosis.result.candidate_wording import Device
+from analysis.diagnosis.result.candidate_wording import DeviceWording
 from analysis.diagnosis.result.wording import describe_place
 from analysis.diagnosis.search.guard import Guard
 from equalizer.plant.effect_vocabulary import find_matrix_unit
@@ -69,7 +69,7 @@ def test_no_unit_holds_a_second(first):
 
 def test_no_place_is_reported_in_hertz(first):
     row = Mismatch("x", "fx", (0.0, 0.5), None, None, 0.02, 0.0)
-    assert "Hz" not in describe_place(row, Device(True, first.model.system))
+    assert "Hz" not in describe_place(row, DeviceWording(True, first.model.system))
     assert "Hz" in describe_place(row)
 
 

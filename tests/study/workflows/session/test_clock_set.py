@@ -77,7 +77,7 @@ def test_a_clock_that_is_set_in_a_sitting_changes_nothing_and_is_said_everywhere
     undisturbed = sitter.whole("P02")
     assert end.end_reason == ""
     assert end.state.sitting.dose == undisturbed.state.sitting.dose
-    assert end.state.sitting.sat_s == pytest.approx(undisturbed.state.sitting.sat_s, abs=0.1)
+    assert end.state.sitting.sitting_elapsed_s == pytest.approx(undisturbed.state.sitting.sitting_elapsed_s, abs=0.1)
     (told,) = seat.display.told
     assert told.startswith("The computer's clock was ") and said in told
     assert notes(end.folder) == [told]
@@ -97,7 +97,7 @@ def test_a_clock_set_back_between_sittings_is_reported_when_the_session_continue
     assert told.startswith("The computer's clock reads 2 h 0 min earlier than at the last entry of the log.")
     assert notes(again.folder) == [told]
     assert again.state.sitting.dose.vibrated_s > first.state.sitting.dose.vibrated_s
-    assert again.state.sitting.sat_s >= 0.0
+    assert again.state.sitting.sitting_elapsed_s >= 0.0
 
 
 def test_every_entry_of_a_sitting_carries_the_monotonic_clock(sitter):

@@ -8,7 +8,7 @@ from analysis.psychophysics.runs import InconsistentTrialsError
 from analysis.psychophysics.study_analysis import analyse_study
 from protocols.definition.staircase_rule import BayesianPlacement
 from protocols.document.dumping import dump_protocol
-from protocols.document.hashing import protocol_hash
+from protocols.document.hashing import hash_protocol
 from protocols.trial import Phase
 from study.workflows.results.fold_session import fold_session
 
@@ -42,7 +42,7 @@ def test_a_session_is_played_folded_and_analysed(placed):
 
 def test_off_it_leaves_the_hash_alone_and_it_does_not_go_with_roving(placed):
     off = replace(placed.protocol.staircase, bayesian=BayesianPlacement())
-    assert protocol_hash(replace(placed.protocol, staircase=off)) != protocol_hash(placed.protocol)
+    assert hash_protocol(replace(placed.protocol, staircase=off)) != hash_protocol(placed.protocol)
     with pytest.raises(ValueError, match="rove_db"):
         replace(placed.protocol, stimulus=replace(placed.protocol.stimulus, rove_db=3.0))
 

@@ -11,13 +11,13 @@ from scipy.signal import lfilter
 
 from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.errors.hypothesis import Claim, make_claim_hypothesis
-from analysis.diagnosis.errors.intervals import (
+from analysis.diagnosis.errors.output_error import build_jacobian, evaluate_fit, fit
+from analysis.diagnosis.errors.standard_errors import (
     compute_full_sensitivity,
     compute_segment_errors,
     compute_standard_errors,
     finish_fit,
 )
-from analysis.diagnosis.errors.output_error import build_jacobian, evaluate_fit, fit
 from analysis.diagnosis.errors.tuning import Tuning
 from equalizer.effects.catalogue import EFFECTS
 from equalizer.plant.mechanical_model import MechanicalModel

@@ -1,6 +1,7 @@
-"""Examination of the fits after a search: localisation of the mismatch, curves of the effects, and a black box.
+"""Examination of the fits after a search: localisation of the mismatch, curves of the effects, and a black-box model.
 
-The parts are independent and computed in parallel; one that crashes is left out and noted (`search.guard`). Called by
+First the entry point of the mismatch is located; then its dependence on the state, the effects' curves, the black box
+and the distortion are computed in parallel. A part that crashes is left out with a remark (`search.guard`). Called by
 `assemble_findings`.
 """
 
@@ -30,33 +31,36 @@ from equalizer.effects.placing import shorten_axis_name
 from equalizer.effects.starts.evidence import Evidence
 
 LOCALISATION_NAME = "the localisation"
-"""Name of the work in the note of a crash (`guard`)."""
+"""Name of the part in the remark on a crash (`search.guard`)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Examination:
-    """What is computed from the fits after a search: evidence, localisation, signatures and a black box."""
+    """Results computed from the fits after a search."""
 
     evidence: tuple[Evidence, ...]
-    """Evidence of the re-tuned model."""
-    local: Localisation
+    """Residuals and motion under the re-tuned model, one entry per recording."""
+    localisation: Localisation
     signatures: tuple[Signature, ...]
-    """Curve of each named effect: its force over position, velocity or command."""
+    """Curve of each named effect, such as its force over position, velocity or command."""
     black_box: BlackBox | None
+    """Fitted to the residuals of the re-tuned model; None without one (see `_fit_black_box`)."""
 
 
 def examine_fits(result: SearchResult, floor: NoiseFloor, maps: Maps) -> Examination:
-    """Examine the given, the re-tuned and the final model. floor: noise of the first recording. maps: mismatch maps of
-    these three stages."""
+    """Localise the mismatch of the given, the re-tuned and the final model, and characterise the named effects. floor:
+    noise of the first recording. maps: mismatch maps of these three stages."""
     context, explanation = result.context, result.found
     measure, tuning, stages = context.full_measure, context.tuning, explanation.stages
     evidence = gather_evidence(measure, tuning, stages["retuned"])
     entry_search = partial(find_entry_point, measure, tuning, stages["retuned"], floor, maps.cells["retuned"])
-    entry = context.guard.run(LOCALISATION_NAME, "its work", entry_search, None)
+    entry_point = context.guard.run(LOCALISATION_NAME, "its work", entry_search, None)
     # Stages with the same fit are examined once.
     stage_by_fit = {id(fitted): stage for stage, fitted in stages.items()}
     state_searches = [
-        partial(find_state_dependences, measure, tuning, stages[stage], maps.cells[stage], entry, retuned_evidence)
+        partial(
+            find_state_dependences, measure, tuning, stages[stage], maps.cells[stage], entry_point, retuned_evidence
+        )
         for stage in stage_by_fit.values()
         for retuned_evidence in [evidence if stages[stage] is stages["retuned"] else ()]
     ]
@@ -71,15 +75,15 @@ def examine_fits(result: SearchResult, floor: NoiseFloor, maps: Maps) -> Examina
             Distortions((), ()),
         ),
     ]
-    *state_results, signatures, box, distortions = context.guard.run_parts(context.map_, work_parts)
+    *state_results, signatures, black_box, distortions = context.guard.run_parts(context.map_, work_parts)
     states_by_fit = dict(zip(stage_by_fit, state_results, strict=True))
     states = {stage: states_by_fit[id(fitted)] for stage, fitted in stages.items()}
-    return Examination(evidence, Localisation(states, entry, distortions), signatures, box)
+    return Examination(evidence, Localisation(states, entry_point, distortions), signatures, black_box)
 
 
 def _fit_black_box(context: SearchContext, explanation: Explanation) -> BlackBox | None:
-    """Fit a black box with as many terms per channel as the effects have parameters, at least 1, to the residuals of
-    the re-tuned model; None where band powers are compared instead of samples."""
+    """Fit a black-box model to the residuals of the re-tuned model, with as many terms per channel as the effects have
+    parameters, at least 1; None where band powers are compared instead of samples."""
     if explanation.statistic is not None:
         return None
     parameter_count = max(len(explanation.after.fitted.hypothesis.point), 1)
@@ -93,14 +97,14 @@ def _fit_black_box(context: SearchContext, explanation: Explanation) -> BlackBox
 
 def _compute_signatures(context: SearchContext, explanation: Explanation) -> tuple[Signature, ...]:
     """Compute the curve of each named effect: the missing force or residual of the final model without that effect, in
-    the record with the most samples to fit or choose by."""
+    the record of `_find_main_record`; empty without named effects."""
     measure, tuning, fitted = context.full_measure, context.tuning, explanation.after.fitted
     if not fitted.hypothesis.claims:
         return ()
     record_index = _find_main_record(measure)
     recording = measure.records[record_index].recording
     labels, signatures = make_labels(recording, tuning.model), []
-    names = Names(
+    curve_names = Names(
         tuple(shorten_axis_name(name, labels.inputs) for name in labels.inputs),
         labels.outputs,
         labels.response_unit,
@@ -108,24 +112,26 @@ def _compute_signatures(context: SearchContext, explanation: Explanation) -> tup
     )
     full_prediction = gather_evidence(measure, tuning, fitted)[record_index].predicted
     for effect_index in range(len(fitted.hypothesis.claims)):
-        remaining = remove_claim(fitted.hypothesis, effect_index)
-        evidence = gather_evidence(measure, tuning, evaluate_fit(measure, tuning, fitted.deviations, remaining))
+        reduced_hypothesis = remove_claim(fitted.hypothesis, effect_index)
+        evidence = gather_evidence(
+            measure, tuning, evaluate_fit(measure, tuning, fitted.deviations, reduced_hypothesis)
+        )
         main_effect = max(
             fitted.hypothesis.list_effects_of(effect_index),
             key=lambda placed_effect: _compute_strength(placed_effect.values),
         )
         signatures.append(
-            compute_signature(evidence[record_index], full_prediction, main_effect, names, recording.hold)
+            compute_signature(evidence[record_index], full_prediction, main_effect, curve_names, recording.hold)
         )
     return tuple(signatures)
 
 
 def _find_main_record(measure: ErrorMeasure) -> int:
-    """Return the index of the first record with the most samples to fit or choose by: others may be held out
-    entirely."""
+    """Find the index of the record with the most samples to fit or choose by, the first of equals; other records may be
+    held out entirely."""
     return int(np.argmax([np.sum(record.fit | record.choose) for record in measure.records]))
 
 
 def _compute_strength(values: Values) -> float:
-    """Return the magnitude of the main parameter, which is the first of the values."""
+    """Compute the strength of an effect: the magnitude of its main parameter, the first of its values."""
     return abs(next(iter(values.values())))

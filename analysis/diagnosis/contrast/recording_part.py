@@ -1,6 +1,7 @@
-"""Parts of recordings without long gaps, as arrays in which a fault can be undone by replacing samples (`fault`).
+"""Split recordings at long gaps into parts: arrays without missing values, in which a fault can be undone (`fault`).
 
-`rank_faults` and `compare_with_reference` split the faulty and the clean recordings into parts.
+Undoing a fault replaces samples by those without the fault. Called by `rank_faults`, `compare_with_reference` and
+`study.evaluation.real.injected_halves` for the faulty and the clean recordings.
 """
 
 from collections.abc import Sequence
@@ -19,10 +20,10 @@ from equalizer.signals.signal import FloatArray, Signal
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """One part without long gaps; missing samples are interpolated, and not `known`."""
+    """One part of a recording without long gaps; missing samples are interpolated, and False in `known`."""
 
     recording: Recording
-    """The part as recorded, for its rate, hold and names."""
+    """The part as recorded, for its sample rate, hold and channel names."""
     command: FloatArray
     """(n, m): commands, in SI units."""
     response: FloatArray
@@ -30,15 +31,15 @@ class Part:
     position: FloatArray | None
     """(n, d): measured positions, in SI units; None where none were measured."""
     known: Mask
-    """(n,): samples of response and position that were recorded, not interpolated."""
+    """(n,): samples at which all channels of response and position were recorded, not interpolated."""
     start: int
-    """Index of the part's first sample in its file, because drifts and clocks also run between the parts."""
+    """Index of the part's first sample in its file, because a drift and a clock error continue between the parts."""
     file_length: int
     """Number of samples of the file."""
 
     @property
     def elapsed_share(self) -> FloatArray:
-        """(n,): elapsed share of the file's duration, 0 to 1."""
+        """(n,): elapsed share of the file's duration, 0 at its first sample, 1 at its last."""
         return np.linspace(self.start, self.start + len(self.known) - 1, len(self.known)) / max(self.file_length - 1, 1)
 
     @property
@@ -47,7 +48,7 @@ class Part:
         return self.recording.sample_rate_hz
 
     def to_observed(self) -> Observed:
-        """The part in the form that the force balance reads; all known samples are to fit, none are held out."""
+        """The part in the form that the force balance reads: known samples are used to fit, none are held out."""
         recording = replace(
             self.recording,
             command=replace(self.recording.command, samples=self.command),
@@ -59,8 +60,8 @@ class Part:
 
 
 def split_into_parts(recordings: Sequence[Recording]) -> tuple[Part, ...]:
-    """The parts of recordings, each from its first to its last known sample. Only the last `PART_MOST_SAMPLES` samples
-    of a recording are used, and parts shorter than `PART_LEAST_SAMPLES` are left out."""
+    """Split recordings into parts, each from its first to its last known sample. Only the last `PART_MOST_SAMPLES`
+    samples of a recording are used; parts shorter than `PART_LEAST_SAMPLES` are left out."""
     parts: list[Part] = []
     for recording in recordings:
         for start, stop in find_parts(recording):
@@ -70,19 +71,21 @@ def split_into_parts(recordings: Sequence[Recording]) -> tuple[Part, ...]:
             known_indices = np.flatnonzero(_mask_finite_samples(cut_part(recording, first_used, stop)))
             if len(known_indices) and known_indices[-1] - known_indices[0] + 1 >= PART_LEAST_SAMPLES:
                 parts.append(
-                    _fill_part(recording, first_used + int(known_indices[0]), first_used + int(known_indices[-1]) + 1)
+                    _cut_filled_part(
+                        recording, first_used + int(known_indices[0]), first_used + int(known_indices[-1]) + 1
+                    )
                 )
     return tuple(parts)
 
 
 def _mask_finite_samples(part: Recording) -> Mask:
-    """(n,): samples at which all channels of response and position were recorded."""
+    """Mask (n,) of the samples at which all channels of response and position are finite."""
     signals = [part.response.samples, *([] if part.position is None else [part.position.samples])]
     return np.asarray(np.isfinite(np.hstack(signals)).all(axis=1), dtype=np.bool_)
 
 
-def _fill_part(recording: Recording, start: int, stop: int) -> Part:
-    """The samples from `start` to before `stop`, with missing ones interpolated (`fill_gaps`)."""
+def _cut_filled_part(recording: Recording, start: int, stop: int) -> Part:
+    """Cut the samples from `start` to before `stop`, with missing ones interpolated (`fill_gaps`)."""
     part = cut_part(recording, start, stop)
     position = None if part.position is None else fill_gaps(part.position.samples)
     return Part(
@@ -97,5 +100,5 @@ def _fill_part(recording: Recording, start: int, stop: int) -> Part:
 
 
 def _replace_samples(signal: Signal | None, samples: FloatArray | None) -> Signal | None:
-    """The signal with these samples; None where either is None."""
+    """Replace the samples of a signal; None where either is None."""
     return None if signal is None or samples is None else replace(signal, samples=samples)

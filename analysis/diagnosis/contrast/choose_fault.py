@@ -1,8 +1,10 @@
-"""Decides which fault is named after a comparison with clean recordings: a fault, a class of faults, or none.
+"""Choose which fault to name after a comparison with clean recordings: a fault, a class of faults, or none.
 
-The fault with the smallest error is named if its gain passes the tests of `_find_objection`. Rivals whose error is not
-significantly larger (bootstrap over blocks) form its class; a class of too many faults, or an unnamed candidate with a
-smaller error, prevents a name. Errors and gains are those of `rank_faults`. Called by `compare_with_reference`.
+Of the faults that pass all tests of `_find_objection`, the one with the smallest error is the best. Its class contains
+the rivals whose error is not significantly larger (bootstrap over blocks) and those that failed a test but fit about as
+well (`_find_inconclusive`). No fault is named where the class is too large, a fault that failed a test has a clearly
+smaller error, the best explains too small a share of the difference, or its axis is ambiguous. Errors and gains are
+those of `rank_faults`. Called by `compare_with_reference`.
 """
 
 from collections.abc import Sequence
@@ -29,61 +31,62 @@ from analysis.diagnosis.settings import (
 
 T_QUANTILE = float(stdtrit(FOLDS - 1, 0.975))
 """Half-width of a 95 % confidence interval in standard errors: quantile 0.975 of Student's t with FOLDS - 1 degrees of
-freedom. A fault is not named where its parameter may have the value without a fault."""
+freedom. A fault is not named where the interval of its parameter includes the value without a fault."""
 ALIASES = {
     "transport_delay": ("logger_offset",),
     "logger_offset": ("transport_delay",),
     "force_offset": ("constant_force",),
 }  # fmt: skip
-"""Faults with the same effect on the signals: the two delays in a recording of one response, and an offset of the
-command and a constant force in any recording."""
+"""Faults with the same effect on the signals: the two delays with a single response channel, and for a force offset a
+constant force in any recording."""
 
-REFINEMENT_REASON = "it contains the named fault as a special case, and its error is not significantly smaller"
+NO_GAIN_REASON = "it contains the named fault as a special case, and its error is not significantly smaller"
 RIVAL_REASON = "another fault explains more of the difference between these recordings"
 """Reasons, in messages, why a rival of the named fault is not named."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Decision:
-    """The named fault with its class and probability, or None, and the candidates that are not named."""
+    """The named fault with its class and probability, and the candidates that are not named."""
 
     named: JudgedFault | None
+    """None where no fault is named."""
     equivalents: tuple[str, ...]
-    """Effects that fit about as well in its place (class); empty where none is named."""
+    """Names of the effects that fit about as well (class); empty where no fault is named."""
     probability: float
-    """Share of bootstrap draws in which no accepted rival has a smaller error, refinements not counted; 0 without a
-    name."""
+    """Share of bootstrap draws in which no rival that passed the tests has a smaller error, rivals that contain the
+    named fault as a special case not counted; 0 where no fault is named."""
     unnamed: tuple[tuple[JudgedFault, str], ...]
-    """Candidates that are not named, each with the reason in words."""
+    """Candidates that are not named, each with the reason in words; without members of the class."""
 
 
 def choose_fault(comparison: Comparison, response_count: int) -> Decision:
     """Choose the fault or class to name, and list the other candidates. response_count: number of response channels."""
     tested = [(fault, _find_objection(fault, comparison.sets_differ_without(fault))) for fault in comparison.faults]
-    accepted = [fault for fault, note in tested if note == ""]
-    unnamed = tuple((fault, note) for fault, note in tested if fault.gain > 0 and note)
+    accepted = [fault for fault, flaw in tested if flaw == ""]
+    unnamed = tuple((fault, flaw) for fault, flaw in tested if fault.gain > 0 and flaw)
     if not accepted:
         return Decision(None, (), 0.0, unnamed)
     best = _choose_simplest(accepted, comparison)
     rivals = [fault for fault in accepted if fault is not best]
-    distinct = [rival for rival in rivals if not _is_finer(rival, best)]
-    inseparable = [rival for rival in distinct if _is_inseparable(best, rival, comparison)]
-    failed = [fault for fault, note in tested if note and fault.gain >= LEAST_FAULT_GAIN and not _is_finer(fault, best)]
-    inseparable += [fault for fault in rivals if _is_finer(fault, best) and _is_significantly_better(fault, best)]
-    peers = (
+    distinct_rivals = [rival for rival in rivals if not _contains(rival, best)]
+    inseparable = [rival for rival in distinct_rivals if _is_inseparable(best, rival, comparison)]
+    failed = [fault for fault, flaw in tested if flaw and fault.gain >= LEAST_FAULT_GAIN and not _contains(fault, best)]
+    inseparable += [fault for fault in rivals if _contains(fault, best) and _is_significantly_better(fault, best)]
+    members = (
         *inseparable,
         *_find_inconclusive(failed, best, comparison)[: max(LARGEST_FAULT_CLASS - 1 - len(inseparable), 0)],
     )
-    better = [
-        fault for fault in failed if fault.gain_low > 0 and _get_gap(fault, best) < -_get_least_gap(best, comparison)
+    better_faults = [
+        fault for fault in failed if fault.gain_low > 0 and _sum_gap(fault, best) < -_find_least_gap(best, comparison)
     ]
     aliases = ALIASES.get(best.fault.effect, ()) if response_count == 1 or best.fault.effect == "force_offset" else ()
-    equivalents = tuple(name for name in dict.fromkeys((*(rival.fault.effect for rival in peers), *aliases))
+    equivalents = tuple(name for name in dict.fromkeys((*(rival.fault.effect for rival in members), *aliases))
                   if name != best.fault.effect)  # fmt: skip
-    other_axes = [rival.fault.axis for rival in peers if rival.fault.effect == best.fault.effect]
+    other_axes = [rival.fault.axis for rival in members if rival.fault.effect == best.fault.effect]
     reason = ""
-    if better:
-        reason = f"{get_noun(better[0].fault.effect)} explains more, but is not significant itself"
+    if better_faults:
+        reason = f"{get_noun(better_faults[0].fault.effect)} explains more, but is not significant itself"
     elif best.share < FAULT_MAIN_PART:
         reason = (
             f"it explains {100 * best.share:.0f} % of the difference between these recordings: the main cause is "
@@ -93,43 +96,44 @@ def choose_fault(comparison: Comparison, response_count: int) -> Decision:
         reason = "these data cannot distinguish it from " + ", ".join(equivalents)
     elif other_axes:
         reason = f"these data do not show whether it is on {best.fault.axis} or on {', '.join(other_axes)}"
-    rejected = tuple((rival, REFINEMENT_REASON if _is_finer(rival, best) else RIVAL_REASON) for rival in rivals)
+    unnamed_rivals = tuple((rival, NO_GAIN_REASON if _contains(rival, best) else RIVAL_REASON) for rival in rivals)
     if reason:
-        return Decision(None, (), 0.0, ((best, reason), *rejected, *unnamed))
-    remaining = tuple(candidate for candidate in (*rejected, *unnamed) if candidate[0] not in peers)
-    return Decision(best, equivalents, _estimate_probability_of_best(best, distinct), remaining)
+        return Decision(None, (), 0.0, ((best, reason), *unnamed_rivals, *unnamed))
+    unnamed_candidates = tuple(candidate for candidate in (*unnamed_rivals, *unnamed) if candidate[0] not in members)
+    return Decision(best, equivalents, _estimate_probability_of_best(best, distinct_rivals), unnamed_candidates)
 
 
 def _find_inconclusive(failed: Sequence[JudgedFault], best: JudgedFault, comparison: Comparison) -> list[JudgedFault]:
-    """Candidates that fail a test of `_find_objection` although their gain has a lower bound above 0, and whose error
-    differs too little from that of the best, which passes all tests: either may be the cause."""
+    """Find the candidates of other effects that failed a test of `_find_objection`, whose gain has a lower bound above
+    0, and whose error differs too little from that of the best to exclude them."""
     return [
         judged_fault
         for judged_fault in failed
         if judged_fault.fault.effect != best.fault.effect
         and judged_fault.gain_low > 0
-        and abs(_get_gap(judged_fault, best)) <= _get_least_gap(best, comparison)
+        and abs(_sum_gap(judged_fault, best)) <= _find_least_gap(best, comparison)
     ]
 
 
-def _is_finer(candidate: JudgedFault, best: JudgedFault) -> bool:
-    """Whether `candidate` contains `best` as a special case at the same axis, so that it always fits better."""
+def _contains(candidate: JudgedFault, best: JudgedFault) -> bool:
+    """Whether `candidate` contains `best` as a special case at the same axis, so that it cannot fit worse."""
     return best.fault.effect in candidate.fault.simpler and best.fault.axis == candidate.fault.axis
 
 
-def _choose_simplest(significant: Sequence[JudgedFault], comparison: Comparison) -> JudgedFault:
-    """The fault with the smallest error, or a special case of it that these data cannot distinguish from it."""
-    best = min(significant, key=lambda judged_fault: float(judged_fault.errors.sum()))
-    for candidate in significant:
-        if _is_finer(best, candidate) and _is_inseparable(best, candidate, comparison):
+def _choose_simplest(accepted: Sequence[JudgedFault], comparison: Comparison) -> JudgedFault:
+    """Choose the fault with the smallest error, or the first special case of it that these data cannot distinguish from
+    it."""
+    best = min(accepted, key=lambda judged_fault: float(judged_fault.errors.sum()))
+    for candidate in accepted:
+        if _contains(best, candidate) and _is_inseparable(best, candidate, comparison):
             return candidate
     return best
 
 
 def _find_objection(fault: JudgedFault, sets_differ: bool) -> str:
-    """Reason not to name a fault; empty if it passes all tests. sets_differ: whether the clean and the faulty set
-    differ by more than stretches of a single set do. If not, the fault must gain about equally in all blocks, which
-    excludes slow changes during a recording."""
+    """Find the reason not to name a fault; empty if it passes all tests. sets_differ: whether the clean and the faulty
+    set differ by more than stretches of a single set do. If not, the gain must be steady: its lower bound at least
+    `FAULT_STEADY` of it, and the fault constant during a recording."""
     if fault.gain < LEAST_FAULT_GAIN or fault.gain_low <= 0:
         return "its gain is not larger than its variation between stretches of the recordings"
     is_steady = fault.gain_low >= FAULT_STEADY * fault.gain and not fault.fault.varies
@@ -147,17 +151,17 @@ def _find_objection(fault: JudgedFault, sets_differ: bool) -> str:
 
 
 def _compute_distance_from_no_fault(fault: JudgedFault, name: str) -> float:
-    """Distance of a parameter from its value without a fault: 1 for a gain, else 0."""
+    """Compute the difference of a parameter from its value without a fault: 1 for a gain, else 0."""
     return fault.values[name] - (1.0 if name == "gain" else 0.0)
 
 
 def _is_inseparable(best: JudgedFault, rival: JudgedFault, comparison: Comparison) -> bool:
-    """Whether the error of `rival` exceeds that of the best too little to distinguish them, or not significantly
+    """Whether the error of `rival` exceeds that of the best by at most `_find_least_gap`, or not significantly
     (bootstrap over blocks)."""
     excess_errors = rival.errors - best.errors
     draws = draw_bootstrap_blocks(len(excess_errors))
     return bool(
-        excess_errors.sum() <= _get_least_gap(best, comparison)
+        excess_errors.sum() <= _find_least_gap(best, comparison)
         or np.quantile(excess_errors[draws].sum(axis=1), BOOTSTRAP_LEVEL) <= 0
     )
 
@@ -171,14 +175,14 @@ def _is_significantly_better(refinement: JudgedFault, best: JudgedFault) -> bool
     )
 
 
-def _get_gap(rival: JudgedFault, best: JudgedFault) -> float:
-    """Sum of squared errors with `rival` undone, minus that with the best undone."""
+def _sum_gap(rival: JudgedFault, best: JudgedFault) -> float:
+    """Sum the squared errors with `rival` undone, less those with the best undone."""
     return float((rival.errors - best.errors).sum())
 
 
-def _get_least_gap(best: JudgedFault, comparison: Comparison) -> float:
-    """Least difference between a rival's error and that of the best, as sums of squares, at which both are
-    distinguished: a share of the reduction by the best, or of its remaining error, the smaller of both."""
+def _find_least_gap(best: JudgedFault, comparison: Comparison) -> float:
+    """Find the difference between the error sums of a rival and the best above which they are distinguished: the
+    smaller of `FAULT_RIVAL_BEHIND` of the reduction by the best and `FAULT_RIVAL_WORSE` of its remaining error."""
     remaining_error = float(best.errors.sum())
     return min(
         FAULT_RIVAL_BEHIND * (float(comparison.errors.sum()) - remaining_error), FAULT_RIVAL_WORSE * remaining_error
@@ -186,7 +190,8 @@ def _get_least_gap(best: JudgedFault, comparison: Comparison) -> float:
 
 
 def _estimate_probability_of_best(best: JudgedFault, rivals: Sequence[JudgedFault]) -> float:
-    """Share of bootstrap draws over blocks in which no rival has a smaller error than the best."""
+    """Estimate the probability that the best is the cause: share of bootstrap draws over blocks in which no rival has a
+    smaller error. 1 without rivals."""
     draws = draw_bootstrap_blocks(len(best.errors))
     is_best = np.ones(BOOTSTRAP_DRAWS, dtype=np.bool_)
     for rival in rivals:

@@ -1,4 +1,8 @@
-"""Outcomes of faults that were injected into real recordings, and how often the diagnosis was right."""
+"""Score the diagnosis on faults that were injected into real recordings: class of each answer, shares of correct
+answers.
+
+`study.evaluation.real.inject_real` injects the faults and reads the outcomes; `injected_section` shows the shares in
+the report, `real_summary` in the terminal."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,51 +11,67 @@ from typing import Any, Literal, get_args
 from analysis.evaluation.blind_test.confidence_intervals import IntervalEstimate, compute_share
 
 DETECTABLE = 1.25
-"""Factor by which a fault must change the held-out error of the device's base model, up or down, to count as
-detectable. By hand."""
+"""Least factor by which a fault changes the held-out error of the device's base model, up or down, to count as
+detectable. Chosen by hand."""
 AnswerClass = Literal["named", "in class", "other name, right place", "wrong", "unnamed", "nothing named"]
+"""Class of the answer to a case, see `InjectedOutcome.answer_class`."""
 ANSWER_CLASSES: tuple[AnswerClass, ...] = get_args(AnswerClass)
+"""All classes; the last is the correct answer to a case without a fault."""
 
 
 @dataclass(frozen=True, slots=True)
 class InjectedOutcome:
-    """A case of injected faults: what was injected, by how much it shows, and what the diagnosis said."""
+    """A case of injected faults: what was injected, how much it changes the recording, and the answer of the
+    diagnosis."""
 
     recording: str
+    """Name of the recording."""
     effects: tuple[str, ...]
-    """Injected faults; none, or two where two were injected at once."""
+    """Names of the injected faults; none, or two where two were injected at once."""
     places: tuple[str, ...]
-    """Place of each fault."""
+    """Place of each fault on the signal path: mechanism, hand, actuator or sensor."""
     strength: float
+    """Strength of the faults, 0 (weakest) to 1 (strongest); 0 without a fault."""
     values: Mapping[str, float]
+    """Parameters of the faults by name, in the units of the recording."""
     change: float | None
     """Held-out error with the fault over that without it, of a base model that is fitted to the clean half; None where
     there was no such model."""
     verdict: str
+    """Verdict of the diagnosis; "failed" without a diagnosis."""
     named: tuple[str, ...]
+    """Names of the effects that the diagnosis names."""
     named_places: tuple[str, ...]
+    """Place of each named effect."""
     returned: tuple[str, ...]
+    """The named effects and the rivals that the recording does not distinguish from these."""
     seconds: float
+    """Duration of the diagnosis, s."""
     failed: str = ""
+    """Why the diagnosis failed; empty if it did not."""
 
     @property
     def injected(self) -> str:
-        """The injected effects in a line, joined by " + "; empty without any."""
+        """Names of the injected faults, joined by " + "; empty without any."""
         return " + ".join(self.effects)
 
     @property
     def detectable(self) -> bool:
-        """Whether the fault changes the error by the factor `DETECTABLE`, up or down; False without a fault, or where
-        `change` is not known."""
+        """Whether the fault changes the error by at least the factor `DETECTABLE`, up or down; False without a fault,
+        or where `change` is None."""
         if not self.effects or self.change is None:
             return False
         return self.change >= DETECTABLE or self.change <= 1 / DETECTABLE
 
     @property
     def answer_class(self) -> AnswerClass:
-        """Class of the answer, by the worst of its names: every name is an injected fault ("named"); an injected fault
-        is in the returned set ("in class"); the other names are at the right places; or "wrong". With two faults at
-        once, naming one of them is right."""
+        """Class of the answer.
+
+        Without a fault: "nothing named"; "wrong" where the diagnosis names an effect or fails. With faults: "unnamed"
+        without a name; "named" if every name is an injected fault, of which one of two suffices; "in class" if an
+        injected fault is in the returned set and there are at most as many names as faults; "other name, right place"
+        if all names that are no injected fault are at places of injected faults; else "wrong".
+        """
         if not self.effects:
             return "wrong" if self.named or self.failed else "nothing named"
         if not self.named:
@@ -66,13 +86,14 @@ class InjectedOutcome:
         return "other name, right place" if set(other_places) <= set(self.places) else "wrong"
 
     @property
-    def right(self) -> bool:
-        """Whether `judged` is "named", "in class" or, without a fault, "nothing named"."""
+    def is_correct(self) -> bool:
+        """Whether `answer_class` is "named", "in class" or, without a fault, "nothing named"."""
         return self.answer_class in ("named", "in class", "nothing named")
 
 
 def read_outcome(label: Mapping[str, Any], answer: Mapping[str, Any]) -> InjectedOutcome:
-    """Outcome from a sealed label and the document that the diagnosis wrote."""
+    """Read the outcome from a sealed label and the document that the diagnosis wrote, both parsed from JSON. Raises
+    KeyError where a key of the label is missing."""
     diagnosis = answer.get("diagnosis", {})
     effects = diagnosis.get("effects", [])
     names = [effect["effect"] for effect in effects]
@@ -94,49 +115,55 @@ def read_outcome(label: Mapping[str, Any], answer: Mapping[str, Any]) -> Injecte
 
 
 def score_injections(outcomes: Sequence[InjectedOutcome]) -> tuple[IntervalEstimate, ...]:
-    """Shares of right and wrong answers, with Wilson's 95 % intervals."""
+    """Compute the shares of correct and wrong answers, with Wilson's 95 % intervals, for cases without a fault, with
+    detectable and with undetectable faults."""
     faults = [outcome for outcome in outcomes if outcome.detectable]
     undetectable = [outcome for outcome in outcomes if outcome.effects and not outcome.detectable]
     faultless = [outcome for outcome in outcomes if not outcome.effects]
     return (
-        compute_share("nothing injected, nothing named", faultless, lambda case: case.right),
-        compute_share("detectable faults named, or in the class", faults, lambda case: case.right),
+        compute_share("nothing injected, nothing named", faultless, lambda case: case.is_correct),
+        compute_share("detectable faults named, or in the class", faults, lambda case: case.is_correct),
         compute_share(
             "detectable faults, another name at the right place", faults, _make_class_test("other name, right place")
         ),
         compute_share("detectable faults, a wrong fault named", faults, _make_class_test("wrong")),
-        compute_share("too weak to ask for, named all the same", undetectable, lambda case: case.right),
+        compute_share("too weak to ask for, named all the same", undetectable, lambda case: case.is_correct),
         compute_share("too weak to ask for, a wrong fault named", undetectable, _make_class_test("wrong")),
     )
 
 
 def _make_class_test(answer_class: AnswerClass) -> Callable[[InjectedOutcome], bool]:
+    """Make the test whether the answer to a case is of this class."""
     return lambda case: case.answer_class == answer_class
 
 
 @dataclass(frozen=True, slots=True)
 class Tally:
-    """One row of a table: a kind of fault, or a recording."""
+    """Counts and shares of a group of cases: of a kind of fault, or of a recording."""
 
     name: str
+    """Name of the group."""
     fault_count: int
-    """Number of injected faults, detectable or not."""
+    """Number of cases with a fault, detectable or not."""
     counts: tuple[int, ...]
-    """Number of detectable faults per entry of `ANSWER_CLASSES` without its last."""
-    right: IntervalEstimate
+    """Number of cases with a detectable fault per class of `ANSWER_CLASSES`, without the last class."""
+    correct_share: IntervalEstimate
+    """Share of the cases with a detectable fault whose answer is correct."""
     faultless: IntervalEstimate
-    """Cases without a fault in which nothing was named."""
+    """Share of the cases without a fault in which nothing was named."""
 
 
-def make_tallies(outcomes: Sequence[InjectedOutcome], key: Callable[[InjectedOutcome], str]) -> tuple[Tally, ...]:
-    """Groups by key, in the order of names; outcomes with an empty key are left out."""
+def make_tallies(outcomes: Sequence[InjectedOutcome], get_key: Callable[[InjectedOutcome], str]) -> tuple[Tally, ...]:
+    """Make the tally of each group, ordered by name. get_key: name of the group of an outcome; outcomes with an empty
+    name are left out."""
     return tuple(
-        _make_tally(name, [outcome for outcome in outcomes if key(outcome) == name])
-        for name in sorted({*map(key, outcomes)} - {""})
+        _make_tally(name, [outcome for outcome in outcomes if get_key(outcome) == name])
+        for name in sorted({*map(get_key, outcomes)} - {""})
     )
 
 
 def _make_tally(name: str, outcomes: Sequence[InjectedOutcome]) -> Tally:
+    """Make the tally of the outcomes of a group."""
     faults = [outcome for outcome in outcomes if outcome.effects]
     detectable = [fault for fault in faults if fault.detectable]
     faultless = [outcome for outcome in outcomes if not outcome.effects]
@@ -147,6 +174,6 @@ def _make_tally(name: str, outcomes: Sequence[InjectedOutcome]) -> Tally:
         name,
         len(faults),
         counts,
-        compute_share(name, detectable, lambda case: case.right),
-        compute_share(name, faultless, lambda case: case.right),
+        compute_share(name, detectable, lambda case: case.is_correct),
+        compute_share(name, faultless, lambda case: case.is_correct),
     )

@@ -1,7 +1,8 @@
-"""Tables of a study report on detection, delivered acceleration, catch trials and practice; called by `study_report`.
+"""Supplementary tables of a study report: detection, delivered acceleration, catch trials and practice.
 
-They supplement the direction thresholds. Detection thresholds: from which level a vibration is felt at all. Delivered
-over wanted acceleration: whether the stimulus was as intended. Catch trials: how attentive a participant was.
+They supplement the tables of direction thresholds. Detection thresholds: the level from which a vibration is felt at
+all. Delivered over requested acceleration: whether the stimulus was as intended. Catch trials: the participants'
+attention. A threshold is "cut" where the force cap limited it (censored). Called by `study_report`.
 """
 
 from collections.abc import Iterator
@@ -46,8 +47,8 @@ def make_detection_table(analysis: StudyAnalysis) -> Table:
 
 
 def make_detection_run_table(analysis: StudyAnalysis) -> Table:
-    """Make the folded table of all detection runs: thresholds (N), reversals (for staircases only), trials, share of
-    correct answers in %, d' of two intervals, and criterion."""
+    """Make the folded (collapsed) table of all detection runs: thresholds (N), reversals (for staircases only), trials,
+    proportion correct (%), d' of two intervals, and criterion."""
     reversal_header = () if analysis.protocol.staircase.is_bayesian else ("Reversals",)
     return Table(
         caption="All detection runs",
@@ -67,7 +68,8 @@ def make_detection_run_table(analysis: StudyAnalysis) -> Table:
 
 
 def make_delivery_tables(analysis: StudyAnalysis) -> tuple[Table, ...]:
-    """Make the table of delivered over wanted acceleration by frequency; empty where levels are commanded forces."""
+    """Make the table of delivered over requested acceleration by frequency; empty without trials of known delivered
+    acceleration."""
     rows = tuple(
         (
             f"{delivery.frequency_hz:g} Hz",
@@ -85,7 +87,7 @@ def make_delivery_tables(analysis: StudyAnalysis) -> tuple[Table, ...]:
 
 
 def _format_percent(share: float | None) -> str:
-    """Format a ratio in percent without decimals; a dash for None."""
+    """Format a ratio in percent without decimals; `MISSING` for None."""
     return MISSING if share is None else f"{100 * share:.0f} %"
 
 
@@ -113,8 +115,8 @@ def make_catch_table(analysis: StudyAnalysis) -> Table:
 
 
 def make_practice_table(analysis: StudyAnalysis) -> Table:
-    """Make the folded table of practice runs, with correct answers and whether each was passed, not passed or broken
-    off."""
+    """Make the folded (collapsed) table of practice runs, with numbers of correct answers and the outcome: passed, not
+    passed or broken off."""
     settings = analysis.protocol.practice
     return Table(
         caption="Practice runs",
@@ -147,8 +149,8 @@ def make_practice_table(analysis: StudyAnalysis) -> Table:
 def _format_detection_cells(
     analysis: StudyAnalysis, subject: str, frequency_hz: float, detection_n: float | None, detection_is_cut: bool
 ) -> Iterator[str]:
-    """Format the cells of detection threshold, direction threshold and their ratio in dB; the ratio is a dash where
-    either is missing or cut. detection_n: detection threshold (N); detection_is_cut: whether the cap cut it."""
+    """Format the cells of detection threshold, direction threshold and their ratio in dB; the ratio is `MISSING` where
+    either is missing or cut. detection_n: detection threshold (N), None = missing."""
     direction_n, direction_is_cut = _find_direction_threshold(analysis, subject, frequency_hz)
     yield mark_cut(detection_n, detection_is_cut)
     yield mark_cut(direction_n, direction_is_cut)
@@ -159,8 +161,7 @@ def _format_detection_cells(
 
 
 def _find_direction_threshold(analysis: StudyAnalysis, subject: str, frequency_hz: float) -> tuple[float | None, bool]:
-    """Find the direction threshold (N) of a participant at a frequency, and whether the cap cut it; None where
-    missing."""
+    """Find the direction threshold (N) of a participant at a frequency, and whether it is cut; None where missing."""
     thresholds = analysis.table
     if subject not in thresholds.subjects or frequency_hz not in thresholds.frequencies_hz:
         return None, False

@@ -1,10 +1,10 @@
-"""Final steps of a fit, and standard errors valid where residuals are neither white nor of the assumed variance.
+"""Standard errors of fitted parameters, valid where residuals are neither white nor of the assumed variance.
 
-Final fit (`finish_fit`): a search stops at a relative change of the cost, which with 10^5 samples may leave a parameter
-several standard errors from the minimum. Gauss-Newton steps therefore continue until the sum of squares falls by less
-than `CONVERGED_DECREASE`. Sensitivities are central differences: parameters with the same effect on the prediction (an
-added mass and the model's own) must have proportional columns; curvature in one-sided differences would seem to
-separate them.
+Final fit (`finish_fit`), before the errors are computed: a search stops at a relative change of the cost, which with
+10^5 samples may leave a parameter several standard errors from the minimum. Gauss-Newton steps therefore continue until
+the sum of squares falls by less than `CONVERGED_DECREASE`. Sensitivities are central differences: parameters with the
+same effect on the prediction (an added mass and that of the model) must have proportional columns; the curvature error
+of one-sided differences would make them seem separable.
 
 Random errors (`compute_standard_errors`): sandwich estimate of Huber (1967) and White (1980), with scores summed over
 stretches longer than the residuals' correlation time. Under periodic excitation model errors repeat: the same stretch
@@ -14,7 +14,9 @@ delete-one jackknife over segments (Efron and Stein, Ann. Stat. 9:586, 1981), ea
 
     theta_g - theta = -(A - A_g)^-1 b_g,   A = sum of A_g + prior,   A_g = X_g X_g',   b_g = X_g r_g,
 
-with the sensitivities X_g (parameters, samples) and the residuals r_g of segment g.
+with the sensitivities X_g (parameters, samples) and the residuals r_g of segment g. Residuals are in units of the
+noise. Throughout, t is the number of the model's free parameters (deviations); those of the hypothesis follow. Called
+by `search.identifiability` and `discovery.snap_exponents`.
 """
 
 from collections.abc import Callable, Iterator
@@ -37,34 +39,35 @@ from equalizer.signals.signal import FloatArray
 IndexArray = npt.NDArray[np.int64]
 
 STRETCH_S = 0.5
-"""Length (s) of the stretches over which scores are summed: longer than the residuals' correlation time."""
+"""Length (s) of the stretches over which scores are summed: longer than the residuals' correlation time. Chosen."""
 BOUND_TOLERANCE = 1e-6
-"""Distance of a coordinate from its bound at or below which it counts as at the bound."""
+"""Distance of a coordinate from its bound at or below which it counts as at the bound. Chosen."""
 CONVERGED_DECREASE = 0.01
 """Fall of the sum of squares, in noise variances, that ends a fit: the minimum is then within a tenth of a standard
 error."""
 FINAL_DAMPINGS = ((1e-13, True), (1e-13, False), (1e-9, True), (1e-3, False), (0.1, False))
-"""Dampings of the final steps (see `DAMPINGS`), smaller than in a search: in a direction that the data do not
-determine, the prior of the calibration must decide, not the damping."""
+"""Dampings of the final steps (pairs as in `output_error.Dampings`), smaller than in a search: in a direction that the
+data do not determine, the prior of the calibration must decide, not the damping. Chosen."""
 MOST_ROUNDS, STEPS_PER_ROUND = 4, 3
-"""Largest number of rounds, each with a newly computed sensitivity, and of Gauss-Newton steps per round."""
+"""Largest number of rounds, each with a newly computed sensitivity, and of Gauss-Newton steps per round. Chosen."""
 STEP_FACTOR_LINEAR, STEP_FACTOR = 0.02, 0.2
 """Steps of the central differences, relative to those of a search. Linear simulation: short, because curvature is the
 only error. Other effects, with thresholds or forces that are solved for: longer, because a short step would magnify the
-numerical errors of the simulation."""
+numerical errors of the simulation. Chosen."""
 
 
 def compute_full_sensitivity(
     measure: ErrorMeasure, tuning: Tuning, deviations: FloatArray, hypothesis: Hypothesis, map_: Mapper = map
 ) -> Sensitivity:
-    """Sensitivity (t + parameters, samples) to the model's parameters, then to the hypothesis's parameters, by central
-    differences; one-sided at a bound and where the other side gives no valid model, zero where neither does."""
+    """Compute the sensitivity (t + parameters, samples) to the model's parameters, then to the hypothesis's parameters,
+    by central differences; one-sided at a bound and where the other side gives no valid model, zero where neither does.
+    map_: a possibly parallel `map` over the parameters."""
     t, placed_effects = len(deviations), hypothesis.list_placed_effects()
-    linear = all(isinstance(placed_effect.effect.action, Structure) for placed_effect in placed_effects)
-    step_factor = STEP_FACTOR_LINEAR if linear else STEP_FACTOR
+    is_linear = all(isinstance(placed_effect.effect.action, Structure) for placed_effect in placed_effects)
+    step_factor = STEP_FACTOR_LINEAR if is_linear else STEP_FACTOR
 
     def compute_residuals(parameter_index: int, displacement: float) -> FloatArray | None:
-        """(samples,): residuals to fit with one coordinate displaced; None where model or residuals are not valid."""
+        """Compute the residuals (samples,) with one coordinate displaced; None where model or residuals are invalid."""
         displaced, point = deviations.copy(), hypothesis.point.copy()
         (displaced if parameter_index < t else point)[
             parameter_index if parameter_index < t else parameter_index - t
@@ -79,7 +82,7 @@ def compute_full_sensitivity(
         return residuals if np.isfinite(residuals).all() else None
 
     def compute_column(parameter_index: int) -> FloatArray:
-        """(samples,): change of the prediction per unit of one coordinate."""
+        """Compute the change of the prediction per unit of one coordinate, (samples,)."""
         trial_sides = [
             (displacement, compute_residuals(parameter_index, displacement))
             for displacement in _limit_steps(hypothesis, parameter_index - t, step_factor)
@@ -99,7 +102,7 @@ def compute_full_sensitivity(
 
 
 def _limit_steps(hypothesis: Hypothesis, parameter_index: int, step_factor: float) -> tuple[float, float]:
-    """Steps of the coordinate down and up, limited to its bounds. parameter_index: among the hypothesis's parameters;
+    """Limit the steps of a coordinate, down and up, to its bounds. parameter_index: among the hypothesis's parameters;
     below 0: a parameter of the model, which has no bounds here."""
     if parameter_index < 0:
         return -step_factor * DIFFERENCE_STEP, step_factor * DIFFERENCE_STEP
@@ -115,9 +118,9 @@ def finish_fit(
     compute_sensitivity: Callable[[Fitted], Sensitivity],
     time_left: TimeBudget,
 ) -> tuple[Fitted, Sensitivity]:
-    """The fit at its minimum, and the sensitivity to all its parameters there. compute_sensitivity:
+    """Continue a fit to its minimum; returns the fit and the sensitivity to all its parameters. compute_sensitivity:
     `compute_full_sensitivity` of a fit; called once, and again after each round that lowered the sum of squares by
-    `CONVERGED_DECREASE` or more, even where no time is left for further steps."""
+    `CONVERGED_DECREASE` or more, even where no time is left for a further round."""
     jacobian, sample_count = compute_sensitivity(fitted), len(stack_fit_residuals(measure, fitted.residuals))
     for _ in range(MOST_ROUNDS):
         round_start_cost = fitted.cost
@@ -143,26 +146,27 @@ def finish_fit(
 def _build_normal_equations(
     measure: ErrorMeasure, fitted: Fitted, jacobian: Sensitivity
 ) -> tuple[FloatArray, FloatArray]:
-    """Normal matrix and right side of a Gauss-Newton step in all parameters, with the calibration as prior."""
+    """Build normal matrix and right side of a Gauss-Newton step in all parameters, with the calibration as prior."""
     rhs, t = jacobian.multiply(stack_fit_residuals(measure, fitted.residuals)), len(fitted.deviations)
     rhs[:t] -= fitted.deviations
     return _add_calibration_prior(jacobian.gram, t), rhs
 
 
-def _add_calibration_prior(squares: FloatArray, t: int) -> FloatArray:
-    """Normal matrix with the prior of the calibration: one observation of each of the model's t parameters, with a
-    standard deviation of 1 in its coordinate."""
-    normal_matrix = squares.copy()
+def _add_calibration_prior(gram: FloatArray, t: int) -> FloatArray:
+    """Add the prior of the calibration to a Gram matrix (t + parameters, t + parameters): one observation of each of
+    the model's t parameters, with a standard deviation of 1 in its coordinate."""
+    normal_matrix = gram.copy()
     normal_matrix[:t, :t] += np.eye(t)
     return normal_matrix
 
 
 def compute_standard_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sensitivity) -> FloatArray:
-    """(t + parameters,): standard errors of the deviations and of the hypothesis's point; 0 for parameters at a bound.
-    jacobian: sensitivity to all parameters (`compute_full_sensitivity`).
+    """Compute the standard errors (t + parameters,) of the model's deviations and the hypothesis's point; 0 for
+    parameters at a bound. jacobian: sensitivity to all parameters (`compute_full_sensitivity`).
 
     Scores sum to zero at the minimum, so that few clusters underestimate the variance. The larger of two estimates is
-    returned: with all periods of a segment in common clusters, and with separate ones."""
+    returned: with all periods of a segment in common clusters, and with separate ones. Directions with less than 1e-12
+    of the largest scaled information, undetermined up to rounding, are left out."""
     t, is_free = len(fitted.deviations), _find_free_parameters(fitted)
     residuals = stack_fit_residuals(measure, fitted.residuals)
     information = _add_calibration_prior(jacobian.gram * np.outer(is_free, is_free), t)
@@ -178,12 +182,12 @@ def compute_standard_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sen
 
 
 def compute_segment_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sensitivity) -> FloatArray | None:
-    """(t + parameters,): jackknife standard errors over segments; None where there is a single segment. jacobian: as in
-    `compute_standard_errors`."""
-    residuals, free = stack_fit_residuals(measure, fitted.residuals), _find_free_parameters(fitted)
+    """Compute the jackknife standard errors over segments, (t + parameters,); None for fewer than two segments with
+    samples to fit. jacobian, limit 1e-12: as in `compute_standard_errors`."""
+    residuals, is_free = stack_fit_residuals(measure, fitted.residuals), _find_free_parameters(fitted)
     products, scores = [], []
     for first, stop in _list_segment_ranges(measure):
-        segment_columns = jacobian.select_samples(first, stop) * free[:, None]
+        segment_columns = jacobian.select_samples(first, stop) * is_free[:, None]
         products.append(segment_columns @ segment_columns.T)
         scores.append(segment_columns @ residuals[first:stop])
     if len(products) < 2:
@@ -201,8 +205,8 @@ def compute_segment_errors(measure: ErrorMeasure, fitted: Fitted, jacobian: Sens
 
 
 def _list_segment_ranges(measure: ErrorMeasure) -> Iterator[tuple[int, int]]:
-    """Ranges (begin, end) of the residuals to fit: one per segment, up to the next, or one per recording without
-    segments."""
+    """List the ranges (start, exclusive stop) of the residuals to fit: one per segment, from its start (the first: of
+    the recording) to the next, or one per recording without segments; empty ranges are left out."""
     record_start = 0
     for record in measure.records:
         channel_count, fit_samples = record.measured.shape[1], np.flatnonzero(record.fit)
@@ -217,8 +221,8 @@ def _list_segment_ranges(measure: ErrorMeasure) -> Iterator[tuple[int, int]]:
 
 
 def _find_free_parameters(fitted: Fitted) -> Mask:
-    """(t + parameters,): whether a parameter is away from its bounds; always true for the model's parameters."""
-    point, bounds = fitted.hypothesis.point, [free.bounds for free in fitted.hypothesis.parameters]
+    """Determine whether each parameter, (t + parameters,), is away from its bounds; always true for the model's."""
+    point, bounds = fitted.hypothesis.point, [parameter.bounds for parameter in fitted.hypothesis.parameters]
     is_interior = [
         not np.isclose(coordinate, limits, rtol=0.0, atol=BOUND_TOLERANCE).any()
         for coordinate, limits in zip(point, bounds, strict=True)
@@ -227,7 +231,7 @@ def _find_free_parameters(fitted: Fitted) -> Mask:
 
 
 def _sum_scores(measure: ErrorMeasure, jacobian: Sensitivity, residuals: FloatArray, pool_periods: bool) -> FloatArray:
-    """(t + parameters, clusters): score of each parameter (column times residual), summed per cluster. pool_periods: as
+    """Sum the score of each parameter (column times residual) per cluster, (t + parameters, clusters). pool_periods: as
     in `_assign_clusters`."""
     sums: list[FloatArray] = []
     record_start = 0
@@ -247,8 +251,8 @@ def _sum_scores(measure: ErrorMeasure, jacobian: Sensitivity, residuals: FloatAr
 
 
 def _assign_clusters(record: Observed, pool_periods: bool) -> IndexArray:
-    """(n,): number of the cluster of each sample: stretches of `STRETCH_S`. pool_periods: the same stretch of all
-    periods of a segment is one cluster."""
+    """Assign each sample of a record the number of its cluster, (n,): a stretch of `STRETCH_S`. pool_periods: whether
+    the same stretch of all periods of a segment is one cluster."""
     stretch_samples = max(int(STRETCH_S * record.recording.sample_rate_hz), 1)
     sample_position = np.arange(len(record.fit))
     for periods in find_settled_periods(record.recording) if pool_periods else ():
