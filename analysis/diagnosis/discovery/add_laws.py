@@ -27,6 +27,7 @@ from analysis.diagnosis.search.identifiability import keep_identifiable
 from analysis.diagnosis.search.parsimony import has_far_smaller_error
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
 from analysis.diagnosis.search.starting_hypotheses import is_within_data
+from analysis.diagnosis.search.time_budget import limit_map
 from analysis.diagnosis.search.verdict import SearchResult, Unconfirmed, judge
 from analysis.diagnosis.settings import HELD_OUT_ALONE_ERROR, LAW_MOST_ROUNDS, NAMED_ERROR, NOISE_ALONE, PITCHES_SEEN
 from analysis.diagnosis.types import Progress, TimeBudget
@@ -105,7 +106,7 @@ def check_laws(result: SearchResult, discovery: Discovery, time_left: TimeBudget
     unconfirmed candidates; unchanged where the laws do not lower the held-out error."""
     context, catalogue_explanation = result.context, result.found
     if time_left():
-        discovery = choose_on_held_out(context, discovery)
+        discovery = choose_on_held_out(replace(context, map_=limit_map(context.map_, time_left)), discovery)
     if not _improves_held_out(discovery.explanation):
         return result
     identifiable = keep_identifiable(context, discovery.explanation, time_left)

@@ -11,6 +11,7 @@ from analysis.diagnosis.discovery.convert_sum import list_fitted_laws
 from analysis.diagnosis.errors.hypothesis import Claim, Hypothesis, combine_hypotheses, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import Fitted, evaluate_fit, fit
 from analysis.diagnosis.errors.standard_errors import compute_full_sensitivity, compute_standard_errors
+from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.search_context import FIRST_FIT_ROUNDS, SearchContext
 from analysis.diagnosis.settings import INTERVAL_FACTOR, LAW_SNAP
 from equalizer.effects.discovered_law import collect_channels, get_law_values, make_law_effect
@@ -24,6 +25,8 @@ _SOFT_LIMIT_PATTERN = re.compile(r"(\w+) \+ p0\*\((.+) - \1\)")
 def snap_exponents(context: SearchContext, fitted: Fitted) -> Fitted:
     """The fit repeated with exponents fixed at whole or half numbers and without short memories; unchanged where no law
     becomes simpler, or where the cost rises by a share of more than `LAW_SNAP`."""
+    if not any(law is not None and _can_simplify(law) for law in list_fitted_laws(fitted.hypothesis)):
+        return fitted
     tuned_count = len(fitted.deviations)
     sensitivity = compute_full_sensitivity(
         context.measure, context.tuning, fitted.deviations, fitted.hypothesis, context.map_
@@ -40,6 +43,22 @@ def snap_exponents(context: SearchContext, fitted: Fitted) -> Fitted:
     return refitted if refitted.cost <= fitted.cost * (1 + LAW_SNAP) else fitted
 
 
+def converge_and_snap(context: SearchContext, fitted: Fitted) -> Fitted:
+    """The fit continued until it converges, then `snap_exponents`."""
+    return snap_exponents(context, refine(context, fitted))
+
+
+def _can_simplify(law: Law) -> bool:
+    """Whether a law has an exponent, a short memory or a soft limit that might be simplified: only then are standard
+    errors needed, which take a simulation per parameter."""
+    has_exponent = "exponent" in find_parameter_roles(law.tree).values()
+    return (
+        has_exponent
+        or _LAGGED_CUBE_PATTERN.search(law.expression) is not None
+        or _SOFT_LIMIT_PATTERN.fullmatch(law.expression) is not None
+    )
+
+
 def _simplify_laws(context: SearchContext, hypothesis: Hypothesis, errors: np.ndarray) -> Hypothesis | None:
     """The hypothesis with simpler laws; None where none changes. errors: (parameters,), standard errors of
     coordinates."""
@@ -54,7 +73,7 @@ def _simplify_laws(context: SearchContext, hypothesis: Hypothesis, errors: np.nd
             continue
         simplified_law = _drop_short_memory(law, 1 / recording.sample_rate_hz)
         simplified_law = _simplify_exponents(law, claim_errors) if simplified_law is law else simplified_law
-        any_simplified |= simplified_law is not law
+        any_simplified |= simplified_law != law
         effect = make_law_effect(simplified_law, collect_channels(recording))
         claim_hypotheses.append(
             make_claim_hypothesis(Claim(effect, "one", claim.sites), [get_law_values(simplified_law)])

@@ -8,6 +8,7 @@ time-shuffled force finds nothing (negative control), and where no law of other 
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -16,11 +17,11 @@ from analysis.diagnosis.data.observed import Observed
 from analysis.diagnosis.discovery.antisymmetric_pairs import can_coupling_imitate
 from analysis.diagnosis.discovery.convert_sum import convert_sum_to_law, list_fitted_laws
 from analysis.diagnosis.discovery.discover import Discovery, Round
+from analysis.diagnosis.discovery.fit_laws import run_within_time
 from analysis.diagnosis.discovery.fit_sum import Sum
 from analysis.diagnosis.discovery.grammar import POWER_BOUNDS
-from analysis.diagnosis.discovery.snap_exponents import snap_exponents
+from analysis.diagnosis.discovery.snap_exponents import converge_and_snap
 from analysis.diagnosis.effect_words import get_noun
-from analysis.diagnosis.search.compare_candidates import refine
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.parsimony import are_inseparable
 from analysis.diagnosis.search.search_context import FittedCandidate, SearchContext
@@ -57,7 +58,8 @@ def find_failed_checks(
 def choose_on_held_out(context: SearchContext, discovery: Discovery) -> Discovery:
     """The discovery with its last law replaced by an inseparable law of the same round whose held-out error is
     significantly smaller, if there is one: formulas that agree on the fitted data may differ on stronger commands. The
-    alternatives are few and fixed beforehand, and the chosen law must still pass all other checks."""
+    alternatives are few and fixed beforehand, and the chosen law must still pass all other checks. Ends early with
+    the time of the context's map."""
     last_round, best_candidate, law_count = discovery.rounds[-1], discovery.explanation.after, 1
     chosen_sum = last_round.sums[0]
     for candidate, term_sum in zip(last_round.fitted_candidates[1:], last_round.sums[1:], strict=True):
@@ -65,7 +67,12 @@ def choose_on_held_out(context: SearchContext, discovery: Discovery) -> Discover
         if is_pair or not are_inseparable(last_round.fitted_candidates[0], candidate):
             continue
         law_count += 1
-        refined = snap_exponents(context, refine(context, candidate.fitted))
+        early_gain = estimate_held_out_gain(context.full_measure, best_candidate, context.with_test_score(candidate))
+        if early_gain is not None and early_gain.high < 0:
+            continue  # Significantly worse: converging to about the same fit would not make it better.
+        refined = run_within_time(partial(converge_and_snap, context, candidate.fitted), None)
+        if refined is None:
+            break
         alternative = context.with_test_score(context.score_fit(refined))
         gain = estimate_held_out_gain(context.full_measure, best_candidate, alternative)
         if gain is not None and gain.low > 0:

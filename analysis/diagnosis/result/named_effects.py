@@ -16,6 +16,7 @@ from analysis.diagnosis.search.parsimony import is_equal_rival, is_refined_candi
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.search.verdict import compute_step_shares
 from analysis.diagnosis.settings import (
+    CONVINCING_SHARE,
     EXPLAINED_BY_CHANCE,
     INTERVAL_SHARE,
     MOST_RIVALS,
@@ -111,7 +112,8 @@ def _list_rivals(explanation: Explanation, number: int, labels: Labels) -> tuple
         if explanation.statistic is None
         else explanation.after.score.worst_channel / EXPLAINED_BY_CHANCE
     )
-    candidate_probabilities = compute_probabilities(fitted_candidates, error_in_limits)
+    remaining_share = 1.0 if explanation.statistic is not None else _compute_remaining_share(explanation)
+    candidate_probabilities = compute_probabilities(fitted_candidates, error_in_limits, remaining_share)
     best, by_name = fitted_candidates[0], _sum_by_name(fitted_candidates, candidate_probabilities)
     rivals: dict[str, Rival] = {}
     unit = BY_NOISE if explanation.statistic is None else BY_CHANCE
@@ -240,10 +242,20 @@ def _list_group_values(hypothesis: Hypothesis, number: int, point: FloatArray) -
     ]
 
 
-def compute_probabilities(fitted_candidates: Sequence[FittedCandidate], error: float) -> tuple[float, ...]:
+def _compute_remaining_share(explanation: Explanation) -> float:
+    """Share of the re-tuned model's excess error over the noise that the effects leave, each in its worst channel."""
+    retuned_excess, remaining_excess = (
+        max(candidate.score.worst_channel - 1.0, 0.0) for candidate in (explanation.retuned, explanation.after)
+    )
+    return remaining_excess / retuned_excess if retuned_excess > 0 and np.isfinite(retuned_excess) else 1.0
+
+
+def compute_probabilities(
+    fitted_candidates: Sequence[FittedCandidate], error: float, remaining_share: float = 1.0
+) -> tuple[float, ...]:
     """Probability of each candidate of a round: proportional to exp(-excess / PROBABILITY_SCALE), the excess being its
     mean log error above that of the first, preferred candidate (at least 0); 0 for a refinement of the first. The sum
-    is 1 - `compute_none_probability(error)`."""
+    is 1 - `compute_none_probability(error, remaining_share)`."""
     if not fitted_candidates:
         return ()
     best = fitted_candidates[0]
@@ -254,11 +266,15 @@ def compute_probabilities(fitted_candidates: Sequence[FittedCandidate], error: f
         [candidate is not best and is_refined_candidate(candidate, best) for candidate in fitted_candidates]
     )
     weights = np.where(is_refinement, 0.0, np.exp(-excess / PROBABILITY_SCALE))
-    return tuple((1 - compute_none_probability(error)) * float(weight) for weight in weights / weights.sum())
+    some_is_right = 1 - compute_none_probability(error, remaining_share)
+    return tuple(some_is_right * float(weight) for weight in weights / weights.sum())
 
 
-def compute_none_probability(error: float) -> float:
-    """Probability that no candidate is right: a logistic function of ln(error - 1), from
-    NO_CANDIDATE_LEAST to NO_CANDIDATE_MOST. error: of the explanation in the worst channel, in units of the noise."""
-    odds = (max(error - 1.0, 0.0) / NO_CANDIDATE_HALFWAY) ** NO_CANDIDATE_STEEPNESS
+def compute_none_probability(error: float, remaining_share: float = 1.0) -> float:
+    """Probability that no candidate is right: a logistic function of ln(error - 1), or of the logarithm of the
+    remaining share if that gives less, from NO_CANDIDATE_LEAST to NO_CANDIDATE_MOST. A right law of a strong effect
+    leaves a small share, which may still be more than noise. error: of the explanation in the worst channel, in units
+    of the noise; remaining_share: share of the mismatch that the explanation leaves."""
+    excess = min(max(error - 1.0, 0.0) / NO_CANDIDATE_HALFWAY, remaining_share / (1 - CONVINCING_SHARE))
+    odds = excess**NO_CANDIDATE_STEEPNESS
     return float(NO_CANDIDATE_LEAST + (NO_CANDIDATE_MOST - NO_CANDIDATE_LEAST) * odds / (1 + odds))

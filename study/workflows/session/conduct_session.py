@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from protocols.definition.study_protocol import StudyProtocol
 from study.devices.clock import Clock
 from study.devices.device import Device, DeviceInfo, Fault
-from study.devices.opening import open_lab_onset_line, open_device
+from study.devices.opening import open_device, open_lab_onset_line
 from study.errors import DeviceError
 from study.session.state.state import SessionState
 from study.store.sessions.archive import SessionFolder

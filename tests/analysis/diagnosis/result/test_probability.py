@@ -48,3 +48,9 @@ def test_the_more_an_explanation_leaves_the_less_likely_is_what_it_names(make_ca
     assert chances == sorted(chances, reverse=True)
     assert chances[1] > 0.9 and chances[-1] < 0.25
     assert NO_CANDIDATE_LEAST == compute_none_probability(0.9) < compute_none_probability(1e6) <= NO_CANDIDATE_MOST
+
+
+def test_a_small_share_of_a_strong_mismatch_is_no_sign_of_another_effect():
+    assert compute_none_probability(2.0, 0.01) < 0.1 < 0.5 < compute_none_probability(2.0, 0.5)
+    assert compute_none_probability(2.0, 0.5) == compute_none_probability(2.0)
+    assert compute_none_probability(1.02, 0.9) == compute_none_probability(1.02)
