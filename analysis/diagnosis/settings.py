@@ -160,7 +160,7 @@ EXPLAINED_BY_CHANCE = 2.5
 CONFIRMED_SHARE = 0.3  # share of the mismatch, in logarithms, that must be removed on held-out samples,
 HELD_OUT_TOO_SMALL = 0.05  # unless the mismatch there is smaller than this
 # factor by which the held-out error must exceed the noise, and the error on the other samples, for a part of the
-# held-out samples to be used for fitting (`open_milder`). Pairs of seeds 101000 and 101200
+# held-out samples to be used for fitting (`open_quieter_segments`). Pairs of seeds 101000 and 101200
 HELD_OUT_ALONE_ERROR = 1.25
 LEAST_PART = 16  # samples: shortest part into which held-out stretches are cut
 LOUDER_RATIO = 1.05  # ratio to the largest command elsewhere, from which a stretch counts as louder

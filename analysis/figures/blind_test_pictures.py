@@ -1,4 +1,5 @@
-"""Figures of the blind test (`hapteq prove`): detection thresholds, detection by effect size, confusion, reliability.
+"""Draw figures of the blind test (`hapteq prove`): detection thresholds, detection by effect size, confusion matrix,
+reliability.
 
 The outcomes are those of a bank of simulated devices with concealed effects. Vertical bars in the figure of detection
 thresholds mark an ideal observer, which compares the device with and without the effect and has no model to re-tune.
@@ -29,8 +30,8 @@ NO_NAME_COLUMN = "no name"
 
 
 def make_blind_test_pictures(outcomes: Sequence[Outcome], calibration: Calibration) -> tuple[Picture, ...]:
-    """Make the pictures of detection thresholds, detection by effect size and confusion, where the bank has devices
-    with a single effect; and of reliability, where effects were named."""
+    """Make the pictures of detection thresholds, detection by effect size and confusion where the bank has devices with
+    a single effect; and of reliability where effects were named. () without either."""
     singles = [outcome for outcome in outcomes if outcome.kind == "single"]
     pictures = []
     if singles:
@@ -76,7 +77,9 @@ def _make_strips_picture(strips: Sequence[EffectDraws]) -> Picture:
         "effect, detects it: no re-tuning can hide the effect from it (line fit to the logarithms of the changes "
         "that the effects cause).",
         figure,
-        alternative=" ".join(f"{s.effect}: {', '.join(f'{x:.2f} {word}' for x, word in s.draws)}." for s in strips),
+        alternative=" ".join(
+            f"{drawn.effect}: {', '.join(f'{size:.2f} {result}' for size, result in drawn.draws)}." for drawn in strips
+        ),
     )  # fmt: skip
 
 
@@ -107,7 +110,10 @@ def _make_size_picture(singles: Sequence[Outcome]) -> Picture:
         "All effects together, in bins of equal count; bars are Wilson's 95 % intervals. The abscissa compares the "
         "same device with and without the effect, before a re-tuned model hides part of it.",
         figure,
-        alternative=" ".join(f"{b.median_change:.3g}: {100 * b.rate:.0f} % of {b.count}." for b in size_bins),
+        alternative=" ".join(
+            f"{described_bin.median_change:.3g}: {100 * described_bin.rate:.0f} % of {described_bin.count}."
+            for described_bin in size_bins
+        ),
     )  # fmt: skip
 
 
@@ -117,39 +123,45 @@ def _make_confusion_picture(singles: Sequence[Outcome]) -> Picture:
     detectable = [outcome for outcome in singles if outcome.detectable]
     answers = [outcome.named_effect_names[0] if outcome.named else NO_NAME_COLUMN for outcome in detectable]
     pairs = [(outcome.names[0], answer) for outcome, answer in zip(detectable, answers, strict=True)]
-    names = sorted({true for true, _ in pairs} | {answer for _, answer in pairs if answer != NO_NAME_COLUMN})
-    columns = [*names, NO_NAME_COLUMN]
-    counts = np.zeros((len(names), len(columns)))
-    for true, answer in pairs:
-        counts[names.index(true), columns.index(answer)] += 1
-    figure = create_figure(9.6, 2.2 + 0.23 * len(names))
+    effect_names = sorted(
+        {concealed for concealed, _ in pairs} | {answer for _, answer in pairs if answer != NO_NAME_COLUMN}
+    )
+    columns = [*effect_names, NO_NAME_COLUMN]
+    counts = np.zeros((len(effect_names), len(columns)))
+    for concealed, answer in pairs:
+        counts[effect_names.index(concealed), columns.index(answer)] += 1
+    figure = create_figure(9.6, 2.2 + 0.23 * len(effect_names))
     axes = figure.add_subplot()
     _draw_counts(axes, counts)
-    axes.set_yticks(range(len(names)), labels=[name.replace("_", " ") for name in names], fontsize=8)
+    axes.set_yticks(range(len(effect_names)), labels=[name.replace("_", " ") for name in effect_names], fontsize=8)
     axes.set_xticks(range(len(columns)), labels=[name.replace("_", " ") for name in columns], rotation=90, fontsize=8)
     axes.set_xlabel("named first")
     axes.set_ylabel("concealed")
     return Picture(
         "confusion", "Confusion matrix",
         "Devices with one concealed effect that shows; blue is right, red is not.", figure,
-        alternative=" ".join(f"{true} named {answer}." for true, answer in pairs),
+        alternative=" ".join(f"{concealed} named {answer}." for concealed, answer in pairs),
     )  # fmt: skip
 
 
 def _draw_counts(axes: Axes, counts: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> None:
-    """Draw the cells of the confusion matrix, shaded by their count; the diagonal in another colour. counts: (rows,
-    columns)."""
-    rows, columns = counts.shape
+    """Draw the cells of the confusion matrix, shaded by their count: blue on the diagonal, red elsewhere; empty cells
+    are not drawn. counts: (rows, columns)."""
+    row_count, column_count = counts.shape
     largest_count = max(counts.max(initial=1.0), 1.0)
-    for i in range(rows):
-        for j in range(columns):
-            if counts[i, j]:
-                colour = BLUE if i == j else VERMILLION
-                shade = 0.25 + 0.65 * counts[i, j] / largest_count
-                axes.fill_between([j - 0.5, j + 0.5], i - 0.5, i + 0.5, color=colour, alpha=shade, linewidth=0)
-                axes.text(j, i, f"{counts[i, j]:.0f}", ha="center", va="center", fontsize=7.5, color=BLACK)
-    axes.set_xlim(-0.5, columns - 0.5)
-    axes.set_ylim(rows - 0.5, -0.5)
+    for row in range(row_count):
+        for column in range(column_count):
+            if counts[row, column]:
+                colour = BLUE if row == column else VERMILLION
+                shade = 0.25 + 0.65 * counts[row, column] / largest_count
+                axes.fill_between(
+                    [column - 0.5, column + 0.5], row - 0.5, row + 0.5, color=colour, alpha=shade, linewidth=0
+                )
+                axes.text(
+                    column, row, f"{counts[row, column]:.0f}", ha="center", va="center", fontsize=7.5, color=BLACK
+                )
+    axes.set_xlim(-0.5, column_count - 0.5)
+    axes.set_ylim(row_count - 0.5, -0.5)
     axes.set_axisbelow(True)
     axes.grid(True, color="#EEEEEE", linewidth=0.5)
     for side in ("top", "right"):
@@ -173,5 +185,8 @@ def _make_reliability_picture(calibration: Calibration) -> Picture:
         "reliability", "Reliability of stated probabilities",
         "All named effects in bins of equal count, with Wilson's 95 % intervals. Dashed: perfect calibration.",
         figure,
-        alternative=" ".join(f"{p.stated:.2f} stated, {p.right:.2f} right, of {p.of}." for p in calibration.bins),
+        alternative=" ".join(
+            f"{described_bin.stated:.2f} stated, {described_bin.right:.2f} right, of {described_bin.of}."
+            for described_bin in calibration.bins
+        ),
     )  # fmt: skip

@@ -1,7 +1,8 @@
-"""Figure of acceleration ellipses by frequency, as in the published figure 3, by second moments and by phasors.
+"""Figure of acceleration ellipses by frequency, by second moments and by phasors.
 
+As figure 3 of Wilson, Chan, Salisbury and Niemeyer, Multi-DOF Equalization of Haptic Devices.
 `analysis.psychophysics.ellipsoid` defines both ellipses and the frame: the first axis is the test direction. Called by
-`study_pictures`.
+`study_pictures`. Sizes of the figure are chosen by eye.
 """
 
 from collections.abc import Sequence
@@ -19,38 +20,49 @@ from analysis.wording import format_number
 _MAX_COLUMNS = 6
 """Largest number of frequencies in a row of panels."""
 _COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE)
-_STYLES: tuple[LineStyleType, ...] = ("-", "--", "-.", ":", (0, (5, 1)))
+_LINE_STYLES: tuple[LineStyleType, ...] = ("-", "--", "-.", ":", (0, (5, 1)))
+"""Five colours and five dashes of the test directions, in order of appearance; a sixth direction has those of the
+first."""
 
 
 def draw_ellipsoids(results: Sequence[EllipsoidResult]) -> Figure:
-    """A column per frequency: above the ellipse by second moments, below by phasors, each scaled to its largest
-    semi-axis.
+    """Draw a column per frequency: above the ellipse by second moments, below by phasors, each scaled to its largest
+    semi-axis. After `_MAX_COLUMNS` frequencies a new pair of rows begins.
 
     The horizontal line is the test direction. Repeats are drawn over each other; test directions differ by colour and
     dash. A note is drawn where there are no results.
     """
     if not results:
         return draw_no_data_note(create_figure(8.6, 2.0), "There is no ellipsoid to draw.")
-    frequencies = sorted({result.frequency_hz for result in results})
+    frequencies_hz = sorted({result.frequency_hz for result in results})
     directions = list(dict.fromkeys(result.along for result in results))
+    # In units of the largest semi-axis: a margin of 10 %, and at least 0.44 for narrow ellipses.
     half_height = 1.1 * max(0.4, *(_compute_half_height(result) for result in results))
-    columns = min(_MAX_COLUMNS, len(frequencies))
-    block_count = -(-len(frequencies) // columns)
-    figure = create_figure(8.6, (1.6 + 2 * min(2.0, 8.0 / columns) * half_height / 1.15) * block_count + 0.4)
-    grid = figure.subplots(2 * block_count, columns, squeeze=False, sharex=True, sharey=True)
+    column_count = min(_MAX_COLUMNS, len(frequencies_hz))
+    block_count = -(-len(frequencies_hz) // column_count)
+    figure = create_figure(8.6, (1.6 + 2 * min(2.0, 8.0 / column_count) * half_height / 1.15) * block_count + 0.4)
+    grid = figure.subplots(2 * block_count, column_count, squeeze=False, sharex=True, sharey=True)
     for grid_row in grid:
         for axes in grid_row:
             axes.axis("off")
-    for index, frequency in enumerate(frequencies):
-        block, column = divmod(index, columns)
-        frequency_results = [result for result in results if result.frequency_hz == frequency]
+    for index, frequency_hz in enumerate(frequencies_hz):
+        block, column = divmod(index, column_count)
+        frequency_results = [result for result in results if result.frequency_hz == frequency_hz]
         _draw_panels(grid[2 * block][column], grid[2 * block + 1][column], frequency_results, directions, half_height)
-    handles = [
-        Line2D([], [], color=_COLOURS[i % 5], linestyle=_STYLES[i % 5], label=direction.replace("_", " "))
-        for i, direction in enumerate(directions)
+    legend_handles = [
+        Line2D(
+            [],
+            [],
+            color=_COLOURS[direction_index % 5],
+            linestyle=_LINE_STYLES[direction_index % 5],
+            label=direction.replace("_", " "),
+        )
+        for direction_index, direction in enumerate(directions)
     ]
-    handles.append(Line2D([], [], color=GREY, linewidth=0.9, label="test direction"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9, frameon=False)
+    legend_handles.append(Line2D([], [], color=GREY, linewidth=0.9, label="test direction"))
+    figure.legend(
+        handles=legend_handles, loc="outside lower center", ncols=len(legend_handles), fontsize=9, frameon=False
+    )
     return figure
 
 
@@ -85,8 +97,8 @@ def _draw_panels(
         fontsize=9,
     )
     for result in frequency_results:
-        index = directions.index(result.along)
-        colour, style = _COLOURS[index % 5], _STYLES[index % 5]
+        direction_index = directions.index(result.along)
+        colour, style = _COLOURS[direction_index % 5], _LINE_STYLES[direction_index % 5]
         _draw_ellipse(moment_axes, result.moments.normalised_axes[1], result.moments.turn_deg, colour, style)
         _draw_ellipse(phasor_axes, result.phasor.ellipticity, result.phasor.turn_deg, colour, style)
 
@@ -97,8 +109,8 @@ def _format_ellipse_label(ratio: float, tilt_deg: float) -> str:
 
 
 def _compute_half_height(result: EllipsoidResult) -> float:
-    """Extent of the taller of both ellipses perpendicular to the test direction, largest semi-axis = 1:
-    hypot(sin(turn), ratio cos(turn))."""
+    """Compute the half extent, perpendicular to the test direction, of that of both ellipses which extends further, in
+    units of its largest semi-axis: hypot(sin(turn), ratio cos(turn))."""
     shapes = (
         (result.moments.normalised_axes[1], result.moments.turn_deg),
         (result.phasor.ellipticity, result.phasor.turn_deg),
@@ -110,7 +122,7 @@ def _compute_half_height(result: EllipsoidResult) -> float:
 
 
 def _draw_ellipse(axes: Axes, ratio: float, turn_deg: float, colour: str, style: LineStyleType) -> None:
-    """Draw an ellipse with semi-axes 1 and `ratio`, turned by turn_deg counter-clockwise."""
+    """Draw an ellipse with semi-axes 1 and `ratio`, turned by turn_deg (degrees) counter-clockwise."""
     angle, turn_rad = np.linspace(0, 2 * np.pi, 181), np.radians(turn_deg)
     x, y = np.cos(angle), ratio * np.sin(angle)
     axes.plot(

@@ -1,8 +1,9 @@
-"""Figure of the primary analysis of a study: median thresholds by frequency with intervals, the participants'
+"""Draw the figure of the primary analysis of a study: median thresholds by frequency with intervals, the participants'
 estimates, and the limit of direction perception.
 
 The values come from a hierarchical psychometric model (`analysis.psychophysics.hierarchy`). Thresholds are force
-amplitudes in N. Above the cap, the largest force that was played, only a lower bound is known.
+amplitudes in N. Above the cap, the largest force that was played, only a lower bound is known. Called by
+`study_pictures` for the report of a study. The constants below set the layout; chosen by eye.
 """
 
 import numpy as np
@@ -26,18 +27,18 @@ from analysis.figures.thresholds import draw_threshold
 from analysis.psychophysics.hierarchy.inference import DirectionLimit, MedianThreshold
 from analysis.psychophysics.hierarchy.primary import PersonEstimate, PrimaryAnalysis
 
-_SPREAD = 0.5
+_PARTICIPANT_SPREAD = 0.5
 """Width over which the participants are spread at one frequency, as a share of the step between frequencies."""
 _ABOVE_CAP_RATIO, _SMALLEST_TOP_RATIO = 1.12, 1.45
 """Ordinate at which thresholds above the cap are drawn, and smallest upper end of the axis, relative to the cap."""
 _LARGEST_TOP_RATIO, _LEAST_ARROW_RATIO = 8.0, 1.25
 """Largest upper end of the axis, relative to the cap; and smallest ratio of an arrow's upper to its lower end."""
-_LEGEND_LIMIT = 24
+_MAX_LEGEND_PARTICIPANTS = 24
 """Largest number of participants that the legend lists."""
 
 
 def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
-    """Draw thresholds in N on a logarithmic axis, by frequency; called by `study_pictures` for the report of a study.
+    """Draw thresholds in N on a logarithmic axis, by frequency.
 
     A threshold above the cap has no known size: participants are drawn on a common line with an arrow, and a median as
     an arrow that begins at its one-sided lower bound. cap_n: largest force that was played, N."""
@@ -49,7 +50,7 @@ def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
     axes.set_ylim(bottom_n, top_n)
     set_ratio_ticks(axes.yaxis, bottom_n, cap_n)
     axes.axhline(cap_n, color=GREY, linestyle="--", linewidth=1.2)
-    shifts = np.linspace(-_SPREAD / 2, _SPREAD / 2, len(primary.persons))
+    shifts = np.linspace(-_PARTICIPANT_SPREAD / 2, _PARTICIPANT_SPREAD / 2, len(primary.persons))
     answered = {(run.subject, run.frequency_hz) for run in primary.runs}
     for participant, person in enumerate(primary.persons):
         has_answers = np.array([(person.subject, frequency_hz) in answered for frequency_hz in primary.frequencies_hz])
@@ -57,7 +58,7 @@ def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
     for index, median in enumerate(primary.medians):
         _draw_median(axes, index, median, (bottom_n, top_n))
     _draw_direction_limit(axes, primary.limit, primary.frequencies_hz, cap_n)
-    axes.set_xticks(range(len(primary.frequencies_hz)), [f"{f:g}" for f in primary.frequencies_hz])
+    axes.set_xticks(range(len(primary.frequencies_hz)), [f"{tick_hz:g}" for tick_hz in primary.frequencies_hz])
     axes.set_xlim(-0.6, len(primary.frequencies_hz) - 0.4)
     axes.set_xlabel("Frequency (Hz)")
     axes.set_ylabel("Threshold (N)")
@@ -66,8 +67,8 @@ def draw_medians(primary: PrimaryAnalysis, cap_n: float) -> Figure:
 
 
 def _compute_upper_limit_n(primary: PrimaryAnalysis, cap_n: float) -> float:
-    """Upper end of the axis in N: above all intervals and arrows, but at most `_LARGEST_TOP_RATIO` times the cap, so
-    that the rest stays readable."""
+    """Compute the upper end of the axis in N: above all intervals and arrows, but at most `_LARGEST_TOP_RATIO` times
+    the cap, so that the rest stays readable."""
     upper_ends_n = [median.upper_n or _LEAST_ARROW_RATIO * (median.lower_n or 0.0) for median in primary.medians]
     return min(
         max(_SMALLEST_TOP_RATIO * cap_n, *(1.1 * upper_end_n for upper_end_n in upper_ends_n)),
@@ -76,7 +77,7 @@ def _compute_upper_limit_n(primary: PrimaryAnalysis, cap_n: float) -> float:
 
 
 def _compute_lower_limit_n(primary: PrimaryAnalysis) -> float:
-    """Lower end of the axis in N, below all thresholds and bounds."""
+    """Compute the lower end of the axis in N: 15 % below all thresholds and lower bounds."""
     thresholds_n = [threshold_n for person in primary.persons for threshold_n in person.thresholds_n]
     return 0.85 * min(*thresholds_n, *(median.lower_n or median.newton for median in primary.medians))
 
@@ -96,8 +97,8 @@ def _draw_person(
     ordinates_n = np.where(above_cap, _ABOVE_CAP_RATIO * cap_n, person.thresholds_n)[has_answers]
     abscissae = (np.arange(len(has_answers)) + shift)[has_answers]
     axes.plot(abscissae, ordinates_n, "-", color=choose_colour(participant), linewidth=0.7, alpha=0.45, zorder=1)
-    for x, ordinate_n, is_above in zip(abscissae, ordinates_n, above_cap[has_answers], strict=True):
-        draw_threshold(axes, float(x), float(ordinate_n), participant, bool(is_above))
+    for abscissa, ordinate_n, is_above in zip(abscissae, ordinates_n, above_cap[has_answers], strict=True):
+        draw_threshold(axes, float(abscissa), float(ordinate_n), participant, bool(is_above))
 
 
 def _draw_median(axes: Axes, index: int, median: MedianThreshold, axis_ends_n: tuple[float, float]) -> None:
@@ -137,7 +138,8 @@ def _draw_direction_limit(axes: Axes, limit: DirectionLimit, frequencies_hz: tup
 
 
 def _make_legend_handles(primary: PrimaryAnalysis, cap_n: float) -> list[Line2D]:
-    """Legend entries of the marks that the figure contains."""
+    """Make the legend entries of the marks that the figure contains, and of the participants if they are not too
+    many."""
     confidence_text = f"{100 * primary.confidence:g} %"
     handles = [
         Line2D([], [], color=BLACK, marker="_", markersize=12, markeredgewidth=2.4, linewidth=0,
@@ -150,7 +152,7 @@ def _make_legend_handles(primary: PrimaryAnalysis, cap_n: float) -> list[Line2D]
         handles.append(Line2D([], [], color=BLACK, marker="D", markerfacecolor="white", markersize=7, linewidth=3.2,
                               label=f"direction limit,\n{confidence_text} interval"))  # fmt: skip
     handles.append(Line2D([], [], color=GREY, linestyle="--", linewidth=1.2, label=f"cap {cap_n:g} N"))
-    if len(primary.persons) <= _LEGEND_LIMIT:
+    if len(primary.persons) <= _MAX_LEGEND_PARTICIPANTS:
         handles += [
             Line2D(
                 [],

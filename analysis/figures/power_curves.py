@@ -18,12 +18,14 @@ from analysis.psychophysics.power.power_curve import CONFIDENCE, PowerPoint, Sha
 from analysis.threshold_words import REVERSAL_WORDS
 from equalizer.signals.signal import FloatArray
 
-_DESIRED_POWER = 80.0
-"""Conventional power, percent (J. Cohen, Statistical Power Analysis for the Behavioral Sciences, 1988)."""
-_MARKER_STEP = 0.12
-"""Horizontal offset between the curves, in participants, so that their error bars do not hide each other."""
+_TARGET_POWER_PERCENT = 80.0
+"""Conventional target of the power, percent (J. Cohen, Statistical Power Analysis for the Behavioral Sciences,
+1988)."""
+_MARKER_OFFSET_PEOPLE = 0.12
+"""Horizontal offset between the curves, in participants, so that their error bars do not hide each other. Chosen by
+eye."""
 _MARGIN_PEOPLE = 1.5
-"""Margin at either end of the horizontal axis, in participants."""
+"""Margin at either end of the horizontal axis, in participants. Chosen by eye."""
 
 
 def make_power_picture(
@@ -55,11 +57,12 @@ def make_power_picture(
 
 def _choose_reference_percent(effect_db: float) -> float:
     """Choose the reference line, percent: the conventional power, or without an effect the level of the test."""
-    return _DESIRED_POWER if effect_db else 100 * (1 - CONFIDENCE)
+    return _TARGET_POWER_PERCENT if effect_db else 100 * (1 - CONFIDENCE)
 
 
 def _draw_power(points: Sequence[PowerPoint], effect_db: float, threshold_noun: str) -> Figure:
-    """Two panels: power (above) and coverage (below) over the number of participants."""
+    """Draw two panels: power (above) and coverage (below) over the number of participants. Sizes: in inches, font sizes
+    in points."""
     figure = create_figure(PAGE_WIDTH_IN, 5.6)
     power_axes, coverage_axes = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     curves = (
@@ -68,8 +71,10 @@ def _draw_power(points: Sequence[PowerPoint], effect_db: float, threshold_noun: 
         ("as published (Tukey)", VERMILLION, "D:", [point.published for point in points]),
     )
     people = np.array([point.people for point in points], dtype=float)
-    for index, (label, colour, style, shares) in enumerate(curves):
-        error_bars = _draw_shares(power_axes, people + _MARKER_STEP * (index - 1), shares, colour, style)
+    for index, (label, colour, format_string, shares) in enumerate(curves):
+        error_bars = _draw_shares(
+            power_axes, people + _MARKER_OFFSET_PEOPLE * (index - 1), shares, colour, format_string
+        )
         error_bars.set_label(label)
     _draw_shares(coverage_axes, people, [point.coverage for point in points], BLUE, "o-")
     power_axes.axhline(_choose_reference_percent(effect_db), color=GREY, linewidth=0.9)
@@ -89,16 +94,18 @@ def _draw_power(points: Sequence[PowerPoint], effect_db: float, threshold_noun: 
     return figure
 
 
-def _draw_shares(axes: Axes, people: FloatArray, shares: Sequence[Share], colour: str, style: str) -> ErrorbarContainer:
+def _draw_shares(
+    axes: Axes, people: FloatArray, shares: Sequence[Share], colour: str, format_string: str
+) -> ErrorbarContainer:
     """Draw shares, 0 to 1, in percent, with their intervals as error bars. people: (points,), number of participants.
-    style: marker and line in matplotlib's notation."""
-    percent = 100 * np.array([(share.value, share.lower, share.upper) for share in shares])
-    bar_lengths = np.abs(percent[:, 1:] - percent[:, :1]).T
+    format_string: marker and line in matplotlib's notation."""
+    percentages = 100 * np.array([(share.value, share.lower, share.upper) for share in shares])
+    bar_lengths = np.abs(percentages[:, 1:] - percentages[:, :1]).T
     return axes.errorbar(
         people,
-        percent[:, 0],
+        percentages[:, 0],
         bar_lengths,
-        fmt=style,
+        fmt=format_string,
         color=colour,
         markersize=5,
         linewidth=1.4,

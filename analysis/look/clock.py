@@ -1,8 +1,9 @@
-"""Checks of the time stamps of a recording against its stated sample rate: gaps, jitter and drift.
+"""Check the time stamps of a recording against its stated sample rate: gaps, jitter and drift.
 
 A straight line is fitted by least squares to the stamps over the sample numbers (gaps counted as lost samples). Its
 slope gives the true period, hence the drift in ppm; the deviations from it are the jitter. Without stamps only the
-plausibility of the rate, and the notes of a resampling at import, can be checked. Called by `analysis.look.overview`.
+plausibility of the rate, and the notes of a resampling at import, can be checked. Called by `analysis.look.overview`,
+and by `build_recording` for the plausibility of the rate. Limits without a source were chosen by hand.
 """
 
 from collections.abc import Sequence
@@ -57,9 +58,13 @@ def describe_implausible_rate(rate_hz: float) -> str:
 
 
 def _check_rate(rate_hz: float) -> tuple[Check, ...]:
-    """A notice where the rate is implausible; else empty."""
-    doubt = describe_implausible_rate(rate_hz)
-    return (Check(CLOCK, "notice", doubt, "Check the unit of the time, and import again."),) if doubt else ()
+    """Check the plausibility of the stated rate: a notice where it is implausible, else empty."""
+    implausibility = describe_implausible_rate(rate_hz)
+    return (
+        (Check(CLOCK, "notice", implausibility, "Check the unit of the time, and import again."),)
+        if implausibility
+        else ()
+    )
 
 
 def _describe_rate_source(recording: Recording) -> str:
@@ -70,7 +75,7 @@ def _describe_rate_source(recording: Recording) -> str:
 
 
 def _check_resampling(recording: Recording) -> tuple[Check, ...]:
-    """Notices from the notes of an import that resampled uneven stamps; empty without such notes."""
+    """Make notices from the notes of an import that resampled uneven stamps; empty without such notes."""
     import_metadata = recording.meta.get("import")
     notes = import_metadata.get("notes", ()) if isinstance(import_metadata, dict) else ()
     resampling_notes = [str(note) for note in notes if "uneven stamps" in str(note)] if isinstance(notes, list) else []
@@ -83,7 +88,8 @@ def _check_resampling(recording: Recording) -> tuple[Check, ...]:
 
 
 def _check_stamps(recording: Recording, start: int, stop: int) -> tuple[Check, ...]:
-    """Check one stretch, samples start to stop, for gaps, jitter and drift; empty for fewer than three stamps."""
+    """Check one stretch, samples start to stop - 1, for gaps, jitter and drift; empty for fewer than three stamps,
+    which a straight line fits exactly."""
     assert recording.time_s is not None
     stamps_s, rate_hz = recording.time_s[start:stop], recording.sample_rate_hz
     if len(stamps_s) < 3:
@@ -91,8 +97,8 @@ def _check_stamps(recording: Recording, start: int, stop: int) -> tuple[Check, .
     intervals_periods = np.diff(stamps_s) * rate_hz
     is_gap = intervals_periods > GAP_PERIODS
     sample_numbers = np.concatenate([[0.0], np.cumsum(np.where(is_gap, np.round(intervals_periods), 1.0))])
-    period_s, offset_s = np.polyfit(sample_numbers, stamps_s - stamps_s[0], 1)
-    deviations_periods = (stamps_s - stamps_s[0] - offset_s - period_s * sample_numbers) / period_s
+    period_s, start_s = np.polyfit(sample_numbers, stamps_s - stamps_s[0], 1)
+    deviations_periods = (stamps_s - stamps_s[0] - start_s - period_s * sample_numbers) / period_s
     jitter_periods, drift_ppm = float(np.std(deviations_periods)), (period_s * rate_hz - 1) * 1e6
     return tuple(
         check
@@ -108,8 +114,8 @@ def _check_stamps(recording: Recording, start: int, stop: int) -> tuple[Check, .
 def _check_gaps(
     intervals_periods: np.ndarray, is_gap: np.ndarray, stamps_s: np.ndarray, rate_hz: float
 ) -> Check | None:
-    """steps: (n - 1,), differences of successive stamps in sample periods; gaps: (n - 1,), those above
-    `GAP_PERIODS`."""
+    """Check for gaps between stamps; None without gaps. intervals_periods: (n - 1,), differences of successive stamps
+    in sample periods; is_gap: (n - 1,), whether above `GAP_PERIODS`; stamps_s: (n,), s; rate_hz: stated sample rate."""
     if not is_gap.any():
         return None
     first_gap, longest_periods = int(np.argmax(is_gap)), float(intervals_periods.max())
@@ -122,12 +128,13 @@ def _check_gaps(
     )
 
 
-def _check_jitter(jitter_periods: float, largest_periods: float, period_s: float) -> Check | None:
-    """jitter, largest: rms and largest deviation, in sample periods of step_s seconds."""
+def _check_jitter(jitter_periods: float, largest_deviation_periods: float, period_s: float) -> Check | None:
+    """Check the deviations of the stamps from even spacing. jitter_periods, largest_deviation_periods: their rms and
+    largest magnitude, in sample periods; period_s: fitted sample period (s)."""
     text = (
         f"Time stamps deviate by {jitter_periods * period_s * 1e6:.3g} us rms from even spacing "
         f"({jitter_periods:.1%} of a step), "
-        f"{largest_periods * period_s * 1e6:.3g} us at most."
+        f"{largest_deviation_periods * period_s * 1e6:.3g} us at most."
     )
     if jitter_periods > WRONG_JITTER_PERIODS:
         return Check(CLOCK, "wrong", text, "Import with the stamps as the clock, and resample.")
@@ -137,7 +144,7 @@ def _check_jitter(jitter_periods: float, largest_periods: float, period_s: float
 
 
 def _check_drift(drift_ppm: float, rate_hz: float) -> Check | None:
-    """Compare the measured with the stated sample period. drift_ppm: relative excess of the measured over the stated
+    """Check the fitted against the stated sample period. drift_ppm: relative excess of the fitted over the stated
     sample period, in ppm."""
     direction = "slower" if drift_ppm > 0 else "faster"
     text = f"By its stamps the clock is {abs(drift_ppm):.4g} ppm {direction} than {rate_hz:g} Hz."

@@ -2,8 +2,7 @@
 
 The checks find missing samples, constant or copied channels, clock errors, wrong units, inconsistent kinematics,
 clipping, coarse quantization, offsets, axes without excitation, low coherence and poor repeatability; each gives a
-sentence, and what to do. `study.workflows.recording.look_at_recordings` calls it; `analysis.reports.look_report` shows
-it.
+sentence and advice. Called by `study.workflows.recording.look_at_recordings`; `analysis.reports.look_report` shows it.
 """
 
 from collections.abc import Sequence
@@ -38,23 +37,24 @@ from equalizer.signals.summary import Summary, SummaryDisplay
 RESOLUTION = "resolution"
 """Name of the check of quantization."""
 HIDDEN_STEPS, ROUGH_STEPS, FINE_STEPS = 3.0, 30.0, 1000.0
-"""Limits of a channel's rms over its quantization step. Below the first, the check is "wrong", because quantization
-hides the motion; below the second, it is a notice; from the last on, nothing is reported."""
+"""Limits of a channel's rms over its quantization step. Below the first, the check is "wrong"; below the second, it is
+a notice; from the last on, nothing is reported. Chosen: the quantization noise of a step q has the rms q / sqrt(12),
+that is 10 %, 1 % and 0.03 % of the signal's rms at these limits."""
 _SENSOR_ROLES = ("response", "position")
 """Roles of channels that are measured."""
 
 
 def check_resolution(channels: Sequence[Channel]) -> tuple[Check, ...]:
-    """Check the quantization of sensor channels, one check per channel with a step that matters, else a single one.
-    Commands are left out: they may have few values by design."""
+    """Check the quantization of sensor channels: one check per channel whose rms is below `FINE_STEPS` steps, or a
+    single one if there is none. Commands are left out: they may have few values by design."""
     candidates = [_check_channel_resolution(channel) for channel in channels if channel.role in _SENSOR_ROLES]
     checks = tuple(check for check in candidates if check is not None)
     return checks or (Check(RESOLUTION, "fine", "No sensor is limited by the resolution of its converter."),)
 
 
 def _check_channel_resolution(channel: Channel) -> Check | None:
-    """Check the quantization of one channel; None where it has no quantization step, or one below a thousandth of its
-    rms."""
+    """Check the quantization of one channel; None where no quantization step is found, or its rms is at least
+    `FINE_STEPS` steps."""
     quantization_step = find_rounding_step(channel.samples)
     rms_in_steps = compute_rms(channel.finite_samples) / quantization_step if quantization_step else FINE_STEPS
     if rms_in_steps >= FINE_STEPS:
@@ -77,7 +77,7 @@ def _check_channel_resolution(channel: Channel) -> Check | None:
 
 @dataclass(frozen=True, slots=True)
 class ChannelSummary:
-    """Range, mean, rms and number of missing samples of a channel, in its unit."""
+    """Range, mean, rms and number of missing samples of a channel, in its unit; NaN without finite samples."""
 
     role: str
     name: str
@@ -89,17 +89,18 @@ class ChannelSummary:
     rms: float
     """Rms about the mean."""
     missing: int
-    """Number of samples without a value."""
+    """Number of samples that are not finite."""
 
 
 @dataclass(frozen=True, repr=False, slots=True, eq=False)
 class Overview(SummaryDisplay):
-    """Results of a recording that need no model: spectra, levels, repeats, consistency and checks."""
+    """Properties of a recording that need no model: spectra, levels, repeats, consistency and checks."""
 
     name: str
     recording: Recording
     channels: tuple[Channel, ...]
     stretches: tuple[Stretch, ...]
+    """Parts of the recording that are analysed separately (`find_parts`)."""
     summaries: tuple[ChannelSummary, ...]
     levels: tuple[SegmentLevel, ...]
     """Rms of each channel in each segment."""
@@ -116,7 +117,7 @@ class Overview(SummaryDisplay):
     """All checks, sorted by level: "wrong", then "notice", then "fine"."""
 
     def summary(self) -> Summary:
-        """Range and rms of each channel, and all checks that are not fine."""
+        """Summarise range and rms of each channel, and list all checks that are not fine."""
         notable_checks = [check for check in self.checks if check.level != "fine"]
         return Summary(
             f"{self.name}: {len(self.channels)} channels",

@@ -1,8 +1,8 @@
-"""The declared result: the contrast, sample and exclusions that the protocol fixed before the data were collected.
+"""The declared (preregistered) result: contrast, sample and exclusions that the protocol fixed before data collection.
 
 The contrast is the threshold at one frequency minus that at another, by two analyses: the hierarchical model of all
-answers (dB, t interval over people) and the published one-way analysis (N, Tukey's interval). The protocol says which
-is primary; both are reported. Called by `analysis.psychophysics.study_analysis`.
+answers (dB, t interval over participants) and the published one-way analysis (N, Tukey's interval). The protocol states
+which is primary; both are reported. Called by `analysis.psychophysics.study_analysis`.
 """
 
 from collections.abc import Sequence
@@ -37,11 +37,12 @@ class ContrastResult:
     participants: tuple[int, int]
     """Number of participants at the first and at the second frequency."""
     difference: float | None
-    """In `unit`, as the interval. Difference, interval and p are None where the data do not determine them; `notes` say
-    why."""
+    """In `unit`, as the interval. Difference, interval and p are None where the data do not determine them; `notes`
+    state the reason."""
     lower: float | None
     upper: float | None
     p: float | None
+    """Two-sided; with Tukey's interval adjusted for all pairs."""
     notes: tuple[str, ...]
 
 
@@ -53,6 +54,7 @@ class DeclaredResult:
     contrast_hz: tuple[float, ...]
     """The two frequencies of the contrast; empty where none is declared."""
     confidence: float
+    """Confidence level of the intervals, 0 to 1."""
     results: tuple[ContrastResult, ...]
     """The declared analysis first, then the other; none without a declared contrast."""
     participants_declared: int
@@ -62,7 +64,7 @@ class DeclaredResult:
     exclusions: tuple[str, ...]
     """Declared rules of exclusion, in sentences."""
     left_out: tuple[str, ...]
-    """Data that were left out, and why, in sentences."""
+    """Data that were excluded, with the reason, in sentences."""
     interval: Literal["undeclared", "paired_t", "tukey"] = "undeclared"
     """Declared method of the interval; undeclared: the method that belongs to `primary`."""
 
@@ -76,8 +78,8 @@ def compute_declared_result(
     rule: StaircaseRule,
 ) -> DeclaredResult:
     """Compute the declared contrast by both analyses, the declared one first. primary: with the contrast of `declared`;
-    None without a fit. table: thresholds in newtons, from which `comparisons` come. rule: staircase rule of the
-    runs."""
+    None without a fit. table: thresholds in newtons, from which `comparisons` come. left_out: excluded data, in
+    sentences. rule: staircase rule of the runs."""
     results = []
     if declared.contrast_hz:
         pair_hz = (declared.contrast_hz[0], declared.contrast_hz[1])
@@ -108,7 +110,8 @@ def compute_declared_result(
 def _make_model_contrast(
     pair_hz: tuple[float, float], primary: PrimaryAnalysis | None, is_declared: bool
 ) -> ContrastResult:
-    """Make the contrast by the hierarchical model, in dB; without values, and with the reason, where there is none."""
+    """Make the contrast by the hierarchical model, in dB; without values, but with the reason, where the model does not
+    give it."""
     contrast = primary.declared_contrast if primary is not None else None
     if primary is None or contrast is None:
         participant_count, reason = (
@@ -159,8 +162,8 @@ def _describe_cap_effects(pair_hz: tuple[float, float], primary: PrimaryAnalysis
 def _make_published_contrast(
     pair_hz: tuple[float, float], comparisons: Comparisons, table: ThresholdTable, is_declared: bool, method_note: str
 ) -> ContrastResult:
-    """Make the contrast by the one-way analysis, in newtons, with Tukey's interval. method_note: note on the method,
-    which comes first. A note alone where the contrast is not determined."""
+    """Make the contrast by the one-way analysis, in newtons, with Tukey's interval. method_note: the first of its
+    notes. Without values, and with the reason as the only note, where the comparisons lack this pair."""
     first_name, second_name = (format_frequency(frequency_hz) for frequency_hz in pair_hz)
     groups = table.group_by_frequency()
     participant_counts = [

@@ -1,14 +1,15 @@
 """Repeated-measures analysis of variance with the corrections of Greenhouse and Geisser and of Huynh and Feldt, and
 Friedman's rank test.
 
-Every participant takes every frequency (condition), so that differences between participants are removed from the error
-term: F = (SS_conditions / (k - 1)) / (SS_error / ((n - 1) (k - 1))) for n participants and k conditions. Participants
-with a missing value are left out. Called by `study_analysis` and by the primary analysis (`hierarchy.primary`).
+Every participant is tested at every frequency (condition), so that differences between participants are removed from
+the error term: F = (SS_conditions / (k - 1)) / (SS_error / ((n - 1) (k - 1))) for n participants and k conditions.
+Participants with a missing value are left out. Called by `study_analysis` and by the primary analysis
+(`hierarchy.primary`).
 
-Source: S. W. Greenhouse, S. Geisser, Psychometrika 24 (1959), 95-112; effect size: S. Olejnik, J. Algina,
+Sources: S. W. Greenhouse, S. Geisser, Psychometrika 24 (1959), 95-112; effect size: S. Olejnik, J. Algina,
 Psychol. Methods 8 (2003), 434-447 (generalized eta squared); H. Huynh, L. S. Feldt, J. Educ. Stat. 1 (1976), 69-82;
 J. W. Mauchly, Ann. Math. Stat. 11 (1940), 204-209, with the second-order term of T. W. Anderson, An Introduction to
-Multivariate Statistical Analysis (2003), section 10.7.
+Multivariate Statistical Analysis (2003), section 10.7; M. Friedman, J. Am. Stat. Assoc. 32 (1937), 675-701.
 """
 
 import math
@@ -26,13 +27,14 @@ from equalizer.signals.signal import FloatArray
 @dataclass(frozen=True, slots=True)
 class FriedmanTest:
     """Result of Friedman's test, which uses only the ranks within each participant and therefore does not depend on the
-    scale of the values. Results are None where the test is impossible; `notes` say why."""
+    scale of the values. Results are None where the test is impossible; `notes` state the reason."""
 
     participants: int
     """Number of participants without a missing value."""
     chi_squared: float | None
     """Friedman's statistic, corrected for ties."""
     df: int | None
+    """Conditions less 1."""
     p: float | None
     """p-value by the chi-squared approximation with `df` degrees of freedom."""
     kendall_w: float | None
@@ -41,7 +43,8 @@ class FriedmanTest:
 
 
 def compute_friedman_test(values: Sequence[Sequence[float | None]]) -> FriedmanTest:
-    """Friedman's test of values[subject][condition]; rows with None, NaN or infinity are left out."""
+    """Compute Friedman's test of values[subject][condition], rows of equal length; rows with None, NaN or infinity are
+    left out. Impossible with fewer than 3 conditions or 2 complete rows, or if each row has equal values."""
     rows = np.array(
         [row for row in values if all(value is not None and math.isfinite(value) for value in row)], dtype=np.float64
     )
@@ -63,7 +66,8 @@ def compute_friedman_test(values: Sequence[Sequence[float | None]]) -> FriedmanT
 
 @dataclass(frozen=True, slots=True)
 class RepeatedMeasures:
-    """Result of the analysis of variance. Numbers that the data do not determine are None; `notes` say why."""
+    """Result of the analysis of variance. Numbers that the data do not determine are None; `notes` state the
+    reasons. Sums of squares (`ss_`) are in the squared unit of the values."""
 
     participants: int
     """Number of participants without a missing value."""
@@ -95,18 +99,21 @@ class RepeatedMeasures:
     p_huynh_feldt: float | None = None
     """p-value with both degrees of freedom multiplied by that epsilon."""
     mauchly_w: float | None = None
-    """W of Mauchly's test: 1 under sphericity. None for two conditions, or for too few participants."""
+    """W of Mauchly's test: 1 under sphericity. None where `compute_mauchly_test` is."""
     mauchly_p: float | None = None
     """p-value of Mauchly's test; small where sphericity is violated."""
 
 
 def analyse_repeated_measures(subjects: Sequence[str], values: Sequence[Sequence[float | None]]) -> RepeatedMeasures:
-    """Repeated-measures analysis of variance of values[subject][condition], any unit; None, NaN and infinity count as
-    missing. subjects: names, one per row."""
-    complete = [all(value is not None and math.isfinite(value) for value in row) for row in values]
-    left_out = tuple(subject for subject, is_complete in zip(subjects, complete, strict=True) if not is_complete)
+    """Compute the repeated-measures analysis of variance of values[subject][condition], any unit, rows of equal length;
+    None, NaN and infinity count as missing. subjects: names, one per row (ValueError otherwise). Without 2 complete
+    rows, 2 conditions or an error above rounding, all results are None."""
+    completeness = [all(value is not None and math.isfinite(value) for value in row) for row in values]
+    left_out = tuple(subject for subject, is_complete in zip(subjects, completeness, strict=True) if not is_complete)
     conditions = len(values[0]) if values else 0
-    rows = np.array([row for row, is_complete in zip(values, complete, strict=True) if is_complete], dtype=np.float64)
+    rows = np.array(
+        [row for row, is_complete in zip(values, completeness, strict=True) if is_complete], dtype=np.float64
+    )
     notes = [f"Left out because a value is missing: {', '.join(left_out)}."] if left_out else []
     if len(rows) < 2:
         notes.append(f"The analysis within participants needs two who have every condition; there are {len(rows)}.")
@@ -122,8 +129,8 @@ def analyse_repeated_measures(subjects: Sequence[str], values: Sequence[Sequence
 
 
 def compute_greenhouse_geisser_epsilon(rows: FloatArray) -> float:
-    """Greenhouse and Geisser's epsilon, from the double-centred covariance of the conditions. rows: (participants,
-    conditions)."""
+    """Compute Greenhouse and Geisser's epsilon, limited to 1 / (k - 1) to 1, from the double-centred covariance of the
+    k conditions. rows: (participants, k), both at least 2, with differences that vary between participants."""
     k = int(rows.shape[1])
     covariance = np.cov(rows, rowvar=False)
     centred = covariance - covariance.mean(axis=0) - covariance.mean(axis=1)[:, None] + covariance.mean()
@@ -132,35 +139,44 @@ def compute_greenhouse_geisser_epsilon(rows: FloatArray) -> float:
 
 
 def compute_huynh_feldt_epsilon(epsilon: float, participants: int, conditions: int) -> float:
-    """Huynh and Feldt's epsilon from Greenhouse and Geisser's. It may exceed 1; the caller limits it to 1."""
+    """Compute Huynh and Feldt's epsilon from Greenhouse and Geisser's. It may exceed 1; `_compute_analysis` limits
+    it."""
     n, df = participants, conditions - 1
     return (n * df * epsilon - 2.0) / (df * (n - 1.0 - df * epsilon))
 
 
 def compute_mauchly_test(rows: FloatArray) -> tuple[float, float] | None:
-    """W and p of Mauchly's test of sphericity. rows: (participants, conditions). None for two conditions, or where the
-    covariance of the contrasts is singular."""
+    """Compute W and p of Mauchly's test of sphericity. rows: (n participants, k conditions). None for k = 2, n < k, or
+    a singular covariance of the contrasts."""
     n, k = rows.shape
-    p = k - 1
-    if p < 2 or n - 1 < p:
+    contrast_count = k - 1
+    if contrast_count < 2 or n - 1 < contrast_count:
         return None
     # Orthonormal contrasts: an orthonormal basis without the constant vector.
     contrasts = np.linalg.qr(np.column_stack([np.ones(k), np.eye(k)[:, 1:]]))[0][:, 1:]
     eigenvalues = np.linalg.eigvalsh(np.cov(rows @ contrasts, rowvar=False))
     if eigenvalues[0] <= 0:
         return None
-    w = float(np.exp(np.log(eigenvalues).sum() - p * np.log(eigenvalues.mean())))
+    w_statistic = float(np.exp(np.log(eigenvalues).sum() - contrast_count * np.log(eigenvalues.mean())))
     # Chi-squared approximation with Anderson's second-order term.
-    df = p * (p + 1) // 2 - 1
-    scale = (n - 1) - (2 * p**2 + p + 2) / (6 * p)
-    chi_squared = -scale * math.log(w)
-    correction = (p + 2) * (p - 1) * (p - 2) * (2 * p**3 + 6 * p**2 + 3 * p + 2) / (288 * p**2 * scale**2)
+    df = contrast_count * (contrast_count + 1) // 2 - 1
+    bartlett_factor = (n - 1) - (2 * contrast_count**2 + contrast_count + 2) / (6 * contrast_count)
+    chi_squared = -bartlett_factor * math.log(w_statistic)
+    second_order_weight = (
+        (contrast_count + 2)
+        * (contrast_count - 1)
+        * (contrast_count - 2)
+        * (2 * contrast_count**3 + 6 * contrast_count**2 + 3 * contrast_count + 2)
+        / (288 * contrast_count**2 * bartlett_factor**2)
+    )
     p_first_order = float(chi2.sf(chi_squared, df))
-    return w, min(1.0, p_first_order + correction * (float(chi2.sf(chi_squared, df + 4)) - p_first_order))
+    return w_statistic, min(
+        1.0, p_first_order + second_order_weight * (float(chi2.sf(chi_squared, df + 4)) - p_first_order)
+    )
 
 
 def _compute_sums_of_squares(rows: FloatArray) -> tuple[float, float, float]:
-    """Sums of squares of conditions, participants and error. rows: (participants, conditions)."""
+    """Compute the sums of squares of conditions, participants and error. rows: (participants, conditions)."""
     n, k = rows.shape
     by_condition = rows.mean(axis=0) - rows.mean()
     by_participant = rows.mean(axis=1) - rows.mean()
@@ -171,12 +187,13 @@ def _compute_sums_of_squares(rows: FloatArray) -> tuple[float, float, float]:
 def _compute_analysis(
     rows: FloatArray, left_out: tuple[str, ...], sums_of_squares: tuple[float, float, float], notes: list[str]
 ) -> RepeatedMeasures:
-    """The analysis of complete rows (n, k). sums_of_squares: of conditions, participants and error (above 0)."""
+    """Compute the analysis of complete rows (n, k), n and k at least 2. sums_of_squares: of conditions, participants
+    and error (above 0)."""
     (n, k), (ss_conditions, ss_participants, ss_error) = rows.shape, sums_of_squares
     df_conditions, df_error = k - 1, (n - 1) * (k - 1)
     f = (ss_conditions / df_conditions) / (ss_error / df_error)
     epsilon = compute_greenhouse_geisser_epsilon(rows)
-    # Otherwise the denominator of Huynh and Feldt's epsilon is not positive.
+    # Where the denominator of Huynh and Feldt's formula is not positive, epsilon is set to 1.
     epsilon_huynh_feldt = (
         min(1.0, compute_huynh_feldt_epsilon(epsilon, n, k)) if n - 1 > df_conditions * epsilon else 1.0
     )
@@ -208,7 +225,7 @@ def _compute_analysis(
 def _make_empty_analysis(
     participants: int, left_out: tuple[str, ...], conditions: int, notes: list[str]
 ) -> RepeatedMeasures:
-    """The result of an analysis that is impossible; the last of `notes` says why."""
+    """Make the result of an analysis that is impossible; the last of `notes` states the reason."""
     return RepeatedMeasures(
         participants=participants,
         left_out=left_out,

@@ -1,8 +1,8 @@
 """Warnings about the results of a study, as sentences for its report. Called by `study_analysis`.
 
-They cover runs without a threshold, thresholds censored by the cap, small or unequal samples, answers at chance,
+They cover runs without a threshold, thresholds censored by the cap, small or unequal samples, performance at chance,
 response bias and its drift, trials that were spoiled (void, presented again), flagged or not measured, lapses in catch
-trials, and direction thresholds below detection. Each `_warn_of_...` returns one sentence, empty without a finding.
+trials, and direction thresholds below detection. Each `_warn_of_...` returns a paragraph, empty without a finding.
 """
 
 import math
@@ -23,47 +23,47 @@ from protocols.definition.study_protocol import StudyProtocol
 from protocols.trial import Trial, TrialStatus
 
 FEW_PARTICIPANTS = 5
-"""Number of participants below which means and tests hardly generalise to the population."""
+"""Number of participants below which means and tests hardly generalise to the population. Chosen."""
 STRONG_BIAS = 0.6
 """Magnitude of the criterion c (units of d') above which a run is listed as biased: at d' = 1.64 it lowers the share of
 right answers by 0.04. An unbiased observer exceeds it by chance in about one of 250 complete runs."""
-BIAS_ERRORS = 2.58
-"""Standard errors by which a criterion must also differ from 0 (1 % by chance): in unfinished runs of 3 to 12 trials,
-one in ten of an unbiased observer exceeds `STRONG_BIAS`. From 45 trials on `STRONG_BIAS` is the stricter limit."""
-DRIFT_LEVEL, LEFT_OUT_LEVEL = 0.02, 0.2
-"""Levels of the test for a drift of the criterion in a session: of all runs, and with any single run left out. Together
-they flag 3 of 1000 simulated sessions with a constant criterion, and 438 of 1000 whose criterion moves by 0.3 in 100
-trials (tests/references/drift_flag.py)."""
+BIAS_Z = 2.58
+"""Standard errors by which a criterion must also differ from 0 (two-sided 1 % normal quantile): in unfinished runs of
+3 to 12 trials, one in ten of an unbiased observer exceeds `STRONG_BIAS`. From 45 trials on that is the stricter one."""
+DRIFT_LEVEL, LEAVE_ONE_OUT_LEVEL = 0.02, 0.2
+"""Significance levels of the test for a drift of the criterion in a session: of all runs, and of the worst result with
+one run left out. Together they flag 3 of 1000 simulated sessions with a constant criterion, and 438 of
+1000 with a drift of 0.3 in 100 trials (tests/references/drift_flag.py)."""
 MANY_LAPSES = 0.1
-"""Lapse rate on catch trials above which a participant is listed: the staircase assumes attentive participants."""
+"""Share of wrong catch trials (lapse rate) above which a participant is listed. Chosen."""
 PERCEIVED_BY_ALL_HZ = 15.0
 """Highest frequency (Hz) at which all participants are expected to feel the direction at full level, so that an error
-in a catch trial there is a lapse."""
+in a catch trial there is a lapse. Chosen."""
 REPEAT_SD_DB = 2.4
 """Standard deviation of the difference of two runs with the same true threshold: sqrt(2) times 1.7 dB, the spread of
 500 simulated runs under the published rule (Weibull slope 2, 2 % lapses)."""
 
 
 def list_study_warnings(
-    trials: Sequence[Trial], rows: Sequence[Threshold], table: ThresholdTable, protocol: StudyProtocol
+    trials: Sequence[Trial], thresholds: Sequence[Threshold], table: ThresholdTable, protocol: StudyProtocol
 ) -> tuple[str, ...]:
-    """All warnings about the direction thresholds. trials: of the test phase. rows: thresholds of their runs. table:
-    those thresholds (N) by participant and frequency."""
-    if not rows:
+    """List all warnings about the direction thresholds. trials: of the test phase. thresholds: of their runs; table:
+    the same (N) by participant and frequency. Without thresholds the only warning is that there are none."""
+    if not thresholds:
         return ("There are no test trials, so there is no threshold of direction.",)
     candidates = (
-        _warn_of_stopped(rows, protocol.staircase),
-        _warn_of_incomplete(rows, protocol.staircase),
-        _warn_of_missing(table),
-        _warn_of_censored(table, protocol.staircase),
+        _warn_of_stopped_runs(thresholds, protocol.staircase),
+        _warn_of_incomplete_runs(thresholds, protocol.staircase),
+        _warn_of_missing_thresholds(table),
+        _warn_of_censoring(table, protocol.staircase),
         _warn_of_few_participants(table),
         _warn_of_unequal_sizes(table),
-        _warn_of_chance(rows),
-        _warn_of_bias(rows),
+        _warn_of_chance(thresholds),
+        _warn_of_bias(thresholds),
         _warn_of_drift(trials),
-        _warn_of_spoiled(trials),
-        _warn_of_flagged(trials),
-        _warn_of_unmeasured(trials),
+        _warn_of_spoiled_trials(trials),
+        _warn_of_flagged_trials(trials),
+        _warn_of_unmeasured_trials(trials),
         *table.notes,
     )
     return tuple(sentence for sentence in candidates if sentence)
@@ -75,37 +75,37 @@ def list_catch_and_detection_warnings(
     table: ThresholdTable,
     detection_table: ThresholdTable,
 ) -> tuple[str, ...]:
-    """Warnings about catch trials and detection runs. detection: thresholds of the detection runs. table,
+    """List the warnings about catch trials and detection runs. detection: thresholds of the detection runs. table,
     detection_table: direction and detection thresholds (N) by participant and frequency."""
-    incomplete = [_describe_run(row) for row in detection if not row.complete]
-    censored = [_describe_run(row) for row in detection if row.complete and row.censored]
+    incomplete = [_describe_run(run) for run in detection if not run.complete]
+    censored = [_describe_run(run) for run in detection if run.complete and run.censored]
     candidates = (
         _warn_of_lapses(catches),
         f"{_format_count(incomplete, 'detection run')} not complete and without a threshold: {conjoin(incomplete)}."
         if incomplete
         else "",
         f"{_format_count(censored, 'detection threshold')} cut by the cap: {conjoin(censored)}." if censored else "",
-        _warn_of_undetected(detection),
-        _warn_of_below_detection(table, detection_table),
+        _warn_of_chance_detection(detection),
+        _warn_of_direction_below_detection(table, detection_table),
         *detection_table.notes,
     )
     return tuple(sentence for sentence in candidates if sentence)
 
 
-def _warn_of_incomplete(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
+def _warn_of_incomplete_runs(thresholds: Sequence[Threshold], rule: StaircaseRule) -> str:
     runs = [
-        f"{_describe_run(row)} ({_describe_progress(row, rule)})"
-        for row in rows
-        if not row.complete and row.ended is not RunEnd.TRIAL_LIMIT
+        f"{_describe_run(run)} ({_describe_progress(run, rule)})"
+        for run in thresholds
+        if not run.complete and run.ended is not RunEnd.TRIAL_LIMIT
     ]
     return f"{_format_count(runs, 'run')} not complete and without a threshold: {conjoin(runs)}." if runs else ""
 
 
-def _warn_of_stopped(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
+def _warn_of_stopped_runs(thresholds: Sequence[Threshold], rule: StaircaseRule) -> str:
     stopped_runs = [
-        f"{_describe_run(row)} ({_describe_progress(row, rule)}, {row.trials_at_cap} trials at the cap)"
-        for row in rows
-        if row.ended is RunEnd.TRIAL_LIMIT
+        f"{_describe_run(run)} ({_describe_progress(run, rule)}, {run.trials_at_cap} trials at the cap)"
+        for run in thresholds
+        if run.ended is RunEnd.TRIAL_LIMIT
     ]
     if not stopped_runs:
         return ""
@@ -116,19 +116,19 @@ def _warn_of_stopped(rows: Sequence[Threshold], rule: StaircaseRule) -> str:
     )
 
 
-def _describe_progress(row: Threshold, rule: StaircaseRule) -> str:
-    """Progress of an incomplete run: its reversals, or with the Psi method its trials."""
+def _describe_progress(run: Threshold, rule: StaircaseRule) -> str:
+    """Describe the progress of an incomplete run: its reversals, or with the Psi method its trials."""
     if rule.is_bayesian:
-        return f"{row.trials} trials"
-    return f"{row.reversals} of {rule.reversals} reversals"
+        return f"{run.trials} trials"
+    return f"{run.reversals} of {rule.reversals} reversals"
 
 
-def _warn_of_missing(table: ThresholdTable) -> str:
+def _warn_of_missing_thresholds(table: ThresholdTable) -> str:
     missing_cells = [f"{subject} at {frequency:g} Hz" for subject, frequency in table.list_gaps()]
     return f"No threshold for {conjoin(missing_cells)}." if missing_cells else ""
 
 
-def _warn_of_censored(table: ThresholdTable, rule: StaircaseRule) -> str:
+def _warn_of_censoring(table: ThresholdTable, rule: StaircaseRule) -> str:
     cells = [
         f"{subject} at {frequency:g} Hz"
         for subject, row in zip(table.subjects, table.censored, strict=True)
@@ -160,8 +160,8 @@ def _warn_of_unequal_sizes(table: ThresholdTable) -> str:
     return "The frequencies have unequally many thresholds, so the comparison intervals are approximate."
 
 
-def _warn_of_chance(rows: Sequence[Threshold]) -> str:
-    chance_runs = _list_runs_at_chance(rows)
+def _warn_of_chance(thresholds: Sequence[Threshold]) -> str:
+    chance_runs = _describe_runs_at_chance(thresholds)
     return (
         "Answers not shown to be better than chance (one-sided binomial test, 5 %; a threshold far above the cap looks "
         f"the same): {conjoin(chance_runs)}."
@@ -170,12 +170,12 @@ def _warn_of_chance(rows: Sequence[Threshold]) -> str:
     )
 
 
-def _list_runs_at_chance(rows: Sequence[Threshold]) -> list[str]:
-    """Descriptions of the runs whose answers are not significantly better than chance."""
+def _describe_runs_at_chance(thresholds: Sequence[Threshold]) -> list[str]:
+    """Describe the runs whose answers are not significantly better than chance; runs without answers are left out."""
     return [
-        f"{_describe_run(row)} ({row.percent_correct:.0f} % right of {row.trials})"
-        for row in rows
-        if row.percent_correct is not None and not _is_above_chance(row.percent_correct, row.trials)
+        f"{_describe_run(run)} ({run.percent_correct:.0f} % right of {run.trials})"
+        for run in thresholds
+        if run.percent_correct is not None and not _is_above_chance(run.percent_correct, run.trials)
     ]
 
 
@@ -185,37 +185,37 @@ def _is_above_chance(percent_correct: float, trials: int) -> bool:
     return bool(binom.sf(correct_count - 1, trials, 0.5) < 0.05)
 
 
-def _warn_of_bias(rows: Sequence[Threshold]) -> str:
+def _warn_of_bias(thresholds: Sequence[Threshold]) -> str:
     biased_runs = [
-        f"{_describe_run(row)} (criterion {format_signed(row.criterion)})"
-        for row in rows
-        if row.criterion is not None and _is_biased(row, row.criterion)
+        f"{_describe_run(run)} (criterion {format_signed(run.criterion)})"
+        for run in thresholds
+        if run.criterion is not None and _is_biased(run, run.criterion)
     ]
     if not biased_runs:
         return ""
     return f"A bias towards one of the two answers, which raises a threshold, was found in {conjoin(biased_runs)}."
 
 
-def _is_biased(row: Threshold, criterion: float) -> bool:
-    """Whether the criterion exceeds `STRONG_BIAS` and `BIAS_ERRORS` standard errors. The standard error assumes that
-    both directions were shown equally often."""
-    half, correct = row.trials / 2.0, round(row.trials * (row.percent_correct or 0.0) / 100.0)
-    return abs(criterion) > max(STRONG_BIAS, BIAS_ERRORS * math.sqrt(compute_criterion_variance(correct, half, half)))
+def _is_biased(run: Threshold, criterion: float) -> bool:
+    """Whether the magnitude of the criterion exceeds `STRONG_BIAS` and `BIAS_Z` standard errors, both directions having
+    been shown equally often."""
+    n_each, correct = run.trials / 2.0, round(run.trials * (run.percent_correct or 0.0) / 100.0)
+    return abs(criterion) > max(STRONG_BIAS, BIAS_Z * math.sqrt(compute_criterion_variance(correct, n_each, n_each)))
 
 
 def _warn_of_drift(trials: Iterable[Trial]) -> str:
-    """Sessions in which the criterion drifts over the runs, by both levels `DRIFT_LEVEL` and `LEFT_OUT_LEVEL`."""
+    """Warn of sessions whose criterion drifts over the runs, by `DRIFT_LEVEL` and `LEAVE_ONE_OUT_LEVEL`."""
     sessions: dict[tuple[str, str], dict[int, list[Trial]]] = {}
     for trial in trials:
         if trial.is_valid:
             sessions.setdefault((trial.subject, trial.session), {}).setdefault(trial.run, []).append(trial)
     drifts = estimate_criterion_drifts(
-        [[_extract_answers(runs[run]) for run in sorted(runs)] for runs in sessions.values()]
+        [[_extract_answers(runs[run_number]) for run_number in sorted(runs)] for runs in sessions.values()]
     )
     drifting_sessions = [
         f"{subject} ({session}, criterion {format_signed(drift.per_100_trials)} per 100 trials)"
         for (subject, session), drift in zip(sessions, drifts, strict=True)
-        if drift is not None and drift.p < DRIFT_LEVEL and drift.p_without_a_run < LEFT_OUT_LEVEL
+        if drift is not None and drift.p < DRIFT_LEVEL and drift.p_without_a_run < LEAVE_ONE_OUT_LEVEL
     ]
     if not drifting_sessions:
         return ""
@@ -226,26 +226,26 @@ def _warn_of_drift(trials: Iterable[Trial]) -> str:
     )
 
 
-def _extract_answers(run: Sequence[Trial]) -> tuple[list[int], list[bool]]:
-    """Directions shown (1 or 2), and whether each answer was right."""
-    return [trial.direction_shown for trial in run], [bool(trial.correct) for trial in run]
+def _extract_answers(run_trials: Sequence[Trial]) -> tuple[list[int], list[bool]]:
+    """Extract the directions shown (1 or 2), and whether each answer was right, from valid trials."""
+    return [trial.direction_shown for trial in run_trials], [bool(trial.correct) for trial in run_trials]
 
 
-def _warn_of_spoiled(trials: Iterable[Trial]) -> str:
+def _warn_of_spoiled_trials(trials: Iterable[Trial]) -> str:
     count = sum(trial.status is TrialStatus.SPOILED for trial in trials)
     return f"{count} spoiled presentation{'s' if count != 1 else ''}, played again; the answers do not count." * bool(
         count
     )
 
 
-def _warn_of_flagged(trials: Iterable[Trial]) -> str:
+def _warn_of_flagged_trials(trials: Iterable[Trial]) -> str:
     count = sum(trial.status is TrialStatus.FLAGGED for trial in trials)
     return f"{count} trial{'s' if count != 1 else ''} flagged: counted, but the stimulus should be checked." * bool(
         count
     )
 
 
-def _warn_of_unmeasured(trials: Iterable[Trial]) -> str:
+def _warn_of_unmeasured_trials(trials: Iterable[Trial]) -> str:
     count = sum(trial.is_valid and trial.delivered_mps2 is None for trial in trials)
     if not count:
         return ""
@@ -256,15 +256,15 @@ def _warn_of_unmeasured(trials: Iterable[Trial]) -> str:
 
 
 def _warn_of_lapses(catches: Sequence[CatchTally]) -> str:
-    """Participants with more than `MANY_LAPSES` wrong catch trials up to `PERCEIVED_BY_ALL_HZ`."""
+    """Warn of participants with a share of more than `MANY_LAPSES` wrong catch trials up to `PERCEIVED_BY_ALL_HZ`."""
     lapses = []
-    felt_tallies = [tally for tally in catches if tally.frequency_hz <= PERCEIVED_BY_ALL_HZ]
-    for subject in dict.fromkeys(tally.subject for tally in felt_tallies):
-        wrong = sum(tally.wrong for tally in felt_tallies if tally.subject == subject)
-        answered = sum(tally.given for tally in felt_tallies if tally.subject == subject)
-        if wrong > MANY_LAPSES * answered:
-            lower, upper = compute_wilson_interval(wrong, answered)
-            lapses.append(f"{subject} ({wrong} of {answered}; 95 % interval {100 * lower:.0f} to {100 * upper:.0f} %)")
+    perceptible_tallies = [tally for tally in catches if tally.frequency_hz <= PERCEIVED_BY_ALL_HZ]
+    for subject in dict.fromkeys(tally.subject for tally in perceptible_tallies):
+        wrong = sum(tally.wrong for tally in perceptible_tallies if tally.subject == subject)
+        answers = sum(tally.given for tally in perceptible_tallies if tally.subject == subject)
+        if wrong > MANY_LAPSES * answers:
+            lower, upper = compute_wilson_interval(wrong, answers)
+            lapses.append(f"{subject} ({wrong} of {answers}; 95 % interval {100 * lower:.0f} to {100 * upper:.0f} %)")
     if not lapses:
         return ""
     return (
@@ -273,12 +273,12 @@ def _warn_of_lapses(catches: Sequence[CatchTally]) -> str:
     )
 
 
-def _warn_of_undetected(detection: Sequence[Threshold]) -> str:
-    chance_runs = _list_runs_at_chance(detection)
+def _warn_of_chance_detection(detection: Sequence[Threshold]) -> str:
+    chance_runs = _describe_runs_at_chance(detection)
     return f"Detection not shown to be better than chance: {conjoin(chance_runs)}." if chance_runs else ""
 
 
-def _warn_of_below_detection(table: ThresholdTable, detection_table: ThresholdTable) -> str:
+def _warn_of_direction_below_detection(table: ThresholdTable, detection_table: ThresholdTable) -> str:
     cells = [
         f"{case.subject} at {case.frequency_hz:g} Hz ({case.direction_n:.2f} N, detected from {case.detection_n:.2f} N)"
         for case in find_directions_below_detection(table, detection_table)
@@ -292,8 +292,8 @@ def _warn_of_below_detection(table: ThresholdTable, detection_table: ThresholdTa
     )
 
 
-def _describe_run(row: Threshold) -> str:
-    return f"{row.subject} at {row.frequency_hz:g} Hz"
+def _describe_run(run: Threshold) -> str:
+    return f"{run.subject} at {run.frequency_hz:g} Hz"
 
 
 def _format_count(items: Sequence[str], noun: str) -> str:

@@ -1,7 +1,8 @@
 """HTML report of a blind test: the diagnosis of simulated devices with concealed missing physics.
 
-Wrong answers come first, each with what was concealed and what was said; then the scores with 95 % intervals, the next
-proposed experiments, the controls, and the method. `analysis.evaluation.blind_test` computes the scores.
+Wrong answers come first, each with the concealed effects and the diagnosis; then the scores with 95 % intervals, the
+further experiments on ambiguous answers, the controls, figures, and the method. `analysis.evaluation.blind_test`
+computes the scores. Called by `study.evaluation.bank.write_proof`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -40,15 +41,17 @@ class BlindTestFacts:
 
     seeds: str
     """Seeds of the simulated devices, as text."""
-    seal: str
+    labels_sha256: str
     """SHA-256 of labels.sha256, the file with the hashes of the labels."""
     commit: str
+    """Hash of the source code's commit."""
     engines: tuple[str, ...]
     """Versions of the code of the diagnosis."""
     remarks: tuple[str, ...]
     """Sentences for the banner of the report."""
     controls: tuple[ControlOutcome, ...] = ()
-    followed: tuple[FollowUp, ...] = ()
+    """Controls: repeated diagnoses of altered recordings, whose change of the answer is known in advance."""
+    follow_ups: tuple[FollowUp, ...] = ()
     """Ambiguous answers that were diagnosed again with a further recording."""
 
 
@@ -60,11 +63,12 @@ def render_blind_test_report(
     provenance: Mapping[str, str],
     generated: str,
 ) -> str:
-    """The report as an HTML page. generated: local time of the report; provenance: versions and hashes by name."""
+    """Render the report as an HTML page. outcomes: of all devices; score: of these outcomes. generated: local time of
+    the report, as text; provenance: texts by name."""
     sections = (
         Section(f"Misses: {len(score.misses)}", tables=(_make_miss_table(score.misses),) if score.misses else ()),
-        Section("Figures", tables=(_make_figure_table(score),)),
-        *_make_follow_up_sections(facts.followed),
+        Section("Figures", tables=(_make_score_table(score),)),
+        *_make_follow_up_sections(facts.follow_ups),
         *_make_control_sections(facts.controls),
         Section("Which, from where on, how sure", pictures=tuple(pictures)),
         Section("How it was done", METHOD_PARAGRAPHS, points=_list_facts(facts)),
@@ -83,7 +87,7 @@ def render_blind_test_report(
 
 
 def _make_control_sections(controls: Sequence[ControlOutcome]) -> tuple[Section, ...]:
-    """Section on the controls: changes with a known effect on the answer; empty without controls."""
+    """Make the section on the controls: changes with a known effect on the answer; empty without controls."""
     if not controls:
         return ()
     rows = tuple(
@@ -95,7 +99,8 @@ def _make_control_sections(controls: Sequence[ControlOutcome]) -> tuple[Section,
 
 
 def _make_follow_up_sections(follow_ups: Sequence[FollowUp]) -> tuple[Section, ...]:
-    """Section on ambiguous answers after the proposed and after a random further recording; empty without any."""
+    """Make the section on ambiguous answers after the proposed and after a random further recording; empty without
+    any."""
     if not follow_ups:
         return ()
     rows = tuple(
@@ -114,22 +119,23 @@ def _make_follow_up_sections(follow_ups: Sequence[FollowUp]) -> tuple[Section, .
 
 
 def _describe_returned(recorded: str, returned: Sequence[str]) -> str:
-    """Names returned after a further recording; "-" where there was none."""
+    """Describe the names returned after a further recording; "-" without one. recorded: the recording, as text."""
     return (", ".join(returned) or "no name") if recorded else "-"
 
 
 def _list_facts(facts: BlindTestFacts) -> tuple[str, ...]:
-    """Points on how the test can be reproduced and checked."""
+    """List sentences on how the test can be reproduced and checked."""
     return (
         f"Seeds {facts.seeds}.",
-        f"SHA-256 of labels.sha256: {facts.seal}.",
+        f"SHA-256 of labels.sha256: {facts.labels_sha256}.",
         f"Commit {facts.commit}; code of the diagnosis {', '.join(facts.engines)}.",
         "sha256sum --check labels.sha256 checks the labels; proof.csv holds one row per device.",
     )
 
 
 def _make_miss_table(misses: Sequence[Outcome]) -> Table:
-    """Table of all wrong answers, with the error over the noise of the re-tuned model and of the model found."""
+    """Make the table of all wrong answers, with the error over the noise of the re-tuned model and of the model
+    found."""
     rows = tuple(
         (
             str(miss.number), f"{miss.kind}, {miss.bank}", describe_concealed(miss), describe_strengths(miss) or "-",
@@ -142,8 +148,8 @@ def _make_miss_table(misses: Sequence[Outcome]) -> Table:
     return Table("Every answer that is not as it should be", header, rows)
 
 
-def _make_figure_table(score: Score) -> Table:
-    """Table of all scores with 95 % intervals, the expected calibration error last."""
+def _make_score_table(score: Score) -> Table:
+    """Make the table of all scores with 95 % intervals, the expected calibration error last."""
     calibration = score.calibration
     calibration_figure = IntervalEstimate(
         "expected calibration error, 10 bins of equal count", calibration.error, calibration.low, calibration.high,

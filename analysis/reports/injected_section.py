@@ -3,7 +3,8 @@
 A known fault of mechanism, actuator or sensor is added to one of two stretches of a real recording; the diagnosis gets
 both stretches and the model. The section has the rates of right answers with 95 % intervals, tallies by kind of fault
 and by recording, and every miss. `analysis.evaluation.blind_test.injected_faults` judges the answers. Called by
-`real_report`."""
+`real_report`; `study.evaluation.real.real_summary` formats rates by `format_rate`.
+"""
 
 from collections.abc import Sequence
 
@@ -20,15 +21,15 @@ from analysis.reports.page import Section, Table
 
 
 def make_injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
-    """Make the section with rates of right answers, tallies by kind and by recording, and all misses; without empty
-    tables."""
-    rates = Table(
+    """Make the section with rates of right answers, tallies by kind and by recording, and all misses: wrong answers
+    where the fault was detectable or a wrong fault was named. Tables without rows are left out."""
+    rate_table = Table(
         "How often it was right",
         ("what", "rate, 95 % interval"),
         tuple((rate.name, format_rate(rate)) for rate in score_injections(outcomes)),
     )
-    by_kind = _make_tally_table("Detectable faults by kind", "injected", make_tallies(outcomes, classify_injection))
-    by_recording = _make_tally_table(
+    kind_table = _make_tally_table("Detectable faults by kind", "injected", make_tallies(outcomes, classify_injection))
+    recording_table = _make_tally_table(
         "Detectable faults by recording", "recording", make_tallies(outcomes, lambda outcome: outcome.recording)
     )
     missed_outcomes = [
@@ -59,17 +60,17 @@ def make_injected_section(outcomes: Sequence[InjectedOutcome]) -> Section:
             f"A fault is detectable where it changes the held-out error of a base model, fitted to the clean stretch "
             f"alone, by a factor of {DETECTABLE} or more, up or down.",
         ),
-        tables=tuple(table for table in (rates, by_kind, by_recording, miss_table) if table.rows),
+        tables=tuple(table for table in (rate_table, kind_table, recording_table, miss_table) if table.rows),
     )
 
 
 def classify_injection(injected_outcome: InjectedOutcome) -> str:
-    """Classify a case: name of the injected fault, "two at once" for two faults, or empty without a fault."""
+    """Classify a case: name of the injected fault, "two at once" for more than one fault, or empty without a fault."""
     return "two at once" if len(injected_outcome.effects) > 1 else injected_outcome.injected
 
 
 def _make_tally_table(title: str, heading: str, tallies: Sequence[Tally]) -> Table:
-    """Make a table of tallies, one row each. heading: of the first column."""
+    """Make a table of tallies, one row each. heading: that of the first column."""
     header = (
         heading,
         "drawn",

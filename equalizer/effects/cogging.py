@@ -3,7 +3,8 @@
     F = A sin(2 pi x / p + phase)        A in N, pitch p in m (a rotation: N m, rad)
 
 For starting values the pitch is found in the spectrum of the missing force over position, amplitude and phase by linear
-least squares. An entry of the catalogue.
+least squares. An effect of the catalogue (`equalizer.effects.catalogue`). Reference: Hanselman, Brushless Permanent
+Magnet Motor Design, chapter 5.
 """
 
 import numpy as np
@@ -22,16 +23,17 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 TRAVEL_CELLS = 4096
-"""Number of cells into which the travel is divided; the shortest pitch that is found is four cells long."""
+"""Number of cells into which the travel is divided, chosen by hand; pitches longer than four cells are found."""
 PITCH_COUNT = 3
-"""Number of pitches that are tried, strongest peak of the periodogram first. By hand."""
+"""Number of pitches that are tried, strongest peak of the periodogram first. Chosen by hand."""
 _ZERO_PADDING = 8
-"""Factor of zero padding: spectral points per period over the travel, so that a peak between two lines is found."""
+"""Factor of zero padding: spectral points per period over the travel, so that a peak between two lines is
+found. Chosen by hand."""
 _LEAST_PERIODS = 2
 """Least number of periods over the travel: fewer cannot be distinguished from a nonlinear spring."""
 _ITERATIONS = 4
 """Fixed-point iterations of the implicit step: each multiplies the error by the force's slope over the position times
-the step's motion per newton, below 1 unless a pitch is crossed within a step. By hand."""
+the step's motion per newton, below 1 unless a pitch is crossed within a step. Chosen by hand."""
 
 
 @compile_law
@@ -56,16 +58,18 @@ def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion:
 
 
 def _pack_parameters(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    """Pack the parameters of `_compute_mean_force`, (3,): amplitude (N), wave number (rad/m), phase (rad)."""
+    """Pack the parameters of `_compute_mean_force`, (3,): amplitude (N), wave number (rad/m), phase (rad; 0
+    where it is missing)."""
     return np.array([values["amplitude"], 2 * np.pi / values["pitch"], values.get("phase", 0.0)])
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Find a set of values for each likely pitch, the set that explains most of the missing force first."""
+    """Find starting values of the parameters for each likely pitch, those that explain most of the missing force first;
+    empty where the axis does not move."""
     motion = select_axis_motion(evidence, axis)
     regression = regress_out_linear_terms(motion)
     fits = [_fit_pitch(motion, regression, pitch) for pitch in _find_likely_pitches(motion, regression)]
-    return tuple(values for _, values in sorted(fits, key=lambda item: -item[0]))
+    return tuple(values for _, values in sorted(fits, key=lambda fit: -fit[0]))
 
 
 def _find_likely_pitches(motion: AxisMotion, regression: PartialRegression) -> list[float]:
@@ -79,7 +83,8 @@ def _find_likely_pitches(motion: AxisMotion, regression: PartialRegression) -> l
     force_by_cell = np.bincount(cell_index, regression.force, TRAVEL_CELLS)
     samples_by_cell = np.bincount(cell_index, minlength=TRAVEL_CELLS).astype(float)
     smoothed_samples = np.convolve(samples_by_cell, np.ones(9) / 9, "same")
-    # Cells are weighted alike: noise from where the axis dwells would otherwise hide the pattern.
+    # Sums of n samples, divided by sqrt(n), have equal noise in all cells: the noise of cells in which the axis dwells
+    # would otherwise hide the pattern. n is averaged over nine cells, chosen by hand.
     cell_weight = 1 / np.sqrt(np.maximum(smoothed_samples, 1.0))
     power = np.abs(np.fft.rfft(force_by_cell * cell_weight, TRAVEL_CELLS * _ZERO_PADDING)) ** 2
     power[: _LEAST_PERIODS * _ZERO_PADDING] = 0

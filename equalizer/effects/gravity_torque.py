@@ -1,6 +1,7 @@
 """Gravity torque of a body whose centre of mass is off its axis of rotation, as of a pendulum (unbalanced rotor).
 
-tau = -torque sin(x + angle), with torque = m g r (N m) and x the rotation angle (rad). For rotational models only.
+tau = -torque sin(x + angle), with torque = m g r (N m), r (m) the distance of the centre of mass from the axis, and x
+and angle in rad. For rotational models only. `equalizer.effects.catalogue` lists the effect.
 """
 
 import numpy as np
@@ -13,14 +14,16 @@ from equalizer.effects.starts.starting_values import regress_out_linear_terms, s
 from equalizer.signals.signal import FloatArray
 
 LEAST_TRAVEL_RAD = 0.5
-"""Least travel (rad): below it, sin(x + angle) is nearly linear in x, so that gravity and a spring cannot be
-distinguished."""
+"""Range of the angle (rad) that must be exceeded: in a smaller one sin(x + angle) is nearly linear in x, so that
+gravity and a spring cannot be distinguished. Chosen."""
 
 
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
     """Mean of the torques (N m) at start and end of the step (trapezoidal rule). The angle at the end depends on that
-    mean, which is found by four fixed-point iterations. parameters: torque, angle; step_motion: see `instant`."""
+    mean, which is found by four fixed-point iterations; each multiplies the error by at most 0.5 torque times the angle
+    that 1 N m adds in a step, a small number at usual sample rates. parameters: torque, angle; memory: not used;
+    step_motion: see `instant`."""
     start_sine, torque = np.sin(step_motion[X] + parameters[1]), 0.0
     for _ in range(4):
         torque = (
@@ -35,7 +38,7 @@ def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion:
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
     """Starting values by linear regression of the missing torque on -sin(x) and -cos(x), whose factors are
     torque cos(angle) and torque sin(angle). Empty for translational models, for a travel of at most `LEAST_TRAVEL_RAD`
-    and for a torque of zero."""
+    (or NaN) and for a torque of zero."""
     motion = select_axis_motion(evidence, axis)
     if not evidence.model.rotational or not np.ptp(motion.position) > LEAST_TRAVEL_RAD:
         return ()

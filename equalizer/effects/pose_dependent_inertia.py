@@ -1,7 +1,7 @@
 """Pose-dependent inertia: a mass that changes with position, as that of a linkage.
 
 With the mass M (1 + per_m x), per_m in 1/m (a rotation: 1/rad), Lagrange's equation adds -per_m M (x dv/dt + v^2 / 2)
-to the force on the axis.
+to the force on the axis, with position x and velocity v. `equalizer.effects.catalogue` lists the effect.
 """
 
 import numpy as np
@@ -20,14 +20,16 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 LAGRANGE_SPEED_SHARE = 0.5
-"""Factor of M per_m v^2 by Lagrange's equation; the default of `speed_share`."""
+"""Factor of -per_m M v^2 by Lagrange's equation; the default of `speed_share`, which may differ from it where several
+axes move."""
 
 
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
     """Force (N) at the mean position and velocity of the step without this force. The mean acceleration depends on the
-    force itself: an implicit step, linear in the force, whose divisor is kept at 0.1 or more. parameters: per_m M,
-    speed_share."""
+    force itself: an implicit step, linear in the force. Its divisor, the total mass over M, is at least 0.1 (chosen),
+    so that a fit cannot make the mass zero or negative. parameters: per_m M, speed_share; memory: not used;
+    step_motion: see `instant`."""
     mid_position, mid_velocity = (
         0.5 * (step_motion[X] + step_motion[X_FREE]),
         0.5 * (step_motion[V] + step_motion[V_FREE]),
@@ -43,16 +45,17 @@ def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion:
     )
 
 
-def _pack(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
-    """(2,): per_m times the mass along the axis, and speed_share (1/2 where it is missing)."""
+def _pack_parameters(model: MechanicalModel, axis: int, values: Values) -> FloatArray:
+    """Pack the kernel's parameters, (2,): per_m times the mass along the axis, and speed_share (1/2 where it is
+    missing)."""
     mass = compute_quadratic_form(model.mass, compute_driven_axes(model)[:, axis])
     return np.array([values["per_m"] * mass, values.get("speed_share", LAGRANGE_SPEED_SHARE)])
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """per_m by regression of the missing force: first with a separate strength of either term, where their ratio is
-    plausible (magnitude below 1.5; a negative speed_share becomes 0), then with the ratio of Lagrange's equation.
-    Values without any dependence (per_m = 0) are left out."""
+    """Find starting values of per_m by regression of the missing force: first with a separate strength of either term,
+    if their ratio is within the upper limit 1.5 of speed_share in magnitude (a negative ratio becomes 0), then with the
+    ratio of Lagrange's equation. Values with per_m = 0 are left out."""
     motion = select_axis_motion(evidence, axis)
     mass = compute_quadratic_form(evidence.model.mass, compute_driven_axes(evidence.model)[:, axis])
     position_term, speed_term = -mass * motion.position * motion.acceleration, -mass * motion.velocity**2
@@ -79,6 +82,6 @@ EFFECT = Effect(
         Parameter("per_m", -1e6, 1e6, none=0.0, scale="signed"),
         Parameter("speed_share", -0.5, 1.5, none=None, scale="linear", step=0.02),
     ),
-    action=AxisForce(_compute_mean_force, _pack),
+    action=AxisForce(_compute_mean_force, _pack_parameters),
     starts=_find_starting_values,
 )

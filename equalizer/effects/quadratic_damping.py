@@ -2,7 +2,8 @@
 
     F = -c v |v|        c in N s²/m² (a rotation: N m s²/rad²)
 
-A simulation solves for the velocity at the end of each step (implicit trapezoidal rule).
+A simulation solves for the velocity at the end of each step (implicit trapezoidal rule). Loaded by
+`equalizer.effects.catalogue`.
 """
 
 import numpy as np
@@ -17,8 +18,9 @@ from equalizer.signals.signal import FloatArray
 
 @compile_law
 def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion: FloatArray) -> float:
-    """Mean of the drag (N) at the step's start and end (trapezoidal rule). The end velocity w depends on it (implicit
-    step) and solves w + r w |w| = v_free - r v |v|, with r = c v_per_n / 2 (`half_drag_gain`). parameters: c."""
+    """Mean of the drag (N) at the step's start and end (trapezoidal rule); the drag at the end is written to
+    step_motion[F_END]. The end velocity w depends on it (implicit step) and solves w + r w |w| = v_free - r v |v|, with
+    r = c v_per_n / 2 (`half_drag_gain`). parameters: c; memory: not used; step_motion: columns as in `instant`."""
     half_drag_gain = 0.5 * parameters[0] * step_motion[V_PER_N]
     right_side = step_motion[V_FREE] - half_drag_gain * step_motion[V] * abs(step_motion[V])
     end_velocity = 2 * right_side / (1 + np.sqrt(1 + 4 * half_drag_gain * abs(right_side)))
@@ -27,7 +29,8 @@ def _compute_mean_force(parameters: FloatArray, memory: FloatArray, step_motion:
 
 
 def _find_starting_values(evidence: Evidence, axis: int) -> tuple[Values, ...]:
-    """Coefficient by linear regression of the missing force on -v |v|; empty unless positive."""
+    """Find the coefficient by linear regression of the missing force on -v |v|, with the terms of a linear model
+    regressed out; empty unless positive."""
     motion = select_axis_motion(evidence, axis)
     coefficient = float(regress_out_linear_terms(motion).fit(-motion.velocity * np.abs(motion.velocity)).strengths[0])
     return ({"coefficient": coefficient},) if coefficient > 0 else ()

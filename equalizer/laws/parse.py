@@ -1,9 +1,9 @@
-"""Parses a formula in Python's expression syntax, restricted to numbers, names, + - * / ** and the functions below. The
-text is parsed to a syntax tree by Python's `ast` and never executed.
+"""Parser of formulas in Python's expression syntax, restricted to numbers, names, + - * / ** and the functions below.
+The text is parsed to a syntax tree by Python's `ast` and never executed.
 
 Numbers with a point or an exponent (`4.1`, `1e-3`) are free parameters, which a fit may change. Whole numbers (`2`) and
 `pi` are part of the form. A template contains the names `p0`, `p1`, … of the free parameters instead of their values.
-Called by `laws.law`.
+Called by `laws.law`; `FUNCTIONS` and `LawError` are used by all modules that handle laws.
 """
 
 import ast
@@ -24,12 +24,14 @@ FUNCTIONS: Mapping[str, int] = {
 }  # fmt: skip
 """Number of arguments of each function."""
 MEMORY_OPERATORS = ("lag", "play", "delay", "integral")
-"""Operators with memory, of a signal s: lag(s, tau_s), play(s, half_width), delay(s, delay_s), integral(s)."""
+"""Operators with memory, of a signal s: lag(s, tau_s), play(s, half_width), delay(s, delay_s), integral(s); times in s,
+half_width in the unit of s."""
 MOST_CHARACTERS, MOST_NODES = 2000, 200
-"""Largest number of characters, and of nodes of the syntax tree, of a formula."""
+"""Largest number of characters, and of nodes of the syntax tree, of a formula. Chosen: they bound the parsing time."""
 _OPERATORS: dict[type[ast.operator], str] = {
     ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"
 }  # fmt: skip
+"""Symbol of each binary operator, by its class in `ast`."""
 ALLOWED = "allowed are numbers, signals, pi, + - * / ** and " + ", ".join(FUNCTIONS)
 """Description of the language, for error messages."""
 
@@ -40,7 +42,8 @@ class LawError(ValueError):
 
 @dataclass(slots=True)
 class _Reader:
-    """Converts Python's syntax tree to the tree of a law, and collects the free numbers. Methods raise LawError."""
+    """Converter of Python's syntax tree to the tree of a law; it collects the free numbers in the order of the text.
+    Methods raise LawError for text outside the language. text, template: see `parse_formula`."""
 
     text: str
     template: bool
@@ -68,7 +71,8 @@ class _Reader:
         raise LawError(f"{self._describe_position(node)} is not part of the language of laws; {ALLOWED}")
 
     def _read_number(self, node: ast.expr, value: float) -> Node:
-        """A free parameter for a number with a point or an exponent outside a template; else a fixed number."""
+        """Convert a number: to a free parameter if it has a point or an exponent and is outside a template, else to a
+        fixed number. Raises LawError where it overflows a 64-bit float."""
         try:
             number = float(value)
         except OverflowError:
@@ -81,7 +85,8 @@ class _Reader:
         return FreeParameter(len(self.numbers) - 1)
 
     def _read_name(self, node: ast.expr, name: str) -> Node:
-        """A signal, pi, or a free parameter (in a template only)."""
+        """Convert a name: pi, a free parameter p0 to p999 (in a template only), or a signal, whose name is not
+        checked."""
         if name == "pi":
             return Variable("pi")
         if parameter_match := re.fullmatch(r"p(\d{1,3})", name):
@@ -93,7 +98,8 @@ class _Reader:
         return Variable(name)
 
     def _read_call(self, node: ast.expr, name: str, arguments: list[ast.expr]) -> Node:
-        """A function of `FUNCTIONS` with its arguments; the second one of an operator with memory must be constant."""
+        """Convert a call of a function of `FUNCTIONS`; the second argument of an operator with memory must be
+        constant."""
         if name not in FUNCTIONS:
             matches = get_close_matches(name[:60], FUNCTIONS, n=1)
             suggestion = f" (did you mean '{matches[0]}'?)" if matches else ""
@@ -109,7 +115,7 @@ class _Reader:
         return Apply(name, argument_trees)
 
     def _describe_position(self, node: ast.expr) -> str:
-        """The text of a node, to 40 characters, and its position from 1, for an error message."""
+        """Describe a node for an error message: its text, to 40 characters, and its position in characters from 1."""
         source = ast.get_source_segment(self.text, node) or self.text
         excerpt = source if len(source) <= 40 else f"{source[:40]}…"
         return f"'{excerpt}' at character {_find_column(self.text, node) + 1}"
@@ -117,8 +123,9 @@ class _Reader:
 
 @lru_cache(maxsize=4096)
 def parse_formula(text: str, template: bool = False) -> tuple[Node, tuple[float, ...]]:
-    """The expression tree of a formula, and the values of its free parameters p0, p1, … in the order of the text.
-    template: the text contains the parameters' names, and all numbers in it are part of the form. Raises LawError."""
+    """Parse a formula; returns its expression tree, and the values of its free parameters p0, p1, … in the order of the
+    text. template: the text contains the parameters' names, all numbers in it are part of the form, and no values are
+    returned. Raises LawError where the text is empty, too long, or outside the language."""
     text = text.strip()
     if not text:
         raise LawError("the law is empty")
@@ -136,7 +143,7 @@ def parse_formula(text: str, template: bool = False) -> tuple[Node, tuple[float,
 
 
 def _describe_syntax_error(text: str, error: BaseException) -> str:
-    """Error message for a text that is no Python expression, with the position where the error has one."""
+    """Describe the error of a text that is no Python expression, with the position in its line (from 1) if known."""
     excerpt = text if len(text) <= 40 else f"{text[:40]}…"
     if isinstance(error, SyntaxError) and error.offset:
         return f"'{excerpt}' cannot be read at character {error.offset}: {error.msg}; {ALLOWED}"
@@ -144,15 +151,15 @@ def _describe_syntax_error(text: str, error: BaseException) -> str:
 
 
 def _find_column(text: str, node: ast.expr) -> int:
-    """Position of a node in the text in characters, from 0; Python's syntax tree counts lines, and bytes of UTF-8 in
-    each line."""
+    """Find the position of a node in the text in characters, from 0; Python's syntax tree counts lines, and bytes of
+    UTF-8 in each line."""
     lines = text.splitlines(keepends=True)
     characters = sum(len(line) for line in lines[: node.lineno - 1])
     return characters + len(lines[node.lineno - 1].encode()[: node.col_offset].decode(errors="replace"))
 
 
 def _list_leaves(tree: Node) -> list[Node]:
-    """Numbers, parameters and signals of an expression tree, from left to right."""
+    """List the numbers, parameters and signals of an expression tree, from left to right."""
     return (
         [leaf for argument in tree.arguments for leaf in _list_leaves(argument)] if isinstance(tree, Apply) else [tree]
     )

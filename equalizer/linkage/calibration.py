@@ -1,5 +1,6 @@
 """Calibration of a linkage: the Jacobian, inertia and gravity that a device reports over a grid of positions, and the
-plausibility checks of these readings. `hapteq calibrate` makes it, `hapteq twin` uses it.
+plausibility checks of these readings. `calibrate_linkage` (`hapteq calibrate`) makes it; `twin_calibration` (`hapteq
+twin`) uses it. Mirror lines are the traces of the arms' planes of symmetry in the plane y-z, see `mirror_lines`.
 
 J is the Jacobian of the forward kinematics: handle velocity = J joint speeds, joint torques = J^T handle force (Spong,
 Hutchinson, Vidyasagar, Robot Modeling and Control, chapter 4). Inertia M(x) is that at the handle (operational space).
@@ -16,31 +17,30 @@ from equalizer.signals.listed_problems import ListedProblemsError
 from equalizer.signals.signal import FloatArray
 
 LARGEST_CONDITION = 50.0
-"""Largest condition number of J. At usable positions of a delta device it is a few units; that of the simulated omega.3
-stays below 2.2."""
+"""Largest accepted condition number of J. Chosen: that of the simulated omega.3 stays below 2.2."""
 LARGEST_ASYMMETRY = 1e-3
-"""Upper limit of the largest entry of |M - M^T| over that of |M|; the asymmetry by rounding errors is smaller."""
+"""Largest accepted ratio of the largest entry of |M - M^T| to that of |M|. Chosen; rounding errors are smaller."""
 PLAUSIBLE_MASSES_KG = (1e-3, 20.0)
-"""Range of plausible effective masses (kg) of the handle of a desktop device, along any direction. Heuristic."""
+"""Range of plausible effective masses (kg) of the handle of a desktop device, along any direction. Chosen."""
 LARGEST_DIFFERENCE = 0.05
-"""Largest relative difference of J from finite differences. A wrong unit or convention gives at least 40 %, a neglected
-arm's length some 10 %."""
+"""Largest accepted relative difference of J from finite differences. Chosen: a wrong unit or convention gives at least
+40 %, a neglected arm's length some 10 %."""
 
 POLYNOMIAL_DEGREES = (4, 3, 2, 1)
 """Degrees of the polynomial of `estimate_local_inertia`, tried from the highest: the first that the positions determine
 is used."""
 POSITIONS_PER_TERM = 2
-"""Least ratio of positions to terms of the polynomial; below it a lower degree is used."""
+"""Least ratio of positions to terms of the polynomial; below it a lower degree is used. Chosen."""
 WEIGHT_SD_RATIO = 0.3
-"""Standard deviation of the Gaussian that multiplies the residuals by their distance from a position, relative to the
-largest distance of a calibrated position from the origin. Without it, far positions change the slope at the centre of
+"""Standard deviation of the Gaussian weight over the distance from the position, relative to the largest distance of a
+calibrated position from the origin. Chosen: without it, far positions change the slope at the centre of
 the simulated omega.3 by 20 %; with it, by 2 %."""
-LISTED_PROBLEMS = 10
+MAX_LISTED_PROBLEMS = 10
 """Largest number of problems at single positions that are listed; further ones are only counted."""
 
 
 class CalibrationError(ListedProblemsError):
-    """Readings that cannot be those of a linkage. `problems`: a sentence for each."""
+    """Readings that are not plausible for a linkage. `problems`: a clause for each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,9 +50,9 @@ class LinkageReading:
     position_m: FloatArray
     """(3,), of the handle: x from the base towards the operator, y to the right, z up."""
     joint_angle_rad: FloatArray
-    """(3,), in the order of the arms"""
+    """(3,), in the order of the arms."""
     jacobian: FloatArray
-    """(3, 3), m/rad"""
+    """(3, 3), m/rad: handle velocity per joint speed."""
     inertia_kg: FloatArray
     """(3, 3), at the handle: force = inertia times acceleration, without gravity and velocity terms."""
     gravity_n: FloatArray
@@ -61,8 +61,8 @@ class LinkageReading:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkageCalibration:
-    """Readings at n positions. Raises CalibrationError for values that cannot be those of a linkage. Arrays without a
-    description are those of `LinkageReading`, stacked."""
+    """Readings at n positions, n >= 1. Raises CalibrationError for shapes that differ, or values that are not
+    plausible. Arrays without a description are those of `LinkageReading`, stacked."""
 
     device: str
     details: str
@@ -95,7 +95,8 @@ class LinkageCalibration:
 
 
 def find_calibration_problems(calibration: LinkageCalibration) -> Iterator[str]:
-    """Find the problems of a calibration, a sentence for each; none for a calibration that can be used."""
+    """Find the problems of a calibration, a clause for each; none for a calibration that can be used. Where shapes
+    differ, nothing else is checked."""
     positions = len(calibration.position_m)
     shapes = {"position_m": (3,), "joint_angle_rad": (3,), "jacobian": (3, 3), "inertia_kg": (3, 3), "gravity_n": (3,)}
     wrong_arrays = [name for name, shape in shapes.items() if getattr(calibration, name).shape != (positions, *shape)]
@@ -109,9 +110,9 @@ def find_calibration_problems(calibration: LinkageCalibration) -> Iterator[str]:
             LinkageReading(*(getattr(calibration, name)[index] for name in shapes)), gravity_known=not is_filled
         )
     ]
-    yield from reading_problems[:LISTED_PROBLEMS]
-    if len(reading_problems) > LISTED_PROBLEMS:
-        yield f"and {len(reading_problems) - LISTED_PROBLEMS} more of this kind at other positions"
+    yield from reading_problems[:MAX_LISTED_PROBLEMS]
+    if len(reading_problems) > MAX_LISTED_PROBLEMS:
+        yield f"and {len(reading_problems) - MAX_LISTED_PROBLEMS} more of this kind at other positions"
     shared_values = calibration.line_deg, calibration.asymmetry, np.atleast_1d(calibration.difference)
     if any(values.shape not in ((3,), (1,)) or not np.isfinite(values).all() for values in shared_values):
         yield "mirror lines, asymmetries or differences are not finite numbers"
@@ -120,8 +121,8 @@ def find_calibration_problems(calibration: LinkageCalibration) -> Iterator[str]:
 
 
 def check_difference(difference: float) -> Iterator[str]:
-    """Check the relative difference of a Jacobian from finite differences of positions; a sentence if it is too
-    large."""
+    """Check the relative difference of a Jacobian from finite differences of positions; yields a clause if it is
+    negative, NaN or above `LARGEST_DIFFERENCE`."""
     if not 0 <= difference <= LARGEST_DIFFERENCE:
         yield (
             f"the Jacobian differs from finite differences of its own positions by {difference:.0%}; "
@@ -130,9 +131,9 @@ def check_difference(difference: float) -> Iterator[str]:
 
 
 def check_reading(reading: LinkageReading, gravity_known: bool = True) -> Iterator[str]:
-    """Check a reading and yield its problems, a sentence for each: values that are not finite, a singular Jacobian, an
+    """Check a reading and yield its problems, a clause for each: values that are not finite, a singular Jacobian, an
     inertia that is not symmetric, not positive definite or not plausible. gravity_known: whether the gravity force must
-    be a number."""
+    be a number; an infinite one is a problem in any case."""
     position_text = "(" + ", ".join(f"{1000 * coordinate:.0f}" for coordinate in reading.position_m) + ") mm"
     jacobian, inertia = reading.jacobian, reading.inertia_kg
     position_and_angles = {"position": reading.position_m, "joint angles": reading.joint_angle_rad}
@@ -160,18 +161,21 @@ def check_reading(reading: LinkageReading, gravity_known: bool = True) -> Iterat
 
 
 def estimate_local_inertia(calibration: LinkageCalibration, position_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Estimate the inertia (3, 3) at position_m (3,), kg, and its derivatives (3, 3, 3), kg/m: entry [a] is that along
-    axis a.
+    """Estimate the inertia (3, 3) at position_m (3,), kg, and its derivatives (3, 3, 3), kg/m: entry [a] is the
+    derivative along axis a.
 
     A polynomial of the position is fitted by weighted least squares, with weights that fall with the distance (local
-    regression; `WEIGHT_SD_RATIO`). Raises ValueError for fewer than eight positions, or for positions in a plane.
+    regression; `WEIGHT_SD_RATIO`). Raises ValueError where the positions do not determine a polynomial of degree 1:
+    fewer than eight, or all in one plane.
     """
     reach_m = float(np.linalg.norm(calibration.position_m, axis=1).max())
     offsets = (calibration.position_m - position_m) / (reach_m or 1.0)
     weights = np.exp(-0.5 * np.sum((offsets / WEIGHT_SD_RATIO) ** 2, axis=1))[:, None]
     for degree in POLYNOMIAL_DEGREES:
         exponents = [powers for powers in itertools.product(range(degree + 1), repeat=3) if sum(powers) <= degree]
-        terms = weights * np.stack([np.prod(offsets ** np.array(triple), axis=1) for triple in exponents], axis=1)
+        terms = weights * np.stack(
+            [np.prod(offsets ** np.array(exponent_triple), axis=1) for exponent_triple in exponents], axis=1
+        )
         if len(offsets) >= POSITIONS_PER_TERM * len(exponents) and np.linalg.matrix_rank(terms) == len(exponents):
             coefficients = np.linalg.lstsq(terms, weights * calibration.inertia_kg.reshape(-1, 9), rcond=None)[0]
             linear_rows = [exponents.index((axis == 0, axis == 1, axis == 2)) for axis in range(3)]

@@ -1,7 +1,8 @@
 """Reads and writes mechanical models as TOML text.
 
 Tables: [model] (name, quantity, matrices as lists of rows), [sensor], [actuator], [[effect]] (kind, axis, parameters),
-[tolerance], [provenance]. The reader collects all problems of format before it raises an error. Called by
+[tolerance], [provenance]. The reader collects all problems of form before it raises an error. Values are in SI units,
+or in those that [provenance] states. Called by
 `study.store.formats.mechanical_model_file`.
 """
 
@@ -32,13 +33,15 @@ from equalizer.signals.unit_system import UnitSystem
 MATRICES = ("mass", "damping", "stiffness", "input", "output")
 """Keys of the matrices in the table [model]."""
 _MODEL_KEYS = ("name", "quantity", *MATRICES, "rotational")
-_TABLES = ("model", "sensor", "actuator", "effect", "tolerance", "provenance", "rotational")
+_TOP_LEVEL_KEYS = ("model", "sensor", "actuator", "effect", "tolerance", "provenance", "rotational")
+"""Tables of the document; `rotational`, a key of [model], is accepted at the top level as well."""
 
 UNITS = "units"
 """Key of the table [provenance] for the units of force, length and time, where the model's values are not in SI
 units."""
 
 Numbers = TypeVar("Numbers", SensorLimits, ActuatorLimits, Tolerance)
+"""A class whose fields are the numbers of one table."""
 
 
 def parse_mechanical_model(text: str) -> MechanicalModel:
@@ -47,14 +50,14 @@ def parse_mechanical_model(text: str) -> MechanicalModel:
         document = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise MechanicalModelError((f"this is not TOML: {error}",)) from error
-    problems: list[str] = _find_unknown_keys(document, _TABLES, "")
+    problems: list[str] = _find_unknown_keys(document, _TOP_LEVEL_KEYS, "")
     model = _read_table(document, "model", problems)
     problems += _find_unknown_keys(model, _MODEL_KEYS, "model.")
     matrices = {name: _read_matrix(model, name, problems) for name in MATRICES}
     texts = {name: _read_text(model, name, problems) for name in ("name", "quantity")}
-    sensor = _read_numbers(document, "sensor", SensorLimits, problems)
-    actuator = _read_numbers(document, "actuator", ActuatorLimits, problems)
-    tolerance = _read_numbers(document, "tolerance", Tolerance, problems) if "tolerance" in document else None
+    sensor = _read_number_table(document, "sensor", SensorLimits, problems)
+    actuator = _read_number_table(document, "actuator", ActuatorLimits, problems)
+    tolerance = _read_number_table(document, "tolerance", Tolerance, problems) if "tolerance" in document else None
     effects = _read_effects(document.get("effect", []), problems)
     rotational = model.get("rotational", document.get("rotational", False))
     if not isinstance(rotational, bool):
@@ -92,7 +95,7 @@ def format_mechanical_model(model: MechanicalModel) -> str:
     lines += _format_section("[actuator]", asdict(model.actuator))
     for effect in model.effects:
         lines += _format_section(
-            "[[effect]]", {"kind": effect.kind, "axis": effect.axis, **_list_law_entries(effect), **effect.parameters}
+            "[[effect]]", {"kind": effect.kind, "axis": effect.axis, **_make_law_entries(effect), **effect.parameters}
         )
     if model.tolerance is not None:
         lines += _format_section("[tolerance]", asdict(model.tolerance))
@@ -112,8 +115,8 @@ def _convert_dates_to_text(value: Any) -> Any:
 
 
 def _read_units(provenance: Mapping[str, Any]) -> UnitSystem | None:
-    """Read the unit system in the provenance, as `format_mechanical_model` writes it; None where it is missing, which
-    means SI units."""
+    """Read the unit system in the provenance, as `format_mechanical_model` writes it; None, which means SI units, where
+    the texts for force or length are missing. The time is in seconds where it is missing."""
     stored_units = provenance.get(UNITS)
     stored_texts = (
         {key: value for key, value in stored_units.items() if isinstance(value, str)}
@@ -128,7 +131,7 @@ def _read_units(provenance: Mapping[str, Any]) -> UnitSystem | None:
 
 
 def _find_unknown_keys(table: Mapping[str, Any], allowed: tuple[str, ...], prefix: str) -> list[str]:
-    """A problem (sentence) for each key that is not allowed. prefix: path of the table, such as `model.`."""
+    """Find the keys that are not allowed, a sentence for each. prefix: path of the table, such as `model.`."""
     return [
         f"unknown key '{prefix}{key}'{suggest_word(key, allowed)}; allowed are {', '.join(allowed)}"
         for key in table
@@ -137,7 +140,7 @@ def _find_unknown_keys(table: Mapping[str, Any], allowed: tuple[str, ...], prefi
 
 
 def _read_table(document: Mapping[str, Any], name: str, problems: list[str]) -> dict[str, Any]:
-    """A table of the document; empty where it is missing (for [model] a problem) or not a table (a problem)."""
+    """Read a table of the document; empty where it is missing (for [model] a problem) or not a table (a problem)."""
     table = document.get(name, {})
     if not isinstance(table, dict):
         problems.append(f"{name} must be a table: [{name}]")
@@ -148,7 +151,7 @@ def _read_table(document: Mapping[str, Any], name: str, problems: list[str]) -> 
 
 
 def _read_text(table: Mapping[str, Any], name: str, problems: list[str]) -> Any:
-    """Text of a required key; a missing, empty or other value adds to `problems`."""
+    """Read a required text of [model]; an empty or other value is returned, with an entry in `problems`."""
     text = table.get(name)
     if not isinstance(text, str) or not text:
         problems.append(
@@ -158,7 +161,7 @@ def _read_text(table: Mapping[str, Any], name: str, problems: list[str]) -> Any:
 
 
 def _read_matrix(table: Mapping[str, Any], name: str, problems: list[str]) -> FloatArray:
-    """Matrix from a list of rows; empty, with an entry in `problems`, where it is not such a list."""
+    """Read a matrix from a list of rows; (0, 0), with an entry in `problems`, where it is not such a list."""
     rows = table.get(name)
     if rows is None:
         problems.append(f"model.{name} is missing")
@@ -173,21 +176,23 @@ def _read_matrix(table: Mapping[str, Any], name: str, problems: list[str]) -> Fl
     return np.empty((0, 0))
 
 
-def _read_numbers(document: Mapping[str, Any], name: str, limits_class: type[Numbers], problems: list[str]) -> Numbers:
-    """A table of numbers as `limits_class`; unknown keys and values that are not numbers add to `problems`."""
+def _read_number_table(
+    document: Mapping[str, Any], name: str, table_class: type[Numbers], problems: list[str]
+) -> Numbers:
+    """Read a table of numbers as `table_class`; other values and unknown keys are left out and added to `problems`."""
     table = _read_table(document, name, problems)
-    allowed = tuple(limit.name for limit in fields(limits_class))
+    allowed = tuple(table_field.name for table_field in fields(table_class))
     problems += _find_unknown_keys(table, allowed, f"{name}.")
     values = {key: value for key, value in table.items() if key in allowed}
     for key, value in values.items():
         if not _is_number(value):
             problems.append(f"{name}.{key} is {_quote_value(value)}; it must be a number")
-    return limits_class(**{key: float(value) for key, value in values.items() if _is_number(value)})
+    return table_class(**{key: float(value) for key, value in values.items() if _is_number(value)})
 
 
 def _read_effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
-    """Effects from the tables [[effect]]; entries other than kind, axis and those of a law must be numbers. Empty where
-    there is any problem."""
+    """Read the effects from the tables [[effect]]; entries other than kind, axis and those of a law must be numbers.
+    Empty where `problems`, also those of earlier tables, is not empty."""
     if not (isinstance(entries, list) and all(isinstance(entry, dict) for entry in entries)):
         problems.append("effects are written as tables: [[effect]]")
         return ()
@@ -195,8 +200,8 @@ def _read_effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
     for effect_number, entry in enumerate(entries, start=1):
         law = _read_law(entry, effect_number, problems) if entry.get("kind") == DISCOVERED_LAW else None
         text_keys = ("kind", "axis") if law is None else ("kind", "axis", *_LAW_KEYS)
-        numbers = {key: value for key, value in entry.items() if key not in text_keys}
-        wrong_entries = [f"{key} = {_quote_value(value)}" for key, value in numbers.items() if not _is_number(value)]
+        parameters = {key: value for key, value in entry.items() if key not in text_keys}
+        wrong_entries = [f"{key} = {_quote_value(value)}" for key, value in parameters.items() if not _is_number(value)]
         if wrong_entries:
             problems.append(f"effect {effect_number} holds {', '.join(wrong_entries)}; parameters are numbers")
         kind = entry.get("kind")
@@ -208,15 +213,16 @@ def _read_effects(entries: Any, problems: list[str]) -> tuple[ModelEffect, ...]:
                 f"effect {effect_number}: axis is {_quote_value(entry['axis'])}; it must be a text, "
                 "or left out for all axes"
             )
-        effects.append(ModelEffect(kind, entry.get("axis") or None, numbers, law))
+        effects.append(ModelEffect(kind, entry.get("axis") or None, parameters, law))
     return () if problems else tuple(_convert_parameters_to_float(effect) for effect in effects)
 
 
 _LAW_KEYS = ("acts_on", "expression")
+"""Keys of a table [[effect]] that only a discovered law has, both texts."""
 
 
 def _read_law(entry: Mapping[str, Any], effect_number: int, problems: list[str]) -> Law | None:
-    """The law of a discovered effect; None, with an entry in `problems`, where a key is missing or the law is wrong."""
+    """Read the law of a discovered effect; None, with an entry in `problems`, where it is incomplete or not valid."""
     missing_keys = [key for key in (*_LAW_KEYS, "axis") if not isinstance(entry.get(key), str)]
     if missing_keys:
         problems.append(f"effect {effect_number}: {DISCOVERED_LAW} lacks {', '.join(missing_keys)} (texts)")
@@ -228,25 +234,25 @@ def _read_law(entry: Mapping[str, Any], effect_number: int, problems: list[str])
         return None
 
 
-def _list_law_entries(effect: ModelEffect) -> dict[str, str]:
-    """Keys and values of a discovered law in a table [[effect]]; empty for an effect of the catalogue."""
+def _make_law_entries(effect: ModelEffect) -> dict[str, str]:
+    """Make the keys and values of a discovered law for a table [[effect]]; none for an effect of the catalogue."""
     return {} if effect.law is None else {"acts_on": effect.law.acts_on, "expression": effect.law.exact_text}
 
 
 def _convert_parameters_to_float(effect: ModelEffect) -> ModelEffect:
     """Return the effect with all parameters as float; TOML integers are read as int."""
-    numbers = {key: float(value) for key, value in effect.parameters.items()}
-    return ModelEffect(effect.kind, effect.axis, numbers, effect.law)
+    parameters = {key: float(value) for key, value in effect.parameters.items()}
+    return ModelEffect(effect.kind, effect.axis, parameters, effect.law)
 
 
 def _is_number(value: Any) -> bool:
-    """Whether a value is a number, with whole numbers below 2^64 in magnitude: Python's parser also reads longer ones,
-    which TOML does not allow and a float may not hold."""
+    """Whether a value is a float (also NaN or infinite) or an integer below 2^64 in magnitude. Python's parser also
+    reads longer integers, which TOML does not require and a float may not represent."""
     return isinstance(value, float) or (isinstance(value, int) and not isinstance(value, bool) and abs(value) < 2**64)
 
 
 def _quote_value(value: Any) -> str:
-    """A value as text for an error message, to 80 characters."""
+    """Quote a value as text for an error message, cut to 80 characters."""
     try:
         text = repr(value)
     except (ValueError, RecursionError):  # Python does not print integers of more than 4300 digits
@@ -255,7 +261,7 @@ def _quote_value(value: Any) -> str:
 
 
 def _format_section(heading: str, table: Mapping[str, Any]) -> list[str]:
-    """Lines of a table, after an empty line; values that are None are left out."""
+    """Format the lines of a table, after an empty line; values that are None are left out."""
     return [
         "",
         heading,
@@ -264,17 +270,17 @@ def _format_section(heading: str, table: Mapping[str, Any]) -> list[str]:
 
 
 def _format_key(key: str) -> str:
-    """A bare TOML key where possible, else a quoted one."""
+    """Format a bare TOML key where possible, else a quoted one."""
     return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _format_text(key)
 
 
 def _format_text(text: str) -> str:
-    """A TOML basic string: control characters, quotes and backslashes escaped."""
+    """Format a TOML basic string: control characters, quotes and backslashes escaped."""
     return '"' + re.sub(r'[\x00-\x1f\x7f"\\]', lambda match: f"\\u{ord(match[0]):04x}", text) + '"'
 
 
 def _format_value(value: Any) -> str:
-    """A value in TOML syntax. Raises TypeError for a type that TOML does not have."""
+    """Format a value in TOML syntax; entries that are None are left out. Raises TypeError for any other type."""
     match value:
         case bool():
             return "true" if value else "false"

@@ -1,7 +1,8 @@
-"""Parses ASCII units and converts them to SI: `N`, `m/s^2`, `N m`, `mm/s`, `deg`, `in`, `g` (standard gravity).
+"""Parse ASCII units and convert them to SI: `N`, `m/s^2`, `N m`, `mm/s`, `deg`, `in`, `g` (standard gravity).
 
 A unit is a product of symbols with exponents; each symbol after a slash divides. Factors are exact by definition: inch,
-pound, standard gravity (9.80665 m/s^2), and angles as multiples of pi. Called by the readers of recordings and maps.
+pound, standard gravity (9.80665 m/s^2), and angles as multiples of pi (BIPM, SI Brochure; NIST SP 811). Called by the
+readers of recordings, models and maps.
 """
 
 import math
@@ -9,16 +10,16 @@ import re
 from dataclasses import dataclass
 
 Dimension = tuple[int, ...]
-"""Exponents of kg, m, s, A, K, rad. The angle is a dimension of its own: otherwise N m and N m/rad would be equal."""
+"""Exponents of kg, m, s, A, K, rad. The angle is a separate dimension: otherwise N m and N m/rad would be equal."""
 
 
 class UnknownUnitError(ValueError):
-    """A unit that cannot be read, or that does not fit its quantity."""
+    """Error for a unit that cannot be parsed, or that does not fit its quantity."""
 
 
 class _NotAUnitError(UnknownUnitError):
-    """A text that is not a unit. Arguments: the text and the reason. The message suggests a similar unit; as that
-    search is slow, it is made only when the message is displayed."""
+    """Error for a text that is not a unit. Arguments: the text, and the reason as a clause in parentheses or "". The
+    message suggests a similar unit; as that search is slow, it is made only when the message is displayed."""
 
     def __str__(self) -> str:
         text, reason = self.args
@@ -35,6 +36,7 @@ class Unit:
     """Conversion of a unit to SI: value in `si` = value in this unit * factor + offset."""
 
     si: str
+    """Name of the SI unit."""
     factor: float
     dimension: Dimension
     offset: float = 0.0
@@ -42,8 +44,8 @@ class Unit:
 
 
 # Decimal prefixes, and the symbols that take them. Other symbols take none: `kg` is a mass, not a multiple of gravity.
-_PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
-_PREFIXABLE: dict[str, Dimension] = {
+_PREFIX_FACTORS = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6}
+_PREFIXABLE_DIMENSIONS: dict[str, Dimension] = {
     "N": (1, 1, -2, 0, 0, 0),
     "m": (0, 1, 0, 0, 0, 0),
     "s": (0, 0, 1, 0, 0, 0),
@@ -58,13 +60,13 @@ _PREFIXABLE: dict[str, Dimension] = {
     "ohm": (1, 2, -3, -2, 0, 0),
     "T": (1, 0, -2, -1, 0, 0),
 }
-_FORCE, _LENGTH = _PREFIXABLE["N"], _PREFIXABLE["m"]
-_TORQUE: Dimension = (1, 2, -2, 0, 0, 0)
-_POUND, _INCH = 0.45359237, 0.0254
+_FORCE_DIMENSION, _LENGTH_DIMENSION = _PREFIXABLE_DIMENSIONS["N"], _PREFIXABLE_DIMENSIONS["m"]
+_TORQUE_DIMENSION: Dimension = (1, 2, -2, 0, 0, 0)
+_POUND_KG, _INCH_M = 0.45359237, 0.0254
 """Kilograms in an avoirdupois pound, metres in an inch (exact by definition)."""
-_POUND_FORCE = _POUND * 9.80665
+_POUND_FORCE_N = _POUND_KG * 9.80665
 """Newtons in a pound-force: a pound at standard gravity, 9.80665 m/s^2 (exact by definition)."""
-_FIXED: dict[str, Unit] = {
+_UNPREFIXED_UNITS: dict[str, Unit] = {
     "1": Unit("1", 1.0, (0, 0, 0, 0, 0, 0)),
     "%": Unit("1", 1e-2, (0, 0, 0, 0, 0, 0)),
     "kg": Unit("kg", 1.0, (1, 0, 0, 0, 0, 0)),
@@ -78,26 +80,26 @@ _FIXED: dict[str, Unit] = {
     "turn": Unit("rad", 2 * math.pi, (0, 0, 0, 0, 0, 1)),
     "rpm": Unit("rad/s", 2 * math.pi / 60, (0, 0, -1, 0, 0, 1)),
     "g": Unit("m/s^2", 9.80665, (0, 1, -2, 0, 0, 0)),
-    "in": Unit("m", _INCH, _LENGTH),
-    "ft": Unit("m", 12 * _INCH, _LENGTH),
-    "lb": Unit("kg", _POUND, (1, 0, 0, 0, 0, 0)),
-    "oz": Unit("kg", _POUND / 16, (1, 0, 0, 0, 0, 0)),
-    "lbf": Unit("N", _POUND_FORCE, _FORCE),
-    "ozf": Unit("N", _POUND_FORCE / 16, _FORCE),
-    "kgf": Unit("N", 9.80665, _FORCE),
-    "gf": Unit("N", 9.80665e-3, _FORCE),
-    "daN": Unit("N", 10.0, _FORCE),
-    "psi": Unit("Pa", _POUND_FORCE / _INCH**2, _PREFIXABLE["Pa"]),
-    "bar": Unit("Pa", 1e5, _PREFIXABLE["Pa"]),
-    "mbar": Unit("Pa", 1e2, _PREFIXABLE["Pa"]),
-    "hPa": Unit("Pa", 1e2, _PREFIXABLE["Pa"]),
-    "degC": Unit("K", 1.0, _PREFIXABLE["K"], 273.15),
-    "degF": Unit("K", 5 / 9, _PREFIXABLE["K"], 459.67 * 5 / 9),
-    "Nm": Unit("N m", 1.0, _TORQUE),
-    "kNm": Unit("N m", 1e3, _TORQUE),
-    "mNm": Unit("N m", 1e-3, _TORQUE),
-    "Ncm": Unit("N m", 1e-2, _TORQUE),
-    "Nmm": Unit("N m", 1e-3, _TORQUE),
+    "in": Unit("m", _INCH_M, _LENGTH_DIMENSION),
+    "ft": Unit("m", 12 * _INCH_M, _LENGTH_DIMENSION),
+    "lb": Unit("kg", _POUND_KG, (1, 0, 0, 0, 0, 0)),
+    "oz": Unit("kg", _POUND_KG / 16, (1, 0, 0, 0, 0, 0)),
+    "lbf": Unit("N", _POUND_FORCE_N, _FORCE_DIMENSION),
+    "ozf": Unit("N", _POUND_FORCE_N / 16, _FORCE_DIMENSION),
+    "kgf": Unit("N", 9.80665, _FORCE_DIMENSION),
+    "gf": Unit("N", 9.80665e-3, _FORCE_DIMENSION),
+    "daN": Unit("N", 10.0, _FORCE_DIMENSION),
+    "psi": Unit("Pa", _POUND_FORCE_N / _INCH_M**2, _PREFIXABLE_DIMENSIONS["Pa"]),
+    "bar": Unit("Pa", 1e5, _PREFIXABLE_DIMENSIONS["Pa"]),
+    "mbar": Unit("Pa", 1e2, _PREFIXABLE_DIMENSIONS["Pa"]),
+    "hPa": Unit("Pa", 1e2, _PREFIXABLE_DIMENSIONS["Pa"]),
+    "degC": Unit("K", 1.0, _PREFIXABLE_DIMENSIONS["K"], 273.15),
+    "degF": Unit("K", 5 / 9, _PREFIXABLE_DIMENSIONS["K"], 459.67 * 5 / 9),
+    "Nm": Unit("N m", 1.0, _TORQUE_DIMENSION),
+    "kNm": Unit("N m", 1e3, _TORQUE_DIMENSION),
+    "mNm": Unit("N m", 1e-3, _TORQUE_DIMENSION),
+    "Ncm": Unit("N m", 1e-2, _TORQUE_DIMENSION),
+    "Nmm": Unit("N m", 1e-3, _TORQUE_DIMENSION),
     "counts": Unit("1", 1.0, (0,) * 6),
     "count": Unit("1", 1.0, (0,) * 6),
 }
@@ -130,23 +132,26 @@ QUANTITY_UNITS: dict[str, tuple[str, ...]] = {
 """SI units that a well-known quantity may have. A quantity that is not listed may have any unit."""
 
 UNSTATED = "1"
-"""Unit of a column for which a file states none; its numbers are not converted."""
+"""SI unit of numbers without a unit or of unknown scale (`counts`); they are not converted."""
 
 LONGEST_UNIT = 100
-"""Largest number of characters of a text for which other spellings are tried."""
+"""Largest number of characters of a text for which other spellings are tried. Chosen by hand."""
 
-_SYMBOLS = frozenset(_FIXED) | {prefix + base for prefix in ("", *_PREFIXES) for base in _PREFIXABLE}
+_SYMBOLS = frozenset(_UNPREFIXED_UNITS) | {
+    prefix + base for prefix in ("", *_PREFIX_FACTORS) for base in _PREFIXABLE_DIMENSIONS
+}
 
 
 def parse_unit(text: str) -> Unit:
-    """Parse a unit: a product such as `N m s/rad`. Raises UnknownUnitError, whose message lists the accepted units."""
+    """Parse a unit: a product such as `N m s/rad`. Raises UnknownUnitError for an empty text and any other that is not
+    a unit; its message lists the accepted units."""
     if not text.strip():
         raise UnknownUnitError(f"the unit is missing; {ALLOWED}")
-    if text.strip() in _FIXED:
-        return _FIXED[text.strip()]
+    if text.strip() in _UNPREFIXED_UNITS:
+        return _UNPREFIXED_UNITS[text.strip()]
     if re.fullmatch(r"ms\^-[12]", text.strip()):  # m/s is meant, but would be read as 1/ms
         raise _NotAUnitError(text, "")
-    symbols: dict[str, int] = {}
+    exponents_by_symbol: dict[str, int] = {}
     factor = 1.0
     dimension: Dimension = (0,) * 6
     for symbol, power in _parse_factors(text):
@@ -157,8 +162,8 @@ def parse_unit(text: str) -> Unit:
             for exponent_sum, added_exponent in zip(dimension, unit.dimension, strict=True)
         )
         for base_symbol, exponent in _parse_factors(unit.si):
-            symbols[base_symbol] = symbols.get(base_symbol, 0) + power * exponent
-    return Unit(_PREFERRED.get(dimension) or _format_symbols(symbols), factor, dimension)
+            exponents_by_symbol[base_symbol] = exponents_by_symbol.get(base_symbol, 0) + power * exponent
+    return Unit(_PREFERRED_SPELLINGS.get(dimension) or _format_symbols(exponents_by_symbol), factor, dimension)
 
 
 def check_quantity(quantity: str, unit: Unit) -> None:
@@ -173,9 +178,9 @@ def check_quantity(quantity: str, unit: Unit) -> None:
 
 
 def suggest_force_unit(quantity: str, unit: Unit) -> str:
-    """Suggest a unit for a force or torque that is stated in units of mass, or in `g`, as a clause after the error;
-    empty for other units."""
-    is_gravity = unit.si == "m/s^2" and unit.factor == _FIXED["g"].factor
+    """Suggest units for a force or torque that is stated in a unit of mass, mass times length, or in `g`, as a clause
+    that follows the error; empty for other units."""
+    is_gravity = unit.si == "m/s^2" and unit.factor == _UNPREFIXED_UNITS["g"].factor
     if quantity == "force" and (is_gravity or unit.si == "kg"):
         return "; grams as a force are written gf" if is_gravity else "; as a force write lbf, ozf or kgf"
     if quantity == "torque" and (is_gravity or unit.si in ("kg", "kg m")):
@@ -185,10 +190,10 @@ def suggest_force_unit(quantity: str, unit: Unit) -> str:
 
 def find_quantity(si: str) -> str:
     """Find the usual quantity of an SI unit, such as "force" for N; the unit itself where there is none."""
-    return _QUANTITY_OF.get(si, si)
+    return _USUAL_QUANTITIES.get(si, si)
 
 
-_QUANTITY_OF = {
+_USUAL_QUANTITIES = {
     "N": "force", "N m": "torque", "m": "position", "rad": "angle", "m/s": "velocity", "rad/s": "velocity",
     "m/s^2": "acceleration", "rad/s^2": "acceleration", "V": "voltage", "A": "current", "s": "time",
     "K": "temperature", "Pa": "pressure",
@@ -196,54 +201,61 @@ _QUANTITY_OF = {
 
 
 def _parse_factors(text: str) -> list[tuple[str, int]]:
-    """Symbols with their exponents; a symbol after a slash has a negative exponent. Raises UnknownUnitError."""
-    numerator, *denominators = text.replace("*", " ").split("/")
-    factors = [_parse_power(factor, 1, text) for factor in numerator.split()]
-    for denominator in denominators:
-        if len(denominator.split()) != 1:
+    """Split a unit into its symbols with their exponents; a symbol after a slash has a negative exponent. Raises
+    UnknownUnitError."""
+    numerator, *denominator_texts = text.replace("*", " ").split("/")
+    factors = [_parse_power(factor_text, 1, text) for factor_text in numerator.split()]
+    for denominator_text in denominator_texts:
+        if len(denominator_text.split()) != 1:
             raise _NotAUnitError(text, " (each slash must be followed by exactly one symbol, as in N m s/rad or m/s/V)")
-        if "-" in denominator:
+        if "-" in denominator_text:
             raise _NotAUnitError(text, " (an exponent after a slash must not be negative, as in m/s^2)")
-        factors.append(_parse_power(denominator.strip(), -1, text))
+        factors.append(_parse_power(denominator_text.strip(), -1, text))
     if not numerator.strip():
         raise _NotAUnitError(text, "")
     return factors
 
 
-def _parse_power(factor: str, sign: int, text: str) -> tuple[str, int]:
-    """Symbol and signed exponent of a factor such as `s^2`. text: the whole unit, for the error. Raises
-    UnknownUnitError."""
-    match = re.fullmatch(r"([A-Za-z%]+|1)(?:\^(-?[1-9]))?", factor)
+def _parse_power(factor_text: str, sign: int, unit_text: str) -> tuple[str, int]:
+    """Parse a factor such as `s^2` into its symbol and its exponent (-9 to 9, not 0) times sign. unit_text: the whole
+    unit, for the error. Raises UnknownUnitError."""
+    match = re.fullmatch(r"([A-Za-z%]+|1)(?:\^(-?[1-9]))?", factor_text)
     if not match:
-        raise _NotAUnitError(text, "")
+        raise _NotAUnitError(unit_text, "")
     return match[1], sign * int(match[2] or 1)
 
 
-def _parse_symbol(symbol: str, text: str) -> Unit:
-    """Unit of a symbol with or without prefix. text: the whole unit, for the error. Raises UnknownUnitError."""
-    if symbol in _FIXED:
-        return _FIXED[symbol]
-    if symbol in _PREFIXABLE:
-        return Unit(symbol, 1.0, _PREFIXABLE[symbol])
+def _parse_symbol(symbol: str, unit_text: str) -> Unit:
+    """Find the unit of a symbol with or without prefix. unit_text: the whole unit, for the error. Raises
+    UnknownUnitError."""
+    if symbol in _UNPREFIXED_UNITS:
+        return _UNPREFIXED_UNITS[symbol]
+    if symbol in _PREFIXABLE_DIMENSIONS:
+        return Unit(symbol, 1.0, _PREFIXABLE_DIMENSIONS[symbol])
     prefix, base = symbol[0], symbol[1:]
-    if prefix in _PREFIXES and base in _PREFIXABLE:
-        return Unit(base, _PREFIXES[prefix], _PREFIXABLE[base])
-    raise _NotAUnitError(text, "")
+    if prefix in _PREFIX_FACTORS and base in _PREFIXABLE_DIMENSIONS:
+        return Unit(base, _PREFIX_FACTORS[prefix], _PREFIXABLE_DIMENSIONS[base])
+    raise _NotAUnitError(unit_text, "")
 
 
-def _format_symbols(symbols: dict[str, int]) -> str:
-    """Text of a product from the exponents of its symbols."""
-    numerator = [_format_power(symbol, power) for symbol, power in symbols.items() if power > 0 and symbol != "1"]
-    denominators = [_format_power(symbol, -power) for symbol, power in symbols.items() if power < 0 and symbol != "1"]
+def _format_symbols(exponents_by_symbol: dict[str, int]) -> str:
+    """Format a product of symbols with exponents, such as `N m/rad`; `1` for none."""
+    numerator = [
+        _format_power(symbol, power) for symbol, power in exponents_by_symbol.items() if power > 0 and symbol != "1"
+    ]
+    denominators = [
+        _format_power(symbol, -power) for symbol, power in exponents_by_symbol.items() if power < 0 and symbol != "1"
+    ]
     return "/".join([" ".join(numerator) or "1", *denominators])
 
 
 def _format_power(symbol: str, power: int) -> str:
+    """Format a symbol with its exponent, above 0; the exponent 1 is omitted."""
     return symbol if power == 1 else f"{symbol}^{power}"
 
 
 def suggest_unit(text: str) -> str:
-    """The accepted unit nearest to an unknown text; empty where none is near."""
+    """Find the accepted unit nearest to a text that is not a unit; empty where none is near."""
     rewritten = normalise_unit(text)
     if rewritten != text:
         return rewritten
@@ -274,7 +286,7 @@ def _is_accepted(text: str) -> bool:
     return True
 
 
-# Preferred spelling of a product in SI units, by dimension: kg m/s^2 is written as N, m/s/s as m/s^2.
-_PREFERRED: dict[Dimension, str] = {}
-for _text in ("N", "N m", "m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2", "V", "A", "s", "kg", "1"):
-    _PREFERRED[parse_unit(_text).dimension] = _text
+# Preferred spelling of a unit by dimension: kg m/s^2 is written as N, m/s/s as m/s^2. Parsing reads it as it is filled.
+_PREFERRED_SPELLINGS: dict[Dimension, str] = {}
+for _unit_text in ("N", "N m", "m", "m/s", "m/s^2", "rad", "rad/s", "rad/s^2", "V", "A", "s", "kg", "1"):
+    _PREFERRED_SPELLINGS[parse_unit(_unit_text).dimension] = _unit_text

@@ -29,7 +29,7 @@ LOWEST_LINE_HZ = 3.0
 """Lowest line (Hz): below it, the acceleration due to forces that are hardly felt is below the sensor's noise."""
 
 LevelN = Annotated[float, Field(gt=0, le=1.5)]
-"""Peak force of a probe, N."""
+"""Peak force of a probe, N; its upper limit is chosen by hand."""
 
 
 @dataclass(frozen=True, config=STRICT)
@@ -106,8 +106,9 @@ class ProbeSettings:
 
 
 def find_probe_contradictions(protocol: StudyProtocol) -> list[Problem]:
-    """Contradictions of the probes with other settings of the protocol: forces above the cap of the trials, a slope
-    above the slew limit, and recordings that are shorter than a period. Called by `study_contradictions`."""
+    """Find contradictions of the probes with other settings of the protocol: forces above the cap of the trials (N), a
+    slope above the slew limit, and kept recordings that are shorter than a period. Empty where no probes are played.
+    Called by `study_contradictions`."""
     probes, cap_n = protocol.probes, protocol.staircase.cap_n
     if not probes.is_enabled:
         return []

@@ -1,4 +1,10 @@
-"""`hapteq identify`: a state-space model of the device from its recordings."""
+"""Command `hapteq identify`: fits a state-space model of the device to its recordings.
+
+The band is that of --band, or ends at the direction limit of a study (--limit-from). `study.workflows.equalizer` fits
+the model, tests it on held-out data and writes it; a summary is printed, and remarks go to standard error. Raises
+StudyError where the output exists or no model can be made from the recordings. Loaded by its name in
+`study.cli.command_table`.
+"""
 
 import json
 from pathlib import Path
@@ -49,23 +55,24 @@ def identify(
     from study.workflows.equalizer.identify_model import IdentifyPlan, check_free, identify_model
     from study.workflows.equalizer.report_identification import report_identification
 
-    chosen_hz = _band(band, limit_from)
-    plan = IdentifyPlan(tuple(recordings), out, chosen_hz, order, smooth, with_spring, physics, longest_decay)
+    chosen_band_hz = _choose_band(band, limit_from)
+    plan = IdentifyPlan(tuple(recordings), out, chosen_band_hz, order, smooth, with_spring, physics, longest_decay)
     check_free(out)
-    with show_bar("Identifying (%)", total=100) as show:
-        device = identify_model(plan, lambda share: show(round(100 * share)))
+    with show_bar("Identifying (%)", total=100) as show_percent:
+        device = identify_model(plan, lambda share: show_percent(round(100 * share)))
     summary_lines = [json.dumps(summarise_model(device), indent=2)] if as_json else [str(out), *format_summary(device)]
     typer.echo("\n".join(summary_lines))
     for remark in device.remarks:
         typer.echo(f"Note: {remark}", err=True)
     if report is not None:
-        with show_bar("Report (%)", total=100) as show:
-            page = report_identification(device, report, lambda share: show(round(100 * share)))
+        with show_bar("Report (%)", total=100) as show_percent:
+            page = report_identification(device, report, lambda share: show_percent(round(100 * share)))
         typer.echo(f"Report: {page}", err=True)
 
 
-def _band(band: tuple[float, float], limit_from: Path | None) -> tuple[float, float]:
-    """The stated band, or with `limit_from` the same band up to the direction limit of that analysis."""
+def _choose_band(band: tuple[float, float], limit_from: Path | None) -> tuple[float, float]:
+    """Choose the band (Hz): the stated one, or with `limit_from` from its lower end to the direction limit of that
+    analysis, whose origin is printed as a note. Raises CannotReadError and UnusableFileError (`read_study_band`)."""
     if limit_from is None:
         return band
     from study.workflows.equalizer.direction_limit import read_study_band

@@ -122,11 +122,11 @@ def _format_session(view: "SessionView", log: bool) -> Iterable[str]:
 
 def _draw_plot(staircase: "Staircase") -> Iterable[str]:
     """Draw the lines of a staircase: title, plot and summary."""
-    from study.tui.drawing.staircase_drawing import draw_staircase, summarize_staircase
+    from study.tui.drawing.staircase_drawing import draw_staircase, summarise_staircase
 
     yield f"\n{staircase.title}"
     yield from draw_staircase(staircase, PLOT_COLUMNS, PLOT_ROWS)
-    yield summarize_staircase(staircase)
+    yield summarise_staircase(staircase)
 
 
 def _format_diagnosis(view: "DiagnosisView") -> Iterable[str]:

@@ -1,4 +1,5 @@
-"""`hapteq study-plan`: who is planned, done and left out, which orders are still needed, and the next code."""
+"""Command `hapteq study-plan`: print planned, finished and left-out participants, the orders of frequencies that are
+still needed, and the next participant code. Registered in the command table of `study.cli`."""
 
 import json
 from collections.abc import Iterator
@@ -35,11 +36,13 @@ def study_plan(
         typer.echo(json.dumps(summarise_plans(studies), indent=2))
         return
     for number, study in enumerate(studies):
-        for line in (*[""] * (number > 0), *_plan_lines(study, read_terminal_width())):
+        for line in (*[""] * (number > 0), *_format_plan(study, read_terminal_width())):
             typer.echo(line)
 
 
-def _plan_lines(study: "PlannedStudy", width: int | None) -> Iterator[str]:
+def _format_plan(study: "PlannedStudy", width: int | None) -> Iterator[str]:
+    """Format a plan as lines: summary, then a table of the orders if they are balanced. width: columns of the terminal;
+    None = not limited."""
     from study.tui.text_rows import align_rows, wrap_hanging
     from study.workflows.views.plan_study import describe_order, format_plan_lines
 
@@ -48,7 +51,7 @@ def _plan_lines(study: "PlannedStudy", width: int | None) -> Iterator[str]:
     if study.plan.cells:
         header = ("order", "frequencies", "wanted", "done", "begun", "needed")
         rows = [
-            (str(place), describe_order(cell), *map(str, (cell.required, cell.done, cell.begun, cell.needed)))
-            for place, cell in enumerate(study.plan.cells, start=1)
+            (str(order_number), describe_order(cell), *map(str, (cell.required, cell.done, cell.begun, cell.needed)))
+            for order_number, cell in enumerate(study.plan.cells, start=1)
         ]
         yield from align_rows((header, *rows), width)

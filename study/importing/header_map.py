@@ -1,7 +1,7 @@
-"""Make a map from the header of a table, or from names of arrays of equal length, that state quantities and units, as
+"""Import map from the header of a table, or from names of arrays of equal length, that state quantities and units, as
 in `time [s], force [N], displacement_mm`.
 
-`find_header_problems` lists what the names leave open; without problems, `make_header_map` makes the map and
+`find_header_problems` lists what the names do not determine; without problems, `make_header_map` makes the map and
 `describe_header_choices` reports the choices. Called by `import_recording` and `map_library`.
 """
 
@@ -45,26 +45,27 @@ _TIME_NAME = re.compile(
 )
 """Name of a time column, with or without a unit."""
 _NUMBER_PATTERN = re.compile(r"\d+")
-"""A number in a prefix: prefixes that differ only by their numbers are runs of one measurement."""
+"""A number in a prefix: prefixes that differ only by numbers denote runs of one measurement."""
 _MAX_LISTED_NAMES = 3
-"""Most names that a message lists."""
+"""Largest number of names that a message lists."""
 
 
 def read_without_map(path: Path) -> Arrays:
-    """Read the arrays of a file that no map describes. Raises CannotReadError, and ImportRefusedError for an invalid
-    field in a column whose name states a role, a quantity or a time, or where every column has one."""
+    """Read the arrays of a file that no map describes. Raises CannotReadError where it cannot be read, and
+    ImportRefusedError for an invalid field in a column whose name states a role, a quantity or a time, or where every
+    column has one."""
     arrays = read_arrays(path, CsvMap())
-    faulty = [name for name, array in arrays.by_name.items() if _find_fault(array)]
-    columns = [parse_signal_name(header) for header in arrays.by_name] if faulty else []
+    faulty_names = [name for name, array in arrays.by_name.items() if _find_invalid_field(array)]
+    columns = [parse_signal_name(header) for header in arrays.by_name] if faulty_names else []
     for column, role in zip(columns, propose_roles(columns), strict=True):
-        is_used = role or column.quantity or _is_time(column) or len(faulty) == len(columns)
-        if is_used and column.header in faulty:
-            raise ImportRefusedError(path.name, _find_fault(arrays.by_name[column.header]), IMPORT_AGAIN)
+        is_used = role or column.quantity or _is_time(column) or len(faulty_names) == len(columns)
+        if is_used and column.header in faulty_names:
+            raise ImportRefusedError(path.name, _find_invalid_field(arrays.by_name[column.header]), IMPORT_AGAIN)
     return arrays
 
 
-def _find_fault(array: Array) -> str:
-    """Problem of a column with an invalid field; empty for all other arrays."""
+def _find_invalid_field(array: Array) -> str:
+    """Find the invalid field of a column, as a clause; empty for a valid column and for any other array."""
     reason = find_unread_reason(array)
     return reason if isinstance(reason, FaultyColumn) else ""
 
@@ -74,9 +75,11 @@ def make_header_map(arrays: Arrays) -> ImportMap | None:
     if find_header_problems(arrays):
         return None
     table, prefixes = _select_table(arrays)
-    times, columns = _split_columns(table)
+    time_columns, columns = _split_time_columns(table)
     clock = (
-        ClockMap(time=times[0].header, time_unit=times[0].unit) if times else ClockMap(rate=_select_rates(arrays)[0])
+        ClockMap(time=time_columns[0].header, time_unit=time_columns[0].unit)
+        if time_columns
+        else ClockMap(rate=_select_rates(arrays)[0])
     )
     roles = swap_imposed_roles(columns, table.by_name, assign_roles(columns) or ())
     channels = tuple(
@@ -95,18 +98,21 @@ def make_header_map(arrays: Arrays) -> ImportMap | None:
 
 
 def describe_header_choices(arrays: Arrays, import_map: ImportMap) -> tuple[str, ...]:
-    """Sentences about what was taken from the header, what was left out, and what the names leave open."""
+    """Describe, in sentences, the channels of a map from `make_header_map`, the omitted arrays, and what the names do
+    not determine. arrays: those that the map was made from."""
     table, _ = _select_table(arrays)
     channels_text = ", ".join(f"{channel.name} as {channel.role}" for channel in import_map.channel)
-    parts = ", ".join(f"'{part.prefix.rstrip('/_')}'" for part in import_map.part)
-    notes = [f"Put one after another, as parts of one recording: {parts}."] if parts else []
+    parts_text = ", ".join(f"'{part.prefix.rstrip('/_')}'" for part in import_map.part)
+    notes = [f"Put one after another, as parts of one recording: {parts_text}."] if parts_text else []
     omissions = [f"Left out: '{name}' {reason}." for name, reason in find_surplus_arrays(table).items()]
     rate_name = find_rates(arrays).get(import_map.clock[0].rate, "")
     notes += [f"The sample rate is taken from '{rate_name}'."] if rate_name else []
     single_values = [
         name
         for name, array in arrays.by_name.items()
-        if not array.ndim and name != rate_name and not _find_fault(array)  # a faulty column has a separate remark
+        if not array.ndim
+        and name != rate_name
+        and not _find_invalid_field(array)  # a faulty column has a separate remark
     ]
     omissions += [f"Left out: '{name}' is no column." for name in single_values]
     peak_channels = [
@@ -119,13 +125,13 @@ def describe_header_choices(arrays: Arrays, import_map: ImportMap) -> tuple[str,
 
 
 def _extract_bracketed_unit(header: str) -> str:
-    """Unit in the brackets of a header, as in the file."""
+    """Extract the unit in square or round brackets from a header; empty without any."""
     return header.partition("[")[2].removesuffix("]") or header.partition("(")[2].removesuffix(")")
 
 
 def _describe_direction(table: Arrays, import_map: ImportMap) -> tuple[str, ...]:
-    """A sentence where names leave open whether the force or the motion was commanded."""
-    _, columns = _split_columns(table)
+    """Describe in a sentence that names do not determine whether force or motion was commanded; empty where they do."""
+    _, columns = _split_time_columns(table)
     roles = {channel.value: channel.role for channel in import_map.channel}
     forces = [roles[column.header] for column in columns if column.quantity in ("force", "torque")]
     more_forces = forces.count("command") > list(roles.values()).count("response")
@@ -135,8 +141,8 @@ def _describe_direction(table: Arrays, import_map: ImportMap) -> tuple[str, ...]
 
 
 def _select_table(arrays: Arrays) -> tuple[Arrays, tuple[str, ...]]:
-    """The columns, without single values. Of several tables of the same form, such as sheets of a workbook: the columns
-    of the first, and the prefixes of all."""
+    """Select the columns, without single values, and no prefixes; of several tables of the same form, such as sheets of
+    a workbook, the columns of the first under names without its prefix, and the prefixes of all."""
     columns = {name: array for name, array in arrays.by_name.items() if array.ndim}
     groups = find_runs(columns, LEAST_SAMPLES)
     member_count = len(groups.prefixes) * len(groups.names)
@@ -148,12 +154,13 @@ def _select_table(arrays: Arrays) -> tuple[Arrays, tuple[str, ...]]:
 
 
 def find_header_problems(arrays: Arrays) -> tuple[str, ...]:
-    """What the names leave open, as clauses that name the column; empty if `make_header_map` makes a map."""
+    """Find what the names do not determine, as clauses that name the column; empty if `make_header_map` can make a
+    map."""
     if not any(array.dtype.kind in "fiub" and array.ndim for array in arrays.by_name.values()):
-        reasons = {name: kind for name, array in arrays.by_name.items() if (kind := find_unread_reason(array))}
-        kinds = ", ".join(f"'{name}' is {kind}" for name, kind in reasons.items())
-        advice = [text for name, kind in reasons.items() if (text := suggest_conversion(name, kind))][:1]
-        return ("; ".join((f"it holds no arrays of numbers{f' ({kinds})' if kinds else ''}", *advice)),)
+        reasons = {name: reason for name, array in arrays.by_name.items() if (reason := find_unread_reason(array))}
+        reasons_text = ", ".join(f"'{name}' is {reason}" for name, reason in reasons.items())
+        advice = [text for name, reason in reasons.items() if (text := suggest_conversion(name, reason))][:1]
+        return ("; ".join((f"it holds no arrays of numbers{f' ({reasons_text})' if reasons_text else ''}", *advice)),)
     table, prefixes = _select_table(arrays)
     if len({_NUMBER_PATTERN.sub("", prefix) for prefix in prefixes}) > 1:
         names = " and ".join(f"'{prefix.rstrip('/_')}'" for prefix in prefixes[:_MAX_LISTED_NAMES])
@@ -168,10 +175,10 @@ def find_header_problems(arrays: Arrays) -> tuple[str, ...]:
         return ("its arrays have several lengths",)
     if next(iter(table.by_name.values())).ndim != 1:
         return ("its arrays are no single columns",)
-    times, columns = _split_columns(table)
+    time_columns, columns = _split_time_columns(table)
     duplicates = [name for name, count in Counter(column.name for column in columns).items() if count > 1]
     return (
-        *_find_time_problems(times, columns, arrays),
+        *_find_time_problems(time_columns, columns, arrays),
         *(f"'{column.header}': {column.doubt}" for column in columns if column.doubt),
         *(
             f"nothing says {question}"
@@ -181,16 +188,17 @@ def find_header_problems(arrays: Arrays) -> tuple[str, ...]:
     )
 
 
-def _split_columns(arrays: Arrays) -> tuple[list[ParsedName], list[ParsedName]]:
-    """Time columns with a unit, and all others. Arrays that `find_surplus_arrays` finds are left out."""
+def _split_time_columns(arrays: Arrays) -> tuple[list[ParsedName], list[ParsedName]]:
+    """Split the columns into time columns (with a unit of time, or marked as a clock by the file) and all others, times
+    without a unit included. Arrays of `find_surplus_arrays` are left out."""
     surplus = find_surplus_arrays(arrays)
     columns = [parse_signal_name(header) for header in arrays.by_name if header not in surplus]
-    times = [
+    time_columns = [
         column
         for column in columns
         if column.header in arrays.clocks or (column.unit and _is_time(column) and column.quantity == "time")
     ]
-    return times, [column for column in columns if column not in times]
+    return time_columns, [column for column in columns if column not in time_columns]
 
 
 def _is_time(column: ParsedName) -> bool:
@@ -206,19 +214,22 @@ def _select_rates(arrays: Arrays) -> list[str]:
     return rates or [rate for rate, name in rate_names.items() if rate != name and units[rate] == "s"]
 
 
-def _find_time_problems(times: Sequence[ParsedName], columns: Sequence[ParsedName], arrays: Arrays) -> Iterator[str]:
-    """A clause where time column, unit of the time, or sample rate are missing or ambiguous."""
+def _find_time_problems(
+    time_columns: Sequence[ParsedName], columns: Sequence[ParsedName], arrays: Arrays
+) -> Iterator[str]:
+    """Find the first problem of the time base, as a clause: time column, its unit, or sample rate missing or
+    ambiguous."""
     rate_names, rates = find_rates(arrays), _select_rates(arrays)
-    unitless = [column.header for column in columns if _is_time(column)]
-    if len(times) > 1:
-        yield f"which of {' and '.join(repr(column.header) for column in times)} is the time is ambiguous"
-    elif unitless:
-        yield f"'{unitless[0]}' does not say in which unit the time is (as in '{unitless[0]} [s]')"
+    unitless_times = [column.header for column in columns if _is_time(column)]
+    if len(time_columns) > 1:
+        yield f"which of {' and '.join(repr(column.header) for column in time_columns)} is the time is ambiguous"
+    elif unitless_times:
+        yield f"'{unitless_times[0]}' does not say in which unit the time is (as in '{unitless_times[0]} [s]')"
     elif len(rates) > 1:
         yield f"which of {' and '.join(map(repr, rates))} is the sample rate is ambiguous"
-    elif not times and not rates and rate_names:
+    elif not time_columns and not rates and rate_names:
         rate, name = next(iter(rate_names.items()))
         unit = "Hz" if rate == name else "s"
         yield f"'{name}' does not say in which unit it is (as in '{name}_{unit}')"
-    elif not times and not rates:
+    elif not time_columns and not rates:
         yield "no column is the time (as in 'time [s]'), and no number is the sample rate (as in 'rate_Hz')"

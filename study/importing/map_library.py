@@ -1,6 +1,7 @@
-"""Find the map for files: by its name or path, in a folder of recordings, or from the headers of the files.
+"""Find the import map for recorded files: by its name or path, in the files' folder, or from the headers of the files.
 
-A map in the folder comes first, then shipped maps (`maps/`) that fit file names and arrays, then `map_by_header`.
+A map in the folder comes first, then shipped maps (`maps/`) that match file names and arrays, then
+`make_map_from_headers`. Called by `study.workflows.recording.import_recording` and `study.evaluation.real`.
 """
 
 import re
@@ -27,16 +28,16 @@ from study.store.disk.text_file import read_toml_text
 from study.store.formats.recording_layout import FORMAT
 
 NO_DATA = (".toml", ".md")
-"""Endings of files in a folder of recordings that hold no data."""
+"""Suffixes of files in a folder of recordings that hold no data."""
 _NUMBER = re.compile(r"\d+")
 """A number in a file name: files whose names differ only by their numbers are parts of one recording."""
-_MAX_SHOWN = 4
-"""Most files that a message names."""
+_MAX_NAMED_FILES = 4
+"""Largest number of files that a message names."""
 
 
 @dataclass(frozen=True, slots=True)
 class MapFile:
-    """A map, its text, and its origin."""
+    """An import map, its name, its text, and its origin."""
 
     name: str
     map: ImportMap
@@ -48,7 +49,7 @@ class MapFile:
 
 @dataclass(frozen=True, slots=True)
 class FoundMap:
-    """A map, and the files of a folder that make one recording by it."""
+    """A map, and the files that it combines into one recording."""
 
     source: MapFile
     files: tuple[Path, ...]
@@ -61,13 +62,14 @@ class FoundMap:
 
 
 def list_shipped_maps() -> tuple[str, ...]:
-    """Names of the maps that come with hapteq, sorted."""
+    """List the names of the maps that come with hapteq, sorted."""
     entries = resources("study.importing").joinpath("maps").iterdir()
     return tuple(sorted(entry.name.removesuffix(".toml") for entry in entries if entry.name.endswith(".toml")))
 
 
 def read_map(name: str) -> MapFile:
-    """A shipped map by its name, or any map by its path. Raises WrongUseError, CannotReadError, UnusableFileError."""
+    """Read a shipped map by its name, or any map by its path. Raises WrongUseError for an unknown name, CannotReadError
+    for a file that cannot be read, UnusableFileError for an invalid map."""
     if name in list_shipped_maps():
         shipped = resources("study.importing").joinpath("maps").joinpath(f"{name}.toml")
         text = shipped.read_text("utf-8")
@@ -84,91 +86,100 @@ def read_map(name: str) -> MapFile:
     return MapFile(path.stem, parse_map(text, path), text, path)
 
 
-def find_map(folder: Path) -> tuple[FoundMap, ...]:
-    """Maps for the recordings in a folder: maps in the folder, otherwise shipped maps that fit file names and arrays.
-    Raises CannotReadError; UnusableFileError for an invalid map."""
+def find_maps_for_folder(folder: Path) -> tuple[FoundMap, ...]:
+    """Find the maps for the recordings in a folder: those in the folder or, without any, shipped maps that match file
+    names and arrays; empty if none matches. Raises CannotReadError; UnusableFileError for an invalid map."""
     paths = sorted(path for path in folder.iterdir() if path.is_file())
-    own_maps = [path for path in paths if path.suffix == ".toml" and _is_map_file(path)]
-    if own_maps:
-        candidates = [read_map(str(path)) for path in own_maps]
-        return tuple(found_map for source in candidates for found_map in _find_recordings(source, paths))
-    shipped = (read_map(name) for name in list_shipped_maps())
-    return tuple(found_map for source in shipped for found_map in _find_recordings(source, paths) if _fits(found_map))
+    map_paths = [path for path in paths if path.suffix == ".toml" and _is_map_file(path)]
+    if map_paths:
+        folder_maps = [read_map(str(path)) for path in map_paths]
+        return tuple(found_map for source in folder_maps for found_map in _match_recordings(source, paths))
+    shipped_maps = (read_map(name) for name in list_shipped_maps())
+    return tuple(
+        found_map
+        for source in shipped_maps
+        for found_map in _match_recordings(source, paths)
+        if _has_required_arrays(found_map)
+    )
 
 
-def map_of_files(paths: Sequence[Path]) -> MapFile | None:
-    """The only shipped map that makes one recording of exactly these files; None if there is none, or several."""
-    sources = [
-        entry.source
+def find_map_for_files(paths: Sequence[Path]) -> MapFile | None:
+    """Find the only shipped map that combines exactly these files into one recording; None without any, or if there are
+    several."""
+    fitting_maps = [
+        found_map.source
         for name in list_shipped_maps()
-        for entry in _find_recordings(read_map(name), paths)
-        if set(entry.files) == set(paths) and _fits(entry)
+        for found_map in _match_recordings(read_map(name), paths)
+        if set(found_map.files) == set(paths) and _has_required_arrays(found_map)
     ]
-    return sources[0] if len(sources) == 1 else None
+    return fitting_maps[0] if len(fitting_maps) == 1 else None
 
 
-def map_by_header(folder: Path) -> FoundMap:
-    """A map from headers, for a folder without a map; the names of its files may differ only by numbers. Raises
-    WrongUseError, MapNeededError, CannotReadError, ImportRefusedError."""
-    data = sorted(
-        (path for path in folder.iterdir() if path.is_file() and path.suffix not in NO_DATA), key=_natural_sort_key
+def make_map_from_headers(folder: Path) -> FoundMap:
+    """Make a map from headers, for a folder without a map. Raises WrongUseError for no files, for hapteq recordings, or
+    for file names that differ by more than numbers; MapNeededError where the header of the first file does not
+    suffice; CannotReadError and ImportRefusedError as `read_without_map`."""
+    data_paths = sorted(
+        (path for path in folder.iterdir() if path.is_file() and path.suffix not in NO_DATA), key=_make_natural_sort_key
     )
     no_map_text = f"No map is for the files of the folder {folder.name}: there is none in it, and no shipped map fits"
-    if not data:
-        raise _ask_which_recording(f"{no_map_text}.", "Give the files.")
-    if any(is_hdf5(path) and read_format(path) == FORMAT for path in data):
-        raise _ask_which_recording(
+    if not data_paths:
+        raise _make_ambiguity_error(f"{no_map_text}.", "Give the files.")
+    if any(is_hdf5(path) and read_format(path) == FORMAT for path in data_paths):
+        raise _make_ambiguity_error(
             f"{no_map_text}; it has hapteq recordings.", "Give these recordings, to hapteq import, look or diagnose."
         )
-    if len({_NUMBER.sub("#", path.name) for path in data}) > 1:
-        names = ", ".join(path.name for path in data[:_MAX_SHOWN])
-        raise _ask_which_recording(
+    if len({_NUMBER.sub("#", path.name) for path in data_paths}) > 1:
+        names = ", ".join(path.name for path in data_paths[:_MAX_NAMED_FILES])
+        raise _make_ambiguity_error(
             f"{no_map_text}; nor are they parts of one recording by their names "
-            f"({names}{', ...' if data[_MAX_SHOWN:] else ''}).",
+            f"({names}{', ...' if data_paths[_MAX_NAMED_FILES:] else ''}).",
             "Give the files that belong together, in their order; or a map with --map.",
         )
-    arrays = read_without_map(data[0])
+    arrays = read_without_map(data_paths[0])
     import_map = make_header_map(arrays)
     if import_map is None:
         raise MapNeededError(
             folder.name, f"{no_map_text}; {'; '.join(find_header_problems(arrays))}", make_map_skeleton(arrays)
         )
-    return FoundMap(MapFile(folder.name, import_map, "", folder), tuple(data))
+    return FoundMap(MapFile(folder.name, import_map, "", folder), tuple(data_paths))
 
 
-def _ask_which_recording(cause: str, remedy: str) -> WrongUseError:
-    """The error that asks which recording is meant."""
+def _make_ambiguity_error(cause: str, remedy: str) -> WrongUseError:
+    """Make the error that asks which recording is meant. cause, remedy: sentences."""
     return WrongUseError("Which recording is meant?", cause, remedy, saved=NOTHING_WRITTEN)
 
 
-def _natural_sort_key(path: Path) -> tuple[tuple[bool, int, str], ...]:
-    """Sort key by which rec_2 precedes rec_10."""
+def _make_natural_sort_key(path: Path) -> tuple[tuple[bool, int, str], ...]:
+    """Make a sort key by which rec_2 precedes rec_10."""
     parts = re.split(r"(\d+)", path.name)
     return tuple((part.isdigit(), int(part) if part.isdigit() else 0, part) for part in parts)
 
 
 def _is_map_file(path: Path) -> bool:
-    """Whether a TOML file declares that it is a map; False for a damaged file."""
+    """Whether a TOML file declares that it is a map; False for a file that cannot be read."""
     try:
         return is_map(tomllib.loads(read_toml_text(path, KIND)))
     except (StudyError, ValueError, RecursionError):
         return False
 
 
-def _find_recordings(source: MapFile, paths: Sequence[Path]) -> Iterator[FoundMap]:
-    """Recordings that a map makes of the files. Without `separate`, every pattern of the map must match a file;
-    otherwise the recording is incomplete and not given."""
-    data = [path for path in paths if path.suffix not in NO_DATA]
-    by_pattern = [[path for path in data if fnmatchcase(path.name, pattern)] for pattern in source.map.files]
-    fitting = tuple(dict.fromkeys(path for matches in by_pattern for path in matches))
+def _match_recordings(source: MapFile, paths: Sequence[Path]) -> Iterator[FoundMap]:
+    """Match the files to the patterns of a map and yield its recordings: with `separate` one per matching file,
+    otherwise one of all matching files, if every pattern matches any."""
+    data_paths = [path for path in paths if path.suffix not in NO_DATA]
+    paths_by_pattern = [
+        [path for path in data_paths if fnmatchcase(path.name, pattern)] for pattern in source.map.files
+    ]
+    matching_paths = tuple(dict.fromkeys(path for matches in paths_by_pattern for path in matches))
     if source.map.separate:
-        yield from (FoundMap(source, (path,)) for path in fitting)
-    elif all(by_pattern):
-        yield FoundMap(source, fitting)
+        yield from (FoundMap(source, (path,)) for path in matching_paths)
+    elif all(paths_by_pattern):
+        yield FoundMap(source, matching_paths)
 
 
-def _fits(found_map: FoundMap) -> bool:
-    """Whether the first part of a recording has all arrays that the map names."""
+def _has_required_arrays(found_map: FoundMap) -> bool:
+    """Whether the first part of a recording has all arrays that the map names; False where it cannot be read."""
     import_map = found_map.source.map
     try:
         part = assign_files(import_map, found_map.files)[0]
@@ -178,12 +189,18 @@ def _fits(found_map: FoundMap) -> bool:
             clock: make_namespace(read_arrays(path, import_map.csv), definitions, part.part.prefix, budget)
             for clock, path in part.by_clock.items()
         }
-        first = import_map.clock[0].name
-        needs = [(channel.clock or first, channel.value) for channel in import_map.channel]
-        needs += [(clock.name, text) for clock in import_map.clock for text in (clock.time, clock.rate) if text]
+        first_clock = import_map.clock[0].name
+        required_expressions = [(channel.clock or first_clock, channel.value) for channel in import_map.channel]
+        required_expressions += [
+            (clock.name, expression)
+            for clock in import_map.clock
+            for expression in (clock.time, clock.rate)
+            if expression
+        ]
         return all(
-            text in namespaces[clock].arrays or all(namespaces[clock].has_name(name) for name in find_names(text))
-            for clock, text in needs
+            expression in namespaces[clock].arrays
+            or all(namespaces[clock].has_name(name) for name in find_names(expression))
+            for clock, expression in required_expressions
         )
     except (ImportProblemError, StudyError):
         return False

@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from analysis.psychophysics.bias import estimate_response_bias
 from analysis.psychophysics.catch_trials import compute_wilson_interval
 from analysis.psychophysics.criterion_drift import estimate_criterion_drifts
-from analysis.psychophysics.study_warnings import DRIFT_LEVEL, LEFT_OUT_LEVEL, STRONG_BIAS
+from analysis.psychophysics.study_warnings import DRIFT_LEVEL, LEAVE_ONE_OUT_LEVEL, STRONG_BIAS
 from protocols.trial import Trial
 from study.participants.observer_catalogue import find_observer
 from study.participants.population import make_member
@@ -64,7 +64,7 @@ def answers_by_run(trials: list[Trial]) -> list[Run]:
 def named(sessions: list[list[Run]]) -> list[bool]:
     """Whether the report on a study of these sessions names each."""
     return [
-        drift is not None and drift.p < DRIFT_LEVEL and drift.p_without_a_run < LEFT_OUT_LEVEL
+        drift is not None and drift.p < DRIFT_LEVEL and drift.p_without_a_run < LEAVE_ONE_OUT_LEVEL
         for drift in estimate_criterion_drifts(sessions)
     ]
 

@@ -11,7 +11,7 @@ from study.cli.main import app
 from study.errors import StudyError
 from study.importing.arrays.read_arrays import read_arrays
 from study.importing.map_format.import_map import CsvMap
-from study.importing.map_library import find_map, read_map
+from study.importing.map_library import find_maps_for_folder, read_map
 from study.regular_file import RefusedFileError, open_regular, read_regular
 from study.store.disk.file_errors import CannotReadError
 from study.store.disk.provenance import compute_sha256
@@ -165,7 +165,7 @@ def test_a_lock_that_cannot_be_read_is_not_taken_for_none(tmp_path):
 def test_a_map_beside_data_that_is_no_file_is_passed_over(tmp_path):
     no_file(tmp_path / "map.toml", "pipe")
     no_file(tmp_path / "data.npz", "device")
-    assert find_map(tmp_path) == ()
+    assert find_maps_for_folder(tmp_path) == ()
 
 
 def test_the_size_is_looked_at_before_anything_is_read(tmp_path):

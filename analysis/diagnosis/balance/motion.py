@@ -4,8 +4,8 @@ Derivatives are computed in the frequency domain: each spectral line is multipli
 filtered. The upper end of the band is the highest frequency up to which white noise makes at most a hundredth of the
 acceleration's mean square, because regression on a noisier acceleration would underestimate the mass by more (errors in
 variables; Soderstrom, Automatica 43:939, 2007). Measured accelerations are integrated above a lower end of the band
-only, below which noise would dominate the position (`band.py` computes both ends). `balances`, `regression` and the
-first models use the motions.
+only, below which noise would dominate the position (`band.py` computes both ends). `compute_motions` is called by
+`balances`, by `contrast`, `confirm` and `first_model`.
 """
 
 from collections.abc import Iterable, Sequence
@@ -44,7 +44,7 @@ class Condition:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Motion and force in one part of a recording, in SI units; all arrays at the recording's rate. Position, velocity
+    """Motion and force in one part of a recording, n samples at the recording's rate, in SI units. Position, velocity
     and acceleration, (n, d) each, are band-limited; force and conditions are not."""
 
     rate_hz: float
@@ -55,7 +55,7 @@ class Motion:
     """Decimation factor after filtering: every `step`-th sample is kept."""
     channels: tuple[str, ...]
     order: int
-    """Order of the position's time derivative that was measured: 0, 1 or 2."""
+    """Order of the position's time derivative that was measured: 0, 1 or 2; 0 without a time axis."""
     position: FloatArray
     """(n, d): as measured, or integrated: a velocity by summation from the first sample on, an acceleration in the
     frequency domain."""
@@ -75,18 +75,19 @@ class Motion:
     """Recorded conditions, for the columns of `condition`."""
 
     def decimate(self, columns: FloatArray) -> FloatArray:
-        """Filter columns (n, k) to the band and decimate them by `step`: (kept samples, k)."""
+        """Filter columns (n, k) to the band and decimate them by `step`: (kept samples, k). Unchanged without a time
+        axis."""
         if not np.isfinite(self.band_hz):
             return columns
         return self.filter_to_band(columns)[:: self.step]
 
     def filter_to_band(self, columns: FloatArray) -> FloatArray:
-        """Filter columns (n, k) to the band, at the recording's rate."""
+        """Filter columns (n, k) to the band, at the recording's rate. Needs a finite `band_hz`."""
         return filter_band_pass(columns, self.rate_hz, self.band_hz, self.lowest_hz)
 
     def mask_valid_samples(self, mask: Mask) -> Mask:
-        """Mask (kept samples,) of the samples in a mask (n,) that are more than a filter length from the part's
-        ends."""
+        """Mask (kept samples,) of the samples in a mask (n,), without `MOTION_EDGE_PERIODS` periods of the band's upper
+        end, but at least one sample, at either end of the part."""
         edge_samples = int(MOTION_EDGE_PERIODS * self.rate_hz / self.band_hz) + 1
         interior = np.zeros(len(mask), dtype=np.bool_)
         interior[edge_samples : len(mask) - edge_samples] = True
@@ -94,8 +95,9 @@ class Motion:
 
 
 def find_motion_signal(recording: Recording) -> Signal | None:
-    """Find the channels of the lowest time derivative of the position (0, 1 or 2) that was measured and varies; None
-    without any."""
+    """Find the channels to compute the motion from: in the position and in the response, the varying ones of the lowest
+    measured order of the position's time derivative (0, 1 or 2); of the two, those of the lower order, or the
+    position's. None without any."""
     signals: list[tuple[int, Signal]] = []
     for signal in (recording.position, recording.response):
         if signal is None:
@@ -113,14 +115,14 @@ def find_motion_signal(recording: Recording) -> Signal | None:
 
 def _is_varying(samples: FloatArray) -> bool:
     """Whether the finite samples are not all equal."""
-    finite = samples[np.isfinite(samples)]
-    return bool(len(finite)) and float(np.ptp(finite)) > 0
+    finite_samples = samples[np.isfinite(samples)]
+    return bool(len(finite_samples)) and float(np.ptp(finite_samples)) > 0
 
 
 def compute_motions(records: Sequence[Observed], band_hz: float | None = None) -> tuple[Motion, ...]:
     """Compute the motion of each record, with derivatives and forces. records: with the same channels, units and rate.
-    band_hz: upper end of the band; None = the highest that the noise allows. Raises NoMotionError where there are no
-    records, or a record contains no motion."""
+    band_hz: upper end of the band (Hz); None = the highest that the noise allows. Raises NoMotionError where there are
+    no records, or a record contains no motion."""
     signals = [find_motion_signal(record.recording) for record in records]
     if not signals or any(signal is None for signal in signals):
         raise NoMotionError("no response is a position, velocity or acceleration")
@@ -144,7 +146,8 @@ def compute_motions(records: Sequence[Observed], band_hz: float | None = None) -
 
 def compute_motion_band_hz(motions: Sequence[Motion], columns: Iterable[int]) -> float:
     """Compute the frequency in Hz below which `MOVING_BAND_SHARE` of a channel's mean square velocity lies, the highest
-    over the channels; infinite without a time axis. columns: indices of the channels."""
+    over the channels; infinite without a time axis. motions: at least one; columns: indices of the channels, at least
+    one."""
     if not np.isfinite(motions[0].band_hz):
         return np.inf
     channel_ends_hz = []
@@ -198,7 +201,7 @@ def _compute_motion(
 def filter_band_pass(columns: FloatArray, rate_hz: float, band_hz: float, lowest_hz: float) -> FloatArray:
     """Filter columns (n, k) to the band from `lowest_hz` to `band_hz` without a phase shift; a low pass where
     `lowest_hz` is 0."""
-    return filter_spectrum(columns, rate_hz, lambda f: _compute_band_gain(f, band_hz, lowest_hz))
+    return filter_spectrum(columns, rate_hz, lambda frequency_hz: _compute_band_gain(frequency_hz, band_hz, lowest_hz))
 
 
 def _compute_band_gain(frequency_hz: FloatArray, band_hz: float, lowest_hz: float) -> FloatArray:
@@ -225,7 +228,7 @@ def _differentiate_in_band(
     end in Hz. advance_s: time in s by which the result is advanced. Integrals of an acceleration are high-pass filtered
     at the lower end of the band; the acceleration itself is not, like the force."""
     band_hz, lowest_hz = band
-    line, slope = _fit_end_line(samples, rate_hz)
+    end_line, slope = _fit_end_line(samples, rate_hz)
 
     def compute_gain(frequency_hz: FloatArray) -> FloatArray:
         i_omega = 2j * np.pi * np.maximum(frequency_hz, 1e-12)
@@ -238,15 +241,16 @@ def _differentiate_in_band(
         return np.asarray(np.cumsum(smoothed, axis=0) / rate_hz)
     if order < 0:
         return filter_spectrum(samples, rate_hz, compute_gain, subtract_line=False)
-    derivative = filter_spectrum(samples - line, rate_hz, compute_gain, subtract_line=False)
+    derivative = filter_spectrum(samples - end_line, rate_hz, compute_gain, subtract_line=False)
     if order == 0:
-        return derivative + line + slope * advance_s
+        return derivative + end_line + slope * advance_s
     return derivative + slope if order == 1 else derivative
 
 
 def filter_low_pass(samples: FloatArray, rate_hz: float, band_hz: float) -> FloatArray:
-    """Low-pass filter samples (n, k) to `band_hz` in the frequency domain; the line between their ends is kept."""
-    return filter_spectrum(samples, rate_hz, lambda f: compute_low_pass_gain(f, band_hz))
+    """Low-pass filter samples (n, k) to `band_hz` in the frequency domain; the straight line between their ends is
+    kept."""
+    return filter_spectrum(samples, rate_hz, lambda frequency_hz: compute_low_pass_gain(frequency_hz, band_hz))
 
 
 def differentiate(samples: FloatArray, rate_hz: float, band_hz: float, order: int) -> FloatArray:
@@ -254,27 +258,31 @@ def differentiate(samples: FloatArray, rate_hz: float, band_hz: float, order: in
     return _differentiate_in_band(samples, rate_hz, (band_hz, 0.0), order, 0.0)
 
 
-def filter_spectrum(samples: FloatArray, rate_hz: float, gain: object, subtract_line: bool = True) -> FloatArray:
-    """Filter samples (n, k) in the frequency domain. gain: function of the frequencies in Hz (lines,) that returns
-    the frequency response (lines,). Samples are continued beyond both ends by an odd extension. subtract_line: whether
-    the line between the end points is subtracted before and added after filtering."""
-    line = _fit_end_line(samples, rate_hz)[0] if subtract_line else np.zeros_like(samples)
-    extended = extend_as_odd(samples - line)
+def filter_spectrum(
+    samples: FloatArray, rate_hz: float, compute_gain: object, subtract_line: bool = True
+) -> FloatArray:
+    """Filter samples (n, k) in the frequency domain. compute_gain: function of the frequencies in Hz (lines,) that
+    returns the frequency response (lines,). Samples are continued beyond both ends by an odd extension. subtract_line:
+    whether the line between the end points is subtracted before and added after filtering."""
+    end_line = _fit_end_line(samples, rate_hz)[0] if subtract_line else np.zeros_like(samples)
+    extended = extend_as_odd(samples - end_line)
     spectrum = rfft(extended, axis=0)
     frequency_hz = rfftfreq(len(extended), 1 / rate_hz)
-    return np.asarray(irfft(gain(frequency_hz)[:, None] * spectrum, len(extended), axis=0)[: len(samples)] + line)  # type: ignore[operator]
+    return np.asarray(
+        irfft(compute_gain(frequency_hz)[:, None] * spectrum, len(extended), axis=0)[: len(samples)] + end_line
+    )  # type: ignore[operator]
 
 
 def _fit_end_line(samples: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray]:
     """Compute the straight line from the first to the last sample, (n, k), and its slope per second, (k,)."""
     fraction = np.linspace(0.0, 1.0, len(samples))[:, None]
-    line = (1 - fraction) * samples[0] + fraction * samples[-1]
-    return np.asarray(line), np.asarray((samples[-1] - samples[0]) / max(len(samples) - 1, 1) * rate_hz)
+    end_line = (1 - fraction) * samples[0] + fraction * samples[-1]
+    return np.asarray(end_line), np.asarray((samples[-1] - samples[0]) / max(len(samples) - 1, 1) * rate_hz)
 
 
 def _standardise_conditions(records: Sequence[Observed]) -> tuple[tuple[Condition, ...], list[FloatArray]]:
-    """Standardise the conditions that change to mean 0 and standard deviation 1 over all records. Returns them and
-    their samples (n, q) per record; none where the records differ in their conditions."""
+    """Standardise the conditions that vary to mean 0 and standard deviation 1 over all records. Returns them and their
+    samples (n, q) per record; q is 0 where the records differ in their conditions or have none."""
     signals = [getattr(record.recording, "condition", None) for record in records]
     if len({None if signal is None else signal.channels for signal in signals}) > 1 or signals[0] is None:
         return (), [np.zeros((len(record.command), 0)) for record in records]

@@ -5,8 +5,8 @@ is fitted and tested without another pass over the samples.
 
 The base is mass, damping and stiffness along every measured motion, linear dynamics of a higher order where there are
 any (`BaseTerms`), and a constant. Errors are sums of squares of the force within the band. In cross-validation, the
-error of a block is that of weights fitted to all other blocks (Stone, J. R. Stat. Soc. B 36:111, 1974). Used by
-`structures` and `judge_laws`.
+error of a block is that of weights fitted to all other blocks (Stone, J. R. Stat. Soc. B 36:111, 1974). Called by
+`structures`, `judge_laws`, and the fits of a first model (`first_model`).
 """
 
 from collections.abc import Sequence
@@ -35,7 +35,7 @@ from analysis.diagnosis.types import Mask
 from equalizer.signals.signal import FloatArray
 
 RIDGE_PARAMETERS = tuple(10.0**exponent for exponent in range(-8, 1))
-"""Ridge parameters relative to the mean power of a column; cross-validation chooses among them."""
+"""Ridge parameters relative to the mean power of a column; cross-validation selects one. Range chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,13 +52,13 @@ class Regression:
     """Number of columns of the base, which come first: mass, damping, stiffness, further linear laws, and a
     constant."""
     matrices: int
-    """Number of mass, damping and stiffness columns, or of those of a given model."""
+    """Number of mass, damping and stiffness columns, or of columns of a given model."""
     positive: tuple[int, ...]
-    """Columns whose weights must not be negative: mass and damping of the driven motion. The active-set method makes
-    one step fewer than there are entries, so that the mass is listed twice; the single entry of a given model means no
+    """Columns whose weights must not be negative: mass and damping of the driven motion. `_solve_nonnegative` makes one
+    step fewer than there are entries, so that the mass is listed twice; the single entry of a given model means no
     step, because its prior fixes that weight."""
     places: tuple[slice, ...]
-    """Range of columns of each law."""
+    """Range of columns of each law, by its index in `laws`."""
     scale: FloatArray
     """(k,): rms of each column, by which the columns are divided in the products."""
     columns: tuple[FloatArray, ...]
@@ -108,17 +108,17 @@ class Regression:
         gram, cross = products = with_prior(products, self.prior)
         weights = solve_normal_equations(products, RIDGE)
         nonnegative = list(self.positive)
-        bound: Mask = np.zeros_like(weights, dtype=np.bool_)
+        is_fixed: Mask = np.zeros_like(weights, dtype=np.bool_)
         for _ in range(len(nonnegative) - 1):
             is_negative = weights[..., nonnegative] < 0
             if not is_negative.any():
                 break
-            bound[..., nonnegative] |= is_negative
-            for fixed in np.unique(bound.reshape(-1, bound.shape[-1]), axis=0):
-                if fixed.any():
-                    rows = (bound == fixed).all(axis=-1)
-                    weights[rows] = solve_without_columns(gram[rows], cross[rows], fixed)
-        return np.where(bound, 0.0, weights)
+            is_fixed[..., nonnegative] |= is_negative
+            for fixed_columns in np.unique(is_fixed.reshape(-1, is_fixed.shape[-1]), axis=0):
+                if fixed_columns.any():
+                    rows = (is_fixed == fixed_columns).all(axis=-1)
+                    weights[rows] = solve_without_columns(gram[rows], cross[rows], fixed_columns)
+        return np.where(is_fixed, 0.0, weights)
 
     def compute_residuals(self, columns: Sequence[int]) -> tuple[FloatArray, ...]:
         """Compute, per motion, (kept samples,): the residual force f - X w, with weights fitted to all fit blocks."""
@@ -142,30 +142,30 @@ def build_regression(
     stiffness. Laws whose columns vanish or are not finite are left out."""
     channel_count = len(motions[0].channels)
     base_terms = base_terms or BaseTerms(min(axis, channel_count - 1))
-    targets = [motion.decimate(motion.force[:, [axis]])[:, 0] for motion in motions]
+    forces = [motion.decimate(motion.force[:, [axis]])[:, 0] for motion in motions]
     linear = [_make_linear_columns(motion, turns, base_terms.laws) for motion in motions] if bases is None else bases
-    parts = [[_make_base_columns(motion, columns) for motion, columns in zip(motions, linear, strict=True)]]
-    kept_laws, places, next_column = [], [], parts[0][0].shape[1]
-    base_width = next_column
+    column_parts = [[_make_base_columns(motion, columns) for motion, columns in zip(motions, linear, strict=True)]]
+    kept_laws, places, next_column = [], [], column_parts[0][0].shape[1]
+    base_count = next_column
     for law in laws:
         columns = _make_law_columns(motions, law)
         if columns is not None:
-            parts.append(columns)
+            column_parts.append(columns)
             kept_laws.append(law)
             places.append(slice(next_column, next_column + columns[0].shape[1]))
             next_column = places[-1].stop
-    rows = tuple(np.hstack([part[k] for part in parts]) for k in range(len(motions)))
+    rows = tuple(np.hstack([part[motion_index] for part in column_parts]) for motion_index in range(len(motions)))
     fit = [motion.mask_valid_samples(motion.fit) for motion in motions]
     scale = compute_scale(rows, fit)
     test = [motion.mask_valid_samples(motion.test) for motion in motions]
-    mean = float(np.concatenate([target[mask] for target, mask in zip(targets, fit, strict=True)]).mean())
+    mean = float(np.concatenate([target[mask] for target, mask in zip(forces, fit, strict=True)]).mean())
     driven = base_terms.driven_channel
     return Regression(
-        tuple(motions), axis, tuple(kept_laws), base_terms, base_width,
-        (2 if turns else 3) * channel_count if bases is None else base_width - 1,
+        tuple(motions), axis, tuple(kept_laws), base_terms, base_count,
+        (2 if turns else 3) * channel_count if bases is None else base_count - 1,
         (driven, channel_count + driven, driven) if bases is None else (0,), tuple(places),
-        scale, rows, tuple(targets),
-        build_blocks(rows, targets, fit, (scale, mean)), build_blocks(rows, targets, test, (scale, mean)),
+        scale, rows, tuple(forces),
+        build_blocks(rows, forces, fit, (scale, mean)), build_blocks(rows, forces, test, (scale, mean)),
     )  # fmt: skip
 
 
@@ -239,15 +239,15 @@ def append_laws(regression: Regression, laws: Sequence[Law]) -> Regression:
     test = [motion.mask_valid_samples(motion.test) for motion in regression.motions]
     scale = np.concatenate([regression.scale, compute_scale([part[:, ends[0] :] for part in extended], fit)])
     mean = np.concatenate([target[mask] for target, mask in zip(regression.force, fit, strict=True)]).mean()
-    units = scale, float(mean)
+    normalisation = scale, float(mean)
     return replace(
         regression,
         laws=(*regression.laws, *added_laws),
         places=(*regression.places, *(slice(start, end) for start, end in pairwise(ends))),
         scale=scale,
         columns=extended,
-        fit=build_blocks(extended, regression.force, fit, units),
-        test=build_blocks(extended, regression.force, test, units),
+        fit=build_blocks(extended, regression.force, fit, normalisation),
+        test=build_blocks(extended, regression.force, test, normalisation),
     )
 
 
@@ -274,11 +274,11 @@ def _select_columns(block: Block, columns: Sequence[int]) -> Block:
 
 def _update_products(regression: Regression, block: Block, column_range: slice) -> Block:
     """Recompute the products of a block's columns in `column_range`."""
-    x = regression.columns[block.motion][block.rows] / regression.scale
+    scaled_columns = regression.columns[block.motion][block.rows] / regression.scale
     gram, cross = block.gram.copy(), block.cross.copy()
-    gram[:, column_range] = x.T @ x[:, column_range]
+    gram[:, column_range] = scaled_columns.T @ scaled_columns[:, column_range]
     gram[column_range, :] = gram[:, column_range].T
-    cross[column_range] = x[:, column_range].T @ regression.force[block.motion][block.rows]
+    cross[column_range] = scaled_columns[:, column_range].T @ regression.force[block.motion][block.rows]
     return replace(block, gram=gram, cross=cross)
 
 
@@ -288,13 +288,13 @@ def fit_all_laws(regression: Regression, columns: Sequence[int]) -> tuple[float,
     base. The result estimates the least error that a sum of a few laws can reach."""
     is_base = np.array([k < regression.base for k in columns])
     products = stack_products(regression.fit, columns)
-    total = products[0].sum(axis=0), products[1].sum(axis=0)
-    training = with_prior((total[0] - products[0], total[1] - products[1]), regression.prior)
-    total = with_prior(total, regression.prior)
+    total_products = products[0].sum(axis=0), products[1].sum(axis=0)
+    training = with_prior((total_products[0] - products[0], total_products[1] - products[1]), regression.prior)
+    total_products = with_prior(total_products, regression.prior)
     errors = [
         float(compute_squared_errors(regression.fit, products, solve_ridge(training, ridge, is_base)).sum())
         for ridge in RIDGE_PARAMETERS
     ]
     best = int(np.argmin(errors))
-    weights = solve_ridge(total, RIDGE_PARAMETERS[best], is_base)
+    weights = solve_ridge(total_products, RIDGE_PARAMETERS[best], is_base)
     return errors[best], compute_squared_errors(regression.test, stack_products(regression.test, columns), weights)

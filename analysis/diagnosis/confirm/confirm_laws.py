@@ -1,8 +1,9 @@
-"""Confirmation, by simulation (output-error fits), of the laws that a force balance named.
+"""Confirm, by output-error fits (simulation), the laws that a force balance named.
 
-Theory of operation. Used where the model itself was fitted to the recordings. Without a calibration the size of the
-model's errors is unknown, so that a residual in units of noise is no evidence, but the gain on held-out data is. The
-balance compares forces, where a wrong law may explain the model's own errors; a simulation compares responses.
+Theory of operation. Called by `diagnose` and `decide_with_model` where the model itself was fitted to the recordings.
+Without a calibration the size of the model's errors is unknown, so that a residual in units of noise is no evidence,
+but the gain on held-out data is. The balance compares forces, where a wrong law may explain the model's own errors; a
+simulation compares responses.
 
 1. The named laws are added to the re-tuned model one after the other and fitted by output error, starting from the
    balance's parameters, or from the model's own where these fail (`_fit_from_starts`).
@@ -67,12 +68,12 @@ class _ConfirmationStart:
     balances: tuple[Balance, ...]
     repeats: bool
     """Whether the noise is known from repeats."""
-    constants: int
+    constant_count: int
     """Number of constant forces, which come before the laws."""
     as_given: FittedCandidate
     """The model with constants only, as it was given."""
     retuned: FittedCandidate
-    """The same with its parameters fitted again."""
+    """`as_given` with the model's parameters fitted again."""
     confirmed: FittedCandidate
     """`retuned`, scored on the held-out samples."""
     baseline: FittedCandidate
@@ -80,8 +81,9 @@ class _ConfirmationStart:
 
 
 def search_by_balance(context: SearchContext, balances: Sequence[Balance], repeats: bool) -> SearchResult | None:
-    """The named laws of the balances as a search result. repeats: whether the noise is known from repeats; otherwise
-    nothing counts as explained. None where nothing is named, or simulations do not confirm it."""
+    """Convert the named laws of the balances (one per axis) to a search result. repeats: whether the noise is known
+    from repeats; otherwise the verdict is not `explained`. None where no law is named that can be simulated, or
+    simulations confirm none."""
     named_laws = [
         (axis, law)
         for axis, balance in enumerate(balances)
@@ -91,9 +93,9 @@ def search_by_balance(context: SearchContext, balances: Sequence[Balance], repea
     if not named_laws:
         return None
     full_context = context.fit_to_all()
-    constants = estimate_constant_forces(balances)
+    forces = estimate_constant_forces(balances)
     given_fit = evaluate_fit(
-        full_context.measure, full_context.tuning, np.zeros(len(full_context.tuning.names)), constants
+        full_context.measure, full_context.tuning, np.zeros(len(full_context.tuning.names)), forces
     )
     as_given, retuned = (
         full_context.with_test_score(full_context.score_fit(given_fit)),
@@ -102,7 +104,7 @@ def search_by_balance(context: SearchContext, balances: Sequence[Balance], repea
     confirmed = full_context.with_test_score(retuned)
     baseline = Explanation(as_given, confirmed, confirmed, (), ()).plain
     start = _ConfirmationStart(
-        context, full_context, tuple(balances), repeats, len(constants.claims), as_given, retuned, confirmed, baseline
+        context, full_context, tuple(balances), repeats, len(forces.claims), as_given, retuned, confirmed, baseline
     )
     confirmed_laws = _confirm_by_simulation(start, named_laws)
     return None if confirmed_laws is None else _prefer_special_case(start, *confirmed_laws)
@@ -111,7 +113,8 @@ def search_by_balance(context: SearchContext, balances: Sequence[Balance], repea
 def _confirm_by_simulation(
     start: _ConfirmationStart, named_laws: Sequence[tuple[int, JudgedLaw]]
 ) -> tuple[SearchResult, _NamedLaws] | None:
-    """The result with those of the laws that simulations confirm, and these laws; None where there are none."""
+    """Fit the laws, dropping undetermined ones, until all are confirmed; returns the result and these laws, None where
+    there are none."""
     context, named_laws = start.context, refit_laws(start.balances, named_laws)
     while named_laws:
         steps, with_laws = _fit_from_starts(context, start.balances, (start.retuned, start.baseline), named_laws)
@@ -122,7 +125,9 @@ def _confirm_by_simulation(
         errors: FloatArray | None = None
         if _lowers_held_out_error(start.baseline, with_laws) and explains_half(context.full_measure, with_laws):
             errors = compute_final_errors(context, explanation)
-            undetermined = _find_undetermined_law(explanation, errors[len(context.tuning.names) :], start.constants)
+            undetermined = _find_undetermined_law(
+                explanation, errors[len(context.tuning.names) :], start.constant_count
+            )
         if undetermined is None:
             test_error = float(np.nanmax(with_laws.score.test, initial=0.0))
             is_complete = start.repeats and as_good_as_noise(explanation) and test_error <= HELD_OUT_ERROR
@@ -138,9 +143,10 @@ def _confirm_by_simulation(
 
 
 def _prefer_special_case(start: _ConfirmationStart, result: SearchResult, named_laws: _NamedLaws) -> SearchResult:
-    """The result with a law replaced by its special case where its further parameters are undetermined (such as a
-    stiffness before sliding) and the error hardly rises; else unchanged."""
-    for index in find_open_refinements(result, start.constants):
+    """Replace a law by its special case where its further parameters are undetermined (such as a stiffness before
+    sliding), no law is lost, and the held-out error rises by at most the factor 1 / CONFIRMED_LEAVES; else
+    unchanged."""
+    for index in find_open_refinements(result, start.constant_count):
         special_case = find_special_case(start.balances, _remove_law(named_laws, index), named_laws[index])
         alternative = (
             None
@@ -155,7 +161,7 @@ def _prefer_special_case(start: _ConfirmationStart, result: SearchResult, named_
 
 
 def _remove_law(named_laws: _NamedLaws, index: int, replacement: tuple[int, JudgedLaw] | None = None) -> _NamedLaws:
-    """The named laws without that at `index`, or with `replacement` in its place."""
+    """Remove the named law at `index`, or put `replacement` in its place."""
     return [*named_laws[:index], *([] if replacement is None else [replacement]), *named_laws[index + 1 :]]
 
 
@@ -165,9 +171,9 @@ def _fit_from_starts(
     reference_fits: tuple[FittedCandidate, FittedCandidate],
     named_laws: Sequence[tuple[int, JudgedLaw]],
 ) -> tuple[list[FittedCandidate], FittedCandidate]:
-    """The fits after each law, and the last of them scored on the held-out samples too. They start from the linear
-    parameters of the balance, or, where that fit is not confirmed, from those of the model if these do better.
-    reference_fits: the re-tuned model, and the better model without laws on held-out samples."""
+    """Fit the laws one after the other; returns the fit after each law, and the last of them scored on the held-out
+    samples too. They start from the linear parameters of the balance, or, where that fit is not confirmed, from those
+    of the model if these do better. reference_fits: the re-tuned model, and `_ConfirmationStart.baseline`."""
     retuned, baseline = reference_fits
     balance_deviations = compute_starting_deviations(context.tuning, balances, [law.law_index for _, law in named_laws])
     steps = _fit_steps(context, retuned, named_laws, balance_deviations)
@@ -186,8 +192,8 @@ def _fit_steps(
     named_laws: Sequence[tuple[int, JudgedLaw]],
     deviations: FloatArray,
 ) -> list[FittedCandidate]:
-    """The fits with the constants and the laws, added one after the other; for each constant, the re-tuned model.
-    deviations: where the model's parameters start, in standard deviations."""
+    """Fit with the laws added one after the other; for each constant force before them, the re-tuned model is returned.
+    deviations: starting values of the model's parameters, in standard deviations from the given ones."""
     hypothesis = retuned.fitted.hypothesis
     steps = [retuned for _ in hypothesis.claims]
     recording = context.measure.records[0].recording
@@ -200,17 +206,18 @@ def _fit_steps(
     return steps
 
 
-def _find_undetermined_law(explanation: Explanation, errors: FloatArray, constants: int) -> int | None:
-    """Index of a named law that may be absent; None if there is none. A law may be absent if the intervals of all
-    parameters that can make it vanish contain the vanishing value, or those of all signed parameters that a special
-    case of it lacks. Where the law only refines another of its family, or is outside the catalogue, one parameter is
-    enough. errors: standard errors of the parameters; constants: number of constant forces before the laws."""
+def _find_undetermined_law(explanation: Explanation, errors: FloatArray, constant_count: int) -> int | None:
+    """Find the index of the first named law that may be absent; None if there is none. A law may be absent if the
+    intervals of all parameters that can make it vanish contain the vanishing value, or those of all signed parameters
+    that a special case of it lacks. Where the law only refines another of its family, or is outside the catalogue, one
+    parameter is enough. errors: standard errors of the laws' parameters; constant_count: constant forces before the
+    laws."""
     first_parameter, hypothesis = 0, explanation.steps[-1].fitted.hypothesis
     law_families = [find_family(claim.effect.name) for claim in hypothesis.claims]
     for index, claim in enumerate(hypothesis.claims):
         free_parameters = [parameter for parameter in claim.effect.parameters if not parameter.fixed]
         any_suffices = (
-            index > constants and law_families[index] in law_families[constants:index]
+            index > constant_count and law_families[index] in law_families[constant_count:index]
         ) or claim.effect.law is not None
         undetermined: list[bool] = []
         zero_by_name: dict[str, bool] = {}
@@ -224,12 +231,12 @@ def _find_undetermined_law(explanation: Explanation, errors: FloatArray, constan
                 undetermined.append(INTERVAL_HALF_WIDTH * errors[parameter_index] >= vanishing_distance)
             if claim.effect.simpler and parameter.scale == "signed":
                 zero_by_name[parameter.name] = INTERVAL_HALF_WIDTH * errors[parameter_index] >= vanishing_distance
-        if index >= constants and (
+        if index >= constant_count and (
             any(undetermined)
             if any_suffices
             else _has_only_true(undetermined) or _may_be_special_case(claim.effect, zero_by_name)
         ):
-            return index - constants
+            return index - constant_count
         first_parameter += len(free_parameters)
     return None
 
@@ -254,9 +261,9 @@ def has_open_parameter(result: SearchResult) -> bool:
     return bool(_find_open_parameters(result))
 
 
-def find_open_refinements(result: SearchResult, constants: int) -> tuple[int, ...]:
-    """Indices of the named laws with a parameter whose interval reaches zero and which their special case lacks.
-    constants: number of constant forces before the laws."""
+def find_open_refinements(result: SearchResult, constant_count: int) -> tuple[int, ...]:
+    """Find the indices of the named laws with a parameter whose interval reaches zero and which their special cases
+    lack. constant_count: number of constant forces before the laws."""
     hypothesis = result.found.steps[-1].fitted.hypothesis
     indices, first_parameter, open_parameters = [], 0, set(_find_open_parameters(result))
     for index, claim in enumerate(hypothesis.claims):
@@ -267,14 +274,14 @@ def find_open_refinements(result: SearchResult, constants: int) -> tuple[int, ..
             for position, parameter in enumerate(free_parameters)
             if parameter.name not in special_case_names
         ]
-        if special_case_names and index >= constants and open_parameters & set(extra_parameters):
-            indices.append(index - constants)
+        if special_case_names and index >= constant_count and open_parameters & set(extra_parameters):
+            indices.append(index - constant_count)
         first_parameter += len(free_parameters)
     return tuple(indices)
 
 
 def _find_open_parameters(result: SearchResult) -> list[int]:
-    """Indices of the positive parameters, over all claims in their order, whose intervals reach zero."""
+    """Find the indices of the positive parameters, over all claims in their order, whose intervals reach zero."""
     assert result.errors is not None
     fitted_parameters = result.found.steps[-1].fitted.hypothesis.parameters
     errors = result.errors[len(result.context.tuning.names) :]
@@ -286,7 +293,8 @@ def _find_open_parameters(result: SearchResult) -> list[int]:
 
 
 def _lowers_held_out_error(baseline: FittedCandidate, with_laws: FittedCandidate) -> bool:
-    """Whether the laws reduce the held-out error to `CONFIRMED_LEAVES` or less; True where nothing was held out."""
+    """Whether the laws reduce the held-out error to `CONFIRMED_LEAVES` times the baseline's or less; True where nothing
+    was held out. `held_out_error` is the log rms error of the module docstring."""
     return not np.isfinite(baseline.held_out_error) or with_laws.held_out_error <= baseline.held_out_error + np.log(
         CONFIRMED_LEAVES
     )

@@ -1,7 +1,7 @@
-"""Convert laws that a force balance named to hypotheses of a simulation, with starting parameters.
+"""Convert laws named by a force balance to hypotheses for output-error fits, with starting parameters.
 
 A law of the catalogue becomes the effect of the same name with the fitted parameters; a law outside the catalogue
-becomes a formula in the language of `equalizer.laws`. `confirm_laws` fits these hypotheses by output error.
+becomes a formula in the language of `equalizer.laws`. Called by `confirm_laws`, which fits these hypotheses.
 """
 
 import re
@@ -36,7 +36,8 @@ v becomes vx and f becomes fx."""
 
 def can_be_simulated(own_channel: int, judged_law: JudgedLaw) -> bool:
     """Whether a simulation can use the law: it has a formula, or is an effect of the catalogue that depends on the
-    motion of its own axis and has all parameters within their bounds. own_channel: channel of that motion."""
+    motion along its force and has values of all parameters within their bounds (included). own_channel: index of the
+    channel of that motion."""
     if judged_law.formula is not None:
         return True
     effect = EFFECTS.get(judged_law.law.effect)
@@ -49,7 +50,8 @@ def can_be_simulated(own_channel: int, judged_law: JudgedLaw) -> bool:
 
 
 def refit_laws(balances: Sequence[Balance], named_laws: Sequence[tuple[int, JudgedLaw]]) -> list[tuple[int, JudgedLaw]]:
-    """Fit the parameters of the laws again, with only these laws in each axis's balance. named_laws: axis and law."""
+    """Fit the parameters of the laws again, with only these laws in each axis's balance. named_laws: axis index and
+    law. Laws without a column in the regression, or without valid fitted values, stay unchanged."""
     refitted = []
     for axis, law in named_laws:
         if not law.has_column:
@@ -65,7 +67,7 @@ def refit_laws(balances: Sequence[Balance], named_laws: Sequence[tuple[int, Judg
 
 
 def _with_values(judged_law: JudgedLaw, values: dict[str, float]) -> JudgedLaw:
-    """The law with these parameters, also in its formula where there is a formula."""
+    """Replace the parameters of a law, also in its formula where it has one."""
     formula = judged_law.formula if judged_law.law.formula is None else judged_law.law.formula(values)
     return replace(judged_law, values=values, formula=formula)
 
@@ -74,8 +76,8 @@ def find_special_case(
     balances: Sequence[Balance], named_laws: Sequence[tuple[int, JudgedLaw]], refining_law: tuple[int, JudgedLaw]
 ) -> tuple[int, JudgedLaw] | None:
     """Find a special case of a law on the same axis, such as Coulomb friction of Stribeck friction; it has the
-    parameters of the refining law until `refit_laws`. None where the balance does not contain it, or it is named
-    already."""
+    parameters of the given law until `refit_laws`. None where the balance contains no special case, or only such as are
+    named already. named_laws: the other named laws; refining_law: axis index and law."""
     axis, judged_law = refining_law
     refining_effect = EFFECTS.get(judged_law.law.effect)
     named_effects = {law.law.effect for law_axis, law in named_laws if law_axis == axis}
@@ -88,43 +90,49 @@ def find_special_case(
 
 def estimate_constant_forces(balances: Sequence[Balance]) -> Hypothesis:
     """Estimate the constant forces along the axes, N (N m): a weight, or the offset of an amplifier or sensor. Axes
-    with a given model are left out."""
+    whose balance has a given model, or whose constant is 0, are left out."""
     hypothesis = NO_EFFECTS
     for axis, balance in enumerate(balances):
         regression = balance.search.regression
         if regression.prior is not None:
             continue
-        force = -float(regression.fit_weights(regression.select_columns(()))[-1])
-        if force:
+        constant_force = -float(regression.fit_weights(regression.select_columns(()))[-1])
+        if constant_force:
             claim = Claim(EFFECTS[CONSTANT], "one", (axis,))
-            hypothesis = combine_hypotheses(hypothesis, make_claim_hypothesis(claim, [{"force": force}]))
+            hypothesis = combine_hypotheses(hypothesis, make_claim_hypothesis(claim, [{"force": constant_force}]))
     return hypothesis
 
 
 def make_hypothesis(axis: int, judged_law: JudgedLaw, recording: Recording) -> Hypothesis:
-    """Convert a named law of the balance to a hypothesis to simulate. recording: has the channels that a formula refers
-    to."""
+    """Convert a named law of the balance of an axis (index) to a hypothesis. recording: one with the channels that a
+    formula refers to."""
     if judged_law.formula is not None:
-        # Imported here: few diagnoses have such a law.
+        # Imported here to save start-up time: few diagnoses have such a law.
         from analysis.diagnosis.errors.law_hypothesis import hypothesis_of_law
         from equalizer.effects.discovered_law import derive_axis_letters
         from equalizer.laws.law import Law
 
-        name, formula = derive_axis_letters(recording.command.channels)[axis], judged_law.formula
-        text = _AXIS_SIGNALS.sub(lambda signal: f"{_SIGNAL_PREFIX[signal[0]]}{name}", formula.text)
-        return hypothesis_of_law(Law(text, formula.numbers, (), formula.acts_on, name), axis, recording)
+        axis_letter, formula = derive_axis_letters(recording.command.channels)[axis], judged_law.formula
+        law_text = _AXIS_SIGNALS.sub(lambda symbol: f"{_SIGNAL_PREFIX[symbol[0]]}{axis_letter}", formula.text)
+        return hypothesis_of_law(Law(law_text, formula.numbers, (), formula.acts_on, axis_letter), axis, recording)
     parameters = EFFECTS_BY_NAME[judged_law.law.effect].parameters
     return make_claim_hypothesis(
         Claim(EFFECTS[judged_law.law.effect], "one", (axis,)),
-        [{p.name: judged_law.values[p.name] for p in parameters if p.name in judged_law.values}],
+        [
+            {
+                parameter.name: judged_law.values[parameter.name]
+                for parameter in parameters
+                if parameter.name in judged_law.values
+            }
+        ],
     )
 
 
 def compute_starting_deviations(tuning: Tuning, balances: Sequence[Balance], laws: Sequence[int]) -> FloatArray:
     """Compute the starting deviations of mass, damping and stiffness, in standard deviations: from the model's values
     to those that the balance fits together with the laws. Zeros unless there is a single balance, without a given
-    model, and the model has one coordinate. A mass is at least a tenth of the model's; deviations are clipped to the
-    bound of 4."""
+    model, and the model has one coordinate. A mass is at least a tenth of the model's (chosen); deviations are
+    clipped to 3.9, just within `RETUNING_BOUND` = 4. laws: indices of the named laws in the regression."""
     deviations = np.zeros(len(tuning.names))
     if any(balance.search.regression.prior is not None for balance in balances):
         return deviations

@@ -123,7 +123,7 @@ def _contains(candidate: JudgedFault, best: JudgedFault) -> bool:
 def _choose_simplest(accepted: Sequence[JudgedFault], comparison: Comparison) -> JudgedFault:
     """Choose the fault with the smallest error, or the first special case of it that these data cannot distinguish from
     it."""
-    best = min(accepted, key=lambda judged_fault: float(judged_fault.errors.sum()))
+    best = min(accepted, key=lambda judged_fault: float(judged_fault.block_squares.sum()))
     for candidate in accepted:
         if _contains(best, candidate) and _is_inseparable(best, candidate, comparison):
             return candidate
@@ -158,7 +158,7 @@ def _compute_distance_from_no_fault(fault: JudgedFault, name: str) -> float:
 def _is_inseparable(best: JudgedFault, rival: JudgedFault, comparison: Comparison) -> bool:
     """Whether the error of `rival` exceeds that of the best by at most `_find_least_gap`, or not significantly
     (bootstrap over blocks)."""
-    excess_errors = rival.errors - best.errors
+    excess_errors = rival.block_squares - best.block_squares
     draws = draw_bootstrap_blocks(len(excess_errors))
     return bool(
         excess_errors.sum() <= _find_least_gap(best, comparison)
@@ -169,7 +169,7 @@ def _is_inseparable(best: JudgedFault, rival: JudgedFault, comparison: Compariso
 def _is_significantly_better(refinement: JudgedFault, best: JudgedFault) -> bool:
     """Whether a fault that contains the best as a special case has a significantly smaller error (bootstrap over
     blocks)."""
-    error_reduction = best.errors - refinement.errors
+    error_reduction = best.block_squares - refinement.block_squares
     return bool(
         np.quantile(error_reduction[draw_bootstrap_blocks(len(error_reduction))].sum(axis=1), BOOTSTRAP_LEVEL) > 0
     )
@@ -177,23 +177,24 @@ def _is_significantly_better(refinement: JudgedFault, best: JudgedFault) -> bool
 
 def _sum_gap(rival: JudgedFault, best: JudgedFault) -> float:
     """Sum the squared errors with `rival` undone, less those with the best undone."""
-    return float((rival.errors - best.errors).sum())
+    return float((rival.block_squares - best.block_squares).sum())
 
 
 def _find_least_gap(best: JudgedFault, comparison: Comparison) -> float:
     """Find the difference between the error sums of a rival and the best above which they are distinguished: the
     smaller of `FAULT_RIVAL_BEHIND` of the reduction by the best and `FAULT_RIVAL_WORSE` of its remaining error."""
-    remaining_error = float(best.errors.sum())
+    remaining_error = float(best.block_squares.sum())
     return min(
-        FAULT_RIVAL_BEHIND * (float(comparison.errors.sum()) - remaining_error), FAULT_RIVAL_WORSE * remaining_error
+        FAULT_RIVAL_BEHIND * (float(comparison.block_squares.sum()) - remaining_error),
+        FAULT_RIVAL_WORSE * remaining_error,
     )
 
 
 def _estimate_probability_of_best(best: JudgedFault, rivals: Sequence[JudgedFault]) -> float:
     """Estimate the probability that the best is the cause: share of bootstrap draws over blocks in which no rival has a
     smaller error. 1 without rivals."""
-    draws = draw_bootstrap_blocks(len(best.errors))
+    draws = draw_bootstrap_blocks(len(best.block_squares))
     is_best = np.ones(BOOTSTRAP_DRAWS, dtype=np.bool_)
     for rival in rivals:
-        is_best &= (rival.errors - best.errors)[draws].sum(axis=1) >= 0
+        is_best &= (rival.block_squares - best.block_squares)[draws].sum(axis=1) >= 0
     return float(is_best.mean())

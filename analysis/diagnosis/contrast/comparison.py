@@ -1,4 +1,4 @@
-"""Result of a comparison of a faulty with a clean set of recordings: gain of each possible fault, and excess error.
+"""Result of comparing recordings of a faulty and of the intact device: excess error, and gain of each possible fault.
 
 A base is a linear model of the device (`bases`) that predicts a signal from others. With E the sum of squared whitened
 errors of one base fitted to both sets, and E0 that of a separate base for each set, the excess is E / E0 - 1. It is
@@ -25,13 +25,14 @@ class JudgedFault:
     spread: dict[str, float]
     """Standard error of each parameter: jackknife that leaves out a sixth of either set, so that the variation within
     the clean set counts as well as that within the faulty set."""
-    errors: FloatArray
+    block_squares: FloatArray
     """(blocks,): sums of squared errors of one base for both sets with the fault undone, blocks of the faulty set, then
     of the clean one; times 1 + the median gain in the negative control."""
     gain: float
-    """Sum of squared errors with no fault undone, over the sum of `errors`, less 1."""
+    """Sum of `Comparison.block_squares` (no fault undone) over the sum of `block_squares`, minus 1; above 0 = undoing
+    it helps."""
     control_gain: float
-    """The largest gain in the negative control, less the median: the gain that the free parameters of the fault yield
+    """The largest gain in the negative control minus the median: the gain that the free parameters of the fault yield
     where there is no fault."""
     share: float
     """Share of the excess error (`Comparison.excess`) that is removed with the fault undone."""
@@ -50,13 +51,13 @@ class Comparison:
 
     faults: tuple[JudgedFault, ...]
     """The best fault first."""
-    errors: FloatArray
+    block_squares: FloatArray
     """(blocks,): sums of squared errors of one base for both sets, with no fault undone; blocks as in
-    `JudgedFault.errors`."""
-    samples: int
+    `JudgedFault.block_squares`."""
+    sample_count: int
     """Number of samples of both sets. It is also E0, because the errors of separate bases are scaled to white noise
     with rms 1."""
-    faulty_samples: int
+    faulty_sample_count: int
     """Number of samples of the faulty set."""
     held_out_squares: float
     """Cross-validated sum of squared errors of the faulty set, with no fault undone."""
@@ -77,7 +78,7 @@ class Comparison:
     def excess(self) -> float:
         """E / E0 - 1: sum of squared errors of one base for both sets over that of separate bases, less 1; 0 = the sets
         do not differ."""
-        return float(self.errors.sum()) / self.samples - 1
+        return float(self.block_squares.sum()) / self.sample_count - 1
 
     @property
     def sets_differ(self) -> bool:

@@ -128,7 +128,7 @@ def _judge_faults(compared_bases: Sequence[ComparedBase], fault_fits: FaultFits)
             _judge_fault(compared_bases, fitted_variant, baseline_fit, sample_count)
             for fitted_variant in fault_fits.variants
         ),
-        key=lambda judged_fault: float(judged_fault.errors.sum()),
+        key=lambda judged_fault: float(judged_fault.block_squares.sum()),
     )
     folds = zip(SIXTHS, _leave_out_sixths(unchanged_pairs), strict=True)
     held_out_squares = sum(compute_held_out_error(fold_pairs, np.zeros(0), left_out) for left_out, fold_pairs in folds)
@@ -139,9 +139,9 @@ def _judge_faults(compared_bases: Sequence[ComparedBase], fault_fits: FaultFits)
     first_base = compared_bases[0]
     return Comparison(
         faults=tuple(judged_faults),
-        errors=baseline_fit.errors,
-        samples=sample_count,
-        faulty_samples=faulty_sample_count,
+        block_squares=baseline_fit.errors,
+        sample_count=sample_count,
+        faulty_sample_count=faulty_sample_count,
         held_out_squares=held_out_squares,
         faulty_share=min(compute_unexplained_share(first_base.base, first_base.faulty.parts), 1.0),
         control_excess=max(control_excesses),
@@ -230,7 +230,7 @@ def _judge_fault(
         spread=_estimate_standard_errors(
             variant, [fold.sizes for fold in fold_fits], _fit_without_clean_sixths(pairs, variant)
         ),
-        errors=errors,
+        block_squares=errors,
         gain=baseline_fit.error / max(corrected_error, 1e-300) - 1,
         control_gain=max([0.0, *control_gains]) - median_control_gain,
         share=(baseline_fit.error - corrected_error) / excess if excess > 0 else 0.0,

@@ -2,7 +2,8 @@
 
 For plants without a restoring force, whose free simulation would drift. The estimated state is not exact, so that the
 residuals of each window are projected on the complement of its free motions from other initial states (least squares):
-only the error that no initial state explains counts. Chosen by `choose_measure`.
+only the error that no initial state explains counts (Bock and Plitt, IFAC World Congress 1984: multiple shooting).
+`choose_measure` builds the measure where it is the suitable one.
 """
 
 from collections.abc import Sequence
@@ -28,19 +29,21 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
 
 _LEAST_SINGULAR_SHARE = 1e-9
-"""Least singular value of the free motions, over the largest, for which a direction of the state is fitted."""
+"""Singular value of the free motions, over the largest, above which a direction of the state is fitted; the rest are
+rounding errors. Chosen."""
 READINGS_PER_STATE = 10.0
-"""Least readings of a window per fitted state: the fit then absorbs a tenth of the power of random errors at most."""
+"""Least readings of a channel in a window, per fitted state and channel: the fit then absorbs at most a tenth of the
+power of random errors."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Windows:
-    """Output error over windows, each from a fitted initial state (multiple shooting): for plants that integrate
-    freely, and for recordings that do not begin at rest."""
+    """`ErrorMeasure` by windows, each simulated from a fitted initial state (multiple shooting): for plants without a
+    restoring force, and for recordings that do not begin at rest. Sizes: n samples or coordinates, c channels."""
 
     records: tuple[Observed, ...]
     states: tuple[FloatArray, ...]
-    """Per record (windows, 2 coordinates): initial state of each window, positions before velocities."""
+    """Per record (windows, 2 n), n coordinates: initial state of each window, positions before velocities."""
     unit: FloatArray
     """(c,): unit of a residual, in each channel's own unit."""
     noise: FloatArray
@@ -50,7 +53,7 @@ class Windows:
     model_effects: tuple[PlacedEffect, ...] = ()
     """Effects named in the model's own file, which are part of every simulation."""
     least: float = 0.0
-    """Least error in units of the noise: smaller errors are set to it; 1 with a floor."""
+    """Lower limit of an error in units of the noise; 0, or 1 after `with_floor`."""
 
     @property
     def name(self) -> str:
@@ -66,7 +69,8 @@ class Windows:
         return replace(self, unit=np.hypot(self.unit, rms), noise=np.hypot(self.noise, rms), least=1.0)
 
     def shorten(self) -> "Windows":
-        """The measure without the samples after the last to fit or to choose by, and without records that have none."""
+        """The measure without the samples after the last one to fit or to choose by; records without such samples are
+        left out."""
         used_records = [
             (record.shorten(), states)
             for record, states in zip(self.records, self.states, strict=True)
@@ -83,8 +87,8 @@ class Windows:
         return True
 
     def residuals(self, model: MechanicalModel, effects: Sequence[PlacedEffect]) -> tuple[FloatArray, ...]:
-        """Per record (n, c): residuals after the fit of each window's initial state, in units of `unit`; NaN where a
-        sample is missing."""
+        """Per record (n, c): measured minus simulated, in units of `unit`, after the fit of each window's initial
+        state; NaN where a sample is missing, and then without that fit in the whole record (`_remove_state_errors`)."""
         all_effects = (*self.model_effects, *effects)
         return tuple(
             self._simulate_from_states(model, all_effects, *record_and_states)[1]
@@ -94,8 +98,8 @@ class Windows:
     def evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], residuals: tuple[FloatArray, ...]
     ) -> tuple[Evidence, ...]:
-        """Per record, the motion and missing force from which starting values are estimated. residuals: not used,
-        because the simulation gives them again."""
+        """Per record, the motion and missing force from which starting values are estimated. residuals: not used; they
+        are computed again with the simulation."""
         return tuple(
             self._gather_evidence(model, (*self.model_effects, *effects), record, states)
             for record, states in zip(self.records, self.states, strict=True)
@@ -104,7 +108,8 @@ class Windows:
     def _simulate_from_states(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, states: FloatArray
     ) -> tuple[SimulationResult, FloatArray]:
-        """The simulation of all windows, and its residuals (n, c) after the fit of the initial states."""
+        """Simulate all windows from their initial states (windows, 2 n). Returns the simulation, and its residuals (n,
+        c) after the fit of the initial states."""
         recording, p = record.recording, model.outputs
         model = add_carried_weight(model, recording)
         position = record.measured[:, p:] if record.measured.shape[1] == 2 * p else None
@@ -128,9 +133,9 @@ class Windows:
         self, structure: MechanicalModel, residual: FloatArray, sample_rate_hz: float, window_samples: int
     ) -> FloatArray:
         """(n, c): residuals without their projection on the free motions from other initial states, window by
-        window; unchanged where a simulation or a free motion diverges."""
+        window. Unchanged in all windows where any value is missing, or where a simulation or free motion diverges."""
         n, c = residual.shape
-        # A fit may try an unstable model, whose free motion overflows: its residuals are returned as they are.
+        # A fit may try an unstable model, whose free motion overflows: its residuals are returned unchanged.
         with np.errstate(over="ignore", invalid="ignore"):
             free_motion = (
                 _compute_free_motion(structure, sample_rate_hz, min(window_samples, n), c) / self.unit[:, None]
@@ -154,8 +159,8 @@ class Windows:
     def _gather_evidence(
         self, model: MechanicalModel, effects: Sequence[PlacedEffect], record: Observed, states: FloatArray
     ) -> Evidence:
-        """The evidence of one record: motion and missing force by the smoother, driven by the actuator's force and the
-        effects' forces on the axes."""
+        """Gather the evidence of one record: motion and missing force are estimated by the smoother, driven by the
+        actuators' forces and the effects' forces on the axes."""
         simulated, residual = self._simulate_from_states(model, effects, record, states)
         recording, p = record.recording, model.outputs
         model = add_carried_weight(model, recording)
@@ -185,47 +190,48 @@ class Windows:
 def build_windows(
     records: tuple[Observed, ...], model: MechanicalModel, scales: tuple[FloatArray, FloatArray], window_s: float = 1.0
 ) -> Windows:
-    """The measure with each window's initial state estimated by a smoother. scales: unit and noise, (c,) each.
-    window_s: shortest window, lengthened where it has too few readings for its states. Raises numpy.linalg.LinAlgError
-    where the motion cannot be estimated."""
+    """Build the measure, with each window's initial state estimated by a smoother. records: at least one. scales: unit
+    and noise, (c,) each. window_s: shortest window (s), lengthened to `READINGS_PER_STATE` at the first record's rate.
+    Raises numpy.linalg.LinAlgError where the motion cannot be estimated."""
     unit, noise = scales
     states_per_channel = 2 * len(model.mass) / records[0].measured.shape[1]
     window_s = max(window_s, READINGS_PER_STATE * states_per_channel / records[0].recording.sample_rate_hz)
-    states = []
+    initial_states = []
     for record in records:
         rate_hz = record.recording.sample_rate_hz
         actuator_forces = compute_actuator_force(model, record.command, rate_hz, (), record.recording.hold)
         motion: SmoothedMotion = smooth_motion(
             add_carried_weight(model, record.recording), record, actuator_forces, unit
         )
-        states.append(motion.states[:: count_window_samples(window_s, rate_hz)])
-    return Windows(records, tuple(states), unit, noise, window_s)
+        initial_states.append(motion.states[:: count_window_samples(window_s, rate_hz)])
+    return Windows(records, tuple(initial_states), unit, noise, window_s)
 
 
 def count_window_samples(window_s: float, sample_rate_hz: float) -> int:
-    """Length of a window in samples, at least 1."""
+    """Compute the length of a window in samples, rounded, at least 1."""
     return max(round(window_s * sample_rate_hz), 1)
 
 
 def _compute_free_motion(
     structure: MechanicalModel, sample_rate_hz: float, window_samples: int, channel_count: int
 ) -> FloatArray:
-    """(window_samples, c, 2n): free response of the channels to each unit initial state, in the channels' units."""
+    """Compute the free response of the channels to each unit initial state, (window_samples, c, 2 n), in the channels'
+    units. structure: linear model with n coordinates."""
     discrete_model = discretise_model(structure, 1 / sample_rate_hz)
     states = np.empty((window_samples, *discrete_model.transition.shape))
     states[0] = np.eye(len(discrete_model.transition))
     for k in range(1, window_samples):
         states[k] = discrete_model.transition @ states[k - 1]
-    response = apply_low_pass(
+    filtered_response = apply_low_pass(
         states.transpose(0, 2, 1) @ discrete_model.response.T, sample_rate_hz, structure.sensor.bandwidth_hz
     )
-    outputs = np.concatenate([response, states.transpose(0, 2, 1) @ discrete_model.position.T], axis=2)
+    outputs = np.concatenate([filtered_response, states.transpose(0, 2, 1) @ discrete_model.position.T], axis=2)
     return np.asarray(outputs[:, :, :channel_count].transpose(0, 2, 1))
 
 
 def _project_out(residual: FloatArray, free_motion: FloatArray) -> FloatArray:
-    """(windows, samples): residuals without their least-squares projection on the columns of `free_motion`, (samples,
-    k)."""
+    """Subtract from residuals (windows, samples) their least-squares projection on the columns of free_motion
+    (samples, k), which are normalised first; a column of zeros has no effect."""
     column_norms = np.linalg.norm(free_motion, axis=0)
     basis, singular_values, _ = np.linalg.svd(
         free_motion / np.where(column_norms > 0, column_norms, 1.0), full_matrices=False

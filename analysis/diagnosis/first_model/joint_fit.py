@@ -1,11 +1,12 @@
-"""Fits symmetric mass, damping and stiffness matrices of all axes at once, by least squares on forces.
+"""Fit symmetric mass, damping and stiffness matrices of all axes together, by least squares on forces.
 
 For the forces f of d axes and the motion q along them,
 
-    f = M q'' + D q' + K q + f0 + e,        M, D, K symmetric; minimal: sum over axes of |e_i|² / power of f_i
+    f = M q'' + D q' + K q + f0 + e,        M, D, K symmetric,
 
-so that every axis has the same weight. Standard errors are sandwich estimates over blocks of samples, because residuals
-are correlated (White, Econometrica 48:817, 1980). Called by `model_structures`.
+the sum over axes of |e_i|² / |f_i - mean f_i|² is minimised, so that every axis has the same weight. Standard errors
+are sandwich estimates over blocks of samples, because residuals are correlated (White, Econometrica 48:817, 1980).
+Called by `model_structures`.
 """
 
 from collections.abc import Sequence
@@ -23,7 +24,9 @@ from analysis.diagnosis.settings import ACCELERATION_NOISE_SHARE, LEAST_TEST_BLO
 from equalizer.signals.signal import FloatArray
 
 Part = Literal["mass", "damping", "stiffness"]
+"""Name of a matrix of the model."""
 PARTS: tuple[Part, ...] = ("mass", "damping", "stiffness")
+"""Matrices in the order of their columns in a regression without laws."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,25 +34,26 @@ class JointFit:
     """Symmetric mass, damping and stiffness matrices fitted together, with their intervals and held-out errors."""
 
     matrices: dict[Part, FloatArray]
-    """(d, d) each, SI; zero where a part was not fitted."""
-    halves: dict[Part, FloatArray]
-    """(d, d) each: half-widths of the 95 % intervals (Student's t over blocks), with the possible bias by noise of the
-    motion, `ACCELERATION_NOISE_SHARE`, added in quadrature."""
+    """(d, d) each, SI units; zero where a part was not fitted."""
+    half_widths: dict[Part, FloatArray]
+    """(d, d) each, SI units: half-widths of the 95 % intervals (Student's t over blocks), with the possible bias by
+    noise of the motion, `ACCELERATION_NOISE_SHARE` of each entry, added in quadrature."""
     deviations: dict[Part, float]
-    """The largest standard error on the diagonal of each matrix, SI."""
-    folds: FloatArray
+    """The largest standard error on the diagonal of each matrix, SI units."""
+    fold_errors: FloatArray
     """(blocks,): cross-validated sum of squares of each block over the power of all blocks, mean over the axes."""
-    folds_error: float
-    """Root of their sum."""
+    cross_validated_error: float
+    """Square root of the sum of `fold_errors`."""
     held_out: FloatArray
-    """(d,): rms of each axis's held-out error over that of its force."""
+    """(d,): rms of each axis's held-out error over that of its force about the mean; of cross-validation where too
+    little was held out."""
     remainders: tuple[FloatArray, ...]
-    """Per motion, (kept samples, d): residual force, N (N m)."""
+    """Per motion, (decimated samples, d): residual force, N (N m)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Parametrisation:
-    """The fitted parameters, and the linear map from them to the weights of each axis's regression."""
+    """The linear map from the fitted parameters to the weights of each axis's regression."""
 
     columns: list[int]
     """Columns of the regression that are used."""
@@ -60,14 +64,16 @@ class _Parametrisation:
 
 
 def build_regressions(motions: Sequence[Motion], turns: bool) -> tuple[Regression, ...]:
-    """Regression of the force of each axis on mass, damping and stiffness alone, without laws. turns: see `Scales`."""
+    """Build the regression of the force of each axis on mass, damping and stiffness alone, without laws. turns: whether
+    a shaft turns freely and has no stiffness (`build_regression`)."""
     return tuple(build_regression(motions, axis, (), turns) for axis in range(motions[0].force.shape[1]))
 
 
 def fit_jointly(regressions: Sequence[Regression], parts: Sequence[Part]) -> JointFit:
-    """The joint fit. parts: the matrices to fit; a constant force per axis is always fitted, too. Held-out errors are
-    those of cross-validation where too little was held out. Raises numpy.linalg.LinAlgError where the motion does not
-    determine them."""
+    """Fit the matrices jointly. parts: those to fit; a constant force per axis is always fitted, too. Held-out errors
+    are those of cross-validation with fewer than `LEAST_TEST_BLOCKS` test blocks, or hardly any motion in them. A force
+    without power is given the power 1e-300, against division by zero. Raises numpy.linalg.LinAlgError where the motion
+    does not determine the parameters."""
     parametrisation = _build_parametrisation(regressions[0], parts)
     powers = [max(compute_signal_power(regression.fit), 1e-300) for regression in regressions]
     block_equations = _build_block_equations([regression.fit for regression in regressions], parametrisation, powers)
@@ -75,37 +81,43 @@ def fit_jointly(regressions: Sequence[Regression], parts: Sequence[Part]) -> Joi
         np.sum([equations[0] for equations in block_equations], axis=0),
         np.sum([equations[1] for equations in block_equations], axis=0),
     )
-    parameters, parameter_errors = _solve(normal_equations), _compute_standard_errors(block_equations, normal_equations)
+    parameters, parameter_errors = (
+        _solve_normal_equations(normal_equations),
+        _compute_standard_errors(block_equations, normal_equations),
+    )
     fit_blocks = [regression.fit for regression in regressions]
     fold_parameters = [
-        _solve((normal_equations[0] - gram, normal_equations[1] - cross)) for gram, cross in block_equations
+        _solve_normal_equations((normal_equations[0] - gram, normal_equations[1] - cross))
+        for gram, cross in block_equations
     ]
-    folds = _compute_squared_errors(fit_blocks, parametrisation, fold_parameters)
+    fold_squares = _compute_squared_errors(fit_blocks, parametrisation, fold_parameters)
     test_blocks = [regression.test for regression in regressions]
     has_test = len(test_blocks[0]) >= LEAST_TEST_BLOCKS and any(map(has_held_out_motion, regressions))
     test_errors = (
-        _compute_squared_errors(test_blocks, parametrisation, [parameters] * len(test_blocks[0])) if has_test else folds
+        _compute_squared_errors(test_blocks, parametrisation, [parameters] * len(test_blocks[0]))
+        if has_test
+        else fold_squares
     )
     force_powers = np.array(
         [max(compute_signal_power(blocks), 1e-300) for blocks in (test_blocks if has_test else fit_blocks)]
     )
-    fold_errors = (folds / np.array(powers)).mean(axis=1)
+    fold_errors = (fold_squares / np.array(powers)).mean(axis=1)
     matrices, deviations = (
         _assemble_matrices(regressions[0], parametrisation, values) for values in (parameters, parameter_errors)
     )
     t_factor = float(stdtrit(max(len(block_equations) - 1, 1), 0.975))
     bias_limits = {part: ACCELERATION_NOISE_SHARE * np.abs(matrices[part]) for part in PARTS}
-    halves = {part: np.hypot(t_factor * deviations[part], bias_limits[part]) for part in PARTS}
+    half_widths = {part: np.hypot(t_factor * deviations[part], bias_limits[part]) for part in PARTS}
     return JointFit(
-        matrices, halves, {part: float(np.diagonal(deviations[part]).max()) for part in PARTS}, fold_errors,
+        matrices, half_widths, {part: float(np.diagonal(deviations[part]).max()) for part in PARTS}, fold_errors,
         float(np.sqrt(fold_errors.sum())), np.sqrt(test_errors.sum(axis=0) / force_powers),
         _compute_remainders(regressions, parametrisation, parameters),
     )  # fmt: skip
 
 
 def _build_parametrisation(regression: Regression, parts: Sequence[Part]) -> _Parametrisation:
-    """The parameters of these symmetric matrices: entries on and above the diagonal, then one constant force per
-    axis."""
+    """Build the map for these symmetric matrices. The parameters are the entries on and above the diagonals, then one
+    constant force per axis."""
     axes = len(regression.motions[0].channels)
     columns = [PARTS.index(part) * axes + k for part in parts for k in range(axes)] + [regression.base - 1]
     entries = tuple((part, i, k) for part in parts for i in range(axes) for k in range(i, axes))
@@ -124,7 +136,8 @@ def _build_parametrisation(regression: Regression, parts: Sequence[Part]) -> _Pa
 def _build_block_equations(
     blocks: Sequence[Sequence[Block]], parametrisation: _Parametrisation, powers: Sequence[float]
 ) -> list[tuple[FloatArray, FloatArray]]:
-    """Normal equations of the joint parameters, per block. powers: of each axis's force."""
+    """Build the normal equations of the joint parameters, (parameters, parameters) and (parameters,), per block.
+    blocks: by axis; powers: sum of squares of each axis's force, which divides its equations."""
     equations = []
     for axis_blocks in zip(*blocks, strict=True):
         parameter_count = parametrisation.rows[0].shape[1]
@@ -136,8 +149,9 @@ def _build_block_equations(
     return equations
 
 
-def _solve(equations: tuple[FloatArray, FloatArray]) -> FloatArray:
-    """(parameters,): solution of the normal equations, scaled to a unit diagonal."""
+def _solve_normal_equations(equations: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """Solve the normal equations, scaled to a unit diagonal, for (parameters,). Raises numpy.linalg.LinAlgError where
+    they are singular."""
     column_norms = np.sqrt(np.maximum(np.diagonal(equations[0]), 1e-300))
     return np.asarray(
         np.linalg.solve(equations[0] / np.outer(column_norms, column_norms), equations[1] / column_norms) / column_norms
@@ -147,9 +161,9 @@ def _solve(equations: tuple[FloatArray, FloatArray]) -> FloatArray:
 def _compute_standard_errors(
     block_equations: Sequence[tuple[FloatArray, FloatArray]], normal_equations: tuple[FloatArray, FloatArray]
 ) -> FloatArray:
-    """(parameters,): sandwich standard errors, the root of the diagonal of G^-1 (sum of s s') G^-1 b / (b - 1), with
-    the normal matrix G, and the gradient s of each of the b blocks."""
-    parameters = _solve(normal_equations)
+    """Compute (parameters,): sandwich standard errors, the root of the diagonal of G^-1 (sum of s s') G^-1 b / (b - 1),
+    with the normal matrix G, and the gradient s of each of the b blocks."""
+    parameters = _solve_normal_equations(normal_equations)
     column_norms = np.sqrt(np.maximum(np.diagonal(normal_equations[0]), 1e-300))
     inverse = np.linalg.inv(normal_equations[0] / np.outer(column_norms, column_norms)) / np.outer(
         column_norms, column_norms
@@ -162,7 +176,8 @@ def _compute_standard_errors(
 def _compute_squared_errors(
     blocks: Sequence[Sequence[Block]], parametrisation: _Parametrisation, block_parameters: Sequence[FloatArray]
 ) -> FloatArray:
-    """(blocks, axes): sums of squared force errors. block_parameters: parameters for each block."""
+    """Compute (blocks, axes): sums of squared force errors. blocks: by axis; block_parameters: parameters for each
+    block."""
     return np.array(
         [
             [
@@ -179,7 +194,7 @@ def _compute_squared_errors(
 def _assemble_matrices(
     regression: Regression, parametrisation: _Parametrisation, parameters: FloatArray
 ) -> dict[Part, FloatArray]:
-    """The symmetric matrices (d, d) that hold the values of the parameters."""
+    """Assemble the symmetric matrices (d, d) from the parameters; the constant forces are not used."""
     axes = len(regression.motions[0].channels)
     matrices = {part: np.zeros((axes, axes)) for part in PARTS}
     for (part, i, k), value in zip(parametrisation.entries, parameters, strict=False):
@@ -190,7 +205,7 @@ def _assemble_matrices(
 def _compute_remainders(
     regressions: Sequence[Regression], parametrisation: _Parametrisation, parameters: FloatArray
 ) -> tuple[FloatArray, ...]:
-    """See `JointFit.remainders`."""
+    """Compute the residual forces (`JointFit.remainders`)."""
     regression_weights = [
         axis_map @ parameters / regressions[0].scale[parametrisation.columns] for axis_map in parametrisation.rows
     ]

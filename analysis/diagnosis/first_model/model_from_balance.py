@@ -1,10 +1,10 @@
 """Builds a linear mechanical model M a + D v + K q = f from force balances, with one body per command.
 
-The rows of M, D and K are the weights of the balances without further laws; the matrices are then made symmetric. Their
-tolerance is half the largest change of an entry when the named laws are added to the balances, plus a share
-(`FOUND_NUMBERS_OPEN`) of the largest entry. A mass is at least `MASSLESS_SHARE` of the force's rms over that of the
-acceleration, because every motion of a model needs a mass. Called by `fit_without_model` and
-`force_balance_measures`.
+The rows of M, D and K are the weights of the balances without further laws; the matrices are then made symmetric. The
+tolerance of a matrix is half the largest difference between its entries and those of the balances with the named laws
+(not made symmetric), plus a share (`FOUND_NUMBERS_OPEN`) of the largest entry. A mass is at least `MASSLESS_SHARE` of
+the force's rms over that of the acceleration, because every coordinate of a mechanical model needs a mass. Called by
+`fit_without_model` and `force_balance_measures`.
 """
 
 from collections.abc import Sequence
@@ -21,34 +21,35 @@ from equalizer.signals.signal import FloatArray
 
 
 def build_first_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
-    """A linear model with the masses, dampers and springs of force balances, one per command. recording: reduced by
-    `reduce_recordings` where the balances hold more than one body per command. None where the commands do not drive one
-    measured motion each. Raises MechanicalModelError for matrices that are no valid model."""
+    """Build a linear model with the masses, dampers and springs of force balances, one per command, at least one.
+    recording: reduced by `reduce_recordings` where the balances hold more than one body per command. None where the
+    commands do not drive one measured motion each. Raises MechanicalModelError for matrices that are no valid model,
+    numpy.linalg.LinAlgError where a fit fails."""
     regressions = [balance.search.regression for balance in balances]
     command_count = len(balances)
     if command_count > len(regressions[0].motions[0].channels) or command_count != len(recording.response.channels):
         return None
     driven_channels = [regression.base_terms.driven_channel for regression in regressions]
-    without_laws, with_laws = (
+    rows_without_laws, rows_with_laws = (
         [_fit_matrix_rows(balance, laws, driven_channels) for balance, laws in zip(balances, law_choices, strict=True)]
         for law_choices in (
             [()] * command_count,
             [tuple(law.law_index for law in balance.named if law.law_index >= 0) for balance in balances],
         )
     )
-    matrices = [np.array([rows[matrix_index] for rows in without_laws]) for matrix_index in range(3)]
-    matrices_with_laws = [np.array([rows[matrix_index] for rows in with_laws]) for matrix_index in range(3)]
+    matrices = [np.array([rows[matrix_index] for rows in rows_without_laws]) for matrix_index in range(3)]
+    matrices_with_laws = [np.array([rows[matrix_index] for rows in rows_with_laws]) for matrix_index in range(3)]
     mass, damping, stiffness = ((matrix + matrix.T) / 2 for matrix in matrices)
-    least_mass = MASSLESS_SHARE * _compute_rms(np.vstack([motion.force for motion in regressions[0].motions]))
+    least_inertial_force = MASSLESS_SHARE * _compute_rms(np.vstack([motion.force for motion in regressions[0].motions]))
     accelerations = [
         np.gradient(motion.velocity[:, driven_channels], 1 / motion.rate_hz, axis=0)
         for motion in regressions[0].motions
     ]
-    least_mass = least_mass / np.maximum(_compute_rms(np.vstack(accelerations)), 1e-300)
+    least_mass = least_inertial_force / np.maximum(_compute_rms(np.vstack(accelerations)), 1e-300)  # no 0 / 0
     mass = mass + np.diag(np.maximum(least_mass - np.diagonal(mass), 0.0))
     tolerances = [
-        float(np.max(np.abs(base_entry - with_laws)) / 2 + FOUND_NUMBERS_OPEN * np.abs(base_entry).max())
-        for base_entry, with_laws in zip((mass, damping, stiffness), matrices_with_laws, strict=True)
+        float(np.max(np.abs(base_matrix - matrix_with_laws)) / 2 + FOUND_NUMBERS_OPEN * np.abs(base_matrix).max())
+        for base_matrix, matrix_with_laws in zip((mass, damping, stiffness), matrices_with_laws, strict=True)
     ]
     return MechanicalModel(
         name,
@@ -58,6 +59,7 @@ def build_first_model(balances: Sequence[Balance], recording: Recording, name: s
         stiffness,
         np.eye(command_count),
         np.eye(command_count),
+        # A tolerance must be positive, also of a matrix of zeros.
         tolerance=Tolerance(max(tolerances[0], 1e-12), max(tolerances[1], 1e-12), max(tolerances[2], 1e-12), None),
         actuator=ActuatorLimits(delay_s=_find_common_delay_s(balances)),
         rotational=recording.is_rotational,
@@ -65,15 +67,15 @@ def build_first_model(balances: Sequence[Balance], recording: Recording, name: s
 
 
 def _find_common_delay_s(balances: Sequence[Balance]) -> float:
-    """The delay (s) that all commands share. 0 where their delays differ, because a model has a single delay, and where
-    the recordings are reduced, because the reduction already removes the delay."""
+    """Find the delay (s) that all commands share. 0 where their delays differ, because a model has a single delay, and
+    where the recordings are reduced, because the reduction already removes the delay."""
     delays = {balance.search.regression.base_terms.delay_s for balance in balances}
     return delays.pop() if len(delays) == 1 and not is_reduction_needed(balances) else 0.0
 
 
 def build_plain_model(balances: Sequence[Balance], recording: Recording, name: str) -> MechanicalModel | None:
-    """`build_first_model` where at least one law is named and there is one body per command: no further fit is needed
-    then. None otherwise, or where the matrices are no valid model."""
+    """Build the first model where at least one law is named and there is one body per command: no further fit is needed
+    then. None otherwise, or where the matrices are no valid model (`build_first_model`)."""
     if not any(balance.named for balance in balances) or is_reduction_needed(balances):
         return None
     try:
@@ -83,28 +85,30 @@ def build_plain_model(balances: Sequence[Balance], recording: Recording, name: s
 
 
 def compute_law_power_share(balances: Sequence[Balance], band_hz: float) -> float:
-    """Share of the power of a named law's force at frequencies up to `band_hz`; the smallest over the named laws of the
-    motion, 1 without any."""
+    """Compute the share of the power of a named law's force at frequencies up to `band_hz` (Hz): the smallest share of
+    all named laws, 1 without any."""
     shares = [1.0]
     for balance in balances:
         regression = balance.search.regression
         laws = [law.law_index for law in balance.named if law.law_index >= 0]
-        weights, first_weight = regression.fit_weights(regression.select_columns(laws)), regression.base
-        for place in (regression.places[law] for law in laws):
-            law_weights = weights[first_weight : first_weight + place.stop - place.start]
-            first_weight += len(law_weights)
+        weights, weight_index = regression.fit_weights(regression.select_columns(laws)), regression.base
+        for law_columns in (regression.places[law] for law in laws):
+            law_weights = weights[weight_index : weight_index + law_columns.stop - law_columns.start]
+            weight_index += len(law_weights)
             shares.append(
                 _compute_power_share(
-                    [columns[:, place] @ law_weights for columns in regression.columns], regression.motions, band_hz
+                    [columns[:, law_columns] @ law_weights for columns in regression.columns],
+                    regression.motions,
+                    band_hz,
                 )
             )
     return min(shares)
 
 
 def _compute_power_share(forces: Sequence[FloatArray], motions: Sequence[Motion], band_hz: float) -> float:
-    """Share of the forces' power at frequencies up to `band_hz`. forces: (kept samples,) per motion. The mean over all
-    recordings is subtracted, not that of each: where each recording moves in one direction only, the friction differs
-    between recordings at frequency zero."""
+    """Compute the share of the forces' power at frequencies up to `band_hz` (Hz), 0 where all forces are equal. forces:
+    (kept samples,) per motion. The mean over all recordings is subtracted, not that of each recording: where each moves
+    in one direction only, friction differs between recordings by a constant, which must count as power in the band."""
     power_in_band, total_power, mean = 0.0, 1e-300, float(np.mean(np.concatenate(forces)))
     for force, motion in zip(forces, motions, strict=True):
         power = np.abs(np.fft.rfft(force - mean)) ** 2
@@ -119,15 +123,16 @@ def _compute_power_share(forces: Sequence[FloatArray], motions: Sequence[Motion]
 def _fit_matrix_rows(
     balance: Balance, laws: Sequence[int], driven_channels: Sequence[int]
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Rows of the mass, damping and stiffness matrices of one balance, fitted together with these laws.
-    laws: indices of the laws. driven_channels: of the driven motions. A row that the balance does not fit is zero."""
+    """Fit one row of the mass, damping and stiffness matrix each, (commands,), to one balance with these laws. laws:
+    indices of the laws; driven_channels: channels of the driven motions. A stiffness row that the balance does not
+    contain is zero."""
     regression = balance.search.regression
     weights = regression.fit_weights(regression.select_columns(laws))[: regression.matrices]
-    d = len(regression.motions[0].channels)
-    rows = [*weights.reshape(-1, d)[:, list(driven_channels)], np.zeros(len(driven_channels))]
+    channel_count = len(regression.motions[0].channels)
+    rows = [*weights.reshape(-1, channel_count)[:, list(driven_channels)], np.zeros(len(driven_channels))]
     return rows[0], rows[1], rows[2]
 
 
 def _compute_rms(samples: FloatArray) -> FloatArray:
-    """(k,): rms of each column (n, k) about its mean."""
+    """Compute the rms of each column about its mean, (k,). samples: (n, k)."""
     return np.asarray(np.sqrt(np.mean((samples - samples.mean(axis=0)) ** 2, axis=0)))

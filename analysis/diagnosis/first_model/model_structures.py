@@ -81,7 +81,7 @@ class StructureFit:
     @property
     def error(self) -> float:
         """Relative error by which structures are compared: cross-validated, else the rms of `held_out`."""
-        return self.joint.folds_error if self.joint else float(np.sqrt(np.mean(np.square(self.held_out))))
+        return self.joint.cross_validated_error if self.joint else float(np.sqrt(np.mean(np.square(self.held_out))))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -188,9 +188,9 @@ def choose_simplest(fits: Sequence[StructureFit]) -> StructureFit:
     best = ordered[0]
     for richer in ordered[1:]:
         assert best.joint is not None and richer.joint is not None
-        gains = best.joint.folds - richer.joint.folds
+        gains = best.joint.fold_errors - richer.joint.fold_errors
         spread = float(np.std(gains, ddof=1) * np.sqrt(len(gains))) if len(gains) > 1 else np.inf
-        least_gain = max(RICHER_STRUCTURE_GAIN * float(best.joint.folds.sum()), RICHER_STRUCTURE_ERRORS * spread)
+        least_gain = max(RICHER_STRUCTURE_GAIN * float(best.joint.fold_errors.sum()), RICHER_STRUCTURE_ERRORS * spread)
         if gains.sum() > max(least_gain, MODEL_FLOOR**2):
             best = richer
     return best
@@ -258,7 +258,7 @@ def _list_parameters(
     names, (system, parts) = balanced.recording.command.channels, units_and_parts
     return tuple(
         ParameterEstimate(f"{part} {name}", find_matrix_unit(part, system), float(fit.matrices[part][k, k]),
-               float(fit.halves[part][k, k]))
+               float(fit.half_widths[part][k, k]))
         for part in parts
         for k, name in enumerate(names)
     )  # fmt: skip

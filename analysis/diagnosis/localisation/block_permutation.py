@@ -1,9 +1,10 @@
-"""Block permutation test: whether a statistic of correlated series exceeds what chance gives.
+"""Block permutation test: whether a statistic of autocorrelated series is larger than under the null hypothesis.
 
-Exchanging single samples would count neighbouring, correlated samples as independent. Blocks of three correlation times
-are exchanged instead, which leaves the correlation within a block as it is. The p-value is the share of permutations
-whose statistic is at least the observed one. A p-value below some ten over the number of permutations cannot be
-counted: there the upper tail of a gamma distribution with the mean m and variance v of the permuted statistics is used,
+A permutation of single samples would treat correlated neighbours as independent. Blocks of three correlation times are
+permuted instead, which preserves the correlation within a block. The p-value is the share of permutations whose
+statistic is at least the observed one. A p-value below about ten over the number of permutations cannot be counted
+precisely: there the upper tail of a gamma distribution with the mean m and variance v of the permuted statistics is
+used,
 
     P(T >= t) = Q(m²/v, t m/v),      Q the regularised upper incomplete gamma function.
 
@@ -22,19 +23,20 @@ from equalizer.signals.signal import FloatArray
 
 IntArray = npt.NDArray[np.int64]
 _CORRELATION_TIMES_PER_BLOCK = 3.0
-"""Length of a block, in correlation times. By hand."""
-_LEAST_EXCEEDING = 10
-"""Number of permutations with a larger statistic above which the p-value is counted instead of fitted. By hand."""
+"""Length of a block, in correlation times. Chosen."""
+_MIN_EXCEEDING_PERMUTATIONS = 10
+"""Number of permutations, the observed order included, with a statistic at least the observed one, above which the
+p-value is counted instead of fitted. Chosen."""
 LEAST_P_VALUE = 1e-6
-"""Least p-value: the fitted tail is not trusted below it. By hand."""
-_LEAST_BLOCKS = 8
-"""Least number of blocks per stratum; in a short stratum blocks are shorter for it. By hand."""
+"""Lower limit of a fitted p-value, because the gamma distribution is not reliable further out. Chosen."""
+_MIN_BLOCKS_PER_STRATUM = 8
+"""Least number of blocks per stratum; blocks are shortened to it, to one sample at the least. Chosen."""
 
 
 def compute_correlation_time(series: FloatArray) -> float:
-    """Correlation time of a series (n,) in samples, at least about 1: 1 + 2 sum over k >= 1 of r_k², r_k the
-    autocorrelation at lag k up to n / 4. By this factor the correlation inflates the variance of a product's mean of
-    two such series (Bartlett). 1 for a constant series."""
+    """Compute the correlation time of a series (n,), n >= 1, in samples: 1 + 2 sum over 1 <= k < n / 4 of r_k², with
+    r_k the autocorrelation at lag k, divided by the factor that it has for white noise. The variance of the correlation
+    of two independent series with this autocorrelation is larger by this factor (Bartlett). 1 for a constant series."""
     n = len(series)
     centred = series - series.mean()
     spectrum = np.abs(np.fft.rfft(centred, 2 * n)) ** 2
@@ -46,28 +48,28 @@ def compute_correlation_time(series: FloatArray) -> float:
     return float((2 * np.sum((covariance / covariance[0]) ** 2) - 1) / (1 + 2 * lags / n))
 
 
-def shuffle_blocks(strata: IntArray, requested_samples: int, random: np.random.Generator) -> IntArray:
-    """Indices (n,) of a random exchange of blocks within each stratum. Blocks are cut from a random offset on, the
-    stratum taken as a ring; the remainder that fills no block stays at its end. strata: (n,), label of each sample's
-    stratum, contiguous. requested_samples: length in samples."""
-    indices, order = np.arange(len(strata)), np.empty(len(strata), dtype=np.int64)
+def shuffle_blocks(strata: IntArray, requested_block_samples: int, random: np.random.Generator) -> IntArray:
+    """Shuffle blocks within each stratum; returns indices (n,). A stratum is cut into blocks from a random sample on,
+    as a ring; the remainder that fills no block comes last. strata: (n,), n >= 1, label of each sample's stratum: a
+    stratum is a run of equal labels. requested_block_samples: length of a block, shortened in a short stratum."""
+    indices, shuffled_indices = np.arange(len(strata)), np.empty(len(strata), dtype=np.int64)
     edges = np.concatenate([[0], np.flatnonzero(np.diff(strata)) + 1, [len(strata)]])
     for start, stop in pairwise(edges.tolist()):
         stratum_samples = stop - start
-        block_samples = max(1, min(requested_samples, stratum_samples // _LEAST_BLOCKS))
-        offset = stop - int(random.integers(stratum_samples))
-        rotated = np.concatenate([indices[offset:stop], indices[start:offset]])
+        block_samples = max(1, min(requested_block_samples, stratum_samples // _MIN_BLOCKS_PER_STRATUM))
+        ring_start = stop - int(random.integers(stratum_samples))
+        rotated = np.concatenate([indices[ring_start:stop], indices[start:ring_start]])
         block_count = stratum_samples // block_samples
         shuffled_samples = block_count * block_samples
-        order[start : start + shuffled_samples].reshape(block_count, block_samples)[:] = rotated[
+        shuffled_indices[start : start + shuffled_samples].reshape(block_count, block_samples)[:] = rotated[
             :shuffled_samples
         ].reshape(block_count, block_samples)[random.permutation(block_count)]
-        order[start + shuffled_samples : stop] = rotated[shuffled_samples:]
-    return order
+        shuffled_indices[start + shuffled_samples : stop] = rotated[shuffled_samples:]
+    return shuffled_indices
 
 
 def compute_block_length(series: FloatArray) -> int:
-    """Length of a block in samples: three correlation times of the series (n,), at least 1."""
+    """Compute the length of a block in samples: three correlation times of the series (n,), n >= 1, at least 1."""
     return max(1, round(_CORRELATION_TIMES_PER_BLOCK * compute_correlation_time(series)))
 
 
@@ -78,9 +80,9 @@ def compute_permutation_p_values(
     permutation_count: int,
     random: np.random.Generator,
 ) -> FloatArray:
-    """p-values (tests,) of the observed statistics, counted or from the fitted gamma tail (see the module).
+    """Compute the p-values (tests,) of the observed statistics, counted or from the fitted gamma tail (see the module).
     compute_statistics: from indices (n,) to statistics (tests,), not negative, larger where the null hypothesis is less
-    likely. strata, block_samples: as of `shuffle_blocks`."""
+    likely. strata, block_samples: as for `shuffle_blocks`. permutation_count: at least 2, for the variance."""
     observed = compute_statistics(np.arange(len(strata)))
     permuted = np.array(
         [compute_statistics(shuffle_blocks(strata, block_samples, random)) for _ in range(permutation_count)]
@@ -90,7 +92,7 @@ def compute_permutation_p_values(
     # Where enough permutations had a larger statistic, their share is used instead of the fitted tail.
     counted_p_values = (np.sum(permuted >= observed, axis=0) + 1) / (permutation_count + 1)
     combined_p_values = np.where(
-        counted_p_values > _LEAST_EXCEEDING / (permutation_count + 1),
+        counted_p_values > _MIN_EXCEEDING_PERMUTATIONS / (permutation_count + 1),
         counted_p_values,
         np.maximum(tail_p_values, LEAST_P_VALUE),
     )

@@ -2,8 +2,8 @@
 
 A state is a variable of the motion or of the signals: position, velocity, command, response, time. Each test asks
 whether the mismatch is larger in a region of it, or follows its sign (`state_regions`); its p-value is multiplied by
-the number of all tests (Bonferroni), and a dependence is stated where it is below `FALSE_DISCOVERY_RATE` and says more
-than where the device was most of the time. Called by `localisation`.
+the number of all tests (Bonferroni). A dependence is stated where the p-value is at most `FALSE_DISCOVERY_RATE` and the
+region has a larger share of the mismatch than of the samples. Called by `localisation`.
 """
 
 from collections.abc import Sequence
@@ -30,28 +30,29 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray
 from equalizer.signals.unit_system import UnitSystem
 
-_SEED = 20
-"""Seed of the permutations: the same recording gives the same result."""
+_PERMUTATION_SEED = 20
+"""Seed of the permutations, fixed so that the same recording gives the same result. Any value serves."""
 TESTS_PER_AXIS = 6
 """Tests along one axis: position and velocity by size and by sign, command and time by size."""
 TESTS_PER_CHANNEL = 2
 """Tests of one response channel: response and time, by size."""
-_DRIVEN_SHARE = 0.02
-"""Least rms of an axis's command, relative to the strongest segment, for the axis to count as driven."""
+_LEAST_DRIVEN_SHARE = 0.02
+"""Rms of the driving signal in a segment, relative to that of the strongest segment, above which the segment is used.
+Chosen by hand."""
 
 
 def find_force_states(
-    evidence: Evidence, recording: Recording, cells: Sequence[MismatchCell], system: UnitSystem
+    evidence: Evidence, recording: Recording, cells: Sequence[MismatchCell], unit_system: UnitSystem
 ) -> tuple[StateMismatch, ...]:
-    """Find regions of state in which the missing force is larger, along each driven axis with a cell beyond noise.
-    p-values are corrected for all regions tested."""
+    """Find regions of state in which the missing force is larger or whose sign it follows, along each driven axis with
+    a cell beyond noise. p-values are corrected for all regions tested. unit_system: units of the coordinates."""
     axis_states = []
     for axis_index, channel in enumerate(recording.command.channels):
         channel_cells = [cell for cell in cells if cell.beyond_noise and channel in cell.input.split("+")]
         if not channel_cells:
             continue
         axis_symbol = shorten_axis_name(channel, recording.command.channels)
-        length_unit = system.length
+        length_unit = unit_system.length
         velocity_symbol = "ω" if length_unit == "rad" else "v"
         command = evidence.command[:, axis_index]
         states = [
@@ -67,7 +68,9 @@ def find_force_states(
         ]
         strata = _assign_strata(recording, evidence.used > 0, command)
         worst_cell = max(channel_cells, key=lambda cell: cell.in_noise)
-        regions = find_state_regions(Disturbance(evidence.axis_force[:, axis_index], strata, command), states, _SEED)
+        regions = find_state_regions(
+            Disturbance(evidence.axis_force[:, axis_index], strata, command), states, _PERMUTATION_SEED
+        )
         axis_states.append(
             [StateMismatch(worst_cell.output, channel, _enclose_bands(channel_cells), region) for region in regions]
         )
@@ -77,8 +80,8 @@ def find_force_states(
 def find_error_states(
     evidence: Evidence, recording: Recording, cells: Sequence[MismatchCell], channels: Sequence[str]
 ) -> tuple[StateMismatch, ...]:
-    """Find regions of response or time in which the error is larger, for each response channel among `channels` with a
-    cell beyond noise. p-values are corrected for all regions tested."""
+    """Find regions of response or time in which the error (reading minus prediction) is larger, for each response
+    channel among `channels` with a cell beyond noise. p-values are corrected for all regions tested."""
     channel_states = []
     for channel_index, channel in enumerate(recording.response.channels):
         quantity = recording.response.quantities[channel_index]
@@ -96,10 +99,10 @@ def find_error_states(
         inputs = "+".join(
             channel
             for channel in recording.command.channels
-            if any(channel in m.input.split("+") for m in channel_cells)
+            if any(channel in channel_cell.input.split("+") for channel_cell in channel_cells)
         )
         regions = find_state_regions(
-            Disturbance(reading - evidence.predicted[:, channel_index], strata, reading), states, _SEED
+            Disturbance(reading - evidence.predicted[:, channel_index], strata, reading), states, _PERMUTATION_SEED
         )
         channel_states.append(
             [StateMismatch(channel, inputs, _enclose_bands(channel_cells), region) for region in regions]
@@ -108,13 +111,13 @@ def find_error_states(
 
 
 def _correct_p_values(groups: Sequence[Sequence[StateMismatch]], tests_per_group: int) -> tuple[StateMismatch, ...]:
-    """Correct p-values by Bonferroni over all axes or channels, with tests_per_group tests each. Only significant and
-    informative ones are kept, of each axis or channel the `STATES_NAMED` with the largest share."""
-    tests = tests_per_group * len(groups)
+    """Correct p-values by Bonferroni over all groups (axes or channels), with tests_per_group tests each. Returns only
+    the significant and informative dependences, of each group the `STATES_NAMED` with the largest share."""
+    test_count = tests_per_group * len(groups)
     significant_states = []
     for group in groups:
         corrected = [
-            replace(state, region=replace(state.region, p_value=min(1.0, tests * state.region.p_value)))
+            replace(state, region=replace(state.region, p_value=min(1.0, test_count * state.region.p_value)))
             for state in group
         ]
         significant = [
@@ -127,27 +130,29 @@ def _correct_p_values(groups: Sequence[Sequence[StateMismatch]], tests_per_group
 
 
 def _is_informative(region: StateRegion) -> bool:
-    """Whether a region says more than where most samples are. A middle of a state has no meaning in mechanics."""
+    """Whether a region is of the kind "sign", or its share of the mismatch is more than `STATE_CROWDED` times its share
+    of the samples. Never for a middle region: no mechanical effect is confined to the middle of a state's range."""
     if region.words.startswith(MIDDLE_REGION_PHRASE):
         return False
     return region.criterion == "sign" or region.share > STATE_CROWDED * region.occupied
 
 
-def _assign_strata(recording: Recording, used: Mask, driving_signal: FloatArray) -> IntArray:
-    """(n,): index of the segment, rests not counted; -1 where samples do not count, or are hardly driven
-    (`_DRIVEN_SHARE`). The permutation test permutes within segments. driving_signal: (n,), command or reading."""
+def _assign_strata(recording: Recording, used_samples: Mask, driving_signal: FloatArray) -> IntArray:
+    """Assign to each sample (n,) the index of its segment, rests not counted; -1 where it is not used or belongs to no
+    segment, and in weakly driven segments (`_LEAST_DRIVEN_SHARE`). A recording without segments is one. The permutation
+    test permutes within segments. driving_signal: (n,), command or reading."""
     sample_count = len(driving_signal)
     strata = np.full(sample_count, -1, dtype=np.int64)
-    spans = [
+    segment_spans = [
         (segment.start, min(segment.stop, sample_count))
         for segment in recording.segments
         if segment.kind != "rest" and segment.start < sample_count
     ] or [(0, sample_count)]
-    driven_rms = [float(np.sqrt(np.nanmean(driving_signal[start:stop] ** 2))) for start, stop in spans]
-    for segment_number, ((start, stop), rms) in enumerate(zip(spans, driven_rms, strict=True)):
-        if rms > _DRIVEN_SHARE * max(driven_rms):
-            strata[start:stop] = segment_number
-    strata[~used] = -1
+    segment_rms = [float(np.sqrt(np.nanmean(driving_signal[start:stop] ** 2))) for start, stop in segment_spans]
+    for segment_index, ((start, stop), rms) in enumerate(zip(segment_spans, segment_rms, strict=True)):
+        if rms > _LEAST_DRIVEN_SHARE * max(segment_rms):
+            strata[start:stop] = segment_index
+    strata[~used_samples] = -1
     return strata
 
 

@@ -1,5 +1,6 @@
-"""Estimates the noise of a recording's response and position, by the first of three methods that it allows: repeated
-periods, stretches at rest, lines above the driven band. Called by `choose_measure` and `rigid_model`."""
+"""Noise floor of a recording's response and position, by the first of three methods that the data allow: differences
+between repeated periods, samples at rest, spectral lines above the driven band. Called by `choose_measure` and
+`rigid_model`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,8 +16,8 @@ from equalizer.signals.recording import Recording
 from equalizer.signals.signal import FloatArray, Signal
 
 NoiseMethod = Literal["repeats", "rest", "quiet band", "unknown"]
-_LINES = 511
-"""Number of lines where no period gives a grid."""
+_DEFAULT_LINE_COUNT = 511
+"""Number of spectral lines below the Nyquist frequency, where no period determines them. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,41 +26,43 @@ class NoiseFloor:
 
     method: NoiseMethod
     frequency_hz: FloatArray
-    """(lines,)"""
+    """(lines,): frequencies of the densities, Hz."""
     response: ChannelNoise
     position: ChannelNoise | None
+    """None where the recording has no position."""
     remarks: tuple[str, ...]
     """Sentences on the method of the estimate, and on its weaknesses."""
 
     @property
     def response_rms(self) -> FloatArray:
-        """Noise of the response (p channels); NaN where `how` is "unknown"."""
+        """Rms noise of the response (p,), in the channels' units; NaN where `method` is "unknown"."""
         return self.response.rms
 
     @property
     def position_rms(self) -> FloatArray | None:
-        """Noise of the position (d channels)."""
+        """Rms noise of the position (d,), in the channels' units; None without a position."""
         return None if self.position is None else self.position.rms
 
     @property
     def is_known(self) -> bool:
-        """Whether the noise could be estimated; else every rms is NaN."""
+        """Whether the noise was estimated; otherwise every rms is NaN."""
         return self.method != "unknown"
 
 
 def estimate_noise_floor(recording: Recording) -> NoiseFloor:
-    """Estimate the noise from repeated periods; else from rest; else from the lines above the driven band, assumed to
-    be white; else `how` is "unknown" and every rms NaN."""
+    """Estimate the noise from repeated periods; else at rest; else from the lines above the driven band, as white
+    noise; else `method` is "unknown" and every rms NaN. A method at rest or above the band is used only if it is
+    possible for the response and, where there is one, for the position."""
     periods = tuple(period for period in find_settled_periods(recording) if period.count > 1)
     if periods:
         return _estimate_from_repeats(recording, periods)
-    rate = recording.sample_rate_hz
-    lines_hz: FloatArray = np.arange(1.0, _LINES + 1) * (rate / 2 / (_LINES + 1))
+    sample_rate_hz = recording.sample_rate_hz
+    lines_hz: FloatArray = np.arange(1.0, _DEFAULT_LINE_COUNT + 1) * (sample_rate_hz / 2 / (_DEFAULT_LINE_COUNT + 1))
     signals = [recording.response] + ([] if recording.position is None else [recording.position])
     rest_estimates = [estimate_rest_noise(recording, signal.samples, lines_hz) for signal in signals]
     if all(rest_estimate is not None for rest_estimate in rest_estimates):
         remark = "Nothing repeats in this recording: its noise was measured at rest."
-        return _build_floor(
+        return _build_noise_floor(
             "rest",
             lines_hz,
             [rest_estimate for rest_estimate in rest_estimates if rest_estimate is not None],
@@ -72,7 +75,7 @@ def estimate_noise_floor(recording: Recording) -> NoiseFloor:
             "Nothing repeats in this recording and it never rests: its noise was measured above the driven band and "
             "is assumed to have the same density below."
         )
-        return _build_floor(
+        return _build_noise_floor(
             "quiet band",
             lines_hz,
             [quiet_estimate for quiet_estimate in quiet_estimates if quiet_estimate is not None],
@@ -80,27 +83,32 @@ def estimate_noise_floor(recording: Recording) -> NoiseFloor:
             remark,
         )
     remark = "Nothing repeats in this recording, it never rests and all its band is driven: its noise is not known."
-    unknown = [(np.full((len(lines_hz), signal.samples.shape[1]), np.nan), 0.0) for signal in signals]
-    return _build_floor("unknown", lines_hz, unknown, signals, remark)
+    unknown_estimates = [(np.full((len(lines_hz), signal.samples.shape[1]), np.nan), 0.0) for signal in signals]
+    return _build_noise_floor("unknown", lines_hz, unknown_estimates, signals, remark)
 
 
-def _build_floor(
+def _build_noise_floor(
     method: NoiseMethod,
     lines_hz: FloatArray,
     estimates: Sequence[tuple[FloatArray, float]],
     signals: Sequence[Signal],
     remark: str,
 ) -> NoiseFloor:
+    """Build the noise floor from an estimate per signal: density (lines, channels) and its degrees of freedom. Adds to
+    the density the quantization error that repeats with the motion."""
     channels = []
-    for (density, freedom), signal in zip(estimates, signals, strict=True):
+    for (density, degrees_of_freedom), signal in zip(estimates, signals, strict=True):
         total_density, rounding = add_repeating_rounding(density, signal.samples)
         channels.append(
-            ChannelNoise(np.sqrt(total_density.mean(axis=0)), total_density, np.full(len(rounding), freedom), rounding)
+            ChannelNoise(
+                np.sqrt(total_density.mean(axis=0)), total_density, np.full(len(rounding), degrees_of_freedom), rounding
+            )
         )
     return NoiseFloor(method, lines_hz, channels[0], channels[1] if len(channels) > 1 else None, (remark,))
 
 
 def _estimate_from_repeats(recording: Recording, periods: Sequence[Periods]) -> NoiseFloor:
+    """Estimate the noise from the differences between periods, at the spectral lines of the longest period."""
     lines_hz = max(periods, key=lambda period: period.length).compute_line_frequencies(recording.sample_rate_hz)
     response = estimate_repeat_noise(recording, recording.response.samples, periods, lines_hz)
     remarks = _describe_variation(recording.response, response)
@@ -112,6 +120,7 @@ def _estimate_from_repeats(recording: Recording, periods: Sequence[Periods]) -> 
 
 
 def _describe_variation(signal: Signal, noise: ChannelNoise) -> list[str]:
+    """Describe, in a sentence per channel, segments whose periods differ by more than noise; empty without any."""
     remarks = []
     for index, name in enumerate(signal.channels):
         varying = sum(segment.varies[index] for segment in noise.segments)

@@ -3,6 +3,8 @@
 A healthy device also repeats readings and has a largest one. Reference recordings of the device without the fault
 therefore give the usual count of such readings, which a fault must exceed significantly (`_is_unusual`). Called by
 `search_by_simulation` and `compare_with_reference`, where reference recordings are given.
+
+Sizes: n samples, p response channels. The limits are chosen by hand, unless a reason is stated.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,22 +34,26 @@ READING_TOLERANCE = 1e-9
 
 
 def find_sensor_faults(
-    recordings: Sequence[Recording], clean: Sequence[Recording], effects: Sequence[Effect]
+    recordings: Sequence[Recording], reference_recordings: Sequence[Recording], effects: Sequence[Effect]
 ) -> tuple[Hypothesis, ...]:
     """Find the first fault of quantization, clipping and lost samples, in this order: at most one hypothesis, because
-    quantized readings also repeat and accumulate at the largest value. clean: reference recordings, at least one;
-    effects: those that may be named. Empty where the fault found first is not among them."""
+    quantized readings also repeat and accumulate at the largest value. reference_recordings: at least one, with the
+    channels of `recordings`; all with two or more complete samples per stretch. effects: those that may be named. Empty
+    without a fault, and where the fault found first is not among them."""
     effects_by_name = {effect.name: effect for effect in effects}
     readings = _stack_readings(recordings)
-    references = [
-        part for recording in clean for part in np.array_split(_stack_readings([recording]), STRETCH_COUNT) if len(part)
+    reference_stretches = [
+        stretch
+        for recording in reference_recordings
+        for stretch in np.array_split(_stack_readings([recording]), STRETCH_COUNT)
+        if len(stretch)
     ]
     for name, detect in (
         ("quantization", _find_quantization),
         ("sensor_clipping", _find_clipping),
         ("lost_samples", _find_lost_samples),
     ):
-        fault = detect(readings, references)
+        fault = detect(readings, reference_stretches)
         if fault is not None:
             return (_make_hypothesis(effects_by_name[name], *fault),) if name in effects_by_name else ()
     return ()
@@ -58,20 +64,22 @@ ChannelFault = tuple[tuple[int, ...], Values]
 
 
 def _make_hypothesis(effect: Effect, channels: tuple[int, ...], values: Values) -> Hypothesis:
-    """Make the hypothesis that these channels have the fault, with the same values."""
+    """Make the hypothesis that these response channels (indices) have the fault, with the same parameter values."""
     spread: Spread = "all" if len(channels) > 1 else "one"
     return make_claim_hypothesis(Claim(effect, spread, channels), [values])
 
 
 def _stack_readings(recordings: Sequence[Recording]) -> FloatArray:
-    """(n, p): responses of all recordings, one after another, without samples in which a channel is missing."""
+    """Stack the responses of all recordings, (n, p), one after another, without samples in which a channel is
+    missing."""
     samples = np.vstack([recording.response.samples for recording in recordings])
     return np.asarray(samples[np.isfinite(samples).all(axis=1)])
 
 
 def _find_quantization(readings: FloatArray, references: Sequence[FloatArray]) -> ChannelFault | None:
-    """Find quantization: readings lie on a lattice whose step is more than `STEP_FACTOR` times that of every
-    reference."""
+    """Find quantization: readings lie on a lattice whose step is more than `STEP_FACTOR` times that of every reference
+    (0 where a reference lies on none). All channels have the fault if their steps are equal, else the one with the
+    largest step. readings: (n, p); references: (samples, p) each."""
     steps = {}
     for channel in range(readings.shape[1]):
         step = find_lattice_step(readings[:, channel])
@@ -79,16 +87,17 @@ def _find_quantization(readings: FloatArray, references: Sequence[FloatArray]) -
             step > STEP_FACTOR * confirm_lattice_step(reference[:, channel], step) for reference in references
         ):
             steps[channel] = step
-    equal_steps = bool(steps) and min(steps.values()) > (1 - STEP_TOLERANCE) * max(steps.values())
-    return _choose_channels(steps, equal_steps and len(steps) == readings.shape[1], readings.shape[1], "step")
+    has_equal_steps = bool(steps) and min(steps.values()) > (1 - STEP_TOLERANCE) * max(steps.values())
+    return _choose_channels(steps, has_equal_steps and len(steps) == readings.shape[1], readings.shape[1], "step")
 
 
 def _find_clipping(readings: FloatArray, references: Sequence[FloatArray]) -> ChannelFault | None:
     """Find clipping: significantly more readings at the largest magnitude than in the references, which exceed that
-    magnitude, and no more repeats below it than usual."""
+    magnitude, and no more repeats below it than usual. All channels have the fault if none exceeds the largest limit,
+    else the one with the largest limit. readings: (n, p); references: (samples, p) each."""
     limits = {}
     for channel in range(readings.shape[1]):
-        limit, count = _count_top_readings(readings[:, channel])
+        limit, top_count = _count_top_readings(readings[:, channel])
         usual_count = max(
             _count_top_readings(reference[:, channel])[1] / len(reference) for reference in references
         ) * len(readings)
@@ -98,35 +107,36 @@ def _find_clipping(readings: FloatArray, references: Sequence[FloatArray]) -> Ch
         ) * len(readings)
         if (
             limit < largest_reference
-            and _is_unusual(count, usual_count)
+            and _is_unusual(top_count, usual_count)
             and not _is_unusual(_count_repeats_below_top(readings[:, channel]), usual_repeats)
         ):
             limits[channel] = limit
-    all_clipped = bool(limits) and bool(np.all(np.abs(readings) <= max(limits.values()) * (1 + READING_TOLERANCE)))
-    return _choose_channels(limits, all_clipped, readings.shape[1], "limit")
+    are_all_clipped = bool(limits) and bool(np.all(np.abs(readings) <= max(limits.values()) * (1 + READING_TOLERANCE)))
+    return _choose_channels(limits, are_all_clipped, readings.shape[1], "limit")
 
 
 def _count_repeats_below_top(values: FloatArray) -> int:
-    """Count the repeated readings below the largest magnitude of one channel: backlash holds readings at any level,
-    clipping at the limit only."""
+    """Count the repeated readings below the largest magnitude of one channel, (n,), n >= 2: backlash holds readings at
+    any level, clipping at the limit only."""
     magnitudes = np.abs(values[1:])
     return int(np.count_nonzero((np.diff(values) == 0) & (magnitudes < magnitudes.max() * (1 - READING_TOLERANCE))))
 
 
 def _count_top_readings(values: FloatArray) -> tuple[float, int]:
-    """Return the largest magnitude of one channel, and the number of readings there less the number at the next smaller
-    magnitude."""
+    """Return the largest magnitude of one channel, (n,), and the number of readings there less the number at the next
+    smaller magnitude."""
     magnitudes = np.abs(values)
-    limit = float(magnitudes.max())
-    at_limit = magnitudes >= limit * (1 - READING_TOLERANCE)
-    smaller = magnitudes[~at_limit]
+    largest_magnitude = float(magnitudes.max())
+    is_at_limit = magnitudes >= largest_magnitude * (1 - READING_TOLERANCE)
+    smaller = magnitudes[~is_at_limit]
     next_count = int(np.count_nonzero(smaller >= smaller.max() * (1 - READING_TOLERANCE))) if len(smaller) else 0
-    return limit, int(np.count_nonzero(at_limit)) - next_count
+    return largest_magnitude, int(np.count_nonzero(is_at_limit)) - next_count
 
 
 def _find_lost_samples(readings: FloatArray, references: Sequence[FloatArray]) -> ChannelFault | None:
     """Find lost samples: significantly more runs of repeats than in the references, short and followed by a full step.
-    The parameter is the share of lost samples. A sensor that rests for a while has not lost samples."""
+    The parameter is the share of lost samples, and all channels have the fault. A sensor that rests for a while has not
+    lost samples. readings: (n, p); references: (samples, p) each."""
     repeated = _mark_repeats(readings)
     usual_count = max(float(_mark_run_starts(_mark_repeats(reference)).mean()) for reference in references) * len(
         repeated
@@ -144,7 +154,8 @@ def _find_lost_samples(readings: FloatArray, references: Sequence[FloatArray]) -
 
 def _has_full_steps(values: FloatArray, repeated: Mask) -> bool:
     """Whether the median step after a repeat exceeds `FULL_STEP_SHARE` of the median of the other steps, as after lost
-    samples; after backlash it is smaller. True where either kind of step does not occur."""
+    samples; after backlash it is smaller. True where either kind of step does not occur. values: (n, p); repeated: as
+    `_mark_repeats` returns it; a step is summed over the channels."""
     step_sizes = np.abs(np.diff(values, axis=0)).sum(axis=1)[1:]
     follows_repeat = repeated[:-1] & ~repeated[1:]
     is_regular = ~repeated[:-1] & ~repeated[1:]
@@ -156,18 +167,18 @@ def _has_full_steps(values: FloatArray, repeated: Mask) -> bool:
 
 
 def _mark_repeats(values: FloatArray) -> Mask:
-    """(n - 1,): whether all channels repeat the previous reading."""
+    """Mark the readings, from the second on, in which all channels repeat the previous one: (n - 1,)."""
     return np.asarray((np.diff(values, axis=0) == 0).all(axis=1), dtype=np.bool_)
 
 
 def _mark_run_starts(repeated: Mask) -> Mask:
-    """(n - 1,): mask of the first repeat of each run."""
+    """Mark the first repeat of each run: (n - 1,)."""
     return np.asarray(repeated & ~np.concatenate([[False], repeated[:-1]]), dtype=np.bool_)
 
 
 def _is_unusual(count: int, usual_count: float) -> bool:
-    """Whether a count exceeds the usual one by a factor and by several standard deviations of a Poisson count,
-    sqrt(usual)."""
+    """Whether a count is at least `READINGS_LEAST` and exceeds the usual one by the factor `READINGS_FACTOR` and by
+    `READINGS_DEVIATIONS` standard deviations of a Poisson count, sqrt(usual_count)."""
     return (
         count >= READINGS_LEAST
         and count > READINGS_FACTOR * usual_count

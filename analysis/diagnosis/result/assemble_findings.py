@@ -18,7 +18,7 @@ from analysis.diagnosis.errors.error_measure import ErrorMeasure
 from analysis.diagnosis.errors.error_measure_rule import IN_SAMPLES
 from analysis.diagnosis.errors.tuning import Tuning
 from analysis.diagnosis.localisation.localisation import Localisation
-from analysis.diagnosis.localisation.mismatch_maps import Maps, build_mismatch_maps, summarise_worst_channel
+from analysis.diagnosis.localisation.mismatch_maps import MismatchMaps, build_mismatch_maps, summarise_worst_channel
 from analysis.diagnosis.localisation.mismatch_rows import list_mismatch_rows
 from analysis.diagnosis.localisation.model_error_floor import ModelErrorFloor, describe_model_error_floor
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
@@ -140,7 +140,7 @@ def _compute_standard_errors(result: SearchResult) -> FloatArray:
 
 
 def _build_document(
-    result: SearchResult, errors: FloatArray, examined: tuple[Maps, Localisation], proposal: "Proposal | None"
+    result: SearchResult, errors: FloatArray, examined: tuple[MismatchMaps, Localisation], proposal: "Proposal | None"
 ) -> Diagnosis:
     """The document. errors: standard errors of all parameters. examined: mismatch maps and localisation."""
     explanation, judgement = result.found, result.judgement

@@ -73,7 +73,7 @@ class DeviceWording:
     system: UnitSystem
     """Units of the recordings."""
     noise: str = ""
-    """Origin of the noise estimate, `NoiseFloor.how`; empty where it is not known."""
+    """Origin of the noise estimate, `NoiseFloor.method`; empty where it is not known."""
 
 
 def format_class_noun(effect: NamedEffect) -> str:

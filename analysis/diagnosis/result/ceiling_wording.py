@@ -84,7 +84,7 @@ def _describe_ceiling_of_axis(errors: BalanceErrors, is_single_axis: bool) -> st
 
 
 _NOISE_SOURCES = {"rest": "at the level measured at rest", "quiet band": "at the level measured above the driven band"}
-"""Words for noise that was not estimated from repeats, by `NoiseFloor.how`. Its level during excitation is then
+"""Words for noise that was not estimated from repeats, by `NoiseFloor.method`. Its level during excitation is then
 unknown, so that errors are not stated in units of it."""
 
 
@@ -97,7 +97,7 @@ def describe_error_change(
     errors: Errors, first_stage: tuple[str, str], last_stage: tuple[str, str], noise_method: str = ""
 ) -> str:
     """Describe, in a clause, the change of the held-out error between two stages. first_stage, last_stage: a field of
-    `Errors`, and its name in words. noise_method: `NoiseFloor.how`; empty where it is not known."""
+    `Errors`, and its name in words. noise_method: `NoiseFloor.method`; empty where it is not known."""
     first_error, last_error = getattr(errors, first_stage[0]), getattr(errors, last_stage[0])
     if first_error is None or last_error is None:
         return "how much better it predicts held-out data is not known"

@@ -1,7 +1,7 @@
-"""Adds the result of a comparison with clean recordings to the findings: verdict, named fault, and candidates.
+"""Add the result of a comparison with clean recordings to the findings: verdict, named fault, and candidates.
 
-The comparison (`contrast`) replaces verdict, effects and errors of the search by simulation. Where the sets could
-not be compared, only a fault that the readings show by themselves is named.
+The comparison (`diagnosis.contrast`) replaces verdict, effects and errors of the search by simulation. Where the sets
+could not be compared, only a fault that the readings show without a model is named. Called by `diagnose`.
 """
 
 from collections.abc import Mapping
@@ -25,23 +25,27 @@ from equalizer.plant.mechanical_model import MechanicalModel, ModelEffect
 from equalizer.signals.recording import Recording
 from equalizer.signals.unit_system import LINEAR, UnitSystem
 
-MOST_LISTED = 6
-"""Most candidates that a diagnosis lists. By hand."""
+MAX_LISTED_CANDIDATES = 6
+"""Largest number of candidates that a diagnosis lists. Chosen."""
 COMPARED_WITH_CLEAN = (
     "The recordings were compared with the clean ones by a model that was fitted to both sets at once, with all laws "
     "that they need: a fault is an effect that the clean recordings lack. It counts where its gain exceeds {:.3g} "
     "times the gain that it would have between stretches of one set."
 )
+"""Remark on the method of a comparison; the placeholder is `gain_factor` of `add_contrast`."""
 NOT_COMPARED = (
     "The recordings could not be compared with the clean ones: too little was recorded without gaps, one recording "
     "contains hardly any motion, or the fits failed. The results here use the model alone."
 )
+"""Remark where no comparison was possible."""
 SHOWN_DIRECTLY = "The sensor's signal itself shows this fault, and the clean recordings do not; no model was used."
+"""Remark on a fault found without a model."""
 
 
 def add_contrast(findings: Findings, contrast: Contrast, recording: Recording, gain_factor: float) -> Findings:
-    """The findings with the result of a comparison in their diagnosis, model and remarks. recording: one of the faulty
-    set. gain_factor: factor on the usual gain from which a fault counts."""
+    """Put the result of a comparison into diagnosis, improved model and remarks of the findings; without a comparison
+    and a directly shown fault, only the remark is added. recording: one of the faulty set. gain_factor: ratio of a
+    fault's gain to that between stretches of one set, above which the fault counts; for the remark."""
     if contrast.comparison is None or contrast.decision is None:
         named_fault = _find_directly_shown_fault(contrast, recording)
         if named_fault is None:
@@ -67,7 +71,8 @@ def add_contrast(findings: Findings, contrast: Contrast, recording: Recording, g
 def _replace_effects(
     diagnosis: Diagnosis, verdict: Verdict, effects: tuple[NamedEffect, ...], candidates: tuple[Candidate, ...]
 ) -> Diagnosis:
-    """The diagnosis with other verdict, effects and candidates; mismatch and remainder as the verdict requires."""
+    """Replace verdict, effects and candidates of a diagnosis; mismatch and remainder become what the verdict requires,
+    and the proposed experiment is removed."""
     remainder = diagnosis.remainder or diagnosis.mismatch
     return replace(
         diagnosis,
@@ -83,7 +88,8 @@ def _replace_effects(
 def _apply_comparison(
     diagnosis: Diagnosis, comparison: Comparison, decision: Decision, recording: Recording, system: UnitSystem
 ) -> Diagnosis:
-    """The diagnosis with the decision of a comparison. Errors are those of the faulty set."""
+    """Put the decision of a comparison into a diagnosis. Without a named fault the verdict is `no_mismatch` where the
+    excess is at most `SETS_AS_ONE`, else `unexplained`. Errors are those of the faulty set."""
     judged_fault = decision.named
     named_effects = () if judged_fault is None else (_name_fault(judged_fault, decision, recording, system),)
     candidates = tuple(_make_candidate(law, reason, recording) for law, reason in decision.unnamed)
@@ -93,8 +99,8 @@ def _apply_comparison(
     fit = Fit(
         _compute_errors(
             comparison,
-            comparison.errors[:CONTRAST_BLOCKS].sum(),
-            (comparison.errors if judged_fault is None else judged_fault.errors)[:CONTRAST_BLOCKS].sum(),
+            comparison.block_squares[:CONTRAST_BLOCKS].sum(),
+            (comparison.block_squares if judged_fault is None else judged_fault.block_squares)[:CONTRAST_BLOCKS].sum(),
         ),
         _compute_errors(
             comparison,
@@ -103,22 +109,22 @@ def _apply_comparison(
         ),
     )
     error_kind = "predicted force" if comparison.by_force else f"windows of {comparison.step_s:.6f} s"
-    updated = _replace_effects(diagnosis, verdict, named_effects, candidates[:MOST_LISTED])
+    updated = _replace_effects(diagnosis, verdict, named_effects, candidates[:MAX_LISTED_CANDIDATES])
     return replace(updated, fit=fit, error=error_kind)
 
 
 def _compute_errors(comparison: Comparison, squares_before: float, squares_after: float) -> Errors:
-    """Errors of the faulty set before and after a fault was undone, rms over the rms of its signal. squares_before,
-    squares_after: sums of squares."""
+    """Compute the errors of the faulty set before and after the fault is undone in its signals (`comparison`), rms over
+    the rms of its signal. squares_before, squares_after: sums of squared errors."""
     relative_errors = [
-        float(np.sqrt(square_sum / comparison.faulty_samples)) * comparison.faulty_share
+        float(np.sqrt(square_sum / comparison.faulty_sample_count)) * comparison.faulty_share
         for square_sum in (squares_before, squares_after)
     ]
     return Errors(relative_errors[0], relative_errors[0], relative_errors[1], None)
 
 
 def _name_fault(judged_fault: JudgedFault, decision: Decision, recording: Recording, system: UnitSystem) -> NamedEffect:
-    """The fault as a named effect of the document, with its class."""
+    """Convert the fault to a named effect of the document, with its equivalents as class and rivals."""
     effect = judged_fault.fault.effect
     rivals = tuple(
         Rival(name, 0.0, True, "equally good in its place on the compared data") for name in decision.equivalents
@@ -136,13 +142,14 @@ def _name_fault(judged_fault: JudgedFault, decision: Decision, recording: Record
 
 
 def _find_axis_letter(judged_fault: JudgedFault, recording: Recording) -> str | None:
-    """Letter of the fault's axis or channel; None where it concerns all."""
+    """Find the letter of the fault's axis or channel; None where its axis is no channel of the signal (all of them)."""
     channels = recording.response.channels if judged_fault.fault.place == "sensor" else recording.command.channels
     return shorten_axis_name(judged_fault.fault.axis, channels) if judged_fault.fault.axis in channels else None
 
 
 def _make_estimates(judged_fault: JudgedFault, recording: Recording, system: UnitSystem) -> dict[str, Estimate]:
-    """Parameters of the fault with units and 95 % intervals; without an interval where the standard error is 0."""
+    """Make the parameters of the fault with units and 95 % intervals; without an interval where the standard error is
+    0."""
     units = _find_units(judged_fault.fault, recording, system)
     return {
         name: Estimate(
@@ -155,7 +162,8 @@ def _make_estimates(judged_fault: JudgedFault, recording: Recording, system: Uni
 
 
 def _find_units(fault: Fault, recording: Recording, system: UnitSystem) -> Mapping[str, str]:
-    """Unit of each parameter of a fault: that of the reading for a sensor's, of the command for an actuator's."""
+    """Find the unit of each parameter of a fault: by the catalogue where it has the effect; else from the unit of the
+    response for a sensor's fault, of the command for another."""
     if fault.effect in EFFECTS_BY_NAME:
         reading_unit = recording.response.units[max(fault.site, 0)] if fault.place == "sensor" else "1"
         return {
@@ -164,12 +172,13 @@ def _find_units(fault: Fault, recording: Recording, system: UnitSystem) -> Mappi
         }
     signal = recording.response if fault.place == "sensor" else recording.command
     unit = signal.units[max(fault.site, 0)]
-    stiffness = get_parameter_unit(fault.effect, "stiffness", system)
-    return {"stiffness": stiffness, "offset": unit, "cubic": f"1/({unit})^2", "square": f"1/({unit})"}
+    stiffness_unit = get_parameter_unit(fault.effect, "stiffness", system)
+    return {"stiffness": stiffness_unit, "offset": unit, "cubic": f"1/({unit})^2", "square": f"1/({unit})"}
 
 
 def _make_candidate(judged_fault: JudgedFault, reason: str, recording: Recording) -> Candidate:
-    """The fault as a candidate. Its gain E / E' - 1 becomes the share 1 - E' / E of the error with the fault."""
+    """Convert the fault to a candidate. With the sums of squared errors E, and E' after undoing it, the gain
+    g = E / E' - 1 becomes the share of the error that is removed, 1 - E' / E = 1 - 1 / (1 + g), limited to 0 to 1."""
     return Candidate(
         effect=judged_fault.fault.effect,
         place=judged_fault.fault.place,
@@ -182,8 +191,8 @@ def _make_candidate(judged_fault: JudgedFault, reason: str, recording: Recording
 
 
 def _find_directly_shown_fault(contrast: Contrast, recording: Recording) -> NamedEffect | None:
-    """The fault that the readings show without a model (`signal_faults`, `model_free_faults`), such as hum or clipping;
-    None without any. It has no interval."""
+    """Find the fault that the readings show without a model (`signal_faults`, then `model_free_faults`), such as hum or
+    clipping; None without any. Its parameters have no intervals; share and probability are 1."""
     place: Place = "sensor"
     if contrast.signal_fault is not None:
         name, sites, values, place = (
@@ -215,7 +224,7 @@ def _find_directly_shown_fault(contrast: Contrast, recording: Recording) -> Name
 
 
 def _improve_model(model: MechanicalModel, effects: tuple[NamedEffect, ...]) -> MechanicalModel:
-    """The given model with the faults that have a simulation, among its effects."""
+    """Add to a model those of the effects that the catalogue can simulate."""
     model_effects = tuple(
         ModelEffect(effect.effect, effect.axis, {name: estimate.value for name, estimate in effect.parameters.items()})
         for effect in effects

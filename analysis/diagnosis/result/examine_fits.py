@@ -15,7 +15,7 @@ from analysis.diagnosis.errors.hypothesis import remove_claim
 from analysis.diagnosis.errors.output_error import evaluate_fit, gather_evidence
 from analysis.diagnosis.localisation.distortion import Distortions, find_distortions
 from analysis.diagnosis.localisation.localisation import Localisation, find_entry_point, find_state_dependences
-from analysis.diagnosis.localisation.mismatch_maps import Maps
+from analysis.diagnosis.localisation.mismatch_maps import MismatchMaps
 from analysis.diagnosis.noise.noise_floor import NoiseFloor
 from analysis.diagnosis.result.black_box import fit_black_box
 from analysis.diagnosis.result.curves.signature_curves import Names, compute_signature
@@ -47,7 +47,7 @@ class Examination:
     """Fitted to the residuals of the re-tuned model; None without one (see `_fit_black_box`)."""
 
 
-def examine_fits(result: SearchResult, floor: NoiseFloor, maps: Maps) -> Examination:
+def examine_fits(result: SearchResult, floor: NoiseFloor, maps: MismatchMaps) -> Examination:
     """Localise the mismatch of the given, the re-tuned and the final model, and characterise the named effects. floor:
     noise of the first recording. maps: mismatch maps of these three stages."""
     context, explanation = result.context, result.found

@@ -1,7 +1,8 @@
-"""A diagnosis in plain sentences, the same in the report, in the terminal and on the screen.
+"""Sentences that state a diagnosis, the same in the report, in the terminal and on the screen.
 
-`write_summary_lines` gives all of them in order, the verdict first; errors are relative to the signal, on held-out
-data."""
+`write_summary_lines` returns all of them in order, the verdict first; errors are relative to the signal, on held-out
+data. Called by `diagnosis_report`, `diagnosed_summary`, `view_diagnosis` and `answer_of_findings`.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -39,36 +40,40 @@ from analysis.diagnosis.settings import FALSE_DISCOVERY_RATE
 from analysis.diagnosis.unit_wording import format_probability, format_share
 from analysis.wording import capitalise, conjoin, end_sentence, format_p_text
 
-_PLACES_NAMED = 3
-"""Largest number of places of a remaining mismatch that a sentence lists."""
+_MAX_LISTED_PLACES = 3
+"""Largest number of rows of a remaining mismatch that a sentence lists. Chosen."""
 _AT_NOISE_LEVEL = (
     "The residual is no larger than the estimated noise; only repeated periods of the excitation could show that "
     "nothing else is missing."
 )
+"""Remark on a diagnosis without a remaining mismatch that is not `explained`."""
 
 
 def format_effect_title(effect: NamedEffect, single: bool = False) -> str:
-    """Noun and place of an effect: "dry friction on the x drive". single: the device has one axis."""
+    """Format noun and place of an effect: "dry friction on the x drive"; the noun alone for a fault of the whole
+    device. single: whether the device has one axis, which is then not named."""
     if effect.effect in WHOLE_DEVICE_FAULTS and effect.axis is None:
         return get_noun(effect.effect)
     return f"{format_class_noun(effect)} {format_place(effect.place, effect.axis, single)}"
 
 
 def describe_effect(effect: NamedEffect, signature: str = "", single: bool = False) -> str:
-    """Sentence on an effect with its parameters. signature: what the effect causes in the data, by the catalogue."""
+    """Describe an effect with its parameters in a sentence. signature: what it causes in the data, from the
+    catalogue."""
     if effect.law is not None:
         signature = "; ".join(filter(None, (format_law(effect.law), signature)))
-    text = ", ".join(
+    title_and_parameters = ", ".join(
         filter(None, (format_effect_title(effect, single), format_parameters(effect.effect, effect.parameters)))
     )
-    return f"{capitalise(text)}: {signature}." if signature else f"{capitalise(text)}."
+    return f"{capitalise(title_and_parameters)}: {signature}." if signature else f"{capitalise(title_and_parameters)}."
 
 
 def describe_verdict(
     diagnosis: Diagnosis, moved_parameters: Sequence[MovedParameter] = (), device: DeviceWording | None = None
 ) -> str:
-    """The answer, with which every output begins: verdict, named effects and held-out errors; where nothing is named,
-    with the best candidate. moved_parameters: re-tuned, for the verdict "parameters"."""
+    """Describe the verdict, with which every output begins, with named effects and held-out errors; where nothing is
+    named, with the best candidate. moved_parameters: re-tuned by a standard deviation or more, for the verdict
+    "parameters". device: None = several axes and no statement on the noise."""
     single = device is not None and device.single
     errors = diagnosis.fit.test
     effect_titles = conjoin([format_effect_title(effect, single) for effect in diagnosis.effects])
@@ -81,16 +86,16 @@ def describe_verdict(
             if moved_parameters
             else ", each within its calibration's standard deviation"
         )
-        error_text_ = describe_error_change(errors, ("before", "as given"), ("retuned", "re-tuned"), noise_method)
-        return f"No physics is missing; parameters of the model are wrong{change_text}. {capitalise(error_text_)}."
+        error_text = describe_error_change(errors, ("before", "as given"), ("retuned", "re-tuned"), noise_method)
+        return f"No physics is missing; parameters of the model are wrong{change_text}. {capitalise(error_text)}."
     if diagnosis.effects:
-        error_text_ = capitalise(
+        error_text = capitalise(
             describe_error_change(errors, choose_better_model(errors), ("after", "with it"), noise_method)
         )
         if not select_significant(diagnosis.remainder):
             remark = "" if diagnosis.verdict == "explained" else f" {_AT_NOISE_LEVEL}"
-            return f"Missing in the model: {effect_titles}. {error_text_}.{remark}"
-        return f"Missing in the model: {effect_titles}, but that is not all. {error_text_}, and a mismatch remains."
+            return f"Missing in the model: {effect_titles}. {error_text}.{remark}"
+        return f"Missing in the model: {effect_titles}, but that is not all. {error_text}, and a mismatch remains."
     sentence = (
         "Model and device disagree, and no effect of the catalogue explains it. "
         f"{capitalise(describe_error(*choose_better_error(errors), errors, noise_method))}."
@@ -99,7 +104,7 @@ def describe_verdict(
 
 
 def write_answer(findings: Findings) -> str:
-    """The sentence of the verdict, by band powers where impacts were compared."""
+    """Write the sentences of the verdict, about band powers where impacts were compared by them."""
     diagnosis, device = findings.diagnosis, extract_device(findings)
     if findings.explanation.statistic is not None:
         return format_impact_answer(
@@ -109,15 +114,15 @@ def write_answer(findings: Findings) -> str:
 
 
 def extract_device(findings: Findings) -> DeviceWording:
-    """The facts about the device that sentences need, from the given model and the noise floor."""
+    """Extract the properties of the device that sentences need, from the given model and the noise floor."""
     return DeviceWording(
         findings.given.inputs == 1, findings.given.system, "" if findings.floor is None else findings.floor.method
     )
 
 
 def describe_rivals(effect: NamedEffect) -> tuple[str, ...]:
-    """A sentence per rival of the effect: its probability and why it was not chosen. Rivals that the data cannot
-    distinguish from the effect are in `describe_equivalents`."""
+    """Describe each rival of the effect in a sentence: its probability and why it was not chosen. Left out are rivals
+    that the data cannot distinguish from the effect, and refinements of it (`describe_equivalents`)."""
     return tuple(
         f"{capitalise(get_noun(rival.effect))} (probability {format_probability(rival.probability)}): "
         f"{end_sentence(rival.why_not)}"
@@ -127,12 +132,13 @@ def describe_rivals(effect: NamedEffect) -> tuple[str, ...]:
 
 
 def describe_equivalents(effect: NamedEffect) -> str:
-    """Sentences on rivals that the data cannot distinguish from the effect, and on laws that only refine it; empty
-    where there are none."""
+    """Describe rivals that the data cannot distinguish from the effect, and laws that only refine it; empty where there
+    are none."""
     return " ".join(filter(None, (_describe_inseparable(effect), describe_refinements(effect))))
 
 
 def _describe_inseparable(effect: NamedEffect) -> str:
+    """Describe the class of the effect, or the rivals marked as inseparable with their probabilities; else empty."""
     if effect.class_:
         return describe_class(effect)
     equivalents = [rival for rival in effect.rivals if rival.inseparable]
@@ -142,49 +148,51 @@ def _describe_inseparable(effect: NamedEffect) -> str:
     probability_texts = ", ".join(
         f"{get_noun(name)} {format_probability(probability)}"
         for name, probability in (
-            (effect.effect, effect.probability), *((other.effect, other.probability) for other in equivalents)
+            (effect.effect, effect.probability),
+            *((equivalent.effect, equivalent.probability) for equivalent in equivalents),
         )
-    )  # fmt: skip
+    )
     return (
         f"These data do not distinguish {get_noun(effect.effect)} from "
-        f"{conjoin([get_noun(other.effect) for other in equivalents])}: {subject} "
+        f"{conjoin([get_noun(equivalent.effect) for equivalent in equivalents])}: {subject} "
         f"named (probabilities: {probability_texts})."
     )
 
 
 def describe_remainder(diagnosis: Diagnosis, device: DeviceWording | None = None) -> str:
-    """Sentence on the remaining mismatch: its first `_PLACES_NAMED` significant rows in the document's order, which
+    """Describe the remaining mismatch: its first `_MAX_LISTED_PLACES` significant rows in the document's order, which
     begins with the largest share of the signal, and the number of the others."""
     significant_rows = select_significant(diagnosis.remainder)
     if not significant_rows:
         return "No significant mismatch remains."
-    unlisted = len(significant_rows) - _PLACES_NAMED
+    unlisted = len(significant_rows) - _MAX_LISTED_PLACES
     unlisted_text = f"; and {unlisted} smaller {'place' if unlisted == 1 else 'places'}" if unlisted > 0 else ""
     return (
-        f"Still unexplained: {'; '.join(describe_place(row, device) for row in significant_rows[:_PLACES_NAMED])}"
+        f"Still unexplained: {'; '.join(describe_place(row, device) for row in significant_rows[:_MAX_LISTED_PLACES])}"
         f"{unlisted_text}."
     )
 
 
 def select_significant(rows: Sequence[Mismatch]) -> tuple[Mismatch, ...]:
-    """The rows with a p-value of at most `FALSE_DISCOVERY_RATE`: a document may list rows that are not significant."""
+    """Select rows with a p-value of at most `FALSE_DISCOVERY_RATE`: a document may list rows that are not
+    significant."""
     return tuple(row for row in rows if row.p_value <= FALSE_DISCOVERY_RATE)
 
 
 def describe_place(mismatch: Mismatch, device: DeviceWording | None = None) -> str:
-    """Where a mismatch occurs and its share, in words: "ax at 8 to 16 Hz, driven by fx at 0.5, near v = 0: 80 % of the
+    """Describe where a mismatch occurs and its share: "ax at 8 to 16 Hz, driven by fx at 0.5, near v = 0: 80 % of the
     mismatch (p < 0.0001)"."""
     low, high = mismatch.band_hz
-    band = f" at {low:g} to {high:g} Hz" if device is None or device.system.time == "s" else ""
-    level = "" if mismatch.amplitude is None else f" at {mismatch.amplitude:g}"
-    state = f", {mismatch.state}" if mismatch.state else ""
-    driven = f", driven by {mismatch.input}{level}" if mismatch.input else ""
-    share = f"{format_share(mismatch.share)} of {'the mismatch' if mismatch.state else 'the signal'}"
-    return f"{mismatch.output}{band}{driven}{state}: {share} ({format_p_text(mismatch.p_value)})"
+    band_text = f" at {low:g} to {high:g} Hz" if device is None or device.system.time == "s" else ""
+    level_text = "" if mismatch.amplitude is None else f" at {mismatch.amplitude:g}"
+    state_text = f", {mismatch.state}" if mismatch.state else ""
+    input_text = f", driven by {mismatch.input}{level_text}" if mismatch.input else ""
+    share_text = f"{format_share(mismatch.share)} of {'the mismatch' if mismatch.state else 'the signal'}"
+    return f"{mismatch.output}{band_text}{input_text}{state_text}: {share_text} ({format_p_text(mismatch.p_value)})"
 
 
 def describe_next_experiment(diagnosis: Diagnosis) -> str:
-    """Sentences on the recording to make next, and why. Without a proposal: a sentence that says so where rivals cannot
+    """Describe the recording to make next, and why. Without a proposal: a sentence that states this where rivals cannot
     be distinguished, else empty."""
     experiment = diagnosis.next_experiment
     if experiment is None:
@@ -199,7 +207,7 @@ def describe_next_experiment(diagnosis: Diagnosis) -> str:
 
 
 def describe_share(effect: NamedEffect) -> str:
-    """Sentences on an effect's share of the mismatch after re-tuning, its probability, and its held-out gain."""
+    """Describe an effect's share of the mismatch after re-tuning, its probability, and its held-out gain."""
     return (
         f"It accounts for {100 * effect.share:.3g} % of the mismatch after re-tuning; the probability that this "
         f"effect is the cause is {format_probability(effect.probability)}.{describe_gain(effect)}"
@@ -207,7 +215,8 @@ def describe_share(effect: NamedEffect) -> str:
 
 
 def describe_gain(effect: NamedEffect) -> str:
-    """Sentence on the effect's held-out gain, preceded by a space; empty where no gain with an interval is known."""
+    """Describe the effect's held-out gain and its 95 % interval, values below 0 as 0, after a leading space; empty
+    where no gain with an interval is known."""
     gain = effect.held_out_gain
     if gain is None or gain.ci95 is None:
         return ""
@@ -216,7 +225,8 @@ def describe_gain(effect: NamedEffect) -> str:
 
 
 def write_summary_lines(findings: Findings) -> tuple[str, ...]:
-    """The diagnosis in a few sentences, the verdict first."""
+    """Write the lines of the diagnosis: verdict, effects, mismatch, next experiment, doubts and remarks; none is
+    empty."""
     diagnosis, single = findings.diagnosis, findings.given.inputs == 1
     moved_parameters = find_final_moves(findings)
     lines = [write_answer(findings)]
@@ -244,13 +254,13 @@ def write_summary_lines(findings: Findings) -> tuple[str, ...]:
 
 
 def find_final_moves(findings: Findings) -> tuple[MovedParameter, ...]:
-    """The model's own parameters that the final fit moved by a standard deviation of their calibration or more, the
-    largest move first."""
+    """Find the model's own parameters that the final fit moved by a standard deviation of their calibration or more,
+    the largest move first; empty without re-tuning."""
     if findings.tuning is None:
         return ()
     return find_moved_parameters(findings.tuning, findings.explanation.after.fitted.deviations)
 
 
 def collect_signature_texts(findings: Findings) -> Mapping[str, str]:
-    """What each named effect causes in the data, by name of the effect, in the words of the catalogue."""
+    """Collect the catalogue's texts on what each named effect causes in the data, by name of the effect."""
     return {placed_effect.effect.name: placed_effect.effect.signature for placed_effect in findings.named}

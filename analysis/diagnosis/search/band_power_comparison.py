@@ -1,9 +1,9 @@
-"""Compares hypotheses by band power, for responses whose waveform cannot be predicted (rattling play).
+"""Compares hypotheses by band power, for chaotic responses whose waveform cannot be predicted (play with impacts).
 
 A misfit is the rms logarithm of the ratio of measured and simulated amplitudes, divided by its chance variation: the
 same quantity between two simulations of one hypothesis, whose coordinates differ by 1e-9 (`perturb`). Impacts make
-these simulations diverge, and no hypothesis can be expected to match the recording better than it matches itself.
-Called by `impacts`.
+these simulations diverge, so that no hypothesis can match the recording better than two of its own simulations match
+each other. Called by `impacts`.
 """
 
 from dataclasses import dataclass
@@ -27,13 +27,13 @@ class BandPowerComparison:
     context: SearchContext
     power: BandPower
     """Band powers of the whole recording."""
-    chance: FloatArray
+    chance_variation: FloatArray
     """(c,): chance variation, the rms difference between two simulations of one hypothesis in the natural logarithm of
     the amplitude; at least `IMPACTS_LEAST_SPREAD`."""
 
     def score_candidate(self, deviations: FloatArray, hypothesis: Hypothesis) -> FittedCandidate:
-        """Simulate the hypothesis and return the candidate with its misfits over the chance variation, those on
-        held-out samples included."""
+        """Simulate the hypothesis and score it: misfits (c,) over the chance variation on the samples to fit, to choose
+        by and to test. deviations: of the model's tuned parameters, as for `Tuning.tune`."""
         fitted = evaluate_fit(self.context.full_measure, self.context.tuning, deviations, hypothesis)
         misfits = self.power.compute_misfits(self.power.measured - self.power.predict(fitted.residuals))
         return FittedCandidate(
@@ -42,34 +42,37 @@ class BandPowerComparison:
         )
 
     def _divide_by_chance(self, misfit: FloatArray) -> FloatArray:
-        """(c,): misfit over the chance variation; 1 for a channel whose bands are all below the noise, NaN where no
-        channel has a band above it."""
-        return misfit if np.isnan(misfit).all() else np.where(np.isnan(misfit), 1.0, misfit / self.chance)
+        """(c,): misfit over the chance variation. A NaN, of a channel without a band above the noise, becomes 1, unless
+        all channels are NaN: then all stay NaN."""
+        return misfit if np.isnan(misfit).all() else np.where(np.isnan(misfit), 1.0, misfit / self.chance_variation)
 
 
-def make_comparison(context: SearchContext, best: BandPowerFit) -> BandPowerComparison:
-    """Make the comparison with the chance variation of the given fit: per channel the largest of its values on the
-    samples to fit, to choose by and to test."""
-    power, model = BandPower(context.full_measure), context.tuning.tune(best.deviations)
+def make_band_power_comparison(context: SearchContext, best_fit: BandPowerFit) -> BandPowerComparison:
+    """Make the comparison with the chance variation of a fit: per channel the largest of its values on the samples to
+    fit, to choose by and to test, at least `IMPACTS_LEAST_SPREAD` (also for a channel without comparable bands)."""
+    power, tuned_model = BandPower(context.full_measure), context.tuning.tune(best_fit.deviations)
 
-    def predict(number: int) -> FloatArray:
+    def predict_perturbed(perturbation_index: int) -> FloatArray:
         return power.predict(
-            context.full_measure.residuals(model, perturb(best.hypothesis, number).list_placed_effects())
+            context.full_measure.residuals(
+                tuned_model, perturb(best_fit.hypothesis, perturbation_index).list_placed_effects()
+            )
         )
 
-    first_powers, second_powers = (np.asarray(powers) for powers in context.map_(predict, range(2)))
+    first_powers, second_powers = (np.asarray(powers) for powers in context.map_(predict_perturbed, range(2)))
     differences = power.compute_misfits(first_powers - second_powers)
-    chance = np.fmax(np.fmax(differences.fit, differences.choose), differences.test)
-    return BandPowerComparison(context, power, np.fmax(chance, IMPACTS_LEAST_SPREAD))
+    chance_variation = np.fmax(np.fmax(differences.fit, differences.choose), differences.test)
+    return BandPowerComparison(context, power, np.fmax(chance_variation, IMPACTS_LEAST_SPREAD))
 
 
-def is_convincing(named: FittedCandidate, retuned: FittedCandidate) -> bool:
+def is_convincing(explanation: FittedCandidate, retuned_candidate: FittedCandidate) -> bool:
     """Whether an explanation removes at least `IMPACTS_SHARE` of the re-tuned model's misfit and leaves at most
-    `IMPACTS_ERROR` times the chance variation, on the samples to choose by and on those to test."""
+    `IMPACTS_ERROR` times the chance variation, both on the samples to choose by and on those to test. A set in which
+    the explanation has no finite misfit is skipped; False if both are skipped."""
     misfit_pairs = [
-        (getattr(retuned.score, part), getattr(named.score, part))
+        (getattr(retuned_candidate.score, part), getattr(explanation.score, part))
         for part in ("choose", "test")
-        if np.isfinite(getattr(named.score, part)).any()
+        if np.isfinite(getattr(explanation.score, part)).any()
     ]
     return bool(misfit_pairs) and all(
         _compute_rms_over_channels(named_misfit) <= (1 - IMPACTS_SHARE) * _compute_rms_over_channels(retuned_misfit)
@@ -78,10 +81,12 @@ def is_convincing(named: FittedCandidate, retuned: FittedCandidate) -> bool:
     )
 
 
-def is_as_good(rival: FittedCandidate, named: FittedCandidate) -> bool:
+def is_as_good(rival: FittedCandidate, named_candidate: FittedCandidate) -> bool:
     """Whether a rival's misfit is at most `IMPACTS_AS_GOOD` times that of the named hypothesis, on the samples to
-    choose by and on those to test."""
-    misfit_pairs = [(getattr(candidate.score, part) for candidate in (rival, named)) for part in ("choose", "test")]
+    choose by and on those to test. A set in which the rival has no finite misfit is skipped; True if both are."""
+    misfit_pairs = [
+        (getattr(candidate.score, part) for candidate in (rival, named_candidate)) for part in ("choose", "test")
+    ]
     return all(
         _compute_rms_over_channels(rival_misfit) <= IMPACTS_AS_GOOD * _compute_rms_over_channels(named_misfit)
         for rival_misfit, named_misfit in misfit_pairs
@@ -90,12 +95,13 @@ def is_as_good(rival: FittedCandidate, named: FittedCandidate) -> bool:
 
 
 def _compute_rms_over_channels(misfit: FloatArray) -> float:
-    """Compute the root mean square over the channels; NaN is left out. misfit: (c,)."""
+    """Compute the root mean square over the channels without those that are NaN. misfit: (c,), not all NaN."""
     return float(np.sqrt(np.nanmean(misfit**2)))
 
 
 def compute_worst_misfit(candidate: FittedCandidate) -> float:
     """Compute the larger of the misfits on the samples to choose by and on the held-out samples, each the root mean
-    square over channels, in units of the chance variation; 0 where there is none."""
+    square over channels, in units of the chance variation; a set without a finite misfit is skipped, and 0 is
+    returned if both are."""
     parts = (candidate.score.choose, candidate.score.test)
     return max((_compute_rms_over_channels(part) for part in parts if np.isfinite(part).any()), default=0.0)

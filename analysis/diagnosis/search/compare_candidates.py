@@ -1,12 +1,12 @@
-"""Compares candidates: the best first fits are continued until they converge, then all are ordered by their errors.
+"""Compare candidate hypotheses: continue the best first fits until they converge, then order all by their errors.
 
 A Gauss-Newton fit converges about geometrically: after relative reductions g1 and g2 of the cost by two fits, the next
-is expected to reduce it by g2 min(g2 / g1, 1) (`predict_decrease`); fits end when that is below a tolerance.
-The sensitivity to the model's own parameters costs one simulation for each of them. It is therefore kept from fit to
-fit, and recomputed only where a parameter has moved far. So all candidates are compared at a small part of the cost of
-full fits, and only those near the best are refined. With forces that depend on the motion, a sensitivity that was
-computed without these forces, or on one period, ends short of the minimum: refined fits are then continued with the
-sensitivity of all parameters on all samples (`_polish`).
+is expected to reduce it by g2 min(g2 / g1, 1) (`predict_decrease`); fits end when that is below a tolerance. The
+sensitivity (Jacobian) to the model's own parameters takes one simulation for each of them. It is therefore kept from
+fit to fit, and recomputed only where a parameter has moved far; only fits near the best are refined. With forces that
+depend on the motion, a sensitivity that was computed without these forces, or on one period, leads to a point short of
+the minimum: refined fits are then continued with the sensitivity of all parameters on all samples (`_polish`). Called
+by the steps of the search (`next_effect`, `explain`, `revise_selection`) and by `confirm_laws`.
 """
 
 from collections.abc import Sequence
@@ -38,93 +38,96 @@ from analysis.diagnosis.settings import (
     WORTH_REFINING,
 )
 
-REFINING_ROUNDS, FULL_FIT_ROUNDS = 4, 2
-"""Gauss-Newton steps of a refining fit, and of a fit to all periods."""
-POLISHING_ROUNDS, POLISHING_SHARE = 3, 0.002
+REFINING_STEPS, FULL_FIT_STEPS = 4, 2
+"""Gauss-Newton steps of a refining fit, and of a fit to all periods. Chosen."""
+POLISHING_ROUNDS, POLISHING_GAIN = 3, 0.002
 """Largest number of rounds of `_polish`, and share of the cost that a round must remove for another to follow. A round
-takes a simulation for every parameter of the model. By hand."""
-MOST_RENEWALS, CONVERGED_SHARE, CONVERGED_PER_LOG, STALE_DEVIATIONS = 4, 0.0005, 0.01, 0.5
-"""Largest number of fits in a row, with the sensitivity renewed between them; share of the cost below which a reduction
-is none, and factor on ln(cost) for that share far above the noise (`_compute_gain_limit`); and move of a parameter, in
-standard deviations, from which the sensitivity is renewed, which costs a simulation per parameter."""
+takes a simulation for every parameter of the model. Chosen."""
+MAX_RENEWALS, CONVERGED_GAIN, CONVERGED_GAIN_PER_LOG, RENEWAL_MOVE = 4, 0.0005, 0.01, 0.5
+"""Largest number of fits in a row, with the sensitivity renewed between them; relative reduction of the cost below
+which a fit has converged, and factor on ln(cost) for that limit far above the noise (`_compute_gain_limit`); and change
+of a parameter, in standard deviations, above which the sensitivity is renewed. Chosen."""
 
 
 def compare_candidates(context: SearchContext, base: Fitted, fits: Sequence[Fitted]) -> tuple[FittedCandidate, ...]:
-    """The candidates sorted by error, the best fits refined. fits: first fits, the best first (`fit_first`)."""
+    """Refine the best fits, and sort all candidates by their error. base: fit without the new effect. fits: first fits,
+    the best first (`fit_first`); may be empty. If `base` contains a force that depends on the motion, they have been
+    continued on all samples already, and only `_polish` is applied to the best."""
     promising = _select_promising(base, fits)
-    # Where a held effect is a force that depends on the motion, first fits were continued on all samples already.
     is_continued = has_motion_forces(base.hypothesis)
     first_refined: list[tuple[Fitted, Sensitivity]] = []
     if not is_continued:
         refine_first = partial(refine_with_sensitivity, context)
         first_refined = list(context.guard.wrap(map, FITTING)(refine_first, promising[:1]))  # type: ignore[arg-type]
-    refined = promising[:1] if is_continued else [trial for trial, _ in first_refined]
+    refined = promising[:1] if is_continued else [fitted for fitted, _ in first_refined]
 
-    def refit(trial: Fitted) -> Fitted:
+    def refit(fitted: Fitted) -> Fitted:
         if is_continued:
-            return trial
-        is_similar = first_refined and _is_time_invariant(trial) == _is_time_invariant(refined[0])
-        is_similar = is_similar and _compute_prediction_difference(context, trial, refined[0]) < SHARED_MOTION * (
+            return fitted
+        is_similar = first_refined and _is_time_invariant(fitted) == _is_time_invariant(refined[0])
+        is_similar = is_similar and _compute_prediction_difference(context, fitted, refined[0]) < SHARED_MOTION * (
             base.cost - refined[0].cost
         )
-        return refine_with_sensitivity(context, trial, first_refined[0][1] if is_similar else None)[0]
+        return refine_with_sensitivity(context, fitted, first_refined[0][1] if is_similar else None)[0]
 
     further_fits = [
-        trial
-        for number, trial in enumerate(promising[1:MOST_REFINED], 1)
-        if not any(_is_same_start(context, trial, compared) for compared in promising[:number])
+        fitted
+        for position, fitted in enumerate(promising[1:MOST_REFINED], 1)
+        if not any(_is_same_start(context, fitted, compared) for compared in promising[:position])
     ]
     if refined and context.score_fit(refined[0]).score.worst_channel <= NO_SECOND_START:
         further_fits = [
-            trial for trial in further_fits if context.score_fit(trial).score.worst_channel <= REACHES_NOISE
+            fitted for fitted in further_fits if context.score_fit(fitted).score.worst_channel <= REACHES_NOISE
         ]
     remaining = [
-        trial for trial in fits[1 if promising else 0 :] if not any(trial is compared for compared in further_fits)
+        fitted for fitted in fits[1 if promising else 0 :] if not any(fitted is compared for compared in further_fits)
     ]
     special_cases = [special for special in remaining if any(_contains(general, special) for general in refined[:1])][
         :1
     ]
     refined += context.guard.wrap(context.map_, FITTING)(refit, [*further_fits, *special_cases])  # type: ignore[arg-type]
-    refined = _polish(context, sorted(refined, key=lambda trial: context.score_fit(trial).score.mean_log_error))
+    refined = _polish(context, sorted(refined, key=lambda fitted: context.score_fit(fitted).score.mean_log_error))
     fitted_candidates = [
-        context.score_fit(trial) for trial in [*refined, *(trial for trial in remaining if trial not in special_cases)]
+        context.score_fit(fitted)
+        for fitted in [*refined, *(other for other in remaining if other not in special_cases)]
     ]
     return tuple(sorted(fitted_candidates, key=lambda candidate: candidate.score.mean_log_error))
 
 
 def _polish(context: SearchContext, fits: list[Fitted]) -> list[Fitted]:
-    """The fits, the best first, continued with the sensitivity of all parameters under the forces of the best;
-    unchanged without forces that depend on the motion. Rounds follow while they lower the cost, even at the noise: such
-    a fit may be two standard deviations off. Where the best reaches the noise, fits far above it are not continued."""
+    """Continue the fits (the best first; may be empty) with the sensitivity of all parameters under the forces of the
+    best; unchanged without forces that depend on the motion. Rounds follow while they lower the cost, even at the noise
+    level, where parameters may still be off by two standard deviations. Where the best reaches the noise, fits far
+    above it are not continued."""
     measure, tuning = context.measure, context.tuning
-    if not any(has_motion_forces(trial.hypothesis) for trial in fits):
+    if not any(has_motion_forces(fitted.hypothesis) for fitted in fits):
         return fits
     if _compute_worst_error(context, fits[0]) <= NO_SECOND_START and any(
-        _compute_worst_error(context, trial) > REACHES_NOISE for trial in fits
+        _compute_worst_error(context, fitted) > REACHES_NOISE for fitted in fits
     ):
-        close_fits = [trial for trial in fits if _compute_worst_error(context, trial) <= REACHES_NOISE]
+        close_fits = [fitted for fitted in fits if _compute_worst_error(context, fitted) <= REACHES_NOISE]
         return sorted(
-            [*_polish(context, close_fits), *(trial for trial in fits if trial not in close_fits)],
-            key=lambda trial: trial.cost,
+            [*_polish(context, close_fits), *(fitted for fitted in fits if fitted not in close_fits)],
+            key=lambda fitted: fitted.cost,
         )
     for _ in range(POLISHING_ROUNDS):
         try:
             jacobian = build_jacobian(measure, tuning, fits[0].deviations, fits[0].hypothesis, context.map_)
 
-            def continue_fit(trial: Fitted, jacobian: Sensitivity = jacobian) -> Fitted:
-                continue_candidate = partial(fit, measure, tuning, trial, jacobian, FULL_FIT_ROUNDS, context.map_)
-                return context.guard.run(trial.hypothesis.claims[-1].effect.name, FITTING, continue_candidate, trial)
+            def continue_fit(fitted: Fitted, jacobian: Sensitivity = jacobian) -> Fitted:
+                continue_candidate = partial(fit, measure, tuning, fitted, jacobian, FULL_FIT_STEPS, context.map_)
+                return context.guard.run(fitted.hypothesis.claims[-1].effect.name, FITTING, continue_candidate, fitted)
 
             previous_cost, fits = fits[0].cost, list(context.map_(continue_fit, fits))  # type: ignore[arg-type]
         except OutOfTimeError:
             break  # the fits so far are valid results
-        if fits[0].cost > previous_cost * (1 - max(POLISHING_SHARE, _compute_gain_limit(fits[0]))):
+        if fits[0].cost > previous_cost * (1 - max(POLISHING_GAIN, _compute_gain_limit(fits[0]))):
             break
     return fits
 
 
 def _compute_worst_error(context: SearchContext, fitted: Fitted) -> float:
-    """Error of the worst channel, in units of the noise."""
+    """Compute the rms error of the worst channel, in units of the noise."""
     return context.score_fit(fitted).score.worst_channel
 
 
@@ -142,7 +145,8 @@ def _is_same_start(context: SearchContext, fitted: Fitted, other_fit: Fitted) ->
 
 
 def _compute_prediction_difference(context: SearchContext, fitted: Fitted, other_fit: Fitted) -> float:
-    """Mean square difference of two fits' predictions on the samples to fit, in units of the noise's variance."""
+    """Compute the mean square difference of two fits' predictions on the samples to fit, in units of the noise
+    variance."""
     difference = stack_fit_residuals(context.measure, fitted.residuals) - stack_fit_residuals(
         context.measure, other_fit.residuals
     )
@@ -151,23 +155,24 @@ def _compute_prediction_difference(context: SearchContext, fitted: Fitted, other
 
 
 def _select_promising(base: Fitted, fits: Sequence[Fitted]) -> list[Fitted]:
-    """The fits that lower the cost of `base` by at least `WORTH_REFINING` of what the best fit does. fits: the best
-    first."""
+    """Select the fits whose reduction of the cost of `base` is at least `WORTH_REFINING` of that by the best fit; none
+    where that is not positive. fits: the best first."""
     gains = [base.cost - fitted.cost for fitted in fits]
     return [fitted for fitted, gain in zip(fits, gains, strict=True) if gain >= WORTH_REFINING * gains[0] > 0]
 
 
 def refine(context: SearchContext, fitted: Fitted) -> Fitted:
-    """The fit continued until it converges."""
+    """Continue a fit until it converges or the rounds are used up."""
     return _polish(context, [refine_with_sensitivity(context, fitted)[0]])[0]
 
 
 def refine_with_sensitivity(
     context: SearchContext, fitted: Fitted, jacobian: Sensitivity | None = None
 ) -> tuple[Fitted, Sensitivity]:
-    """The refined fit and its sensitivity. Where a drive repeats, the fit is first made on one period of each segment,
-    and its sensitivity serves for all periods; else, with forces that depend on the motion, first with longer
-    simulation steps (`coarsen_steps`). jacobian: sensitivity of a law that moves the device nearly alike."""
+    """Refine a fit; returns it with its sensitivity. Where the excitation is periodic, the fit is first made on one
+    period of each segment, whose sensitivity is used for all periods; else, with forces that depend on the motion,
+    first with longer simulation steps (`coarsen_steps`). jacobian: sensitivity of a hypothesis with nearly the same
+    predicted motion; None = to be computed."""
     short_form = shorten_recordings(context, fitted)
     coarse_measure = coarsen_steps(context.measure)
     if short_form is None and (coarse_measure is context.measure or not has_motion_forces(fitted.hypothesis)):
@@ -182,18 +187,18 @@ def refine_with_sensitivity(
     full_fit = _fit_full_record(
         context, start, jacobian if short_form is None else short_form.repeat_sensitivity(jacobian)
     )
-    # Parameters that one period does not determine may diverge on all samples: then the fit before is kept.
+    # Parameters that one period does not determine may diverge on all samples: then start again from the given fit.
     if full_fit.cost <= fitted.cost:
         return choose_plainest(context, full_fit), jacobian
     return (fitted if has_motion_forces(fitted.hypothesis) else _refine_from_both_starts(context, fitted)[0]), jacobian
 
 
 def _fit_full_record(context: SearchContext, start: Fitted, jacobian: Sensitivity) -> Fitted:
-    """The fit to all periods, started from the fit to one period of each segment: a few steps are usually enough, more
-    where the error is above the noise, because periods may then differ."""
+    """Fit to all samples, started from the fit to one period of each segment: repeat fits of `FULL_FIT_STEPS` steps, at
+    most `MAX_RENEWALS`, until the cost converges; above the noise, periods may differ."""
     best = start
-    for _ in range(MOST_RENEWALS):
-        next_fit = fit(context.measure, context.tuning, best, jacobian, FULL_FIT_ROUNDS, context.map_)
+    for _ in range(MAX_RENEWALS):
+        next_fit = fit(context.measure, context.tuning, best, jacobian, FULL_FIT_STEPS, context.map_)
         has_converged = next_fit.cost > best.cost * (1 - _compute_gain_limit(next_fit))
         best = next_fit
         if has_converged:
@@ -202,17 +207,18 @@ def _fit_full_record(context: SearchContext, start: Fitted, jacobian: Sensitivit
 
 
 def _compute_gain_limit(fitted: Fitted) -> float:
-    """Relative reduction of the cost below which a fit has converged: max(CONVERGED_SHARE, CONVERGED_PER_LOG
-    ln(cost))."""
-    return max(CONVERGED_SHARE, CONVERGED_PER_LOG * float(np.log(max(fitted.cost, 1.0))))
+    """Compute the relative reduction of the cost below which a fit has converged: max(CONVERGED_GAIN,
+    CONVERGED_GAIN_PER_LOG ln(cost))."""
+    return max(CONVERGED_GAIN, CONVERGED_GAIN_PER_LOG * float(np.log(max(fitted.cost, 1.0))))
 
 
 def _refine_from_both_starts(
     context: SearchContext, fitted: Fitted, jacobian: Sensitivity | None = None
 ) -> tuple[Fitted, Sensitivity]:
-    """The better of two refined fits, with its sensitivity. Where the first leaves more than noise, a second starts
-    from the calibrated model, because re-tuning may have absorbed the missing effect and ended in another minimum. With
-    a known sensitivity there is no second start: the law it belongs to, which moves the device nearly alike, had it."""
+    """Refine a fit from one or two starts; returns the better one with its sensitivity. Where the first leaves more
+    than noise, a second starts from the calibrated model, because re-tuning may have absorbed the missing effect and
+    ended in another minimum. There is no second start if `jacobian` is given: it was tried for the hypothesis of that
+    sensitivity, whose predicted motion is nearly the same."""
     is_jacobian_shared = jacobian is not None
     # With 1 as the reduction before, `_refine_from` may renew a shared sensitivity instead of ending after one fit.
     first_fit, jacobian = _refine_from(context, fitted, jacobian, 1.0)
@@ -227,8 +233,8 @@ def _refine_from_both_starts(
 
 
 def _refine_similar(context: SearchContext, fitted: Fitted, jacobian: Sensitivity) -> tuple[Fitted, Sensitivity]:
-    """The best fit among similar hypotheses (`generate_near_equivalents`), or the plainest of them if it is about as
-    good, and the sensitivity there."""
+    """Find the best fit among similar hypotheses (`generate_near_equivalents`), or the plainest of them if it is about
+    as good (`choose_plainest`), and the sensitivity of the best."""
     best = fitted, jacobian
     for variant in generate_near_equivalents(fitted.hypothesis):
         refined_variant = _refine_from(
@@ -239,29 +245,28 @@ def _refine_similar(context: SearchContext, fitted: Fitted, jacobian: Sensitivit
 
 
 def choose_plainest(context: SearchContext, fitted: Fitted) -> Fitted:
-    """The fit, or a similar form of its laws (`generate_near_equivalents`) whose sum of squares exceeds that of the
-    form preferred so far by less than `RICHER_LAW_SQUARES` noise variances."""
+    """Choose the fit, or a similar form of its laws (`generate_near_equivalents`, in its order) whose sum of squares
+    exceeds that of the form chosen so far by less than `RICHER_LAW_SQUARES` noise variances."""
     best = fitted
     for variant in generate_near_equivalents(fitted.hypothesis):
         variant_fit = evaluate_fit(context.measure, context.tuning, best.deviations, variant)
-        samples = len(stack_fit_residuals(context.measure, variant_fit.residuals))
-        best = variant_fit if variant_fit.cost < best.cost + RICHER_LAW_SQUARES / samples else best
+        sample_count = len(stack_fit_residuals(context.measure, variant_fit.residuals))
+        best = variant_fit if variant_fit.cost < best.cost + RICHER_LAW_SQUARES / sample_count else best
     return best
 
 
 def _refine_from(
     context: SearchContext, fitted: Fitted, jacobian: Sensitivity | None, previous_gain: float = np.inf
 ) -> tuple[Fitted, Sensitivity]:
-    """The fit continued with renewed sensitivities until the cost hardly falls. jacobian: sensitivity at another point
-    of the same hypothesis, or of a hypothesis that moves the device nearly alike; None = not computed yet.
-    previous_gain: relative reduction of the cost by the fit before; infinite = unknown, no further reduction is
-    expected."""
+    """Continue a fit, with renewed sensitivities, until the cost converges or `MAX_RENEWALS` is reached. jacobian:
+    sensitivity at another point of the same hypothesis, or of one with nearly the same predicted motion; None = not
+    computed yet. previous_gain: relative reduction of the cost by the previous fit; infinite = unknown."""
     best = fitted
     is_complete = jacobian is not None
     previous_gain = previous_gain if is_complete else np.inf
     current_jacobian = jacobian or compute_sensitivity(context, best.deviations, best.hypothesis)
-    for _ in range(MOST_RENEWALS):
-        next_fit = fit(context.measure, context.tuning, best, current_jacobian, REFINING_ROUNDS, context.map_)
+    for _ in range(MAX_RENEWALS):
+        next_fit = fit(context.measure, context.tuning, best, current_jacobian, REFINING_STEPS, context.map_)
         gain = 1 - next_fit.cost / best.cost if best.cost > 0 else 0.0
         best, expected_gain, previous_gain = next_fit, predict_decrease(gain, previous_gain), gain
         has_converged = (expected_gain if is_complete else gain) < _compute_gain_limit(best)
@@ -271,7 +276,7 @@ def _refine_from(
             break
         if (
             not is_complete
-            or np.abs(best.deviations - current_jacobian.base_deviations).max(initial=0.0) > STALE_DEVIATIONS
+            or np.abs(best.deviations - current_jacobian.base_deviations).max(initial=0.0) > RENEWAL_MOVE
         ):
             current_jacobian = compute_sensitivity(context, best.deviations, best.hypothesis, with_forces=True)
             is_complete = True
@@ -279,8 +284,8 @@ def _refine_from(
 
 
 def _contains(general: Fitted, special: Fitted) -> bool:
-    """Whether the last effect of `general` contains that of `special` as a special case at the same sites: for a fair
-    comparison both must then be fitted equally far."""
+    """Whether the last effect of `general` contains that of `special` as a special case, at sites that include those of
+    `special`: for a fair comparison both must then be refined."""
     general_claim, special_claim = general.hypothesis.claims[-1], special.hypothesis.claims[-1]
     return special_claim.effect.name in general_claim.effect.simpler and set(special_claim.sites) <= set(
         general_claim.sites

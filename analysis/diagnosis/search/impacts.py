@@ -39,15 +39,15 @@ from analysis.diagnosis.search.band_power_comparison import (
     compute_worst_misfit,
     is_as_good,
     is_convincing,
-    make_comparison,
+    make_band_power_comparison,
 )
 from analysis.diagnosis.search.explain import Explanation, Statistic
 from analysis.diagnosis.search.identifiability import find_undetermined
 from analysis.diagnosis.search.search_context import SearchContext
 from analysis.diagnosis.search.second_effect_with_play import (
-    NEAR_CHANCE,
     PLAY,
-    RIVAL,
+    RIVAL_EFFECT,
+    SUFFICIENT_COST,
     SecondEffects,
     search_second_effects,
 )
@@ -90,16 +90,18 @@ def explain_impacts(
         return None
     chance_weighted = weight_by_chance_variation(problem, axis_fits[0])
     retuned_deviations = explanation.retuned.fitted.deviations
-    if evaluate_hypothesis(chance_weighted, retuned_deviations, NO_EFFECTS).cost <= NEAR_CHANCE:
+    if evaluate_hypothesis(chance_weighted, retuned_deviations, NO_EFFECTS).cost <= SUFFICIENT_COST:
         return None  # the band powers of the model without play differ from the recorded ones by chance alone
     if not time_left():
         return None
     play_fit = refine_band_power(chance_weighted, axis_fits[0], time_left)
     rivals = list(axis_fits[1:])
-    if RIVAL in effects:
-        rivals.append(_fit_claim(problem, evidence, Claim(effects[RIVAL], "one", play_fit.hypothesis.claims[0].sites)))
+    if RIVAL_EFFECT in effects:
+        rivals.append(
+            _fit_claim(problem, evidence, Claim(effects[RIVAL_EFFECT], "one", play_fit.hypothesis.claims[0].sites))
+        )
     rival_hypotheses = [rival.hypothesis for rival in rivals if rival.hypothesis.claims and np.isfinite(rival.cost)]
-    play_comparison = make_comparison(context, play_fit)
+    play_comparison = make_band_power_comparison(context, play_fit)
     play_candidate = play_comparison.score_candidate(play_fit.deviations, play_fit.hypothesis)
     is_explained = compute_worst_misfit(play_candidate) <= EXPLAINED_BY_CHANCE
     second_effects = SecondEffects((), complete=True)
@@ -126,7 +128,7 @@ def _find_confirmed_explanation(
     for pair_index in range(len(pairs) + 1):
         pair_fits = pairs[pair_index:]
         best_fit = (*pair_fits, play_fit)[0]
-        comparison = make_comparison(context, best_fit) if pair_fits else play_comparison
+        comparison = make_band_power_comparison(context, best_fit) if pair_fits else play_comparison
         play_explanation = _judge_play(comparison, explanation, problem, (play_fit, pair_fits), rival_hypotheses)
         if play_explanation is None or any(find_undetermined(context, play_explanation)):
             continue
@@ -196,7 +198,7 @@ def _judge_play(
     """The explanation by play, and by a second effect if there is one. None where the re-tuned model, another effect or
     a rival of play is about as good, or a second effect does not improve on play alone. comparison: with the chance
     variation of the best fit. fits: of play alone, and with a second effect, the best first. rival_hypotheses: play on
-    other axes, and the effect `RIVAL`."""
+    other axes, and the effect `RIVAL_EFFECT`."""
     play_fit, pair_fits = fits
     best_fit = (*pair_fits, play_fit)[0]
     play_candidate = comparison.score_candidate(play_fit.deviations, play_fit.hypothesis)
@@ -226,7 +228,7 @@ def _judge_play(
         if is_as_good(comparison.score_candidate(rival_pair.deviations, rival_pair.hypothesis), best_candidate):
             return None
     rivals = sorted([*rivals, *waveform_candidates], key=lambda rival: rival.score.mean_log_error)
-    statistic = Statistic(comparison.chance, best_fit.errors)
+    statistic = Statistic(comparison.chance_variation, best_fit.errors)
     rounds = ((play_candidate, *rivals), *((pair_candidates,) if pair_candidates else ()))
     steps = (play_candidate, *pair_candidates[:1])
     return Explanation(given_candidate, retuned_candidate, best_candidate, rounds, steps, statistic)

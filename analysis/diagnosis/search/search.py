@@ -46,7 +46,7 @@ from analysis.diagnosis.search.search_context import (
     HALVES,
     FittedCandidate,
     SearchContext,
-    shows_only_held_out,
+    has_held_out_mismatch,
 )
 from analysis.diagnosis.search.time_budget import OUT_OF_TIME, OutOfTimeError, grant_time
 from analysis.diagnosis.search.verdict import (
@@ -179,7 +179,7 @@ def _search_third_effect(
     earlier = SearchResult(context, final, judgement, list_remarks(final))
     # Effects that fit their samples are kept even if unconfirmed: another may show in the held-out samples alone.
     fit = final.after if judgement.named or (final.steps and as_good_as_noise(final)) else final.retuned
-    if final.ended_early or final.barred or not shows_only_held_out(fit.score.test, fit):
+    if final.ended_early or final.barred or not has_held_out_mismatch(fit.score.test, fit):
         return at_end(earlier)
     try:
         repeated, adds_effects = _search_with_opened(earlier, fit, catalogue, progress, time_left)
@@ -228,8 +228,8 @@ def _repeat_with_opened(
     """Repeat the search with a part of the held-out samples opened (step 4); fit: shows the mismatch. Returns also the
     number of parts into which each stretch was cut; 0 = all but the loudest segments were opened, where both groups
     show the mismatch. least_parts: least number of parts; above 2, all stretches are cut."""
-    milder = earlier.context.open_milder(fit) if least_parts == HALVES else None
-    context, parts = earlier.context.open_alternate(fit, least_parts) if milder is None else (milder, 0)
+    milder = earlier.context.open_quieter_segments(fit) if least_parts == HALVES else None
+    context, parts = earlier.context.open_alternate_parts(fit, least_parts) if milder is None else (milder, 0)
     continues = fit is earlier.found.after and as_good_as_noise(earlier.found)
     previous_steps = earlier.found.rounds[: len(earlier.found.steps)] if continues else ()
     final = explain(context, catalogue, progress, time_left, previous_steps)

@@ -1,6 +1,9 @@
-"""The shared state of all fits of a search, and the first fits of hypotheses that passed the screening.
+"""Shared state of all fits of a search for missing effects, and the first fits of the screened hypotheses.
 
-The modules of this package receive a `SearchContext`; copies of it open held-out samples or fit to more samples.
+Samples have three roles: to fit parameters, to choose between hypotheses, and held out to test. A `SearchContext`
+holds the error measure on the first two and on all samples; copies of it open (use to fit and to choose by) a part of
+the held-out samples where these alone show a mismatch. Created by `search_by_simulation`, passed to the modules of
+this package and to those that test and report its result.
 """
 
 from collections.abc import Sequence
@@ -30,11 +33,12 @@ from equalizer.effects.effect import AxisForce, JointForce
 from equalizer.signals.signal import FloatArray
 
 FIRST_FIT_ROUNDS = 3
-"""Gauss-Newton steps of a first fit."""
+"""Gauss-Newton steps of a first fit, which only ranks the hypotheses. Chosen by hand."""
 STARTING, SCREENING, FITTING = "its starting values", "its screening", "its fit"
-"""Steps of the work on each effect, in words."""
+"""Names of the steps of the search in the messages of `Guard` about an effect that crashes."""
 LEAST_SENSITIVITY_SHARE = 0.06
-"""Least sensitivity of an axis's channel to a parameter that counts, relative to the largest of any parameter there."""
+"""Least sensitivity of an axis's channel to a parameter for which it is recomputed with forces, relative to the largest
+of any parameter there. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,7 +48,7 @@ class FittedCandidate:
     fitted: Fitted
     score: FitScore
     clean_gain: float = 0.0
-    """Reduction of the mean log error power on clean recordings, which is subtracted from the gain on these."""
+    """Reduction of the mean log error power on the clean recordings, by which the errors in `score` were raised."""
 
     @property
     def newest(self) -> str:
@@ -60,8 +64,9 @@ class FittedCandidate:
 
 
 HALVES, FINER_PARTS = 2, (8, 32, 128)
-"""Parts into which held-out stretches are cut where some are opened; finer ones only where coarser ones do not leave
-the mismatch in both, or nothing is found with these. A 128th of some seconds is as long as a contact with a stop."""
+"""Numbers of equal parts into which each held-out stretch is cut, alternately opened and held out. More parts are used
+where fewer do not leave the mismatch in both halves, or where no effect is found with fewer. The largest is chosen for
+contacts with a stop: a 128th of a stretch of some seconds is about as long as a contact."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,16 +74,18 @@ class SearchContext:
     """The measures, the open parameters and the rules that all fits of a search share."""
 
     measure: ErrorMeasure
-    """On the samples to fit and to choose by."""
+    """Error measure on the samples to fit and to choose by."""
     full_measure: ErrorMeasure
-    """The measure on all samples, held-out ones included."""
+    """Error measure on all samples, held-out ones included."""
     tuning: Tuning
+    """Parameters of the model itself that every fit adjusts."""
     map_: Mapper
+    """`map`, or a parallel one."""
     excluded: frozenset[str] = frozenset()
     """Effects that are not to be named. Those that others refine are simulated nevertheless, as rivals of their
     refinements."""
     references: ReferenceRecordings | None = None
-    """Clean recordings: what a candidate gains on them is counted against it."""
+    """Clean recordings; None: there are none. The gain of a candidate on them is counted against it."""
     certain: tuple[Hypothesis, ...] = ()
     """Sensor faults that are detected without a model (`model_free_faults`): added without a search."""
     guard: Guard = field(default_factory=Guard)
@@ -88,43 +95,46 @@ class SearchContext:
     least_remaining_error: float = NOISE_ALONE
     """Error of the worst channel, in units of the noise, above which a further effect is searched for."""
 
-    def open_alternate(self, mismatch_fit: FittedCandidate, least_parts: int = HALVES) -> "tuple[SearchContext, int]":
-        """Return a copy of the context in which a part of every held-out stretch is used to fit and to choose by, and
-        the number of parts per stretch: the first of two; where only one half shows the mismatch (such as in a sweep),
-        every other of more. mismatch_fit: see `open_milder`. least_parts: least number of parts that is tried."""
+    def open_alternate_parts(
+        self, mismatch_fit: FittedCandidate, least_parts: int = HALVES
+    ) -> "tuple[SearchContext, int]":
+        """Return a copy of the context in which every other part of each held-out stretch is opened, and the number of
+        parts per stretch: the first number, from least_parts on, with which opened and held-out parts both show the
+        mismatch (two parts do not in a sweep, for example), else least_parts. Parts are at least `LEAST_PART` samples
+        of the longest stretch. mismatch_fit: see `open_quieter_segments`."""
         longest_samples = max(record.compute_longest_test_stretch() for record in self.full_measure.records)
-        part_counts = [parts for parts in (HALVES, *FINER_PARTS) if parts >= least_parts]
-        for parts in (parts for parts in part_counts if longest_samples >= parts * LEAST_PART):
-            opened_masks = [record.mask_alternate_parts(parts) for record in self.full_measure.records]
-            if self._is_shown_by_both(opened_masks, mismatch_fit):
-                return self._open_samples(opened_masks), parts
+        part_counts = [part_count for part_count in (HALVES, *FINER_PARTS) if part_count >= least_parts]
+        for part_count in (part_count for part_count in part_counts if longest_samples >= part_count * LEAST_PART):
+            opened_masks = [record.mask_alternate_parts(part_count) for record in self.full_measure.records]
+            if self._has_mismatch_in_both(opened_masks, mismatch_fit):
+                return self._open_samples(opened_masks), part_count
         return self._open_samples(
             [record.mask_alternate_parts(least_parts) for record in self.full_measure.records]
         ), least_parts
 
-    def open_milder(self, mismatch_fit: FittedCandidate) -> "SearchContext | None":
-        """Return a copy of the context in which all held-out segments but the loudest are used to fit and to choose by;
-        the loudest remains as test. None unless both, in the channel with the largest held-out error, show a mismatch
-        that the other samples do not. mismatch_fit: a fit with its residuals
-        in all samples, and its held-out errors."""
+    def open_quieter_segments(self, mismatch_fit: FittedCandidate) -> "SearchContext | None":
+        """Return a copy of the context in which the held-out segments with a level below that of the loudest (by the
+        factor `LOUDER_RATIO`) are opened; the others remain held out. None unless both, in the channel with the largest
+        held-out error, show a mismatch that the other samples do not. mismatch_fit: fit with residuals in all samples
+        and its held-out errors."""
         records = self.full_measure.records
         levels = [level for record in records for _, level in record.list_test_levels()]
         opened_masks = [record.mask_test_below(max(levels, default=0.0) / LOUDER_RATIO) for record in records]
         if not any(mask.any() for mask in opened_masks):
             return None
-        return self._open_samples(opened_masks) if self._is_shown_by_both(opened_masks, mismatch_fit) else None
+        return self._open_samples(opened_masks) if self._has_mismatch_in_both(opened_masks, mismatch_fit) else None
 
-    def _is_shown_by_both(self, opened_masks: list[Mask], mismatch_fit: FittedCandidate) -> bool:
-        """Whether opened samples and those that stay held out both show a mismatch that the other samples do not."""
+    def _has_mismatch_in_both(self, opened_masks: list[Mask], mismatch_fit: FittedCandidate) -> bool:
+        """Whether opened samples and those that stay held out both have a mismatch that the other samples do not."""
         # Only the worst channel counts: others may show a small remaining error of a fitted effect, such as friction.
         records, worst_channel = self.full_measure.records, int(np.argmax(np.nan_to_num(mismatch_fit.score.test)))
         sealed_masks = [record.test & ~mask for record, mask in zip(records, opened_masks, strict=True)]
-        scale = self.full_measure.unit / self.full_measure.noise
-        errors = [
-            (compute_residual_rms(records, mismatch_fit.fitted.residuals, part) * scale)[[worst_channel]]
-            for part in (opened_masks, sealed_masks)
+        noise_units = self.full_measure.unit / self.full_measure.noise
+        errors_by_mask = [
+            (compute_residual_rms(records, mismatch_fit.fitted.residuals, sample_mask) * noise_units)[[worst_channel]]
+            for sample_mask in (opened_masks, sealed_masks)
         ]
-        return all(shows_only_held_out(channel_errors, mismatch_fit) for channel_errors in errors)
+        return all(has_held_out_mismatch(channel_errors, mismatch_fit) for channel_errors in errors_by_mask)
 
     def _open_samples(self, opened_masks: Sequence[Mask]) -> "SearchContext":
         """Return a copy of the context in which the masked held-out samples are used to fit and to choose by."""
@@ -133,11 +143,11 @@ class SearchContext:
         return replace(self, measure=full_measure.shorten(), full_measure=full_measure, has_opened_samples=True)
 
     def fit_to_all(self) -> "SearchContext":
-        """Return a copy of the context that also fits to the samples to choose by: laws that a force balance has chosen
-        need no further selection."""
+        """Return a copy of the context that also fits to the samples to choose by, for laws that a force balance has
+        already selected."""
         measure, full_measure = (
-            source.with_records(tuple(record.fit_to_all() for record in source.records))
-            for source in (self.measure, self.full_measure)
+            original.with_records(tuple(record.fit_to_all() for record in original.records))
+            for original in (self.measure, self.full_measure)
         )
         return replace(self, measure=measure, full_measure=full_measure)
 
@@ -159,9 +169,9 @@ class SearchContext:
         return FittedCandidate(fitted, score.scale_errors(np.exp(clean_gain)), 2 * float(clean_gain.mean()))
 
 
-def shows_only_held_out(errors: FloatArray, candidate: FittedCandidate) -> bool:
-    """Whether held-out samples show a mismatch that those to fit and to choose by do not. errors: (c,), on held-out
-    samples, times the noise."""
+def has_held_out_mismatch(errors: FloatArray, candidate: FittedCandidate) -> bool:
+    """Whether held-out samples have a mismatch that those to fit and to choose by do not. errors: (c,), rms on held-out
+    samples in units of the noise; NaN (no such samples) does not count."""
     largest_error = float(np.nanmax(errors, initial=0.0))
     return largest_error > HELD_OUT_ALONE_ERROR * max(candidate.score.worst_channel, 1.0)
 
@@ -170,14 +180,14 @@ def fit_first(
     context: SearchContext, base: Fitted, jacobian: Sensitivity, screened: Sequence[ScreenedHypothesis]
 ) -> list[Fitted]:
     """Fit the hypotheses with the largest predicted gains, `FIRST_FIT_ROUNDS` steps each; the smallest cost first.
-    Hypotheses whose fit crashes are left out."""
+    Hypotheses whose fit crashes are omitted. base: the fit without the further effect; jacobian: its sensitivity."""
     measure, tuning = context.measure, context.tuning
 
-    def make_first_fit(entry: ScreenedHypothesis) -> Fitted:
+    def make_first_fit(candidate: ScreenedHypothesis) -> Fitted:
         return fit(
             measure,
             tuning,
-            evaluate_fit(measure, tuning, base.deviations, entry.hypothesis),
+            evaluate_fit(measure, tuning, base.deviations, candidate.hypothesis),
             jacobian,
             FIRST_FIT_ROUNDS,
         )
@@ -190,13 +200,13 @@ def fit_first(
 def compute_sensitivity(
     context: SearchContext, deviations: np.ndarray, hypothesis: Hypothesis, with_forces: bool = False
 ) -> Sensitivity:
-    """Compute the sensitivity of the prediction to the model's own parameters. Motion-dependent forces are left out,
-    because simulations are fast without them and small forces hardly change it; with_forces recomputes it with them
-    for the parameters of `find_sensitive_parameters`."""
+    """Compute the sensitivity of the prediction to the parameters of the model itself at deviations (t,). Effects that
+    are motion-dependent forces are omitted, because simulations are fast without them and small forces hardly change
+    it; with_forces recomputes it with them for the parameters of `find_sensitive_parameters`."""
     reduced = hypothesis
-    for number in reversed(range(len(hypothesis.claims))):
-        if isinstance(hypothesis.claims[number].effect.action, (AxisForce, JointForce)):
-            reduced = remove_claim(reduced, number)
+    for claim_index in reversed(range(len(hypothesis.claims))):
+        if isinstance(hypothesis.claims[claim_index].effect.action, (AxisForce, JointForce)):
+            reduced = remove_claim(reduced, claim_index)
     base_jacobian = build_jacobian(context.measure, context.tuning, deviations, reduced, context.map_)
     if not with_forces or reduced is hypothesis:
         return base_jacobian
@@ -207,57 +217,60 @@ def compute_sensitivity(
 
 
 def _select_worth_fitting(base: Fitted, screened: Sequence[ScreenedHypothesis]) -> list[ScreenedHypothesis]:
-    """Select the hypotheses with at least `WORTH_FITTING` of the largest predicted gain; from `LEAST_FITTED` to
-    `MOST_FITTED` of them."""
+    """Select the hypotheses with at least `WORTH_FITTING` of the largest predicted gain; from `LEAST_FITTED` (fewer if
+    there are fewer) to `MOST_FITTED` of them."""
     interleaved = _interleave_starts(screened)
-    best_gain = max((base.cost - entry.cost for entry in interleaved), default=0.0)
-    selected = [entry for entry in interleaved if base.cost - entry.cost >= WORTH_FITTING * best_gain]
+    best_gain = max((base.cost - candidate.cost for candidate in interleaved), default=0.0)
+    selected = [candidate for candidate in interleaved if base.cost - candidate.cost >= WORTH_FITTING * best_gain]
     return (selected if len(selected) >= LEAST_FITTED else interleaved[:LEAST_FITTED])[:MOST_FITTED]
 
 
 def _interleave_starts(screened: Sequence[ScreenedHypothesis]) -> list[ScreenedHypothesis]:
-    """Reorder the hypotheses: the best start of each before the second start of any."""
+    """Reorder the hypotheses, given in order of cost: the best starting point of each before the second of any."""
     start_counts: dict[object, int] = {}
-    ranked = []
-    for entry in screened:
-        key = entry.hypothesis.key
-        start_counts[key] = start_counts.get(key, -1) + 1
-        ranked.append((start_counts[key], entry))
-    return [entry for _, entry in sorted(ranked, key=lambda pair: pair[0])]
+    ranked_candidates = []
+    for candidate in screened:
+        hypothesis_key = candidate.hypothesis.key
+        start_counts[hypothesis_key] = start_counts.get(hypothesis_key, -1) + 1
+        ranked_candidates.append((start_counts[hypothesis_key], candidate))
+    return [
+        candidate for _, candidate in sorted(ranked_candidates, key=lambda rank_and_candidate: rank_and_candidate[0])
+    ]
 
 
 def find_sensitive_parameters(
     measure: ErrorMeasure, tuning: Tuning, base_jacobian: Sensitivity, hypothesis: Hypothesis
 ) -> list[int]:
-    """Find the parameters whose sensitivity changes with the hypothesis's forces: those that move the axes at which
-    these act; all of them for a force in a joint.
-    base_jacobian: sensitivity without motion-dependent forces."""
-    forces = [
-        effect
-        for effect in hypothesis.list_placed_effects()
-        if isinstance(effect.effect.action, (AxisForce, JointForce))
+    """Find the indices of the parameters whose sensitivity changes with the hypothesis's forces: those to which the
+    response channel that a force moves most is sensitive (`LEAST_SENSITIVITY_SHARE`); all of them without forces or
+    for a force in a joint. base_jacobian: sensitivity without motion-dependent forces."""
+    placed_forces = [
+        placed_effect
+        for placed_effect in hypothesis.list_placed_effects()
+        if isinstance(placed_effect.effect.action, (AxisForce, JointForce))
     ]
     model = tuning.tune(np.zeros(len(tuning.names)))
-    if not forces or any(isinstance(force.effect.action, JointForce) for force in forces):
+    if not placed_forces or any(isinstance(placed_force.effect.action, JointForce) for placed_force in placed_forces):
         return list(range(len(tuning.names)))
     mobility = np.abs(model.output @ np.linalg.solve(model.mass, model.input))
-    sites = {site for force in forces for site in force.sites}
-    channel_rms = _compute_channel_rms(measure, base_jacobian.columns, model.outputs)
+    sites = {site for placed_force in placed_forces for site in placed_force.sites}
+    channel_norms = _compute_channel_norms(measure, base_jacobian.columns, model.outputs)
     is_sensitive = np.zeros(len(tuning.names), dtype=bool)
     for site in sites:
-        parameter_rms = channel_rms[:, int(np.argmax(mobility[:, site]))]
-        is_sensitive |= parameter_rms > LEAST_SENSITIVITY_SHARE * parameter_rms.max(initial=0.0)
+        parameter_norms = channel_norms[:, int(np.argmax(mobility[:, site]))]
+        is_sensitive |= parameter_norms > LEAST_SENSITIVITY_SHARE * parameter_norms.max(initial=0.0)
     return np.flatnonzero(is_sensitive).tolist()
 
 
-def _compute_channel_rms(measure: ErrorMeasure, columns: FloatArray, outputs: int) -> FloatArray:
-    """(t, p): rms of each parameter's sensitivity per response channel. columns: (t, samples), over all records."""
-    squares, first_column = np.zeros((len(columns), outputs)), 0
+def _compute_channel_norms(measure: ErrorMeasure, columns: FloatArray, output_count: int) -> FloatArray:
+    """(t, p): Euclidean norm, over the samples to fit, of each parameter's sensitivity per response channel; p =
+    output_count. columns: (t, samples), over all records; further channels (positions) are skipped."""
+    square_sums, first_index = np.zeros((len(columns), output_count)), 0
     for record in measure.records:
-        count, channels = int(record.fit.sum()), record.measured.shape[1]
-        part = columns[:, first_column : first_column + count * channels].reshape(len(columns), count, channels)[
-            :, :, :outputs
-        ]
-        squares += np.einsum("tnc,tnc->tc", part, part)
-        first_column += count * channels
-    return np.sqrt(squares)
+        sample_count, channel_count = int(record.fit.sum()), record.measured.shape[1]
+        record_columns = columns[:, first_index : first_index + sample_count * channel_count].reshape(
+            len(columns), sample_count, channel_count
+        )[:, :, :output_count]
+        square_sums += np.einsum("tnc,tnc->tc", record_columns, record_columns)
+        first_index += sample_count * channel_count
+    return np.sqrt(square_sums)

@@ -1,10 +1,10 @@
-"""A second effect next to rattling play: every effect of the catalogue, at several strengths, compared by band power.
+"""Search for a second effect in addition to rattling play (backlash), by band powers.
 
-Starting values come from the residual waveform, which impacts make chaotic: an estimator then returns a strength that
-is wrong by up to an order of magnitude, too small or too large alike at every axis. Each candidate is therefore
-evaluated at a geometric row of strengths (a line search in the logarithm of its main parameter), without a fit; the
-likeliest candidates are fitted, and the best of these refined with the model's parameters. All costs are those of
-`band_power_fit`, about 1 for chance alone.
+Starting values come from the residual waveform, which impacts make chaotic: the estimated strength may be wrong by an
+order of magnitude, by about the same factor at every axis. Each effect of the catalogue is therefore evaluated at
+several strengths (a line search in the logarithm of its main parameter), without a fit; those with the least cost are
+fitted, and the best of these refined with the model's parameters. All costs are those of `band_power_fit`, about 1 for
+chance variation alone. Called by `impacts`.
 """
 
 from collections.abc import Sequence
@@ -24,20 +24,22 @@ from analysis.diagnosis.settings import IMPACTS_SHARE
 from analysis.diagnosis.types import TimeBudget
 from equalizer.effects.effect import Effect
 
-PLAY, RIVAL = "backlash", "loose_joint"
-"""Play, and the effect that is fitted at the same place as play for comparison."""
-FIRST_FACTOR, SMALLER_FACTORS, LARGER_FACTORS = 0.55, (0.3, 0.1, 0.03), (1.8, 3.2)
+PLAY, RIVAL_EFFECT = "backlash", "loose_joint"
+"""Catalogue names of play, and of the effect that `impacts` fits at the same place for comparison."""
+FIRST_STRENGTH_FACTOR, SMALLER_STRENGTH_FACTORS, LARGER_STRENGTH_FACTORS = 0.55, (0.3, 0.1, 0.03), (1.8, 3.2)
 """Factors on a starting strength: the first decides the direction, then those below or above follow while the cost
-falls. They cover a decade and a half downwards, where the scatter of impacts leads an estimator most. By hand."""
-MOST_FITTED, FIRST_ROUNDS, MOST_REFINED = 6, 3, 3
+falls. They reach further down (1.5 decades) than up (0.5), because impacts mostly make an estimate too large.
+Chosen."""
+MAX_FIRST_FITS, FIRST_FIT_STEPS, MAX_REFINED_FITS = 6, 3, 3
 """Most effects, of different names, that are fitted as a second effect with play; steps of that first fit, in which the
-model's parameters are fixed; and most of the fits that are refined, which takes ten times as long. By hand."""
+model's parameters are fixed; and most fits that are refined, which takes ten times as long. Chosen."""
 CHANCE_COST = 1.0
-"""Expected cost of the right hypothesis: chance variation alone, by the definition of the weights."""
-NEAR_CHANCE = 1.2
-"""Cost at which nothing further is fitted: the difference is then the chance variation's. By hand."""
+"""Expected cost of the true hypothesis: chance variation alone, by the definition of the weights."""
+SUFFICIENT_COST = 1.2
+"""Cost up to which no further effect is fitted: the excess over `CHANCE_COST` is then within the chance variation.
+Chosen."""
 BATCH_SIZE = 8
-"""Candidates that are evaluated between two looks at the time."""
+"""Number of candidates that are evaluated between two checks of the time limit. Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,7 +49,7 @@ class SecondEffects:
     fits: tuple[BandPowerFit, ...]
     """The best first; empty where no second effect removes enough."""
     complete: bool
-    """Whether the time sufficed for all candidates."""
+    """Whether the time sufficed for all candidates; True where none had to be tried."""
 
 
 def search_second_effects(
@@ -58,22 +60,24 @@ def search_second_effects(
     catalogue: Sequence[Effect],
     time_left: TimeBudget,
 ) -> SecondEffects:
-    """Fits of play with a second effect: those that remove at least `IMPACTS_SHARE` of the cost of play alone, on the
-    samples to fit and to choose by. None is looked for where even the right pair could not remove so much."""
-    weighted = weight_by_chance_variation(problem, play_fit)
-    play_cost = evaluate_hypothesis(weighted, play_fit.deviations, play_fit.hypothesis).cost
+    """Search for fits of play with a second effect that remove at least `IMPACTS_SHARE` of the cost of play alone, on
+    the samples to fit and to choose by. None is tried where even a cost of `CHANCE_COST` would not remove so much."""
+    weighted_problem = weight_by_chance_variation(problem, play_fit)
+    play_cost = evaluate_hypothesis(weighted_problem, play_fit.deviations, play_fit.hypothesis).cost
     if (1 - IMPACTS_SHARE) * play_cost < CHANCE_COST:
         return SecondEffects((), complete=True)
     if not time_left():
         return SecondEffects((), complete=False)
     suggested_hypotheses = _suggest_second_effects(context, explanation, play_fit, catalogue)
-    guarded = replace(weighted, map_=context.guard.wrap(weighted.map_, SCREENING))
-    starts, has_all_starts = _evaluate_starts(guarded, play_fit, suggested_hypotheses, time_left)
-    promising = _select_best_per_effect([start for start in starts if start.cost < play_cost])[:MOST_FITTED]
-    first_fits, has_all_fits = _fit_starts(context, weighted, promising, time_left)
-    refined, has_all_refined = _refine_fits(context, (problem, weighted), first_fits[:MOST_REFINED], time_left)
+    guarded_problem = replace(weighted_problem, map_=context.guard.wrap(weighted_problem.map_, SCREENING))
+    starts, has_all_starts = _evaluate_starts(guarded_problem, play_fit, suggested_hypotheses, time_left)
+    best_starts = _select_best_per_effect([start for start in starts if start.cost < play_cost])[:MAX_FIRST_FITS]
+    first_fits, has_all_fits = _fit_starts(context, weighted_problem, best_starts, time_left)
+    refined_fits, has_all_refined = _refine_fits(
+        context, (problem, weighted_problem), first_fits[:MAX_REFINED_FITS], time_left
+    )
     return SecondEffects(
-        tuple(fit for cost, fit in refined if cost <= (1 - IMPACTS_SHARE) * play_cost),
+        tuple(fit for cost, fit in refined_fits if cost <= (1 - IMPACTS_SHARE) * play_cost),
         has_all_starts and has_all_fits and has_all_refined,
     )
 
@@ -81,44 +85,45 @@ def search_second_effects(
 def _suggest_second_effects(
     context: SearchContext, explanation: Explanation, play_fit: BandPowerFit, catalogue: Sequence[Effect]
 ) -> list[Hypothesis]:
-    """Hypotheses of a second effect in addition to play: each effect of the catalogue with starting values from the
-    residuals that play leaves, and the candidates of the first round of the search by waveforms, as fitted there.
-    Effects that contain an excluded effect (`SearchContext.excluded`) are left out: they would stand for it."""
+    """List hypotheses of a second effect: each effect of the catalogue with starting values from the residuals of play,
+    and the candidates of the first round of the search by waveforms, as fitted there. Effects that contain an excluded
+    effect (`SearchContext.excluded`) as a special case are left out, because they would replace it."""
     waveform_fit = evaluate_fit(context.measure, context.tuning, play_fit.deviations, play_fit.hypothesis)
     evidence = gather_evidence(context.measure, context.tuning, waveform_fit)[0]
-    allowed = [
+    allowed_effects = [
         effect
         for effect in catalogue
-        if effect.name not in (PLAY, RIVAL) and not context.excluded.intersection(effect.simpler)
+        if effect.name not in (PLAY, RIVAL_EFFECT) and not context.excluded.intersection(effect.simpler)
     ]
-    names = {effect.name for effect in allowed}
+    allowed_names = {effect.name for effect in allowed_effects}
     first_round = explanation.rounds[0] if explanation.rounds else ()
-    fitted_hypotheses = [candidate.fitted.hypothesis for candidate in first_round if candidate.newest in names]
-    return [*list_candidates(allowed, evidence, context.guard.wrap(context.map_, STARTING)), *fitted_hypotheses]
+    fitted_hypotheses = [candidate.fitted.hypothesis for candidate in first_round if candidate.newest in allowed_names]
+    return [*list_candidates(allowed_effects, evidence, context.guard.wrap(context.map_, STARTING)), *fitted_hypotheses]
 
 
 def _fit_starts(
-    context: SearchContext, weighted: BandPowerProblem, starts: Sequence[BandPowerFit], time_left: TimeBudget
+    context: SearchContext, weighted_problem: BandPowerProblem, starts: Sequence[BandPowerFit], time_left: TimeBudget
 ) -> tuple[list[BandPowerFit], bool]:
-    """Each start fitted with the model's parameters fixed, the likeliest first, and whether the time sufficed for
-    all."""
+    """Fit each start with the model's parameters fixed. Returns the fits, the least value of Akaike's criterion first,
+    and whether the time sufficed for all."""
     guarded_map = context.guard.wrap(map, FITTING)
-    fit_first = partial(_fit_first, replace(weighted, ensemble=1))
+    fit_start = partial(_fit_first, replace(weighted_problem, ensemble=1))
     first_fits: list[BandPowerFit] = []
     is_complete = True
     for start in starts:
         is_complete = time_left()
         if not is_complete:
             break
-        first_fits += guarded_map(fit_first, [start])  # type: ignore[arg-type]
-    # Akaike's criterion over the compared bands: a law with more parameters must gain more.
-    bands = max(int(np.count_nonzero(weighted.weights)), 1)
-    ranked = sorted(first_fits, key=lambda fit: fit.cost + 2 * len(fit.hypothesis.point) / bands)
-    return ranked, is_complete
+        first_fits += guarded_map(fit_start, [start])  # type: ignore[arg-type]
+    # Akaike's criterion per compared band: cost + 2 (number of parameters) / (number of bands).
+    band_count = max(int(np.count_nonzero(weighted_problem.weights)), 1)
+    ranked_fits = sorted(first_fits, key=lambda fit: fit.cost + 2 * len(fit.hypothesis.point) / band_count)
+    return ranked_fits, is_complete
 
 
 def _fit_first(problem: BandPowerProblem, start: BandPowerFit) -> BandPowerFit:
-    return fit_band_power(problem, start, FIRST_ROUNDS)
+    """Fit a start by `FIRST_FIT_STEPS` steps."""
+    return fit_band_power(problem, start, FIRST_FIT_STEPS)
 
 
 def _refine_fits(
@@ -127,79 +132,85 @@ def _refine_fits(
     first_fits: Sequence[BandPowerFit],
     time_left: TimeBudget,
 ) -> tuple[list[tuple[float, BandPowerFit]], bool]:
-    """Fits with the model's parameters and their costs, the best first, and whether the time sufficed for all.
-    problems: without weights, and weighted by the chance variation of play, for the costs."""
-    problem, weighted = problems
+    """Refine the fits together with the model's parameters, until one has `SUFFICIENT_COST`. Returns costs and fits,
+    the best first, and whether the time sufficed. problems: without weights, and weighted by the chance variation of
+    play, from which the costs are."""
+    problem, weighted_problem = problems
     fits: list[tuple[float, BandPowerFit]] = []
     for start in first_fits:
         if not time_left():
             return sorted(fits, key=lambda fit: fit[0]), False
-        name = start.hypothesis.claims[-1].effect.name
-        fitted = context.guard.run(name, FITTING, partial(_refine, problem, start, time_left), start)
-        fits.append((evaluate_hypothesis(weighted, fitted.deviations, fitted.hypothesis).cost, fitted))
-        if fits[-1][0] <= NEAR_CHANCE:
+        effect_name = start.hypothesis.claims[-1].effect.name
+        fitted = context.guard.run(effect_name, FITTING, partial(_refine, problem, start, time_left), start)
+        fits.append((evaluate_hypothesis(weighted_problem, fitted.deviations, fitted.hypothesis).cost, fitted))
+        if fits[-1][0] <= SUFFICIENT_COST:
             break
     return sorted(fits, key=lambda fit: fit[0]), True
 
 
 def _refine(problem: BandPowerProblem, start: BandPowerFit, time_left: TimeBudget) -> BandPowerFit:
+    """Refine a fit under the weights of its own chance variation."""
     return refine_band_power(weight_by_chance_variation(problem, start), start, time_left)
 
 
 def _evaluate_starts(
-    weighted: BandPowerProblem,
+    weighted_problem: BandPowerProblem,
     play_fit: BandPowerFit,
     suggested_hypotheses: Sequence[Hypothesis],
     time_left: TimeBudget,
 ) -> tuple[list[BandPowerFit], bool]:
-    """Each suggestion with play at its best strength, and whether the time sufficed for all. One simulation each: the
-    scatter between simulations is in the weights."""
-    single = replace(weighted, ensemble=1, map_=map)
+    """Evaluate each suggestion with play at its best strength; returns also whether the time sufficed for all (the
+    first batch is always evaluated). One simulation each: the scatter between simulations is in the weights."""
+    single_simulation = replace(weighted_problem, ensemble=1, map_=map)
 
     def search_strength(hypothesis: Hypothesis) -> BandPowerFit:
-        return _search_strength(single, play_fit, hypothesis)
+        return _search_strength(single_simulation, play_fit, hypothesis)
 
     starts: list[BandPowerFit] = []
-    for first in range(0, len(suggested_hypotheses), BATCH_SIZE):
-        if first and not time_left():
+    for batch_start in range(0, len(suggested_hypotheses), BATCH_SIZE):
+        if batch_start and not time_left():
             return starts, False
-        starts += weighted.map_(search_strength, suggested_hypotheses[first : first + BATCH_SIZE])  # type: ignore[arg-type]
+        starts += weighted_problem.map_(search_strength, suggested_hypotheses[batch_start : batch_start + BATCH_SIZE])  # type: ignore[arg-type]
     return starts, True
 
 
 def _search_strength(problem: BandPowerProblem, play_fit: BandPowerFit, second_effect: Hypothesis) -> BandPowerFit:
-    """Play with the second effect at the strength with the least cost (`FIRST_FACTOR`). An effect is evaluated as
-    suggested where no strength can be scaled: without parameters, with a main one that is read from the data (such as a
-    step), or with one that is not zero where the effect is absent (such as a gain, or a limit)."""
+    """Evaluate play with the second effect at the strength with the least cost among the factors, in order of their
+    distance, until the cost rises. The suggested strength alone is evaluated where it cannot be scaled: without
+    parameters, with a main one that is read from the data (such as a step), or with one that is not zero where the
+    effect is absent (such as a gain, or a limit)."""
 
-    def evaluate(hypothesis: Hypothesis) -> BandPowerFit:
+    def evaluate_with_play(hypothesis: Hypothesis) -> BandPowerFit:
+        """Evaluate play together with a second effect."""
         return evaluate_hypothesis(problem, play_fit.deviations, combine_hypotheses(play_fit.hypothesis, hypothesis))
 
-    best = evaluate(second_effect)
-    main = next(iter(second_effect.claims[-1].effect.parameters), None)
-    if main is None or main.fixed or main.none != 0:
-        return best
-    weaker = evaluate(_scale_strength(second_effect, FIRST_FACTOR))
-    factors = SMALLER_FACTORS if weaker.cost < best.cost else LARGER_FACTORS
-    best = min(best, weaker, key=_get_cost)
+    best_fit = evaluate_with_play(second_effect)
+    main_parameter = next(iter(second_effect.claims[-1].effect.parameters), None)
+    if main_parameter is None or main_parameter.fixed or main_parameter.none != 0:
+        return best_fit
+    weaker_fit = evaluate_with_play(_scale_strength(second_effect, FIRST_STRENGTH_FACTOR))
+    factors = SMALLER_STRENGTH_FACTORS if weaker_fit.cost < best_fit.cost else LARGER_STRENGTH_FACTORS
+    best_fit = min(best_fit, weaker_fit, key=_get_cost)
     for factor in factors:
-        trial = evaluate(_scale_strength(second_effect, factor))
-        if trial.cost >= best.cost:
+        scaled_fit = evaluate_with_play(_scale_strength(second_effect, factor))
+        if scaled_fit.cost >= best_fit.cost:
             break
-        best = trial
-    return best
+        best_fit = scaled_fit
+    return best_fit
 
 
 def _scale_strength(hypothesis: Hypothesis, factor: float) -> Hypothesis:
-    """The hypothesis of one effect with its main parameter times the factor, at all its sites."""
+    """Multiply the main (first) parameter of a hypothesis of one effect by the factor, at all its sites."""
     (claim,) = hypothesis.claims
     main_name = claim.effect.parameters[0].name
     values = [placed_effect.values for placed_effect in hypothesis.list_placed_effects()]
-    return make_claim_hypothesis(claim, [{**group, main_name: factor * group[main_name]} for group in values])
+    return make_claim_hypothesis(
+        claim, [{**site_values, main_name: factor * site_values[main_name]} for site_values in values]
+    )
 
 
 def _select_best_per_effect(starts: Sequence[BandPowerFit]) -> list[BandPowerFit]:
-    """The best start of each effect, by rising cost."""
+    """Select the start with the least cost of each effect, by rising cost."""
     best_by_effect: dict[str, BandPowerFit] = {}
     for start in sorted(starts, key=_get_cost):
         best_by_effect.setdefault(start.hypothesis.claims[-1].effect.name, start)
@@ -207,4 +218,5 @@ def _select_best_per_effect(starts: Sequence[BandPowerFit]) -> list[BandPowerFit
 
 
 def _get_cost(fit: BandPowerFit) -> float:
+    """Get the cost, a sorting key."""
     return fit.cost

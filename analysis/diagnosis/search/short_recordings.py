@@ -1,8 +1,8 @@
-"""Shortens recordings with a periodic drive to one settled period per segment, on which hypotheses are compared first.
+"""Shorten recordings with periodic excitation to one settled period per segment, on which hypotheses are fitted first.
 
 All settled periods of a segment are equal except for noise. The kept samples are joined end to end and simulated as one
 recording; a run-in before each kept stretch lets the transients of the initial state decay (Pintelon and Schoukens,
-System Identification, 2012, ch. 2: transients of periodic excitation).
+System Identification, 2012, ch. 2). Called by `next_effect`, `compare_candidates`, `identifiability`, `fit_laws`.
 """
 
 from collections.abc import Sequence
@@ -41,29 +41,30 @@ from equalizer.signals.signal import FloatArray
 Indices = npt.NDArray[np.int64]
 
 COARSE_STEP_FACTOR = 2
-"""Factor on the simulation step for ranking: its integration error is far below that of the linearised gains."""
+"""Factor on the simulation step for ranking. Chosen: the integration error is far below that of linearised gains."""
 
 
 def coarsen_steps(measure: ErrorMeasure) -> ErrorMeasure:
-    """The measure with `COARSE_STEP_FACTOR` times the simulation step, if it simulates freely; else unchanged."""
+    """Multiply the simulation step of a free simulation by `COARSE_STEP_FACTOR`; other measures are unchanged."""
     return replace(measure, step_factor=COARSE_STEP_FACTOR) if isinstance(measure, FreeSimulation) else measure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _KeptSamples:
-    """Which samples of one record are kept, which are fitted, and which are repeats of fitted ones."""
+    """Indices of the kept samples of one record, those of them to fit, and the fitted sample that each sample
+    repeats."""
 
     kept: Indices
-    """(k,): indices of the simulated samples: those to fit, with the run-in around them."""
+    """(k,): indices of the simulated samples: those to fit, and the run-in around them."""
     fit: Mask
-    """(n,): the samples to fit, among all n of the record."""
+    """(n,): whether each of the n samples of the record is to be fitted."""
     repeat_of: Indices
     """(n,): index of the fitted sample of which a sample is a repeat; its own index where it is no repeat."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ShortRecordings:
-    """A search context on the kept samples alone, and how these map to the samples of the complete recordings."""
+    """Search context on the kept samples alone, with their indices in the complete recordings (the long measure)."""
 
     context: SearchContext
     """Context whose measure holds the kept samples alone: the samples to fit are also those to choose by."""
@@ -87,8 +88,8 @@ class ShortRecordings:
             return float(np.mean(difference**2)) <= RUN_IN_ERROR * base_fit.cost
 
     def repeat_sensitivity(self, jacobian: Sensitivity) -> Sensitivity:
-        """The sensitivity on the long measure, from that on one period of each segment: the Gram matrix counts each
-        kept sample as often as it repeats."""
+        """Convert the sensitivity on one period of each segment to the long measure: the Gram matrix counts each kept
+        sample as often as it repeats."""
         root_counts = np.sqrt(np.bincount(self.fitted_sample, minlength=self._kept_sample_count)).repeat(
             jacobian.columns.shape[1] // self._kept_sample_count
         )
@@ -101,10 +102,10 @@ class ShortRecordings:
         return sum(int(record.fit.sum()) for record in self.context.measure.records)
 
     def restrict_evidence(self, evidence: Evidence) -> Evidence:
-        """The evidence of the first record, restricted to the kept samples."""
+        """Restrict the evidence of the first record to the kept samples."""
         kept, n = self.kept[0], len(evidence.command)
         fit = np.concatenate([record.fit for record in self.context.measure.records])[: len(kept)]
-        cut_signals = {
+        kept_signals = {
             field.name: value[kept]
             for field in fields(evidence)
             if isinstance(value := getattr(evidence, field.name), np.ndarray) and len(value) == n and value.ndim
@@ -113,17 +114,17 @@ class ShortRecordings:
         # The noise has a value per channel, which must not be cut even if there are as many channels as samples.
         return replace(
             evidence,
-            **{**cut_signals, "used": used, "noise": evidence.noise, "position_noise": evidence.position_noise},
+            **{**kept_signals, "used": used, "noise": evidence.noise, "position_noise": evidence.position_noise},
         )
 
 
 def shorten_recordings(context: SearchContext, base_fit: Fitted) -> ShortRecordings | None:
-    """The shortened recordings; None for windows, with references, with effects that depend on time, where the run-in
-    never suffices or saves little, and where the first record has no samples to fit. base_fit: on all samples.
+    """Shorten the recordings of a context; None for windows, with references, with effects that depend on time, where
+    no run-in suffices or too few samples are saved, or without samples of the first record. base_fit: on all samples.
 
     A force with memory (dry friction, play) may depend on earlier samples for longer than the linear model's transients
     last. Each piece therefore begins with the positions and velocities of the simulation of all samples (states of the
-    forces continue from the piece before), and the run-in is doubled until the errors agree (`has_same_errors`).
+    forces continue from the previous piece), and the run-in is doubled until the errors agree (`has_same_errors`).
     """
     measure = context.measure
     if not isinstance(measure, (FreeSimulation, PredictedForce)) or context.references is not None:
@@ -152,26 +153,26 @@ def _keep_periods(
     context: SearchContext,
     measure: FreeSimulation | PredictedForce,
     periods: Sequence[tuple[Mask, Indices]],
-    around_s: tuple[float, float],
+    run_in_s: tuple[float, float],
 ) -> ShortRecordings | None:
-    """The recordings shortened to the given periods; None where more than `SHORT_SHARE` of the samples would be kept,
-    the first record would keep none, or `_split_pieces` returns None. around_s: as for `_add_run_in`."""
-    cuts = [_add_run_in(record, cut, around_s) for record, cut in zip(measure.records, periods, strict=True)]
+    """Shorten the recordings to the given periods; None where more than `SHORT_SHARE` of the samples would be kept,
+    the first record would keep none, or `_split_pieces` returns None. run_in_s: as for `_add_run_in`."""
+    cuts = [_add_run_in(record, cut, run_in_s) for record, cut in zip(measure.records, periods, strict=True)]
     total_samples = sum(len(record.command) for record in measure.records)
     if not len(cuts[0].kept) or sum(len(cut.kept) for cut in cuts) > SHORT_SHARE * total_samples:
         return None
-    cut_measure = _split_pieces(measure, cuts) if isinstance(measure, PredictedForce) else _join_pieces(measure, cuts)
-    if cut_measure is None:
+    short_measure = _split_pieces(measure, cuts) if isinstance(measure, PredictedForce) else _join_pieces(measure, cuts)
+    if short_measure is None:
         return None
     fitted = np.concatenate([cut.fit[record.fit] for record, cut in zip(measure.records, cuts, strict=True)])
     kept = tuple(cut.kept for cut in cuts if len(cut.kept))
     return ShortRecordings(
-        replace(context, measure=cut_measure), kept, _index_repeats(measure, cuts), np.flatnonzero(fitted), measure
+        replace(context, measure=short_measure), kept, _index_repeats(measure, cuts), np.flatnonzero(fitted), measure
     )
 
 
 def _restart_pieces(shortened: ShortRecordings, measure: FreeSimulation, base_fit: Fitted) -> ShortRecordings:
-    """The shortened recordings, each piece started from the state that the simulation of all samples has there."""
+    """Start each piece from the state of the simulation of all samples at its beginning."""
     records = [record for record in measure.records if record.fit.any()]
     model, effects = shortened.context.tuning.tune(base_fit.deviations), base_fit.hypothesis.list_placed_effects()
     restarts = []
@@ -183,7 +184,7 @@ def _restart_pieces(shortened: ShortRecordings, measure: FreeSimulation, base_fi
 
 
 def _index_repeats(measure: ErrorMeasure, cuts: Sequence[_KeptSamples]) -> Indices:
-    """`ShortRecordings.fitted_sample`: indices over the kept samples to fit of all records."""
+    """Compute `ShortRecordings.fitted_sample`: indices among the kept samples to fit of all records."""
     indices, offset = [], 0
     for record, cut in zip(measure.records, cuts, strict=True):
         indices.append(offset + (np.cumsum(cut.fit) - 1)[cut.repeat_of[record.fit]])
@@ -192,18 +193,18 @@ def _index_repeats(measure: ErrorMeasure, cuts: Sequence[_KeptSamples]) -> Indic
 
 
 def _compute_run_in_s(measure: FreeSimulation | PredictedForce, model: MechanicalModel) -> tuple[float, float]:
-    """Seconds before and after a stretch on which its errors depend: `RUN_IN_CONSTANTS` time constants of the model for
-    a simulation; for a predicted force, which depends on earlier and later motion, of the model's inverse (its zeros)
-    and of the band limit."""
+    """Compute the seconds before and after a stretch on which its errors depend: `RUN_IN_CONSTANTS` time constants of
+    the model for a simulation; for a predicted force, which depends on earlier and later motion, of the model's inverse
+    (its zeros) and of the band limit."""
     if isinstance(measure, FreeSimulation):
         return RUN_IN_CONSTANTS / max(-compute_growth_rate(model), np.finfo(float).tiny), 0.0
-    rates = np.abs(compute_transmission_zeros(model, 2 * np.pi * measure.band_hz).real)
-    settling_s = RUN_IN_CONSTANTS / max(float(rates.min(initial=np.inf)), np.finfo(float).tiny)
+    zero_decay_rates = np.abs(compute_transmission_zeros(model, 2 * np.pi * measure.band_hz).real)
+    settling_s = RUN_IN_CONSTANTS / max(float(zero_decay_rates.min(initial=np.inf)), np.finfo(float).tiny)
     return (settling_s + RUN_IN_CONSTANTS / measure.band_hz,) * 2
 
 
 def _select_last_periods(record: Observed) -> tuple[Mask, Indices]:
-    """`fit` and `repeat_of` of `_KeptSamples`: in each settled segment, only the last period is fitted."""
+    """Select `fit` and `repeat_of` of `_KeptSamples`: in each settled segment, only the last period is fitted."""
     fit, repeat_of = record.fit.copy(), np.arange(len(record.fit))
     for periods in find_settled_periods(record.recording):
         segment = slice(periods.segment.start, periods.segment.stop)
@@ -215,25 +216,25 @@ def _select_last_periods(record: Observed) -> tuple[Mask, Indices]:
     return fit, repeat_of
 
 
-def _add_run_in(record: Observed, periods: tuple[Mask, Indices], around_s: tuple[float, float]) -> _KeptSamples:
-    """The samples to fit with their run-in. around_s: seconds kept before and after each stretch to fit."""
+def _add_run_in(record: Observed, periods: tuple[Mask, Indices], run_in_s: tuple[float, float]) -> _KeptSamples:
+    """Add the run-in to the samples to fit. run_in_s: seconds kept before and after each stretch to fit."""
     fit, repeat_of = periods
-    samples_before, samples_after = (int(np.ceil(min(s * record.recording.sample_rate_hz, len(fit)))) for s in around_s)
-    is_kept, edges = fit.copy(), np.diff(np.concatenate([[0], fit.astype(np.int8), [0]]))
+    samples_before, samples_after = (int(np.ceil(min(s * record.recording.sample_rate_hz, len(fit)))) for s in run_in_s)
+    simulated, edges = fit.copy(), np.diff(np.concatenate([[0], fit.astype(np.int8), [0]]))
     for start, stop in zip(np.flatnonzero(edges > 0).tolist(), np.flatnonzero(edges < 0).tolist(), strict=True):
-        is_kept[max(start - samples_before, 0) : stop + samples_after] = True
-    return _KeptSamples(np.flatnonzero(is_kept), fit, repeat_of)
+        simulated[max(start - samples_before, 0) : stop + samples_after] = True
+    return _KeptSamples(np.flatnonzero(simulated), fit, repeat_of)
 
 
 def _join_pieces(measure: FreeSimulation, cuts: Sequence[_KeptSamples]) -> FreeSimulation:
-    """The measure on the kept samples, joined end to end."""
+    """Build the measure on the kept samples, joined end to end; records without any are left out."""
     pairs = zip(measure.records, cuts, strict=True)
     return measure.with_records(tuple(_cut_record(record, cut.kept, cut.fit) for record, cut in pairs if len(cut.kept)))
 
 
 def _split_pieces(measure: PredictedForce, cuts: Sequence[_KeptSamples]) -> PredictedForce | None:
-    """The measure with each kept stretch as a separate record; None where a stretch does not drive an axis that the
-    whole record drives, because errors are relative to the command."""
+    """Build the measure with each kept stretch as a record; None for a record without kept samples, or a stretch
+    without command on an axis that the whole record drives, because errors are relative to the command."""
     records, motions = [], []
     for record, motion, cut in zip(measure.records, measure.motions, cuts, strict=True):
         is_driven = np.abs(record.command).max(axis=0) > 0
@@ -247,7 +248,7 @@ def _split_pieces(measure: PredictedForce, cuts: Sequence[_KeptSamples]) -> Pred
 
 
 def _cut_record(record: Observed, kept: Indices, fit: Mask) -> Observed:
-    """A record of the kept samples alone. Samples to fit are those to choose by; none is held out."""
+    """Reduce a record to the kept samples. Samples to fit are also those to choose by; none is held out."""
     is_held_out = np.zeros(len(kept), dtype=np.bool_)
     return Observed(record.recording, record.command[kept], record.measured[kept], fit[kept], fit[kept], is_held_out)
 
@@ -259,9 +260,9 @@ def fit_on_short_recordings(
     invariant: Sequence[Hypothesis],
     varying: Sequence[Hypothesis],
 ) -> list[Fitted]:
-    """First fits on all samples, the best first, of hypotheses that were screened on short recordings. varying:
-    hypotheses that depend on sampling times, which short recordings cannot judge; fitted only where their predicted
-    reduction of the cost is not far below that of the time-invariant hypotheses (`_keep_promising`)."""
+    """Fit hypotheses first on short, then on all samples; returns the finite fits, the best first. invariant, varying:
+    hypotheses without and with dependence on time; the latter cannot be compared on short recordings, and are fitted
+    only where their predicted gain is not far below that of the former (`_keep_promising`)."""
     short, guard = replace(short_form.context, measure=coarsen_steps(short_form.context.measure)), context.guard
     short_base = evaluate_fit(short.measure, short.tuning, base.deviations, base.hypothesis)
     jacobian = compute_sensitivity(short, base.deviations, base.hypothesis, with_forces=True)
@@ -292,8 +293,8 @@ def fit_on_short_recordings(
 def _keep_promising(
     reference: tuple[Fitted, Sequence[Fitted]], coarse_base: Fitted, screened: Sequence[ScreenedHypothesis]
 ) -> list[ScreenedHypothesis]:
-    """The hypotheses whose predicted relative reduction of the cost is at least `WORTH_FITTING` of the best one among
-    the reference. It is relative because those costs refer to other samples and steps. reference: base and fits."""
+    """Keep hypotheses whose predicted relative reduction of the cost is at least `WORTH_FITTING` times the largest of
+    the reference; relative, because its costs refer to other samples and steps. reference: base fit, and fits."""
     base, fits = reference
     best = max((1 - trial.cost / base.cost for trial in fits), default=0.0)
     return [trial for trial in screened if 1 - trial.cost / coarse_base.cost >= max(WORTH_FITTING * best, 0.0)]

@@ -2,7 +2,8 @@
 
     error = sum over bins of |sum of stated probabilities - number of right names| / number of names
 
-Its interval is the percentile bootstrap over names (2.5 and 97.5 %).
+Its interval is the percentile bootstrap over names (2.5 and 97.5 %). A name is an effect that a diagnosis named. Called
+by `score`; `blind_test_pictures` draws the curve. Reference: Naeini et al., AAAI 2015.
 """
 
 from collections.abc import Sequence
@@ -14,13 +15,13 @@ from analysis.evaluation.blind_test.confidence_intervals import RESAMPLE_COUNT, 
 from analysis.evaluation.blind_test.outcome import Outcome
 from equalizer.signals.signal import FloatArray
 
-BINS = 10
-"""Bins of the calibration curve, with equally many answers each."""
+BIN_COUNT = 10
+"""Largest number of bins of the reliability curve, with about equally many names each. Chosen by hand."""
 TIE_DECIMALS = 3
 """Decimals to which probabilities are rounded for comparison. Names of equal probability share their right answers
 equally, so that the bin into which each falls does not matter."""
-ANSWERABLE = ("nothing", "single", "pair")
-"""Kinds whose answer is in the catalogue, to which the stated probabilities refer."""
+ANSWERABLE_KINDS = ("nothing", "single", "pair")
+"""Kinds of case (`Outcome.kind`) whose true answer is in the catalogue, to which the stated probabilities refer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,21 +48,23 @@ class Calibration:
     error: float | None
     """Expected calibration error; None where nothing was named."""
     low: float | None
+    """Lower end of its 95 % interval; None where nothing was named."""
     high: float | None
+    """Upper end of that interval."""
     bins: tuple[Bin, ...]
 
 
-def compute_calibration(outcomes: Sequence[Outcome], kinds: Sequence[str] = ANSWERABLE) -> Calibration:
-    """Calibration over all named effects of the cases of these kinds: a name is right where the device has the effect,
-    at any axis."""
-    names = [(outcome, effect) for outcome in outcomes if outcome.kind in kinds for effect in outcome.named]
-    if not names:
+def compute_calibration(outcomes: Sequence[Outcome], kinds: Sequence[str] = ANSWERABLE_KINDS) -> Calibration:
+    """Compute the calibration over all named effects of the cases of these kinds: a name is right where the device has
+    the effect, at any axis. The bootstrap has a fixed seed (21; any value serves), so that results are reproducible."""
+    named_effects = [(outcome, effect) for outcome in outcomes if outcome.kind in kinds for effect in outcome.named]
+    if not named_effects:
         return Calibration(None, None, None, ())
-    probabilities = np.array([effect.probability for _, effect in names])
-    is_right = np.array([float(effect.effect in case.names) for case, effect in names])
-    resamples = np.random.default_rng(21).integers(len(names), size=(RESAMPLE_COUNT, len(names)))
+    probabilities = np.array([effect.probability for _, effect in named_effects])
+    is_right = np.array([float(effect.effect in case.names) for case, effect in named_effects])
+    resamples = np.random.default_rng(21).integers(len(named_effects), size=(RESAMPLE_COUNT, len(named_effects)))
     low, high = np.quantile(
-        [_compute_calibration_error(probabilities[k], is_right[k]) for k in resamples], (0.025, 0.975)
+        [_compute_calibration_error(probabilities[indices], is_right[indices]) for indices in resamples], (0.025, 0.975)
     )
     return Calibration(
         _compute_calibration_error(probabilities, is_right),
@@ -71,31 +74,44 @@ def compute_calibration(outcomes: Sequence[Outcome], kinds: Sequence[str] = ANSW
     )
 
 
-def _split_bins(probabilities: FloatArray) -> list[np.ndarray[tuple[int], np.dtype[np.int64]]]:
-    """Indices of the names in each bin, in rising order of probability; at most `BINS`, none empty."""
+def _split_into_bins(probabilities: FloatArray) -> list[np.ndarray[tuple[int], np.dtype[np.int64]]]:
+    """Split the indices of the names into bins of rising probability; at most `BIN_COUNT`, none empty. probabilities:
+    (n,)."""
     order = np.argsort(probabilities, kind="stable")
-    return [part for part in np.array_split(order, BINS) if len(part)]
+    return [bin_indices for bin_indices in np.array_split(order, BIN_COUNT) if len(bin_indices)]
 
 
 def _compute_calibration_error(probabilities: FloatArray, is_right: FloatArray) -> float:
-    """Expected calibration error by the equation of this file. is_right: 1 for a right name, else 0."""
+    """Compute the expected calibration error by the equation of this file. is_right: (n,), 1 for a right name, else
+    0."""
     tied_shares = _average_ties(probabilities, is_right)
     return float(
-        sum(abs(probabilities[part].sum() - tied_shares[part].sum()) for part in _split_bins(probabilities))
+        sum(
+            abs(probabilities[bin_indices].sum() - tied_shares[bin_indices].sum())
+            for bin_indices in _split_into_bins(probabilities)
+        )
         / len(probabilities)
     )
 
 
 def _average_ties(probabilities: FloatArray, is_right: FloatArray) -> FloatArray:
-    """(n,): for each name, the share of right names among those with the same stated probability."""
-    _, group = np.unique(np.round(probabilities, TIE_DECIMALS), return_inverse=True)
-    group_means: FloatArray = np.bincount(group, weights=is_right) / np.bincount(group)
-    return np.asarray(group_means[group])
+    """Average `is_right` (n,) over the names with the same stated probability, to `TIE_DECIMALS`."""
+    _, group_indices = np.unique(np.round(probabilities, TIE_DECIMALS), return_inverse=True)
+    group_means: FloatArray = np.bincount(group_indices, weights=is_right) / np.bincount(group_indices)
+    return np.asarray(group_means[group_indices])
 
 
 def _make_bins(probabilities: FloatArray, is_right: FloatArray) -> list[Bin]:
+    """Make the bins of the reliability curve; the right names of a bin may be a fraction, by ties."""
     bins, tied_shares = [], _average_ties(probabilities, is_right)
-    for part in _split_bins(probabilities):
-        hits, count = float(tied_shares[part].sum()), len(part)
-        bins.append(Bin(float(probabilities[part].mean()), hits / count, *compute_wilson_interval(hits, count), count))
+    for bin_indices in _split_into_bins(probabilities):
+        right_count, name_count = float(tied_shares[bin_indices].sum()), len(bin_indices)
+        bins.append(
+            Bin(
+                float(probabilities[bin_indices].mean()),
+                right_count / name_count,
+                *compute_wilson_interval(right_count, name_count),
+                name_count,
+            )
+        )
     return bins

@@ -1,7 +1,8 @@
-"""Findings on the published figure 5: the response of the simulated device with and without the equalizer.
+"""Findings on the published figure 5: frequency response of the simulated device with and without the equalizer.
 
 The paper reports that equalization removes the resonance near 11 Hz, reduces coupling peaks by up to a factor of ten,
-and keeps the response fairly flat near the edge of the workspace. Flatness and coupling: `played_response`.
+and keeps the response fairly flat near the edge of the workspace. Each finding compares a figure of our simulation with
+one of these statements. Flatness and coupling are defined in `played_response`. Called by `reproduce_equalized`.
 """
 
 from dataclasses import dataclass
@@ -14,17 +15,18 @@ from analysis.wording import format_number
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 RESONANCE_HZ = (9.0, 14.0)
-"""Range around the published resonance near 11 Hz."""
-REMOVED = 1 / 3
-"""Largest remaining share of a resonance's height in dB that counts as "essentially removed"."""
-ORDER_DB = (10.0, 30.0)
-"""Reductions of the coupling peaks, in dB, that count as an order of magnitude (20 dB)."""
+"""Frequency range that contains the published resonance near 11 Hz. Chosen."""
+LARGEST_REMAINING_HEIGHT = 1 / 3
+"""Largest remaining share of a resonance's height in dB that counts as "essentially removed". Chosen."""
+ORDER_OF_MAGNITUDE_DB = (10.0, 30.0)
+"""Reductions of the coupling peaks, in dB, that count as an order of magnitude (20 dB). Chosen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EqualizedRows:
-    """The rows of figure 5, all played with swept sines, and two rows on friction, played with a multisine. The
-    responses without an equalizer are normalised by their mean gain (`normalise_gain`)."""
+    """Measured responses: the rows of figure 5, and the edge without an equalizer, driven by swept sines; two rows on
+    friction, driven by a multisine. Responses without an equalizer are normalised by their mean gain
+    (`normalise_gain`)."""
 
     unequalized: PlayedResponse
     """At the centre, without the equalizer."""
@@ -39,7 +41,7 @@ class EqualizedRows:
     multisine: PlayedResponse
     """At the centre, equalized, all frequencies at once (multisine)."""
     frictionless: PlayedResponse
-    """As `multisine`, on the device without friction, with a model identified on that device."""
+    """Like `multisine`, on the simulated device without friction, with a model identified on that device."""
 
     @property
     def figure_rows(self) -> tuple[PlayedResponse, ...]:
@@ -63,8 +65,8 @@ class EqualizedRows:
 def make_equalized_findings(
     rows: EqualizedRows, held_out_errors: tuple[float, float] | None, remarks: tuple[str, ...] = ()
 ) -> FigureFindings:
-    """Findings on figure 5. held_out_errors: relative error of the centre's model on a multisine that was not
-    fitted, and the same for the device without friction; None = not computed. remarks: of the analyses."""
+    """Make the findings on figure 5. held_out_errors: relative rms error of the centre's model on a multisine that was
+    not fitted, and the same for the device without friction; None = not computed. remarks: added to the findings."""
     findings = (
         _find_resonance(rows),
         _find_peak_reduction(rows),
@@ -84,12 +86,12 @@ def make_equalized_findings(
         "is all but gone and coupling peaks fall to as little as a tenth; at the edge the response stays fairly flat, "
         "with little gain in coupling. Interpolation between models of several places is named as a possibility.",
         findings=tuple(finding for finding in findings if finding is not None),
-        differs=_DIFFERS,
+        differs=_DIFFERENCES_FROM_PAPER,
         remarks=remarks,
     )
 
 
-_DIFFERS = (
+_DIFFERENCES_FROM_PAPER = (
     "The measured quantity is the true acceleration of the handle, which is known only in a simulation; the paper's "
     "curves are those of its accelerometer, whose mounting error would be in them.",
     "The simulated drives have Coulomb friction of about 0.2 N, which no linear model contains. Swept sines, as in "
@@ -100,27 +102,30 @@ _DIFFERS = (
     "How much a place in the workspace changes the response is a matter of our geometry; the paper does not say how "
     "far off the centre its third row was taken. The fourth row is ours.",
 )
+"""Differences between the simulation and the published measurement, for the report."""
 
 
 def _find_resonance(rows: EqualizedRows) -> Finding:
-    """Whether the resonance near 11 Hz is essentially removed: its height falls to at most `REMOVED` in dB."""
-    plain_db, equalized_db = _measure_height_db(rows.unequalized), _measure_height_db(rows.equalized)
+    """Judge whether the resonance near 11 Hz is essentially removed: its height in dB falls to at most
+    `LARGEST_REMAINING_HEIGHT` times that without the equalizer."""
+    unequalized_db, equalized_db = _measure_height_db(rows.unequalized), _measure_height_db(rows.equalized)
     low, high = RESONANCE_HZ
     return Finding(
         what=f"Rise and fall along the axes, {low:g} to {high:g} Hz",
         published="the resonance near 11 Hz is essentially removed",
-        here=f"{format_number(plain_db, 1)} dB without, {format_number(equalized_db, 1)} dB with the equalizer",
+        here=f"{format_number(unequalized_db, 1)} dB without, {format_number(equalized_db, 1)} dB with the equalizer",
         value=equalized_db,
         unit="dB",
-        as_published=equalized_db <= REMOVED * plain_db,
+        as_published=equalized_db <= LARGEST_REMAINING_HEIGHT * unequalized_db,
         rule="at most a third of what it was, in dB",
     )
 
 
 def _find_peak_reduction(rows: EqualizedRows) -> Finding:
-    """Whether the largest reduction of a coupling peak at the centre is about an order of magnitude (`ORDER_DB`)."""
+    """Judge whether the largest reduction of a coupling peak at the centre is about an order of magnitude
+    (`ORDER_OF_MAGNITUDE_DB`)."""
     reduction_db = _measure_peaks_db(rows.unequalized.response) - _measure_peaks_db(rows.equalized.response)
-    low, high = ORDER_DB
+    low, high = ORDER_OF_MAGNITUDE_DB
     return Finding(
         what="Fall of the coupling peaks, centre",
         published="up to an order of magnitude, that is 20 dB",
@@ -133,11 +138,12 @@ def _find_peak_reduction(rows: EqualizedRows) -> Finding:
 
 
 def _find_worst_coupling(title: str, unequalized: PlayedResponse, equalized: PlayedResponse) -> Finding:
-    plain_db, equalized_db = make_played_row(unequalized).coupling_db, make_played_row(equalized).coupling_db
+    """Compare the worst coupling with and without the equalizer; the paper has no such number."""
+    unequalized_db, equalized_db = make_played_row(unequalized).coupling_db, make_played_row(equalized).coupling_db
     return Finding(
         what=title,
         published="",
-        here=f"{format_number(plain_db, 1)} dB without, {format_number(equalized_db, 1)} dB with the equalizer",
+        here=f"{format_number(unequalized_db, 1)} dB without, {format_number(equalized_db, 1)} dB with the equalizer",
         value=equalized_db,
         unit="dB",
         as_published=None,
@@ -145,37 +151,45 @@ def _find_worst_coupling(title: str, unequalized: PlayedResponse, equalized: Pla
 
 
 def _find_edge_flatness(rows: EqualizedRows) -> Finding:
-    """Whether the model of the centre at least halves the deviation from flatness (dB) near the edge."""
-    plain_db, equalized_db = make_played_row(rows.edge_unequalized).flatness_db, make_played_row(rows.edge).flatness_db
+    """Judge whether the model of the centre at least halves the deviation from flatness (dB) near the edge."""
+    unequalized_db, equalized_db = (
+        make_played_row(rows.edge_unequalized).flatness_db,
+        make_played_row(rows.edge).flatness_db,
+    )
     return Finding(
         what="Flatness at the edge, model of the centre",
         published="remains fairly flat",
-        here=f"{format_number(plain_db, 1)} dB without, {format_number(equalized_db, 1)} dB with the equalizer "
+        here=f"{format_number(unequalized_db, 1)} dB without, {format_number(equalized_db, 1)} dB with the equalizer "
         f"(centre: {format_number(make_played_row(rows.equalized).flatness_db, 1)} dB)",
         value=equalized_db,
         unit="dB",
-        as_published=equalized_db <= plain_db / 2,
+        as_published=equalized_db <= unequalized_db / 2,
         rule="at most half of what it is there without",
     )
 
 
 def _find_edge_coupling(rows: EqualizedRows) -> Finding:
-    """Whether the reduction of coupling near the edge is positive, and less than half of that at the centre, in dB."""
-    plain_db, equalized_db = make_played_row(rows.edge_unequalized).coupling_db, make_played_row(rows.edge).coupling_db
+    """Judge whether the reduction of coupling near the edge is positive, and less than half of that at the centre, in
+    dB."""
+    unequalized_db, equalized_db = (
+        make_played_row(rows.edge_unequalized).coupling_db,
+        make_played_row(rows.edge).coupling_db,
+    )
     centre_reduction_db = make_played_row(rows.unequalized).coupling_db - make_played_row(rows.equalized).coupling_db
     return Finding(
         what="Coupling at the edge, model of the centre",
         published="still a minor improvement",
-        here=f"{format_number(plain_db, 1)} dB without, {format_number(equalized_db, 1)} dB with the equalizer, "
+        here=f"{format_number(unequalized_db, 1)} dB without, {format_number(equalized_db, 1)} dB with the equalizer, "
         "worst line",
-        value=plain_db - equalized_db,
+        value=unequalized_db - equalized_db,
         unit="dB",
-        as_published=0 < plain_db - equalized_db < centre_reduction_db / 2,
+        as_published=0 < unequalized_db - equalized_db < centre_reduction_db / 2,
         rule="better, but by less than half of the gain at the centre, in dB",
     )
 
 
 def _find_blended_forces(rows: EqualizedRows) -> Finding:
+    """Report flatness and coupling near the edge with blended forces, which the paper does not test."""
     blended = make_played_row(rows.edge_blended)
     return Finding(
         what="The same place, forces blended between models of other places (ours)",
@@ -189,6 +203,7 @@ def _find_blended_forces(rows: EqualizedRows) -> Finding:
 
 
 def _find_friction_cost(rows: EqualizedRows) -> Finding:
+    """Compare flatness and coupling under a multisine with and without friction, which the paper does not test."""
     with_friction, frictionless = make_played_row(rows.multisine), make_played_row(rows.frictionless)
     return Finding(
         what="What friction costs, all frequencies at once (ours)",
@@ -204,6 +219,7 @@ def _find_friction_cost(rows: EqualizedRows) -> Finding:
 
 
 def _find_held_out_error(held_out_errors: tuple[float, float] | None) -> Finding | None:
+    """Report the held-out errors of both models (`make_equalized_findings`); None without them."""
     if held_out_errors is None:
         return None
     error, frictionless_error = held_out_errors
@@ -219,16 +235,17 @@ def _find_held_out_error(held_out_errors: tuple[float, float] | None) -> Finding
 
 
 def _measure_height_db(playback: PlayedResponse) -> float:
-    """Height of the resonance in dB: range of the level within `RESONANCE_HZ` along an axis, of the worst axis."""
+    """Measure the height of the resonance in dB: maximum minus minimum of the gain within `RESONANCE_HZ` (ends
+    included) along an axis; of the axes, the largest."""
     low, high = RESONANCE_HZ
     in_range = (playback.frequency_hz >= low) & (playback.frequency_hz <= high)
-    level = 20 * np.log10(np.abs(np.einsum("lii->li", playback.response[in_range])))
-    return float(np.ptp(level, axis=0).max())
+    level_db = 20 * np.log10(np.abs(np.einsum("lii->li", playback.response[in_range])))
+    return float(np.ptp(level_db, axis=0).max())
 
 
 def _measure_peaks_db(response: ComplexArray) -> FloatArray:
-    """(axes (axes - 1),): largest magnitude of each off-axis channel over frequency, in dB. response: (lines, axes,
+    """Measure (axes (axes - 1),): largest gain of each off-axis channel over frequency, in dB. response: (lines, axes,
     axes)."""
-    off_diagonal = ~np.eye(response.shape[1], dtype=bool)
-    peaks: FloatArray = 20 * np.log10(np.abs(response).max(axis=0)[off_diagonal])
-    return peaks
+    is_off_axis = ~np.eye(response.shape[1], dtype=bool)
+    peaks_db: FloatArray = 20 * np.log10(np.abs(response).max(axis=0)[is_off_axis])
+    return peaks_db

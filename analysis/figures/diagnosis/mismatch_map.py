@@ -20,25 +20,26 @@ from analysis.figures.style import BLACK, GREY, create_figure, draw_no_data_note
 from equalizer.signals.signal import FloatArray
 
 _LEAST_COLOUR_LIMIT = 300.0
-"""Smallest upper end of the colour scale, in units of the noise."""
+"""Smallest upper end of the colour scale, in units of the noise. Chosen by eye, as all sizes of this figure."""
 _WHITE_TEXT_FROM = 0.62
 """Share of the logarithmic colour scale from which numbers are white."""
 _LETTER_WIDTH_IN = 0.075
-"""Mean width of a letter of the labels beside the map, inches."""
+"""Width reserved per letter of the labels beside the map, inches."""
 _ROW_HEIGHT_IN, _PANEL_GAP_IN = 0.25, 0.2
 """Height of a row of cells, and between panels, inches."""
 _MOST_LEVELS = 4
-"""Largest number of rows of panels; more levels are drawn in as many groups."""
+"""Largest number of rows of panels; more levels are put into this number of groups."""
 _MIN_NUMBERED_RATIO = 1.15
 """Residual over noise below which a cell has no number."""
 _FRAME_OUTLINE = ((-0.46, -0.46), (0.46, -0.46), (0.46, 0.46), (-0.46, 0.46), (-0.46, -0.46))
-"""Outline of a significant cell about its centre, in cells."""
+"""Outline of a significant cell about its centre, in cells: slightly smaller than the cell, so that outlines of
+neighbours do not touch."""
 _UNIT_SQUARE = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
 """Corners of a panel, relative to its size."""
 _WIDTH_IN = 8.8
 """Width of the figure, inches."""
 _POINTS_PER_CELL, _GAP_CELLS = 4, 0.25
-"""Points per cell, along each side, and cells between panels: a whole number of points."""
+"""Points of the drawn table per cell, along each side; gap between panels in cells, a whole number of points."""
 _MOST_NUMBERED_COLUMNS = 10
 """Columns of a panel up to which a number can be read in each cell."""
 
@@ -48,27 +49,32 @@ Maps = Mapping[str, tuple[MismatchCell, ...]]
 
 @dataclass(frozen=True, slots=True)
 class _Layout:
-    """Stages (columns of panels), levels (rows of panels), bands and channels (columns and rows of cells) of a map."""
+    """Columns and rows of panels in a map, and of cells in a panel."""
 
     stages: tuple[StageStyle, ...]
+    """Columns of panels."""
     levels: tuple[float, ...]
+    """Rows of panels: highest level of each group, rising, in the unit of the command; 0 where it is not known."""
     bands: tuple[tuple[float, float], ...]
+    """Columns of cells: lower and upper edge, Hz, rising."""
     channels: tuple[tuple[str, str], ...]
+    """Rows of cells: name and quantity of the measured channel."""
 
     def find_corner(self, row: int, column: int) -> FloatArray:
-        """(2,): x and y of the centre of a panel's first cell, in cells. row, column: of panels."""
+        """Find the centre of a panel's first cell: (2,), x to the right and y downwards, in cells. row, column: of
+        panels, from 0."""
         return np.array([column * (len(self.bands) + _GAP_CELLS), row * (len(self.channels) + _GAP_CELLS)])
 
 
 def rank_driving_inputs(maps: Maps) -> tuple[str, ...]:
-    """Names of the driving inputs, that with the largest residual over noise first."""
+    """Rank the names of the driving inputs by the largest residual over noise, largest first, then by name."""
     inputs = {cell.input for cells in maps.values() for cell in cells}
     return tuple(sorted(inputs, key=lambda name: (-_find_worst_mismatch(maps, name), name)))
 
 
 def make_mismatch_map_picture(maps: Maps, input_index: int, unit: str) -> Picture:
-    """Make the mismatch map of one driving input. input_index: of the driving input in `rank_driving_inputs`; all but
-    the first are folded. unit: of the command."""
+    """Make the mismatch map of one driving input. input_index: of the driving input in `rank_driving_inputs`; the
+    first is shown as a bitmap, all others are folded. unit: of the command, empty if unknown."""
     input_ = rank_driving_inputs(maps)[input_index]
     return Picture(
         name=f"mismatch-map-{input_index + 1}",
@@ -85,8 +91,8 @@ def make_mismatch_map_picture(maps: Maps, input_index: int, unit: str) -> Pictur
 
 
 def draw_mismatch_map(maps: Maps, input_: str, unit: str) -> Figure:
-    """Draw a row of panels per level and a column per stage, all in a single Axes object, because one per panel takes
-    seconds; a note where no stage has cells in units of the noise."""
+    """Draw the map of one input: a row of panels per level and a column per stage, all in a single Axes object, because
+    one per panel takes seconds; a note where no stage has cells. unit: of the command."""
     layout = _make_layout(maps, input_)
     if not layout.stages or not layout.bands:
         return draw_no_data_note(create_figure(8.6, 1.6), "The noise is not known, so there is no map in its units.")
@@ -121,25 +127,29 @@ def draw_mismatch_map(maps: Maps, input_: str, unit: str) -> Figure:
 
 
 def _choose_colour_limit(table: FloatArray) -> float:
-    """Upper end of the colour scale: `_LEAST_COLOUR_LIMIT`, or the next power of ten above the largest residual."""
+    """Choose the upper end of the colour scale: `_LEAST_COLOUR_LIMIT`, or where the largest residual exceeds it, the
+    next power of ten from that residual on."""
     largest = float(np.nanmax(table, initial=1.0))
     return _LEAST_COLOUR_LIMIT if largest <= _LEAST_COLOUR_LIMIT else float(10 ** np.ceil(np.log10(largest)))
 
 
 def _can_write_levels_upright(layout: _Layout) -> bool:
-    """Whether levels can be written vertically along the panels' sides; else they follow the channels' names."""
+    """Whether the longest label of a level fits along the height of a panel; else levels follow the channels' names.
+    The length is estimated with the longest unit, N m, less about two narrow letters."""
     longest_label = max((len(f"at {level:.3g} N m") for level in layout.levels), default=0)
     return _LETTER_WIDTH_IN * (longest_label - 2) <= _PANEL_GAP_IN + _ROW_HEIGHT_IN * len(layout.channels)
 
 
 def _format_row_label(channel: tuple[str, str], level: float, layout: _Layout) -> str:
-    """Label of a row of cells: its channel, and its level where that is not written along the panel's side."""
+    """Format the label of a row of cells: its channel, and its level where that is not written along the panel's
+    side."""
     label = _format_channel_label(channel, layout)
     return label if _can_write_levels_upright(layout) or not level else f"{label} at {level:.3g}"
 
 
 def _add_axes(figure: Figure, layout: _Layout) -> tuple[Axes, Axes]:
-    """Axes of the map and of its colour bar, laid out by computed sizes instead of a layout engine."""
+    """Add the axes of the map and of its colour bar, placed by sizes in inches instead of a layout engine.
+    layout: at least one channel and level."""
     figure.set_layout_engine("none")
     width, height = figure.get_size_inches()
     longest_label = max(
@@ -157,8 +167,9 @@ def _add_axes(figure: Figure, layout: _Layout) -> tuple[Axes, Axes]:
 
 
 def _fill_table(maps: Maps, input_: str, layout: _Layout) -> tuple[FloatArray, list[FloatArray]]:
-    """Residual over noise with `_POINTS_PER_CELL` squared points per cell, NaN between panels and where nothing was
-    driven; and the outlines of the significant cells."""
+    """Fill a table (rows, columns of points) with the residual over noise, `_POINTS_PER_CELL` squared points per cell:
+    the largest of a group of levels, NaN between panels and where nothing was driven. Also returns the outlines (5, 2)
+    of the significant cells, in cells."""
     rows, columns = len(layout.levels), len(layout.stages)
     last_corner = layout.find_corner(rows - 1, columns - 1)
     table_cells = last_corner[1] + len(layout.channels), last_corner[0] + len(layout.bands)
@@ -211,7 +222,7 @@ def _label_axes(axes: Axes, layout: _Layout, unit: str) -> None:
 
 
 def _make_layout(maps: Maps, input_: str) -> _Layout:
-    """Layout of the cells of one input; levels are grouped where there are more than `_MOST_LEVELS`."""
+    """Make the layout of the cells of one input; levels are grouped where there are more than `_MOST_LEVELS`."""
     cells = [map_cell for stage_cells in maps.values() for map_cell in stage_cells if map_cell.input == input_]
     levels = sorted({cell.amplitude for cell in cells})
     groups = [group for group in np.array_split(levels, min(_MOST_LEVELS, len(levels))) if len(group)] if levels else []
@@ -224,36 +235,36 @@ def _make_layout(maps: Maps, input_: str) -> _Layout:
 
 
 def _find_level_group(layout: _Layout, cell: MismatchCell) -> int:
-    """Index of the cell's group of levels, which is named by its highest level."""
+    """Find the index of the cell's group of levels: the first whose highest level is not below the cell's."""
     return next(row for row, level in enumerate(layout.levels) if cell.amplitude <= level)
 
 
 def _format_channel_label(channel: tuple[str, str], layout: _Layout) -> str:
-    """Name of a channel, with its quantity where channels share the name. channel: name and quantity."""
+    """Format the name of a channel, with its quantity where channels share the name. channel: name and quantity."""
     name, quantity = channel
     return f"{name} ({quantity})" if [other_name for other_name, _ in layout.channels].count(name) > 1 else name
 
 
 def _format_ratio(value: float) -> str:
-    """Residual over noise in at most four characters: 1.2, 12, 1.2k, at most 999k."""
+    """Format the residual over noise in at most four characters: 1.2, 12, 1.2k, at most 999k."""
     if value >= 999.5:
         return f"{value / 1e3:.1f}k" if value < 9950 else f"{min(value / 1e3, 999):.0f}k"
     return f"{value:.1f}".removesuffix(".0") if value < 9.95 else f"{value:.0f}"
 
 
 def _find_worst_mismatch(maps: Maps, input_: str) -> float:
-    """Largest residual over noise of one input, over all stages; 0 without cells."""
+    """Find the largest residual over noise of one input, over all stages; 0 without cells."""
     return max((cell.in_noise for cells in maps.values() for cell in cells if cell.input == input_), default=0.0)
 
 
 def _describe_levels(maps: Maps, input_: str, unit: str) -> str:
-    """Clause of the caption about the levels; empty where no level is known."""
+    """Write the clause of the caption about the levels; empty where no level is known."""
     levels = {cell.amplitude for cells in maps.values() for cell in cells if cell.input == input_}
     return f", at levels of the excitation{f' in {unit}' if unit else ''}" if any(levels) else ""
 
 
 def _describe_groups(maps: Maps, input_: str) -> str:
-    """Sentence of the caption about groups of levels; empty where each level has its own row."""
+    """Write the sentence of the caption about groups of levels; empty where each level has a row of panels."""
     levels = {cell.amplitude for cells in maps.values() for cell in cells if cell.input == input_}
     if len(levels) <= _MOST_LEVELS:
         return ""
@@ -263,7 +274,8 @@ def _describe_groups(maps: Maps, input_: str) -> str:
 
 
 def _write_alternative_text(maps: Maps, input_: str) -> str:
-    """Text for screen readers: per stage, the number of significant cells and the worst cell."""
+    """Write the text for screen readers: per stage with cells, the number of significant cells and the cell with the
+    largest residual over noise."""
     sentences = []
     for stage in STAGES:
         cells = [map_cell for map_cell in maps.get(stage.name, ()) if map_cell.input == input_]

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from equalizer.effects.effect import AxisForce, JointForce, PlacedEffect, Structure
 from equalizer.effects.simulation.command_path import ActuatorForce
 from equalizer.effects.simulation.mechanism_kernel import MAX_LAWS, compute_zero_force, wrap_law
-from equalizer.effects.simulation.stepping import Forces, Stepping, step_with_forces, step_without_forces
+from equalizer.effects.simulation.stepping import Forces, Stepping, build_forced_stepping, build_unforced_stepping
 from equalizer.plant.linear_simulation import DiscreteModel, compute_driven_axes, discretise_model
 from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import FloatArray
@@ -171,9 +171,9 @@ def _prepare_steps(
     ports = tuple(sorted({*bodies.force_ports, *range(bodies.axes if bodies.reads_all_axes else 0)}))
     steps, stride = (counts[1], len(actuator_force.mean) // counts[0])
     if not ports:
-        return linear, step_without_forces(linear, steps, stride), ports
+        return linear, build_unforced_stepping(linear, steps, stride), ports
     commands = actuator_force.mean if actuator_force.commanded is None else actuator_force.commanded
-    return (linear, step_with_forces(linear, pack_kernel_forces(bodies, ports), steps, stride, commands), ports)
+    return (linear, build_forced_stepping(linear, pack_kernel_forces(bodies, ports), steps, stride, commands), ports)
 
 
 def _iterate_blocks(sample_count: int, max_length: int, restarts: Restarts | None) -> Iterator[tuple[int, int]]:

@@ -3,7 +3,8 @@
 Two values are computed per integration step: the mean over the step, which determines the motion (masses integrate the
 force), and the value at the step's end, which an acceleration sampled there contains directly. First-order lag T and
 step h: F_end = d F_start + (1 - d) u, with d = exp(-h / T); mean = u + (F_start - u) (1 - d) T / h. Called by
-`simulator` and `forces_along_motion`; sizes: n samples, m commands.
+`simulator` and `forces_along_motion`; lag and delay also by the effects `amplifier_lag` and `transport_delay`. Sizes: n
+samples, m commands.
 """
 
 from collections.abc import Sequence
@@ -34,7 +35,8 @@ def has_intersample_changes(model: MechanicalModel, effects: Sequence[PlacedEffe
     """Whether the actuator force changes between two samples, so that several steps per sample are needed: by an effect
     that declares it (`OnCommand.fine`), a hold other than zero-order, or the model's own delay or bandwidth."""
     has_fine_effect = any(
-        isinstance(placed.effect.action, OnCommand) and placed.effect.action.fine for placed in effects
+        isinstance(placed_effect.effect.action, OnCommand) and placed_effect.effect.action.fine
+        for placed_effect in effects
     )
     return (
         has_fine_effect or hold is not Hold.ZERO_ORDER or model.actuator.delay_s > 0 or model.actuator.bandwidth_hz > 0
@@ -45,26 +47,29 @@ def drive_actuators(
     model: MechanicalModel, commands: ActuatorForce, step_s: float, effects: Sequence[PlacedEffect]
 ) -> ActuatorForce:
     """Compute the force of the actuators: first the effects on the command in their order, then the model's own
-    bandwidth, delay and limit. step_s: length of the steps of `commands` in s. Other effects are ignored.
+    bandwidth, delay and limit (mean and end are clipped separately; 0 = none of each). step_s: length of the steps of
+    `commands` in s. Effects that do not act on the command are ignored; `commands` is not changed.
 
-    Raises ValueError where an effect acts on a channel that is not there.
+    Raises ValueError where an effect acts on a channel (index from 0) that does not exist.
     """
     mean, end = commands.mean, commands.end
-    if any(isinstance(placed.effect.action, OnCommand) for placed in effects):
+    if any(isinstance(placed_effect.effect.action, OnCommand) for placed_effect in effects):
         mean, end = mean.copy(), end.copy()
-    for placed in effects:
-        action, values = placed.effect.action, placed.values
+    for placed_effect in effects:
+        action, values = placed_effect.effect.action, placed_effect.values
         original_mean = mean.copy() if isinstance(action, OnCommand) and action.of_all is not None else mean
-        for site in placed.sites if isinstance(action, OnCommand) else ():
+        for channel in placed_effect.sites if isinstance(action, OnCommand) else ():
             assert isinstance(action, OnCommand)
-            if not 0 <= site < mean.shape[1]:
-                raise ValueError(f"{placed.effect.name} is placed at axis {site + 1}; there are {mean.shape[1]}")
+            if not 0 <= channel < mean.shape[1]:
+                raise ValueError(
+                    f"{placed_effect.effect.name} is placed at axis {channel + 1}; there are {mean.shape[1]}"
+                )
             if action.of_all is not None:
-                mean[:, site], end[:, site] = action.of_all(original_mean, site, step_s, values)
+                mean[:, channel], end[:, channel] = action.of_all(original_mean, channel, step_s, values)
                 continue
             compute_end = action.change if action.at_end is None else action.at_end
-            end_force = compute_end(end[:, site] if action.at_end is None else mean[:, site], step_s, values)
-            mean[:, site], end[:, site] = action.change(mean[:, site], step_s, values), end_force
+            end_force = compute_end(end[:, channel] if action.at_end is None else mean[:, channel], step_s, values)
+            mean[:, channel], end[:, channel] = action.change(mean[:, channel], step_s, values), end_force
     actuator = model.actuator
     if actuator.bandwidth_hz > 0:
         time_constant_s = 1 / (2 * np.pi * actuator.bandwidth_hz)
@@ -74,8 +79,11 @@ def drive_actuators(
         )
     if actuator.delay_s > 0:
         # After a lag, the force is not held over a step: within one, it is interpolated between the ends.
-        delay_end = compute_delayed_mean if actuator.bandwidth_hz > 0 else compute_delayed_end
-        mean, end = compute_delayed_mean(mean, step_s, actuator.delay_s), delay_end(end, step_s, actuator.delay_s)
+        compute_delay_at_end = compute_delayed_mean if actuator.bandwidth_hz > 0 else compute_delayed_end
+        mean, end = (
+            compute_delayed_mean(mean, step_s, actuator.delay_s),
+            compute_delay_at_end(end, step_s, actuator.delay_s),
+        )
     if actuator.limit > 0:
         mean, end = np.clip(mean, -actuator.limit, actuator.limit), np.clip(end, -actuator.limit, actuator.limit)
     return ActuatorForce(mean, end, commands.mean)
@@ -83,7 +91,7 @@ def drive_actuators(
 
 def subdivide_commands(commands: FloatArray, steps: int, hold: Hold) -> ActuatorForce:
     """Divide commands (n, m) into `steps` per sample, with the course between samples that `hold` states: constant,
-    linear, or band-limited (polyphase interpolation). A single step is always constant."""
+    linear (constant after the last), or band-limited (polyphase interpolation). A single step is always constant."""
     if steps == 1 or hold is Hold.ZERO_ORDER:
         commands = np.asarray(commands, dtype=np.float64)
         held_commands = np.repeat(commands, steps, axis=0) if steps > 1 else commands
@@ -105,8 +113,8 @@ def subdivide_commands(commands: FloatArray, steps: int, hold: Hold) -> Actuator
 
 
 def compute_lagged_mean(commands: FloatArray, step_s: float, time_constant_s: float) -> FloatArray:
-    """First-order lag, mean over each step, from zero; exact for commands (n, …) that are held over a step. Unchanged
-    commands for a time constant of zero or less."""
+    """Compute a first-order lag of the commands, mean over each step, from zero; exact for commands (n, …) that are
+    held over a step. Unchanged commands for a time constant of zero or less."""
     if time_constant_s <= 0:
         return commands
     decay = float(np.exp(-step_s / time_constant_s))
@@ -117,8 +125,8 @@ def compute_lagged_mean(commands: FloatArray, step_s: float, time_constant_s: fl
 
 
 def compute_lagged_end(commands: FloatArray, step_s: float, time_constant_s: float) -> FloatArray:
-    """First-order lag, value at each step's end, from zero; exact for commands (n, …) that are held over a step.
-    Unchanged commands for a time constant of zero or less."""
+    """Compute a first-order lag of the commands, value at each step's end, from zero; exact for commands (n, …) that
+    are held over a step. Unchanged commands for a time constant of zero or less."""
     if time_constant_s <= 0:
         return commands
     decay = float(np.exp(-step_s / time_constant_s))
@@ -135,7 +143,7 @@ def _filter_one_pole(commands: FloatArray, decay: float) -> FloatArray:
 
 
 def compute_delayed_mean(commands: FloatArray, step_s: float, delay_s: float) -> FloatArray:
-    """Held commands (n, …) delayed by delay_s, mean over each step; zero before the first. A negative delay counts as
+    """Delay held commands (n, …) by delay_s, mean over each step; zero before the first. A negative delay counts as
     0."""
     whole_steps, step_fraction = divmod(max(delay_s, 0.0) / step_s, 1.0)
     delayed = np.zeros((len(commands) + 1, *commands.shape[1:]))
@@ -145,5 +153,6 @@ def compute_delayed_mean(commands: FloatArray, step_s: float, delay_s: float) ->
 
 
 def compute_delayed_end(commands: FloatArray, step_s: float, delay_s: float) -> FloatArray:
-    """Held commands (n, …) delayed by delay_s, at each step's end: only whole steps of the delay matter there."""
+    """Delay held commands (n, …) by delay_s, value just before each step's end: only whole steps of the delay matter
+    there."""
     return compute_delayed_mean(commands, step_s, np.floor(max(delay_s, 0.0) / step_s) * step_s)

@@ -10,7 +10,8 @@ on the state within the step: each force law is evaluated at the position, veloc
 corrected for its own effect (`per_newton`), step by step in compiled code (`mechanism_kernel`). Many samples are
 stepped per call, because a call of compiled code costs as much as many steps.
 
-Sizes: n coordinates, m commands, s states in modal form, r ports with forces, L samples.
+Sizes: n coordinates, m commands, s states in modal form, r ports with forces, L samples. Called by
+`simulation.bodies`.
 
 Reference: Van Loan, IEEE Trans. Autom. Control 23:395 (1978) (integrals of the matrix exponential).
 """
@@ -34,7 +35,7 @@ longer, because passing the laws to the kernel takes about 0.1 ms per call."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Forces:
-    """Forces in the form that the compiled kernel takes; see `mechanism_kernel.step_mechanism`."""
+    """Motion-dependent forces in the form that the compiled kernel takes; see `mechanism_kernel.step_mechanism`."""
 
     ports: tuple[int, ...]
     """Indices of the ports at which the forces act."""
@@ -54,10 +55,10 @@ class Forces:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stepping:
-    """Time stepping of the mechanism in blocks of samples, from rest; `run` keeps the state from block to block."""
+    """Procedures and matrices to step a structure in blocks of samples; its state is kept between calls of `run`."""
 
     rows: int
-    """Rows per sample of the drive (inputs columns) and of the array that `run` takes."""
+    """Rows per sample of the drive (one column per input) and of the array that `run` takes."""
     input_matrix: FloatArray
     """(inputs, s + r): from a row of the drive to its contributions to the state, and to the accelerations of the r
     ports with forces."""
@@ -74,9 +75,9 @@ class Stepping:
     """Sets the state (2n,), positions then velocities, from which the next block starts."""
 
 
-def step_without_forces(linear: DiscreteModel, steps: int, stride: int) -> Stepping:
-    """Stepping without motion-dependent forces, a whole sample at once. steps: steps of `linear` per sample; stride:
-    commands per sample, 1 where a command is held over all steps."""
+def build_unforced_stepping(linear: DiscreteModel, steps: int, stride: int) -> Stepping:
+    """Build the stepping without motion-dependent forces, a whole sample at once, from rest. steps: steps of `linear`
+    per sample; stride: commands per sample, `steps`, or 1 where a command is held over all steps."""
     responses = [linear.by_command]
     for _ in range(steps - 1):
         responses.append(linear.transition @ responses[-1])
@@ -85,6 +86,7 @@ def step_without_forces(linear: DiscreteModel, steps: int, stride: int) -> Stepp
     state = np.zeros(len(form.modal_from_state))
 
     def run(rows: FloatArray, first: int) -> None:
+        """Advance the state by one block; `first` has no effect, because nothing depends on the time."""
         advance_unforced(form.step_matrix, rows, state)
 
     def set_state(initial_state: FloatArray) -> None:
@@ -93,9 +95,12 @@ def step_without_forces(linear: DiscreteModel, steps: int, stride: int) -> Stepp
     return Stepping(1, (form.modal_from_state @ by_command).T, form.state_from_modal, BLOCK, run, set_state)
 
 
-def step_with_forces(linear: DiscreteModel, forces: Forces, steps: int, stride: int, commands: FloatArray) -> Stepping:
-    """Stepping under motion-dependent forces. steps: steps of `linear` per sample; stride: commands per sample, 1 where
-    a command is held over all steps. commands: (L * stride, m), for laws that read them."""
+def build_forced_stepping(
+    linear: DiscreteModel, forces: Forces, steps: int, stride: int, commands: FloatArray
+) -> Stepping:
+    """Build the stepping under motion-dependent forces, from rest. steps: steps of `linear` per sample; stride:
+    commands per sample, `steps`, or 1 where a command is held over all steps. commands: (L * stride, m), for laws that
+    read them."""
     form = build_step_form(linear.transition)
     port_indices, axis_count = np.array(forces.ports), linear.by_axis_force.shape[1]
     output = linear.motion[np.concatenate([port_indices, axis_count + port_indices, 2 * axis_count + port_indices])]
@@ -104,7 +109,7 @@ def step_with_forces(linear: DiscreteModel, forces: Forces, steps: int, stride: 
     per_newton[2 * len(port_indices) :] = linear.motion_by_axis_force[2 * axis_count + port_indices][:, port_indices]
     law_output = output if forces.acceleration else output[: 2 * len(port_indices)]
     port_output, force_input = law_output @ form.state_from_modal, (form.modal_from_state @ by_force).T
-    step_matrices = (form.step_matrix, _contiguous(port_output), _contiguous(force_input), _contiguous(per_newton.T))
+    step_matrices = (form.step_matrix, _to_c_order(port_output), _to_c_order(force_input), _to_c_order(per_newton.T))
     input_matrix = np.hstack(
         [(form.modal_from_state @ linear.by_command).T, linear.motion_by_command[2 * axis_count + port_indices].T]
     )
@@ -116,8 +121,8 @@ def step_with_forces(linear: DiscreteModel, forces: Forces, steps: int, stride: 
     )
 
     force_history = np.zeros((FORCE_ROWS, len(forces.places)))
-    at = np.zeros(LENGTH + BLOCK_SIZE * len(port_indices) if forces.reads_all_axes else LENGTH)
-    scratch = np.zeros(len(state) + len(port_indices)), at, force_history, np.zeros_like(memory)
+    step_motion = np.zeros(LENGTH + BLOCK_SIZE * len(port_indices) if forces.reads_all_axes else LENGTH)
+    scratch = np.zeros(len(state) + len(port_indices)), step_motion, force_history, np.zeros_like(memory)
 
     def run(rows: FloatArray, first: int) -> None:
         step_mechanism(
@@ -135,5 +140,6 @@ def step_with_forces(linear: DiscreteModel, forces: Forces, steps: int, stride: 
     return Stepping(stride, input_matrix, form.state_from_modal, BLOCK_UNDER_FORCES, run, set_state)
 
 
-def _contiguous(matrix: FloatArray) -> FloatArray:
+def _to_c_order(matrix: FloatArray) -> FloatArray:
+    """Convert a matrix to row-major (C) order, for which the kernel is compiled."""
     return np.ascontiguousarray(matrix)

@@ -1,4 +1,8 @@
-"""Reliability of the lines of an estimate: which should not be used, and why, in sentences."""
+"""Reliability of the lines of a frequency response estimate: which should not be used, with the reasons as sentences.
+
+A line is unreliable below the natural frequency of a virtual spring, where the excitation does not span all inputs, or
+where the coherence is low. Called by `transfer_estimate`.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,15 +15,15 @@ from equalizer.signals.signal import ComplexArray, FloatArray, find_runs
 
 _LEAST_INDEPENDENCE = 0.1
 """Least singular value of the matrix whose columns are the excited directions, each of unit length: 1 where they are
-orthogonal, 0 where one lies in the span of the others. By hand."""
+orthogonal, 0 where one lies in the span of the others. Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReliabilityRules:
-    """Thresholds of coherence, frequency and energy below which a line counts as not reliable. All by hand."""
+    """Thresholds of coherence, frequency and energy below which a line counts as not reliable. All are chosen."""
 
     least_coherence: float = 0.5
-    """Least coherence, of the worst output."""
+    """Least coherence of the output with the lowest one."""
     spring_margin: float = 1.1
     """Lowest frequency, as a multiple of the virtual spring's natural frequency: below, the spring compensates most of
     the excitation."""
@@ -29,59 +33,63 @@ class ReliabilityRules:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Judgement:
-    """Which lines are reliable, and sentences on why others are not; result of `judge_lines`."""
+class LineReliability:
+    """Mask of the reliable lines, and the reasons why others are not, as sentences; result of `judge_lines`."""
 
     reliable: BoolArray
-    """(lines,)"""
+    """(lines,): whether each line is reliable."""
     remarks: tuple[str, ...]
 
 
 def judge_lines(
     frequency_hz: FloatArray, excited: BoolArray, coherence: FloatArray, spring_hz: float, rules: ReliabilityRules
-) -> Judgement:
-    """Judge each line. excited: (lines,), by `find_excited_lines`. coherence: (lines, outputs). spring_hz: 0 = no
-    spring."""
+) -> LineReliability:
+    """Judge each line. frequency_hz: (lines,), rising. excited: (lines,), by `find_excited_lines`. coherence: (lines,
+    outputs); NaN = not known, counts as 1. spring_hz: natural frequency of a virtual spring; 0 = no spring."""
     remarks = []
-    by_spring = frequency_hz < rules.spring_margin * spring_hz
-    if by_spring.any():
+    is_below_spring = frequency_hz < rules.spring_margin * spring_hz
+    if is_below_spring.any():
         remarks.append(
             f"Below {rules.spring_margin * spring_hz:.2f} Hz lines are not reliable: the virtual spring "
             f"({spring_hz:g} Hz) absorbs most of the excitation there."
         )
-    unexcited = ~excited & ~by_spring
-    if unexcited.any():
+    is_unexcited = ~excited & ~is_below_spring
+    if is_unexcited.any():
         remarks.append(
-            f"Not reliable, because not every direction was excited: {_describe_spans(frequency_hz, unexcited)}."
+            f"Not reliable, because not every direction was excited: {_describe_spans(frequency_hz, is_unexcited)}."
         )
-    worst = np.min(np.where(np.isnan(coherence), 1.0, coherence), axis=1, initial=1.0)
-    noisy = (worst < rules.least_coherence) & excited & ~by_spring
-    if noisy.any():
+    worst_coherence = np.min(np.where(np.isnan(coherence), 1.0, coherence), axis=1, initial=1.0)
+    is_noisy = (worst_coherence < rules.least_coherence) & excited & ~is_below_spring
+    if is_noisy.any():
         remarks.append(
             f"Not reliable, because noise is more than {100 * (1 - rules.least_coherence):g} % of an output's power: "
-            f"{_describe_spans(frequency_hz, noisy)}."
+            f"{_describe_spans(frequency_hz, is_noisy)}."
         )
-    return Judgement(~(by_spring | unexcited | noisy), tuple(remarks))
+    return LineReliability(~(is_below_spring | is_unexcited | is_noisy), tuple(remarks))
 
 
 def find_excited_lines(frequency_hz: FloatArray, excitation: ComplexArray, least_energy_db: float) -> BoolArray:
-    """Lines at which the excitations span as many directions as there are inputs.
+    """Find the lines at which the excitations span as many directions as there are inputs.
 
-    excitation: spectra (lines, inputs, experiments). Returns a mask (lines,): where the smallest singular value of the
-    strong excitations, each of unit length, exceeds `_LEAST_INDEPENDENCE`.
+    excitation: spectra (lines, inputs, experiments), at least as many experiments as inputs. Returns a mask (lines,):
+    where the smallest singular value of the excitations with at least `least_energy_db` of energy
+    (`ReliabilityRules`), each of unit length, exceeds `_LEAST_INDEPENDENCE`.
     """
     least_power = 10 ** (least_energy_db / 10)
     power = np.sum(np.abs(excitation) ** 2, axis=1)
-    per_octave = power * frequency_hz[:, None]
-    is_strong = (power >= least_power * power.max(axis=0)) | (per_octave >= least_power * per_octave.max(axis=0))
-    length = np.sqrt(np.maximum(power, np.finfo(np.float64).tiny))
-    directions = np.where(is_strong[:, None, :], excitation / length[:, None, :], 0.0)
+    power_per_octave = power * frequency_hz[:, None]
+    is_strong = (power >= least_power * power.max(axis=0)) | (
+        power_per_octave >= least_power * power_per_octave.max(axis=0)
+    )
+    norms = np.sqrt(np.maximum(power, np.finfo(np.float64).tiny))
+    directions = np.where(is_strong[:, None, :], excitation / norms[:, None, :], 0.0)
     spans_inputs: BoolArray = np.linalg.svd(directions, compute_uv=False)[:, -1] > _LEAST_INDEPENDENCE
     return spans_inputs
 
 
-def spring_frequency_hz(metas: Sequence[Mapping[str, Any]]) -> float:
-    """Highest natural frequency of a virtual spring named in the recordings' meta data; 0 where there is none."""
+def find_spring_frequency_hz(metas: Sequence[Mapping[str, Any]]) -> float:
+    """Find the highest natural frequency (Hz) of a virtual spring in the recordings' meta data; 0 where there is
+    none."""
     frequencies_hz = [0.0]
     for meta in metas:
         feedback = meta.get("feedback")
@@ -91,17 +99,18 @@ def spring_frequency_hz(metas: Sequence[Mapping[str, Any]]) -> float:
     return max(frequencies_hz)
 
 
-def _describe_spans(frequency_hz: FloatArray, chosen: BoolArray) -> str:
-    """The chosen lines as text: up to three spans, such as "1 to 4 Hz and from 38 Hz on", else their number and
-    range."""
-    spans = find_runs(chosen)
+def _describe_spans(frequency_hz: FloatArray, selected: BoolArray) -> str:
+    """Describe the selected lines: up to three spans, such as "1 to 4 Hz and from 38 Hz on", else their number and
+    range. selected: (lines,), at least one."""
+    spans = find_runs(selected)
     if len(spans) > 3:
-        first, last = frequency_hz[chosen][[0, -1]]
-        return f"{int(chosen.sum())} lines between {first:.4g} and {last:.4g} Hz"
+        first, last = frequency_hz[selected][[0, -1]]
+        return f"{int(selected.sum())} lines between {first:.4g} and {last:.4g} Hz"
     return " and ".join(_describe_span(frequency_hz, first, stop - 1) for first, stop in spans)
 
 
 def _describe_span(frequency_hz: FloatArray, first: int, last: int) -> str:
+    """Describe the span of lines from index first to last (included); "from ... on" where it reaches the last line."""
     if last == len(frequency_hz) - 1 and first > 0:
         return f"from {frequency_hz[first]:.4g} Hz on"
     return f"{frequency_hz[first]:.4g} to {frequency_hz[last]:.4g} Hz"

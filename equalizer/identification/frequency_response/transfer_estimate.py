@@ -22,8 +22,8 @@ from equalizer.identification.frequency_response.noise_floor import estimate_res
 from equalizer.identification.frequency_response.reliable_lines import (
     ReliabilityRules,
     find_excited_lines,
+    find_spring_frequency_hz,
     judge_lines,
-    spring_frequency_hz,
 )
 from equalizer.identification.frequency_response.shared_lines import SharedLines, solve_shared_lines
 from equalizer.signals.recording import Recording
@@ -82,7 +82,7 @@ def _collect_experiments(recordings: Sequence[Recording], settings: EstimateSett
             "No experiment has two counted periods: errors were estimated from the scatter from line to line, and from "
             "the noise at rest where that is larger."
         )
-    if any(recording.excitation is None and spring_frequency_hz([recording.meta]) for recording in recordings):
+    if any(recording.excitation is None and find_spring_frequency_hz([recording.meta]) for recording in recordings):
         remarks.append(
             "A feedback acted, but its share of the command was not recorded: noise that it fed back biases the "
             "estimate where the response is weak."
@@ -140,7 +140,7 @@ def _join_parts(
         [find_excited_lines(part.frequency_hz, part.excitation, settings.rules.least_energy_db) for part in parts]
     )[order]
     coherence = np.concatenate([part.coherence for part in parts])[order]
-    spring_hz = spring_frequency_hz([recording.meta for recording in recordings])
+    spring_hz = find_spring_frequency_hz([recording.meta for recording in recordings])
     judgement = judge_lines(frequency_hz, excited, coherence, spring_hz, settings.rules)
     return FrequencyResponse(
         frequency_hz,

@@ -1,8 +1,8 @@
-"""Simulation error of a mechanical model on measured segments, channel by channel.
+"""Free-simulation (output) error of a mechanical model on measured segments, by channel.
 
 The error is computed from spectra: measured response minus the response to the commands minus that to the initial
 state, which is fitted by least squares. By Parseval's theorem its power is that of a free simulation's error over the
-segment, without the mean.
+segment, without the mean. Called by `mechanical_fit` and by `first_model.choose_structure`.
 """
 
 from collections.abc import Sequence
@@ -15,22 +15,25 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from equalizer.signals.signal import ComplexArray, FloatArray
 
 _MAX_FITTED_LINES = 3000
-"""Approximate number of lines to which the initial state is fitted; more are thinned out to limit computing time."""
+"""Approximate number of lines to which the initial state is fitted; more are thinned out to limit computing time.
+Chosen."""
 
 
 def compute_simulation_errors(
     model: MechanicalModel, segments: Sequence[SegmentLines], band_hz: tuple[float, float]
 ) -> tuple[FloatArray, FloatArray]:
-    """Compute two arrays (p + 1,): rms error, and rms noise (NaN where not known), of each channel relative to the rms
-    of its response; the last entry is the root mean square over the channels. band_hz: ends included."""
-    p = model.outputs
-    error_power, response_power, noise_power = np.zeros(p), np.zeros(p), np.zeros(p)
+    """Compute two arrays (p + 1,) for p channels: rms error, and rms noise (NaN where not known), of each channel
+    relative to the rms of its response; the last entry is the root mean square over the channels. band_hz: lines from
+    its lower to its upper limit, both included. Without a line in the band all errors are 0."""
+    output_count = model.outputs
+    error_power, response_power, noise_power = np.zeros(output_count), np.zeros(output_count), np.zeros(output_count)
     for segment in segments:
         in_band = (segment.frequency_hz >= band_hz[0]) & (segment.frequency_hz <= band_hz[1])
         misfit = compute_simulation_misfit(model, segment)[in_band]
         error_power += (np.abs(misfit) ** 2).sum(axis=0)
         response_power += (np.abs(segment.response[in_band]) ** 2).sum(axis=0)
         noise_power += segment.noise[in_band].sum(axis=0)
+    # 1e-300 avoids a division by zero for a response without power.
     error_shares, noise_shares = (
         error_power / np.maximum(response_power, 1e-300),
         noise_power / np.maximum(response_power, 1e-300),
@@ -42,8 +45,8 @@ def compute_simulation_errors(
 
 
 def compute_simulation_misfit(model: MechanicalModel, segment_lines: SegmentLines) -> ComplexArray:
-    """(lines, p): measured minus simulated spectrum, in the response's unit, with the best-fitting initial state where
-    the segment has a transient."""
+    """Compute (lines, p): measured minus simulated spectrum, in the response's unit. Where the segment has a transient,
+    the initial state is fitted by least squares, with each channel divided by the norm of its response."""
     frequency_response = compute_sampled_response(
         model, segment_lines.frequency_hz, segment_lines.rate_hz, segment_lines.hold
     )
@@ -55,13 +58,14 @@ def compute_simulation_misfit(model: MechanicalModel, segment_lines: SegmentLine
         feedthrough = np.broadcast_to(np.eye(model.outputs), (len(free_response), model.outputs, model.outputs))
         free_response = np.concatenate([free_response, feedthrough], axis=2)
     stride = max(1, len(free_response) // _MAX_FITTED_LINES)
-    # The initial state contributes mostly at low frequencies: the first 200 lines are all kept, the others thinned out.
+    # The initial state contributes mostly at low frequencies: all of the first 200 lines (chosen) are kept.
     fitted_lines = np.unique(
         np.concatenate([np.arange(min(200, len(free_response))), np.arange(0, len(free_response), stride)])
     )
     response_norm = np.linalg.norm(segment_lines.response, axis=0)[:, None] + 1e-300
     weighted_response = (free_response[fitted_lines] / response_norm).reshape(-1, free_response.shape[2])
     weighted_misfit = (misfit[fitted_lines] / response_norm[:, 0]).ravel()
+    # Real and imaginary parts are separate equations of real unknowns; columns are scaled to unit norm for rcond.
     real_matrix = np.concatenate([weighted_response.real, weighted_response.imag])
     column_norms = np.maximum(np.linalg.norm(real_matrix, axis=0), 1e-300)
     initial_state = (

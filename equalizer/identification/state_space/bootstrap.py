@@ -2,6 +2,8 @@
 noise with the lines' standard errors, once for each draw.
 
 Reference: Efron and Tibshirani, An Introduction to the Bootstrap (1993), chapter 6. Called by `identify`.
+
+Sizes: p outputs, m inputs, k parameters (entries of A, B, C and D).
 """
 
 from dataclasses import replace
@@ -17,31 +19,34 @@ from equalizer.plant.model_response import compute_model_response
 from equalizer.signals.signal import FloatArray
 
 BAND_POINTS = 200
-"""Number of equally spaced frequencies of the integral over the band."""
+"""Number of equally spaced frequencies of the integral over the band. Chosen by hand."""
 PEAK_OFFSETS = np.sinh(np.linspace(-4, 4, 41))
-"""Distances of frequencies from a slow pole, in half-widths of its peak: dense at the peak, up to 27."""
+"""Distances of frequencies from a slow pole, in half-widths of its peak: dense at the peak, up to 27.
+Chosen by hand."""
 REFIT_STEPS = 3
-"""Levenberg-Marquardt steps of each refit: a draw of the noise moves the minimum little."""
+"""Levenberg-Marquardt steps of each refit, which are enough because a draw of the noise moves the minimum little.
+Chosen by hand."""
 
 
 def draw_bootstrap_parameters(
     fitted: FittedForm, lines: WeightedLines, radius: Radius, noise_factor: float, draws: int, seed: int
 ) -> FloatArray:
-    """Parametric bootstrap (draws, k), in the order of `IdentifiedModel.parameters`; each row is a fit to another draw
-    of the noise. lines: the fitted lines, binned or not. noise_factor: assumed standard error over 1 / weight, above 1
-    where residuals exceed the noise.
+    """Draw parameters by a parametric bootstrap, (draws, k), in the order of `IdentifiedModel.parameters`; each row is
+    a fit to another draw of complex normal noise. lines: the fitted lines, binned or not. radius: largest magnitude of
+    the poles (`stable_poles.Radius`). noise_factor: assumed standard error over 1 / weight, above 1 where residuals
+    exceed the noise. seed: of the random generator; the same seed gives the same draws.
 
     A covariance from the Jacobian is not used: where the order is higher than the data determine, the response depends
     on some directions of the parameters only beyond first order, and normally distributed draws would be unstable
     models. Refitting keeps every draw within the decay bound.
     """
     generator = np.random.default_rng(seed)
-    modelled = fitted.compute_response(lines.z)
+    modelled_response = fitted.compute_response(lines.z)
     noise_deviation = noise_factor / lines.weight / np.sqrt(2)
     refitted_parameters = []
     for _ in range(draws):
-        real, imaginary = generator.standard_normal((2, *modelled.shape))
-        noisy_lines = replace(lines, response=modelled + noise_deviation * (real + 1j * imaginary))
+        real, imaginary = generator.standard_normal((2, *modelled_response.shape))
+        noisy_lines = replace(lines, response=modelled_response + noise_deviation * (real + 1j * imaginary))
         refit = refine_form(fitted.form, noisy_lines, radius, REFIT_STEPS)
         matrices = (refit.form.state_matrix, refit.B, refit.form.C, refit.D)
         refitted_parameters.append(np.concatenate([matrix.ravel() for matrix in matrices]))
@@ -49,8 +54,8 @@ def draw_bootstrap_parameters(
 
 
 def estimate_response_deviation(model: IdentifiedModel, frequency_hz: FloatArray) -> FloatArray:
-    """Standard error of each entry of the response, (lines, p, m): rms deviation of the model's samples from the model.
-    Raises ValueError for a model without samples."""
+    """Estimate the standard error of each entry of the response, (lines, p, m): rms deviation of the model's samples
+    from the model. frequency_hz: (lines,). Raises ValueError for a model without samples."""
     if model.samples is None:
         raise ValueError("the model contains no samples of its uncertainty; identify it again with draws > 0")
     nominal_response = compute_model_response(model, frequency_hz)
@@ -64,9 +69,9 @@ def estimate_response_deviation(model: IdentifiedModel, frequency_hz: FloatArray
 def compute_relative_deviation(
     model: IdentifiedModel, frequency_hz: FloatArray, slow_poles: tuple[SlowPole, ...]
 ) -> float | None:
-    """Rms standard error of the response over the band, relative to the response's rms; None without samples or with
-    fewer than two lines. frequency_hz: (lines,), rising; the band is from the first to the last. The grid is finer
-    about slow poles, because a narrow resonance may have its peak between two lines."""
+    """Compute the rms standard error of the response over the band, relative to the response's rms; None without
+    samples or with fewer than two lines. frequency_hz: (lines,), rising; the band is from the first to the last. The
+    grid of the integral is finer about slow poles, because a narrow resonance may have its peak between two lines."""
     if model.samples is None or len(frequency_hz) < 2:
         return None
     low_hz, high_hz = frequency_hz[0], frequency_hz[-1]

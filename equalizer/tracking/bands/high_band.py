@@ -4,7 +4,8 @@ Above the limit of direction perception a person perceives the strength of a vib
 reference acceleration is therefore reduced to a single signal of the same spectral energy and played along a single
 direction d of force. With g the norm of the device's response G d at a spectral line and w the force weight, the
 magnitude of the force is that of the reduced reference times g / (g² + w). The direction is free: of those tried, that
-of the smallest peak force is chosen. Called by `banded_equalizer`; sizes: N samples, m forces, p responses.
+of the smallest peak force is chosen. Called by `banded_equalizer` and `narrow_and_wide_models`. Sizes: N samples,
+m forces, p responses.
 """
 
 from dataclasses import dataclass
@@ -18,18 +19,19 @@ from equalizer.signals.signal import ComplexArray, FloatArray
 
 SMALLEST_WEIGHT, LARGEST_WEIGHT = 1e-3, 1e-2
 """Allowed range of the weight of |force|², to be compared with |G|², (m/s² per N)². A smaller weight amplifies noise at
-antiresonances; with a larger weight the level at weak lines is too low."""
+antiresonances; with a larger weight the level at weak lines is too low. Both chosen."""
 DEFAULT_WEIGHT = 1e-3
-"""Default weight of the force against the error, (m/s² per N)²."""
-SPIRAL_DIRECTIONS = 64
-"""Number of force directions over the half sphere that are tried in addition to the three axes."""
+"""Default weight of |force|² against |error|², (m/s² per N)²: the smallest allowed."""
+SPIRAL_DIRECTION_COUNT = 64
+"""Number of force directions over the half sphere that are tried in addition to the three axes. Chosen: neighbours
+are then about 18 degrees apart, and the peak differs by little between them."""
 
 
 class ResponseSource(Protocol):
     """Frequency response of a device, defined at any frequency."""
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
-        """(lines, p, m): complex response at frequencies (lines,), m/s² per N."""
+        """(lines, p, m): complex response, m/s² per N, at frequencies (lines,), Hz."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +41,7 @@ class ModelledResponse:
     model: IdentifiedModel
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
-        """(lines, p, m), m/s² per N: response of the model."""
+        """(lines, p, m): response of the model, m/s² per N, at frequencies (lines,), Hz."""
         return compute_model_response(self.model, frequency_hz)
 
 
@@ -49,12 +51,12 @@ class MeasuredResponse:
     between the lines, and constant below the first and above the last line."""
 
     frequency_hz: FloatArray
-    """(lines,), rising."""
+    """(lines,), Hz, rising."""
     response: ComplexArray
     """(lines, p, m), m/s² per N."""
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
-        """(lines, p, m), m/s² per N: interpolated response."""
+        """(lines, p, m): interpolated response, m/s² per N, at frequencies (lines,), Hz."""
         channels = self.response.reshape(len(self.frequency_hz), -1)
         columns = []
         for column in channels.T:
@@ -66,11 +68,11 @@ class MeasuredResponse:
 
 @dataclass(frozen=True, slots=True)
 class HighBandSettings:
-    """Settings of the high band. Raises ValueError for a weight outside 1e-3 to 1e-2."""
+    """Settings of the high band. Raises ValueError for a weight outside `SMALLEST_WEIGHT` to `LARGEST_WEIGHT`."""
 
     weight: float = DEFAULT_WEIGHT
     """Weight of |force|², (m/s² per N)²."""
-    shared: bool = True
+    oblique_directions: bool = True
     """Whether directions between the axes are tried (three axes only); False = the axes alone."""
     causal: bool = False
     """Whether forces start with the first row: the inverse then has the same magnitude and minimum phase."""
@@ -95,7 +97,7 @@ class HighBandForces:
 
 
 def reduce_to_one_dof(reference: FloatArray) -> FloatArray:
-    """(N,) from (N, p): spectral reduction, at each line the norm over all axes with the phase of their sum. The energy
+    """Reduce (N, p) to (N,) by spectrum: at each line the norm over all axes with the phase of their sum. The energy
     of every line is preserved (Landin et al., Dimensional reduction of high-frequency accelerations for haptic
     rendering, 2010)."""
     spectrum = np.fft.rfft(reference, axis=0)
@@ -108,7 +110,7 @@ def reduce_to_one_dof(reference: FloatArray) -> FloatArray:
 
 
 def project_to_one_dof(reference: FloatArray) -> FloatArray:
-    """(N,) from (N, p): projection on the first principal direction, scaled to the energy of all axes. Unlike
+    """Project (N, p) to (N,), N >= 1, on the first principal direction, scaled to the energy of all axes. Unlike
     `reduce_to_one_dof` it is causal: each row depends on the same row of `reference`, apart from direction and
     scale."""
     direction = np.linalg.svd(reference, full_matrices=False)[2][0]
@@ -125,23 +127,25 @@ def compute_high_band_forces(
     settings: HighBandSettings | None = None,
 ) -> HighBandForces:
     """Compute the forces along the direction of the smallest peak. reference: (N,), m/s², one degree of freedom; unless
-    causal, at rest at both ends, because the two-sided inverse is circular. added_forces: (N, m), N, further forces,
-    which count in the peak."""
+    causal, at rest at both ends, because the two-sided inverse is circular. added_forces: (N, m), N,
+    further forces, which are included in the peak."""
     settings = settings or HighBandSettings()
-    n = 2 * len(reference) if settings.causal else len(reference)
-    response = source.at(compute_lines_hz(n, sample_rate_hz))
+    fft_length = 2 * len(reference) if settings.causal else len(reference)
+    response = source.at(compute_lines_hz(fft_length, sample_rate_hz))
     other_forces_n = (
         np.zeros((len(reference), response.shape[2]))
         if added_forces is None
         else np.asarray(added_forces, dtype=np.float64)
     )
-    spectrum = np.fft.rfft(reference, n)
-    candidates = _list_candidate_directions(response.shape[2], settings.shared)
-    force_signals = [_invert_along(spectrum, n, response @ direction, settings) for direction in candidates]
+    spectrum = np.fft.rfft(reference, fft_length)
+    candidate_directions = _list_candidate_directions(response.shape[2], settings.oblique_directions)
+    force_signals = [
+        _compute_force_along(spectrum, fft_length, response @ direction, settings) for direction in candidate_directions
+    ]
     # The sign of the direction is not perceived, but it changes the peak of the sum with the other forces.
     candidate_forces = [
         sign * signal[:, None] * unit_vector
-        for signal, unit_vector in zip(force_signals, candidates, strict=True)
+        for signal, unit_vector in zip(force_signals, candidate_directions, strict=True)
         for sign in (1.0, -1.0)
     ]
     peaks_n = np.array(
@@ -150,57 +154,60 @@ def compute_high_band_forces(
     best_index = int(peaks_n.argmin())
     peak_by_axis_n = peaks_n.reshape(-1, 2).min(axis=1)[: response.shape[2]]
     return HighBandForces(
-        candidate_forces[best_index], candidates[best_index // 2], float(peaks_n[best_index]), peak_by_axis_n
+        candidate_forces[best_index], candidate_directions[best_index // 2], float(peaks_n[best_index]), peak_by_axis_n
     )
 
 
 def predict_acceleration(forces: FloatArray, sample_rate_hz: float, source: ResponseSource) -> FloatArray:
-    """(N, p), m/s²: response of the source to forces (N, m), in N, from rest; zero-padded to twice the length."""
-    n = 2 * len(forces)
-    spectrum = np.fft.rfft(forces, n, axis=0)[:, :, None]
-    response = (source.at(compute_lines_hz(n, sample_rate_hz)) @ spectrum)[:, :, 0]
-    return np.asarray(np.fft.irfft(response, n, axis=0)[: len(forces)])
+    """Predict (N, p), m/s²: response of the source to forces (N, m), in N, from rest; zero-padded to twice the
+    length."""
+    fft_length = 2 * len(forces)
+    spectrum = np.fft.rfft(forces, fft_length, axis=0)[:, :, None]
+    response = (source.at(compute_lines_hz(fft_length, sample_rate_hz)) @ spectrum)[:, :, 0]
+    return np.asarray(np.fft.irfft(response, fft_length, axis=0)[: len(forces)])
 
 
 def compute_lines_hz(samples: int, sample_rate_hz: float) -> FloatArray:
-    """(samples // 2 + 1,): frequencies (Hz) of the lines of a real FFT of `samples` samples."""
+    """Compute (samples // 2 + 1,): frequencies (Hz) of the lines of a real FFT of `samples` samples."""
     return np.asarray(np.fft.rfftfreq(samples, 1 / sample_rate_hz), dtype=np.float64)
 
 
-def _invert_along(spectrum: ComplexArray, n: int, response: ComplexArray, settings: HighBandSettings) -> FloatArray:
-    """Force along a direction, (N,), N. spectrum: reduced reference, n samples; response: (lines, p), response to a
-    unit force along the direction, m/s² per N."""
+def _compute_force_along(
+    spectrum: ComplexArray, fft_length: int, response: ComplexArray, settings: HighBandSettings
+) -> FloatArray:
+    """Compute the force along a direction, (N,), N. spectrum: of the reduced reference, fft_length samples; response:
+    (lines, p), response to a unit force along the direction, m/s² per N."""
     gain = np.linalg.norm(response, axis=1)
     inverse = (gain / (gain**2 + settings.weight)).astype(np.complex128)
     if settings.causal:
         # At twice the length, so that the filter's decay does not wrap around to the start.
-        return np.asarray(np.fft.irfft(spectrum * compute_minimum_phase(inverse.real), n)[: n // 2])
+        return np.asarray(np.fft.irfft(spectrum * compute_minimum_phase(inverse.real), fft_length)[: fft_length // 2])
     strongest_channel = np.take_along_axis(response, np.abs(response).argmax(axis=1)[:, None], axis=1)[:, 0]
     # The strongest axis is in phase with the reduced reference.
-    return np.asarray(np.fft.irfft(spectrum * inverse * np.exp(-1j * np.angle(strongest_channel)), n))
+    return np.asarray(np.fft.irfft(spectrum * inverse * np.exp(-1j * np.angle(strongest_channel)), fft_length))
 
 
 def compute_minimum_phase(gain: FloatArray) -> ComplexArray:
-    """Minimum-phase response (lines,) with the given gain, (lines,) of a real FFT of even length, all above zero.
+    """Compute the minimum-phase response (lines,) of a gain (lines,), of a real FFT of even length, none negative.
 
     By folding the real cepstrum (Oppenheim and Schafer, Discrete-Time Signal Processing).
     """
-    n = 2 * (len(gain) - 1)
-    # A zero, as at 0 Hz, has no logarithm: it counts as the rounding error of the largest gain.
+    fft_length = 2 * (len(gain) - 1)
+    # A zero, as at 0 Hz, has no logarithm: it is replaced by the rounding error of the largest gain.
     floor = max(np.finfo(float).eps * float(gain.max()), np.finfo(float).tiny)
-    cepstrum = np.fft.irfft(np.log(np.maximum(gain, floor)), n)
-    cepstrum[1 : n // 2] *= 2
-    cepstrum[n // 2 + 1 :] = 0
+    cepstrum = np.fft.irfft(np.log(np.maximum(gain, floor)), fft_length)
+    cepstrum[1 : fft_length // 2] *= 2
+    cepstrum[fft_length // 2 + 1 :] = 0
     return np.asarray(np.exp(np.fft.rfft(cepstrum)))
 
 
-def _list_candidate_directions(inputs: int, shared: bool) -> list[FloatArray]:
-    """Unit vectors (inputs,) that are tried: the axes; with three inputs, if `shared`, also a golden-angle spiral over
-    the half sphere."""
+def _list_candidate_directions(inputs: int, with_oblique: bool) -> list[FloatArray]:
+    """List the unit vectors (inputs,) that are tried: the axes; with three inputs, if `with_oblique`, also a
+    golden-angle spiral over the half sphere."""
     axes = list(np.eye(inputs))
-    if not shared or inputs != 3:
+    if not with_oblique or inputs != 3:
         return axes
-    z = 1 - (2 * np.arange(SPIRAL_DIRECTIONS) + 1) / (2 * SPIRAL_DIRECTIONS)
-    azimuth = np.pi * (1 + np.sqrt(5)) * np.arange(SPIRAL_DIRECTIONS)
+    z = 1 - (2 * np.arange(SPIRAL_DIRECTION_COUNT) + 1) / (2 * SPIRAL_DIRECTION_COUNT)
+    azimuth = np.pi * (1 + np.sqrt(5)) * np.arange(SPIRAL_DIRECTION_COUNT)
     radius = np.sqrt(1 - z**2)
     return axes + list(np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), z], axis=1))

@@ -4,7 +4,9 @@ model.
 The reference is first limited to the model's band, because the model is not valid outside it; the result states the
 share outside. There is one row of forces per row of the reference, from rest. Forces above a cap are refused, or solved
 again under the cap with the loss stated (`constrained`). Called by `workspace.feedforward_at_place` (a single model)
-and by `bands.narrow_and_wide_models` (the middle band of two models); exported as `equalizer.equalize`.
+and `bands.narrow_and_wide_models` (the middle band of two models); exported as `equalizer.equalize`. The band and its
+edges are also used by `realtime.realtime_controller` and `study.workflows.equalizer`. Sizes: N rows (samples), m
+inputs, p outputs.
 """
 
 from dataclasses import dataclass
@@ -27,14 +29,15 @@ from equalizer.tracking.lqr.tracking_problem import (
 )
 
 BAND_MARGIN_HZ = 1.0
-"""Margin (Hz) of the crossovers beyond the model's band, so that the whole band is played."""
+"""Margin (Hz) of the crossovers beyond the model's band, so that the whole band is played. Chosen by hand."""
 LEAKAGE_SHARE = 3e-3
 """Leakage of the filters from outside the band, relative to the rms of a signal. A signal with at most this share
-inside the band is treated as one without content there."""
+inside the band is treated as one without content there. Chosen by hand."""
 NO_CAP_N = 1e9
 """A cap (N) without effect, for forces of which only the sum is checked later."""
 DUALITY_GAP = 1e-3
-"""Relative duality gap at which the iteration for forces under the cap ends."""
+"""Relative duality gap at which the iteration for forces under the cap ends: the cost is then within 0.1 % of the
+minimum. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +45,7 @@ class FeedforwardSettings:
     """Weight of the forces, cap on the norm of the force vector, and what to do above the cap."""
 
     weight: float = 1e-3
-    """R = weight I, of |u|² against the squared tracking error, (m/s² per N)²."""
+    """R = weight I, of |u|² against the squared tracking error, (m/s² per N)². Default chosen by hand."""
     cap_n: float = 3.0
     """Largest norm of the force vector of a row, N."""
     constrain: bool = False
@@ -62,7 +65,7 @@ class Feedforward(SummaryDisplay):
     predicted: FloatArray
     """(N, p), m/s²: the model's response to the forces, from rest."""
     error: float
-    """Relative rms error of the predicted against the reference acceleration, in the band."""
+    """Rms error of the predicted acceleration in the band, relative to the rms of `reference`."""
     out_of_band_share: float
     """Rms of the part outside the band, over the rms of the whole reference acceleration."""
     peaks: ForcePeaks
@@ -71,7 +74,7 @@ class Feedforward(SummaryDisplay):
     """Tracking loss due to the cap; None where forces did not have to be constrained."""
 
     def summary(self) -> Summary:
-        """Length, predicted error, share that is not played, and largest force of a single axis."""
+        """Summarise length, predicted error, share that is not played, and largest force of a single axis."""
         largest_component_n = float(np.abs(self.forces.samples).max(initial=0.0))
         return Summary(
             "Forces for wanted accelerations",
@@ -121,7 +124,7 @@ def compute_feedforward_forces(
 
 
 def extract_band(model: IdentifiedModel, reference: FloatArray) -> FloatArray:
-    """(N, p): the part of `reference` (N, p) within the model's band, by linear-phase filters whose delay is
+    """Extract the part of `reference` (N, p) within the model's band, (N, p), by linear-phase filters whose delay is
     removed."""
     split = LinearPhaseSplit(compute_band_edges(model), model.sample_rate_hz)
     bands = split.split(reference)
@@ -129,7 +132,7 @@ def extract_band(model: IdentifiedModel, reference: FloatArray) -> FloatArray:
 
 
 def compute_band_edges(model: IdentifiedModel) -> BandEdges:
-    """Edges (Hz) of a model's band, each `BAND_MARGIN_HZ` further out; None where the band comes within twice the
+    """Compute the edges (Hz) of a model's band, each `BAND_MARGIN_HZ` further out; None for an edge within twice the
     margin of zero or of half the sample rate."""
     low_hz, high_hz = model.band_hz
     nyquist_hz = model.sample_rate_hz / 2
@@ -145,9 +148,10 @@ def solve_causally(
     settings: FeedforwardSettings,
     other_forces: FloatArray | None = None,
 ) -> tuple[FloatArray, TrackingLoss | None]:
-    """Forces (N, m), N, from the first row on, and the loss due to the cap (None where it was not needed). With
-    `settings.constrain`, the sum of the forces with other_forces (N, m) is kept under the cap; otherwise the cap is not
-    applied here. reference: (N, p), m/s². Raises TrackingError as `track_padded` and `track_under_cap`."""
+    """Solve for forces (N, m), in newtons, that are zero before the first row; and the loss due to the cap, None where
+    the forces did not have to be constrained. With `settings.constrain`, the sum of the forces and other_forces (N, m)
+    is kept under the cap; otherwise the cap is not applied here. reference: (N, p), m/s². Raises TrackingError as
+    `track_padded` and `track_under_cap`."""
     unconstrained = track_padded(problem, reference, CAUSAL).forces
     total_forces = unconstrained if other_forces is None else unconstrained + other_forces
     if not settings.constrain or find_force_peaks(total_forces, settings.cap_n).is_under_cap:

@@ -1,7 +1,7 @@
 """Feedforward forces at a place of the workspace, by a single model or by the weighted sum of several models' forces.
 
-The models and weights come from an interpolation between places (`interpolation_choice`). Called by
-`study.workflows.equalizer.equalize_trajectory` and `repeat_trajectory`.
+The models and weights come from an interpolation between places (`interpolation_choice`). Called by the workflows
+`equalize_trajectory` and `repeat_trajectory`; `playback_models` and `convergence_at_place` use the selection of models.
 """
 
 from dataclasses import replace
@@ -27,53 +27,59 @@ def compute_feedforward_at(
 ) -> Feedforward:
     """Compute feedforward forces at a place: the weighted sum of the forces of all models with a weight above zero.
     Error and loss are the largest of any model's forces, predicted by that model; `predicted` and the other fields are
-    those of the model with the largest weight. reference: (N, p), m/s². Raises what `compute_feedforward_forces`
-    raises."""
+    those of the model with the largest weight. reference: (N, p), m/s². Raises ForceLimitError where the sum exceeds
+    the cap, and the errors of `compute_feedforward_forces`."""
     used_models = select_used_models(place_models)
     if len(used_models) == 1:
         return compute_feedforward_forces(used_models[0][1], reference, settings)
-    # The sum may be under the cap where the forces of a model are not. Weights are not negative and add up to 1, so the
-    # sum is under the cap where those of all models are.
+    # The sum may be under the cap where the forces of one model are not, so that the cap is checked on the sum. With
+    # `constrain`, each model's forces are limited, and so is their convex combination.
     model_settings = settings if settings.constrain else replace(settings, cap_n=NO_CAP_N)
     weighted_results = [
-        (weight, compute_feedforward_forces(model, reference, model_settings)) for weight, model in used_models
+        (force_weight, compute_feedforward_forces(model, reference, model_settings))
+        for force_weight, model in used_models
     ]
-    forces = np.asarray(sum(weight * result.forces.samples for weight, result in weighted_results), dtype=np.float64)
+    forces = np.asarray(
+        sum(force_weight * result.forces.samples for force_weight, result in weighted_results), dtype=np.float64
+    )
     most_weighted = max(weighted_results, key=lambda weighted_result: weighted_result[0])[1]
-    losses = [result.loss for _, result in weighted_results if result.loss is not None]
+    cap_losses = [result.loss for _, result in weighted_results if result.loss is not None]
     return replace(
         most_weighted,
         forces=replace(most_weighted.forces, samples=forces),
         error=max(result.error for _, result in weighted_results),
         peaks=require_under_cap(forces, settings.cap_n, reference.sample_rate_hz),
-        loss=max(losses, key=lambda loss: loss.error_capped, default=None),
+        loss=max(cap_losses, key=lambda loss: loss.error_capped, default=None),
     )
 
 
 def select_used_models(place_models: ModelsAtPlace) -> tuple[tuple[float, IdentifiedModel], ...]:
-    """Weights above zero and their models, with the band of each restricted to the band that all these models cover."""
+    """Select the weights above zero and their models, with the band of each restricted to the band common to all of
+    them."""
     weighted_models = [
-        (weight, model) for weight, model in zip(place_models.weights, place_models.models, strict=True) if weight > 0
+        (force_weight, model)
+        for force_weight, model in zip(place_models.weights, place_models.models, strict=True)
+        if force_weight > 0
     ]
     band_hz = (
         max(model.band_hz[0] for _, model in weighted_models),
         min(model.band_hz[1] for _, model in weighted_models),
     )
-    return tuple((weight, replace(model, band_hz=band_hz)) for weight, model in weighted_models)
+    return tuple((force_weight, replace(model, band_hz=band_hz)) for force_weight, model in weighted_models)
 
 
 def make_inverse_at(place_models: ModelsAtPlace, weight: float) -> InverseOfLength:
     """Make the weighted sum of the inverse operators of all models at a place, for iterative learning control. weight:
     R = weight I, of |u|², (m/s² per N)²."""
     weighted_inverses = [
-        (share, make_inverse_operator(model, weight)) for share, model in select_used_models(place_models)
+        (force_weight, make_inverse_operator(model, weight)) for force_weight, model in select_used_models(place_models)
     ]
 
-    def make_inverse_of_length(rows: int) -> Invert:
-        """Inverse operator for records of `rows` rows."""
-        inverses = [(share, inverse(rows)) for share, inverse in weighted_inverses]
+    def make_inverse_of_length(row_count: int) -> Invert:
+        """Make the inverse operator for records of `row_count` samples."""
+        inverses = [(force_weight, inverse(row_count)) for force_weight, inverse in weighted_inverses]
         return lambda reference: np.asarray(
-            sum(share * invert(reference) for share, invert in inverses), dtype=np.float64
+            sum(force_weight * invert(reference) for force_weight, invert in inverses), dtype=np.float64
         )
 
     return make_inverse_of_length

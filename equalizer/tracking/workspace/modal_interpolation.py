@@ -3,7 +3,9 @@
 A weighted sum of responses would contain the resonances of every model. Here the resonances in the band are matched
 between models (`mode_matching`), and their natural frequencies, damping ratios and residues are interpolated. The
 remainder of each response without its resonances is smooth and is interpolated linearly. The sum is realised as a
-state-space model, with fixed real poles for the remainder.
+state-space model, with fixed real poles for the remainder. Called by `interpolation_choice`.
+
+Sizes: m inputs (forces), p outputs (accelerations).
 """
 
 from collections.abc import Sequence
@@ -22,14 +24,18 @@ from equalizer.tracking.workspace.place_weights import compute_place_weights
 from equalizer.tracking.workspace.workspace_models import Place, WorkspaceModels
 
 REAL_POLES_PER_OCTAVE = 2.0
-"""Density of the fixed real poles that describe the smooth remainder."""
+"""Density of the fixed real poles that describe the smooth remainder. Chosen by hand; the error of the fit is tested
+against `LARGEST_SILENT_ERROR` for every place."""
 LOWEST_POLE_RATIO, HIGHEST_POLE_RATIO = 0.3, 4.5
-"""Frequency of the lowest and the highest of these poles, relative to the lower and the upper end of the band."""
+"""Frequency of the lowest and the highest of these poles, relative to the lower and the upper end of the band.
+Chosen by hand."""
 RANK_TOLERANCE = 0.1
 """Singular values below this share of the largest are not counted in the rank of a residue matrix. The interpolated
-residue is truncated to the largest rank of the models' residues, because a sum of matrices has a higher rank."""
+residue is truncated to the largest rank of the models' residues, because a sum of matrices has a higher rank. Chosen by
+hand."""
 LARGEST_SILENT_ERROR = 0.02
-"""Largest relative error of the fit of the remainder for which the user gets no remark."""
+"""Largest error of the fit of the remainder, relative to the total response of the line, for which the user gets no
+remark. Chosen by hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,9 +51,8 @@ class ModalInterpolation:
     """(models, lines, p, m), m/s² per N: responses without the matched resonances."""
 
     def at(self, place_m: Place) -> ModelsAtPlace:
-        """A single model for a place (m), from interpolated resonances and remainder, valid in the models' common band.
-        Its remarks tell the user of a place outside the convex hull of the models, and of a poor fit of the
-        remainder."""
+        """Interpolate a single model for a place (m), valid in the models' common band. Remarks state a place outside
+        the convex hull of the models, and a fit of the remainder whose error exceeds `LARGEST_SILENT_ERROR`."""
         weights = compute_place_weights(self.workspace.places_m, place_m)
         modes = [_interpolate_mode(track, weights.smooth) for track in self.tracks]
         remainder = np.einsum("k,klpm->lpm", weights.linear, self.remainders)
@@ -61,45 +66,50 @@ class ModalInterpolation:
 
 
 def build_modal_interpolation(workspace: WorkspaceModels) -> ModalInterpolation:
-    """Find and match the resonances of all models; called by `interpolation_choice`. Raises ModesDoNotMatchError where
-    the matching of resonances of neighbouring models is ambiguous."""
+    """Find and match the resonances of all models. Raises ModesDoNotMatchError where the matching of resonances of
+    neighbouring models is ambiguous."""
     band_hz = workspace.band_hz
     modes = [find_band_modes(model, band_hz) for model in workspace.models]
     tracks = _track_modes(workspace, modes)
-    lines = [compute_band_lines(model, band_hz) for model in workspace.models]
+    band_lines = [compute_band_lines(model, band_hz) for model in workspace.models]
     remainders = []
-    for index, model_lines in enumerate(lines):
+    for model_index, model_lines in enumerate(band_lines):
         resonant_response = sum(
-            (track[index].compute_response(model_lines.z) for track in tracks), np.zeros_like(model_lines.response)
+            (track[model_index].compute_response(model_lines.z) for track in tracks),
+            np.zeros_like(model_lines.response),
         )
         remainders.append(model_lines.response - resonant_response)
-    return ModalInterpolation(workspace, tracks, lines[0], np.array(remainders))
+    return ModalInterpolation(workspace, tracks, band_lines[0], np.array(remainders))
 
 
 def _track_modes(workspace: WorkspaceModels, modes: Sequence[Sequence[BandMode]]) -> tuple[tuple[BandMode, ...], ...]:
-    """(resonances, models): the modes of each resonance, matched from neighbour to neighbour along the minimum spanning
-    tree of the places. modes: per model. Resonances that are not in every model are left out."""
+    """Match the modes of each resonance from neighbour to neighbour along the minimum spanning tree of the places.
+    Returns tuples (resonances, models) without resonances that are missing in a model. modes: per model."""
     places = workspace.places_m
     distances_m = np.linalg.norm(places[:, None] - places[None], axis=2)
     tree = minimum_spanning_tree(distances_m)
     order, predecessors = breadth_first_order(tree, 0, directed=False)
-    mode_tracks: dict[int, dict[int, int]] = {start: {0: start} for start in range(len(modes[0]))}
+    mode_indices_by_track: dict[int, dict[int, int]] = {
+        mode_index: {0: mode_index} for mode_index in range(len(modes[0]))
+    }
     for node in order[1:]:
         parent = int(predecessors[node])
         try:
             pairs = dict(match_modes(modes[parent], modes[node], workspace.band_hz))
         except ModesDoNotMatchError as error:
             raise ModesDoNotMatchError(f"models {parent + 1} (first) and {node + 1} (second): {error}") from error
-        for track in mode_tracks.values():
+        for track in mode_indices_by_track.values():
             if track.get(parent) in pairs:
                 track[int(node)] = pairs[track[parent]]
-    complete_tracks = [track for track in mode_tracks.values() if len(track) == len(modes)]
-    return tuple(tuple(modes[k][track[k]] for k in range(len(modes))) for track in complete_tracks)
+    complete_tracks = [track for track in mode_indices_by_track.values() if len(track) == len(modes)]
+    return tuple(
+        tuple(modes[model_index][track[model_index]] for model_index in range(len(modes))) for track in complete_tracks
+    )
 
 
 def _interpolate_mode(track: Sequence[BandMode], weights: FloatArray) -> BandMode:
-    """Mode at a place: frequency and damping by weighted geometric means, the residue over frequency by a weighted
-    mean. track: one mode per model; weights: (models,), sum 1."""
+    """Interpolate a mode: frequency and damping ratio by weighted geometric means, residue divided by frequency by a
+    weighted mean. track: the mode in each model; weights: (models,), sum 1."""
     natural_hz = float(np.exp(weights @ np.log([mode.natural_hz for mode in track])))
     damping_ratio = float(np.exp(weights @ np.log([mode.damping_ratio for mode in track])))
     # The residue of an acceleration response is proportional to the natural frequency. It is divided by it before the
@@ -112,7 +122,7 @@ def _interpolate_mode(track: Sequence[BandMode], weights: FloatArray) -> BandMod
 
 
 def _count_rank(residue: ComplexArray) -> int:
-    """Numerical rank of a residue (p, m), by `RANK_TOLERANCE`."""
+    """Count the singular values of a residue (p, m) above `RANK_TOLERANCE` times the largest."""
     singular_values = np.linalg.svd(residue, compute_uv=False)
     return int((singular_values > RANK_TOLERANCE * singular_values[0]).sum())
 
@@ -120,8 +130,10 @@ def _count_rank(residue: ComplexArray) -> int:
 def _assemble_model(
     interpolation: ModalInterpolation, modes: Sequence[BandMode], remainder: ComplexArray, total_norm: FloatArray
 ) -> tuple[IdentifiedModel, float]:
-    """State-space model of the modes and of the remainder (lines, p, m), which is fitted by least squares with fixed
-    real poles; and the largest error of that fit relative to `total_norm`, (lines,), the norm of the total response."""
+    """Assemble the state-space model of the modes and of the remainder (lines, p, m), which is fitted by least squares
+    with fixed real poles; also returns the largest error of that fit relative to `total_norm`, (lines,), the norm of
+    the total response. The model has no covariance and no samples of its uncertainty. Singular values of the basis
+    below 1e-7 of the largest (chosen by hand) are dropped, because neighbouring poles have similar responses."""
     first_model, lines = interpolation.workspace.models[0], interpolation.lines
     poles = _choose_remainder_poles(interpolation.workspace.band_hz, first_model.sample_rate_hz)
     basis = np.hstack([(1 - poles) / (lines.z[:, None] - poles), np.ones((len(lines.z), 1))]) / total_norm[:, None]
@@ -153,15 +165,16 @@ def _assemble_model(
 
 
 def _choose_remainder_poles(band_hz: tuple[float, float], rate_hz: float) -> FloatArray:
-    """(poles,): discrete real poles, logarithmically spaced from below the band to above it, at most 0.4 of the sample
-    rate."""
+    """Choose the discrete real poles, (poles,), at least four, logarithmically spaced from below the band to above it,
+    at most 0.4 of the sample rate, which is below half of it. Chosen by hand."""
     lowest_hz, highest_hz = LOWEST_POLE_RATIO * band_hz[0], min(HIGHEST_POLE_RATIO * band_hz[1], 0.4 * rate_hz)
     count = max(4, round(REAL_POLES_PER_OCTAVE * np.log2(band_hz[1] / band_hz[0])))
     return np.asarray(np.exp(-2 * np.pi * np.geomspace(lowest_hz, highest_hz, count) / rate_hz))
 
 
 def _realise_mode(mode: BandMode) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Real state-space matrices A, B, C of R / (z - pole) plus its conjugate; two states per rank of the residue R."""
+    """Realise R / (z - pole) plus its conjugate by real state-space matrices A, B, C, two states per rank of the
+    residue R. Singular values below 1e-9 of the largest are rounding errors of the truncation to that rank."""
     u, s, v = np.linalg.svd(mode.residue)
     rank = int((s > 1e-9 * s[0]).sum())
     pole = mode.pole

@@ -1,6 +1,8 @@
 """Models with weights for a place of the workspace: the forces there are the weighted sum of the models' forces.
 
-Result of an interpolation between places: a single model by `modal_interpolation`, several by `blended_inverse`.
+Result of an interpolation between places: a single model by `modal_interpolation`, several by `blended_inverse`, chosen
+by `interpolation_choice`. Used by `feedforward_at_place` (models and weights), `convergence_at_place` and
+`interpolation_choice` (inverse), and `study.evaluation.reproduction` (forces). Sizes: m inputs, p outputs of a model.
 """
 
 from collections.abc import Callable
@@ -17,11 +19,12 @@ from equalizer.tracking.workspace.workspace_models import Place
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelsAtPlace:
-    """Models for a place with the weights of their forces, from which inverses and forces for the place follow."""
+    """Models for a place, with the weights by which their inverses and forces are summed."""
 
     place_m: Place
     """The place, m."""
     models: tuple[IdentifiedModel, ...]
+    """At least one; the same inputs, outputs and sample rate."""
     weights: tuple[float, ...]
     """One per model, none negative, sum 1: weights of the forces, never of models or responses."""
     remarks: tuple[str, ...] = ()
@@ -30,8 +33,9 @@ class ModelsAtPlace:
     def compute_inverse(
         self, frequency_hz: FloatArray, weight: float = WEIGHT, spring: VirtualSpring = NO_SPRING
     ) -> ComplexArray:
-        """(lines, m, p), N per m/s²: regularised inverse (`compute_regularised_inverse`), for frequencies
-        (lines,). weight: of |force|², (m/s² per N)²; spring: its force is subtracted."""
+        """Compute the weighted sum of the models' regularised inverses (`compute_regularised_inverse`), (lines, m, p),
+        N per m/s², at frequency_hz (lines,). weight: of |force|², (m/s² per N)²; spring: virtual spring whose force is
+        subtracted."""
         weighted_inverses = [
             force_weight * compute_regularised_inverse(model, frequency_hz, weight, spring)
             for force_weight, model in self._select_used_models()
@@ -39,14 +43,14 @@ class ModelsAtPlace:
         return np.asarray(sum(weighted_inverses), dtype=np.complex128)
 
     def compute_forces(self, track: Callable[[IdentifiedModel], FloatArray]) -> FloatArray:
-        """Forces (N, m), N, of a trajectory: the weighted sum of the forces that `track` returns for each model."""
+        """Compute the weighted sum of the forces (samples, m), in newtons, that `track` returns for each model."""
         return np.asarray(
             sum(force_weight * track(model) for force_weight, model in self._select_used_models()),
             dtype=np.float64,
         )
 
     def _select_used_models(self) -> list[tuple[float, IdentifiedModel]]:
-        """Weights above zero and their models."""
+        """Select the weights above zero with their models; the others need not be evaluated."""
         return [
             (force_weight, model)
             for force_weight, model in zip(self.weights, self.models, strict=True)

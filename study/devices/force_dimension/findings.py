@@ -1,7 +1,7 @@
 """Findings of `hapteq doctor` about a Force Dimension device before a study day. Commands only zero forces.
 
 In this order: library, USB, real-time rights, accelerometer, connection, power, calibration, watchdog, masses, gravity
-compensation. Each finding that is not fine says what to do.
+compensation. Each finding that is not fine states a remedy. Called by `study.devices.opening`.
 """
 
 import contextlib
@@ -21,29 +21,30 @@ from study.errors import DeviceError
 from study.session.views.participant_views import DeviceFinding
 
 CAP_N = 1.0
-"""Force cap set in the library during the examination (N). Only zero forces are sent; the cap protects against an error
-of this program."""
+"""Force cap (N) set in the library during the examination. Only zero forces are sent; the cap protects against an error
+of this program. Chosen by hand."""
 
-AT_REST_S = 0.3
-"""Time (s) for which the handle is left to itself, gravity compensated, before its speed is read."""
-EVERY_S = 0.002
-"""Interval (s) of the zero forces sent meanwhile, shorter than the device's watchdog."""
-COMPARED_S = 0.02
-"""Time (s), after `AT_REST_S`, over which the velocity is computed from two positions. The library averages over 20 ms
-too (`Handle.read_velocity_mps`)."""
-DRIFTING_MPS = 0.02
-"""Speed (m/s) after `AT_REST_S` above which the gravity compensation is off: an acceleration of 0.07 m/s² (0.7 % of g)
-in excess of friction. A smaller error is held by friction."""
+FREE_MOTION_S = 0.3
+"""Time (s) for which the handle moves freely, gravity compensated, before its speed is measured. Chosen by hand."""
+COMMAND_INTERVAL_S = 0.002
+"""Interval (s) between zero forces, shorter than the device's watchdog time."""
+VELOCITY_WINDOW_S = 0.02
+"""Time (s), after `FREE_MOTION_S`, over which the velocity is computed from two positions. The library also averages
+over 20 ms (`Handle.read_velocity_mps`)."""
+DRIFT_LIMIT_MPS = 0.02
+"""Speed (m/s) after `FREE_MOTION_S` above which the gravity compensation is reported as wrong: an acceleration of 0.07
+m/s² (0.7 % of g) in excess of friction. Chosen by hand: friction holds the handle at a smaller error."""
 
-POWER = "Switch its power supply on."
+POWER_ADVICE = "Switch its power supply on."
 """Advice for a device without power."""
-SENSOR = "Accelerometer"
+SENSOR_TITLE = "Accelerometer"
 """Title of the findings on the accelerometer."""
 
 
 def examine(name: str) -> tuple[DeviceFinding, ...]:
-    """Findings up to the first failure that prevents the further checks; checks that need no library are made in any
-    case. name: a key of `MODELS`. Raises no `DeviceError`; the device is left braked."""
+    """Examine a device: findings up to the first failure that prevents further checks. The checks of USB and real-time
+    rights are made in any case, that of the accelerometer where the lab file can be read. name: a key of `MODELS`.
+    A `DeviceError` becomes a finding; the device is disconnected and braked afterwards."""
     try:
         lab = read_lab()
     except DeviceError as error:
@@ -53,7 +54,7 @@ def examine(name: str) -> tuple[DeviceFinding, ...]:
     except DeviceError as error:
         return (
             _make_failed_finding("Driver", error),
-            *(_check_usb() or _find_if_unplugged()),
+            *(_check_usb() or _report_unplugged_device()),
             check_real_time_rights(),
             *_check_sensor(lab),
         )
@@ -68,7 +69,7 @@ def examine(name: str) -> tuple[DeviceFinding, ...]:
 
 
 def _examine_device(library: Library, model: DeviceModel, lab: LabSettings) -> list[DeviceFinding]:
-    """Open the device, examine it, and disconnect it. Errors become findings."""
+    """Open the device, examine it, and disconnect it. `DeviceError` and `LibraryError` become findings."""
     findings: list[DeviceFinding] = []
     try:
         handle = open_model(library, model)
@@ -89,8 +90,8 @@ def _examine_device(library: Library, model: DeviceModel, lab: LabSettings) -> l
 
 
 def calibrate(name: str, patience_s: float) -> None:
-    """Calibrate the device: wait, for patience_s (s) at most, until a person has put the handle to its rest position.
-    Raises `DeviceError`."""
+    """Calibrate the device: wait, for at most patience_s (s), until a person has moved the handle to its rest position.
+    name: a key of `MODELS`. Raises `DeviceError` where the device cannot be opened or is not calibrated in time."""
     handle = open_model(load_library(), MODELS[name])
     try:
         handle.calibrate(patience_s)
@@ -103,7 +104,8 @@ def calibrate(name: str, patience_s: float) -> None:
 
 
 def _check_usb() -> list[DeviceFinding]:
-    """Findings on the USB permissions of the devices that are plugged in; empty on systems other than Linux."""
+    """Check the USB permissions of the devices that are plugged in; empty without any, and on systems other than
+    Linux."""
     return [
         DeviceFinding("USB", device.product, fine=True)
         if device.may_open
@@ -114,18 +116,18 @@ def _check_usb() -> list[DeviceFinding]:
     ]
 
 
-def _find_if_unplugged() -> list[DeviceFinding]:
-    """Finding that no device is plugged in, for a computer without the vendor's library. Called where no device was
+def _report_unplugged_device() -> list[DeviceFinding]:
+    """Report that no device is plugged in, for a computer without the vendor's library. Called where no device was
     found by USB; empty on systems other than Linux, where that is not known."""
     if find_usb_devices() is None:
         return []
-    value, advice = "no device of the vendor is plugged in", "Plug its USB cable in and switch its power on."
-    return [DeviceFinding("USB", value, fine=False, advice=advice, warning=True)]
+    text, advice = "no device of the vendor is plugged in", "Plug its USB cable in and switch its power on."
+    return [DeviceFinding("USB", text, fine=False, advice=advice, warning=True)]
 
 
 def _check_sensor(lab: LabSettings) -> list[DeviceFinding]:
-    """Findings on the accelerometer. It is opened, read and closed again, because the loop's process opens it
-    itself."""
+    """Check the accelerometer; a warning where none is configured. It is opened, read and closed again, because the
+    process of the control loop opens it later."""
     if lab.accelerometer is None:
         advice = (
             "Without one no acceleration is measured. To add one: calibrate it with `hapteq doctor --calibrate-sensor "
@@ -133,106 +135,114 @@ def _check_sensor(lab: LabSettings) -> list[DeviceFinding]:
             "accelerometer)."
         )
         return [
-            DeviceFinding(SENSOR, f"none is configured in {locate_lab_file()}", fine=False, advice=advice, warning=True)
+            DeviceFinding(
+                SENSOR_TITLE, f"none is configured in {locate_lab_file()}", fine=False, advice=advice, warning=True
+            )
         ]
     try:
         with contextlib.closing(lab.accelerometer.open_sensor()) as sensor:
             return list(check_sensor(sensor))
     except DeviceError as error:
-        return [_make_failed_finding(SENSOR, error)]
+        return [_make_failed_finding(SENSOR_TITLE, error)]
 
 
 def _examine_opened(handle: Handle, model: DeviceModel, lab: LabSettings) -> list[DeviceFinding]:
-    """Findings on an opened device: power, calibration, watchdog, masses, gravity compensation. Raises `DeviceError`,
-    `LibraryError`."""
+    """Examine an opened device: power and calibration and, with both, watchdog, masses and gravity compensation. Raises
+    `DeviceError`, `LibraryError`."""
     status = handle.read_status()
-    power = DeviceFinding("Power", "on" if status.powered else "off", status.powered, "" if status.powered else POWER)
-    calibrated = status.calibrated
-    calibration_text = (
-        "done" if calibrated else "not done since it was switched on: it does not know where its handle is"
+    power_finding = DeviceFinding(
+        "Power", "on" if status.powered else "off", status.powered, "" if status.powered else POWER_ADVICE
     )
-    advice = (
+    is_calibrated = status.calibrated
+    calibration_text = (
+        "done" if is_calibrated else "not done since it was switched on: it does not know where its handle is"
+    )
+    calibration_advice = (
         ""
-        if calibrated
+        if is_calibrated
         else f"Run `hapteq doctor --device {_find_option_name(model)} --calibrate`, or: {CALIBRATION_ADVICE}"
     )
-    findings = [power, DeviceFinding("Calibration", calibration_text, calibrated, advice)]
-    if not (status.powered and calibrated):
+    findings = [power_finding, DeviceFinding("Calibration", calibration_text, is_calibrated, calibration_advice)]
+    if not (status.powered and is_calibrated):
         return findings
-    drops_after_s = make_ready(handle, model, CAP_N, lab.effector_mass_kg)
-    release_s = check_watchdog(handle, drops_after_s, time.monotonic, time.sleep)
-    watchdog = (
-        f"set to {1000 * drops_after_s:.1f} ms; without forces the device let go within {1000 * release_s:.0f} ms"
+    watchdog_s = make_ready(handle, model, CAP_N, lab.effector_mass_kg)
+    release_s = check_watchdog(handle, watchdog_s, time.monotonic, time.sleep)
+    watchdog_text = (
+        f"set to {1000 * watchdog_s:.1f} ms; without forces the device let go within {1000 * release_s:.0f} ms"
     )
     return [
         *findings,
-        DeviceFinding("Watchdog", watchdog, fine=True),
+        DeviceFinding("Watchdog", watchdog_text, fine=True),
         _report_masses(model, lab),
         *_check_gravity(handle),
     ]
 
 
 def _report_masses(model: DeviceModel, lab: LabSettings) -> DeviceFinding:
-    """The masses in use (kg): for the gravity compensation, and for the stiffness of the centring spring."""
+    """Report the masses in use (kg): for the gravity compensation, and for the stiffness of the centring spring."""
     effector_mass_kg = lab.effector_mass_kg or model.effector_mass_kg
-    gravity_mass = f"{effector_mass_kg:g} kg" if effector_mass_kg else "with the library's own mass"
-    spring_mass = (
+    gravity_text = f"{effector_mass_kg:g} kg" if effector_mass_kg else "with the library's own mass"
+    spring_text = (
         f"{lab.effective_mass_kg:g} kg" if lab.effective_mass_kg else f"{model.effective_mass_kg:g} kg, assumed"
     )
     return DeviceFinding(
-        "Masses", f"gravity compensation {gravity_mass}, spring {spring_mass} ({locate_lab_file()})", fine=True
+        "Masses", f"gravity compensation {gravity_text}, spring {spring_text} ({locate_lab_file()})", fine=True
     )
 
 
 def _check_gravity(handle: Handle) -> list[DeviceFinding]:
-    """Findings on the vertical drift of the handle by its positions, and on a velocity of the library that differs from
-    it; empty where positions cannot be read, which another finding reports. Raises `LibraryError`."""
-    _send_zero_forces(handle, AT_REST_S)
+    """Check the vertical drift of the handle (z is up) by its positions, and whether the library's velocity agrees with
+    it within `DRIFT_LIMIT_MPS` plus half of it; NaN does not agree. Empty where positions cannot be read, which another
+    finding reports. Raises `LibraryError`."""
+    _send_zero_forces(handle, FREE_MOTION_S)
     try:
-        began_s, from_m = time.monotonic(), handle.read_position_m()[2]
-        _send_zero_forces(handle, COMPARED_S)
-        up_mps = (handle.read_position_m()[2] - from_m) / (time.monotonic() - began_s)
+        start_s, start_height_m = time.monotonic(), handle.read_position_m()[2]
+        _send_zero_forces(handle, VELOCITY_WINDOW_S)
+        upward_mps = (handle.read_position_m()[2] - start_height_m) / (time.monotonic() - start_s)
     except LibraryError as error:
         if error.function == "dhdGetPosition":
             return []
         raise
-    reported_mps = handle.read_velocity_mps()[2]
-    findings = [_check_drift(up_mps)]
-    if not abs(reported_mps - up_mps) <= DRIFTING_MPS + 0.5 * abs(up_mps):
-        value = f"the library says {reported_mps:g} m/s along z; by its positions the handle moves at {up_mps:.2g} m/s"
+    library_mps = handle.read_velocity_mps()[2]
+    findings = [_check_drift(upward_mps)]
+    if not abs(library_mps - upward_mps) <= DRIFT_LIMIT_MPS + 0.5 * abs(upward_mps):
+        text = (
+            f"the library says {library_mps:g} m/s along z; by its positions the handle moves at {upward_mps:.2g} m/s"
+        )
         advice = "Nothing that hapteq plays depends on it. Other programs may: install the vendor's newest SDK."
-        findings.append(DeviceFinding("Velocity", value, fine=False, advice=advice, warning=True))
+        findings.append(DeviceFinding("Velocity", text, fine=False, advice=advice, warning=True))
     return findings
 
 
-def _send_zero_forces(handle: Handle, seconds: float) -> None:
-    """Send zero forces for this time (s): the library compensates gravity only while forces are sent. Raises
+def _send_zero_forces(handle: Handle, duration_s: float) -> None:
+    """Send zero forces for duration_s (s): the library compensates gravity only while forces are sent. Raises
     `LibraryError`."""
-    until_s = time.monotonic() + seconds
-    while time.monotonic() < until_s:
+    end_s = time.monotonic() + duration_s
+    while time.monotonic() < end_s:
         handle.set_force(0.0, 0.0, 0.0)
-        time.sleep(EVERY_S)
+        time.sleep(COMMAND_INTERVAL_S)
 
 
-def _check_drift(up_mps: float) -> DeviceFinding:
-    """Finding on the gravity compensation by the vertical speed of the free handle (m/s, > 0: it rises)."""
-    if abs(up_mps) <= DRIFTING_MPS:
+def _check_drift(upward_mps: float) -> DeviceFinding:
+    """Judge the gravity compensation by the vertical speed of the free handle (m/s, > 0: it rises); at most a
+    warning."""
+    if abs(upward_mps) <= DRIFT_LIMIT_MPS:
         return DeviceFinding("Gravity", "compensated: the handle stays where it is", fine=True)
-    is_sinking = up_mps < 0
+    is_sinking = upward_mps < 0
     advice = (
         f"With no hand on it, make effector_mass_kg in {locate_lab_file()} {'larger' if is_sinking else 'smaller'}."
     )
     direction = "sinks" if is_sinking else "rises"
     return DeviceFinding(
-        "Gravity", f"the handle {direction} at {1000 * abs(up_mps):.0f} mm/s", False, advice, warning=True
+        "Gravity", f"the handle {direction} at {1000 * abs(upward_mps):.0f} mm/s", False, advice, warning=True
     )
 
 
 def _find_option_name(model: DeviceModel) -> str:
-    """The name that `--device` takes for a model."""
+    """Find the name of a model for the option `--device`: its key in `MODELS`."""
     return next(name for name, candidate in MODELS.items() if candidate is model)
 
 
 def _make_failed_finding(name: str, error: DeviceError) -> DeviceFinding:
-    """An error as a finding, with its remedy as advice."""
+    """Convert an error to a finding, with its remedy as advice."""
     return DeviceFinding(name, f"{error.title}. {error.happened}", fine=False, advice=error.do_now)

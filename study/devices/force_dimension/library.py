@@ -2,7 +2,7 @@
 
 A negative return value becomes a `LibraryError` with the library's own text. The library keeps its last error per
 thread, so that the text must be fetched at once, in the thread whose call failed. Loaded by `connect.load_library`;
-`handle` and `linkage` call the functions.
+`connect`, `handle` and `linkage` call the functions. Names, types and codes are those of the vendor's `dhdc.h`.
 """
 
 import ctypes
@@ -96,7 +96,7 @@ class Library:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._functions = _bind(_load(path), path)
+        self._functions = _bind_functions(_load(path), path)
         self.version = self._read_version()
         if self.version[:3] < OLDEST_SDK:
             raise _make_outdated_error(f"{path} is version {_format_version(self.version)}")
@@ -107,21 +107,21 @@ class Library:
         return _format_version(self.version)
 
     def get_function(self, name: str) -> Callable[..., Any]:
-        """The function without error handling, for calls at every tick; its return value must be passed to
-        `check_return_value`. Raises `DeviceError` where the library lacks this function."""
+        """Get the bound function without error handling; its return value must be passed to `check_return_value`,
+        unless it is no status. Raises `DeviceError` where the library lacks the function."""
         if name not in self._functions:
             raise _make_outdated_error(f"{self.path} has no {name}")
         return self._functions[name]
 
     def check_return_value(self, name: str, return_value: int) -> int:
-        """Return `return_value`, which function `name` returned. Raises `LibraryError` where it is negative or unknown.
-        Must run in the thread of the call, because the error is kept per thread."""
+        """Return `return_value`, which function `name` returned. Raises `LibraryError` where it is negative, or above
+        `HIGHEST_NOTICE` (except for `RESULT_FUNCTIONS`). To be called in the thread of the call, see the module."""
         if 0 <= return_value <= HIGHEST_NOTICE or (return_value > 0 and name in RESULT_FUNCTIONS):
             return return_value
         raise self.fetch_last_error(name)
 
     def fetch_last_error(self, name: str) -> LibraryError:
-        """The library's error of function `name`, whose call has just failed in this thread."""
+        """Read the library's last error in this thread, as the error of function `name`, whose call has just failed."""
         code = int(self._functions["dhdErrorGetLast"]())
         if code == 0:
             return LibraryError(name, code, "an answer that is neither success nor a known error")
@@ -129,7 +129,8 @@ class Library:
         return LibraryError(name, code, text.decode("utf-8", "replace"))
 
     def find_addresses(self, names: tuple[str, ...]) -> npt.NDArray[np.int64]:
-        """(len(names),): addresses of the library's functions, for calls from compiled code."""
+        """(len(names),): addresses of functions, for calls from compiled code. Raises `KeyError` for one that is not
+        bound."""
         return np.array([find_address(self._functions[name]) for name in names], dtype=np.int64)
 
     def call(self, name: str, *arguments: Any) -> int:
@@ -138,7 +139,7 @@ class Library:
         return self.check_return_value(name, int(self.get_function(name)(*arguments)))
 
     def _read_version(self) -> tuple[int, int, int, int]:
-        """Version of the SDK: major, minor, release, revision."""
+        """Read the version of the SDK: major, minor, release, revision."""
         parts = [c_int() for _ in range(4)]
         self._functions["dhdGetSDKVersion"](*map(ctypes.byref, parts))
         major, minor, release, revision = (part.value for part in parts)
@@ -159,9 +160,9 @@ def _load(path: Path) -> ctypes.CDLL:
         ) from error
 
 
-def _bind(shared_library: ctypes.CDLL, path: Path) -> dict[str, Callable[..., Any]]:
-    """The library's functions by name, with their types set. Raises `DeviceError` where a function of `SIGNATURES` is
-    missing; those of `LINKAGE_SIGNATURES` may be missing."""
+def _bind_functions(shared_library: ctypes.CDLL, path: Path) -> dict[str, Callable[..., Any]]:
+    """Bind the library's functions, by name, with their types set. Raises `DeviceError` where a function of
+    `SIGNATURES` is missing; those of `LINKAGE_SIGNATURES` may be missing."""
     missing = [name for name in SIGNATURES if not hasattr(shared_library, name)]
     if missing:
         raise _make_outdated_error(f"{path} has no {', '.join(missing)}")
@@ -175,12 +176,13 @@ def _bind(shared_library: ctypes.CDLL, path: Path) -> dict[str, Callable[..., An
 
 
 def _format_version(version: tuple[int, ...]) -> str:
-    """Text of a version, such as 3.17.5.0."""
+    """Format a version with dots between its parts, such as 3.17.5.0."""
     return ".".join(map(str, version))
 
 
 def _make_outdated_error(reason: str) -> DeviceError:
-    """Error for a library that is too old. reason: the version, or the missing functions."""
+    """Make the error for a library that is too old. reason: a sentence without its full stop, on the version or the
+    missing functions."""
     return DeviceError(
         "The device's library is too old",
         f"{reason}.",

@@ -1,8 +1,9 @@
 """Follow-up experiments for cases whose diagnosis returned several effects that the data could not separate.
 
-The sealed device plays the experiments that the diagnosis proposed and, for comparison, as many drawn at random from
-the same menu. Separate processes diagnose both, with the first recording. The number of effects that the diagnosis
-still returns shows whether its proposals are better than chance.
+The simulated device of the sealed case plays the experiments that the diagnosis proposed and, for comparison, as many
+(at least one) drawn at random from the same menu. Separate processes diagnose each set together with the first
+recording. The number of effects that the diagnosis still returns shows whether its proposals are better than chance.
+Called by `prove`.
 """
 
 import json
@@ -43,11 +44,12 @@ from study.store.formats.mechanical_model_file import read_mechanical_model
 from study.store.formats.recording_file import write_recording
 
 FOLLOW_UP_FOLDER = "next"
-"""Folder of the follow-up cases: a bank of its own, whose labels name the case they follow."""
+"""Folder of the bank of follow-up cases in that of the first bank; each label has the number of the first case."""
 PROPOSED_KEY, RANDOM_KEY = "proposed", "drawn"
-"""Keys of the two follow-up cases in a label."""
+"""Keys of the two follow-up cases in a label: with the proposed experiments, and with those drawn at random."""
 NOISE_SEED = 7
-"""Part of the seeds of a follow-up's noise and random order: makes them independent of all other draws of a case."""
+"""Constant in the seeds of a follow-up's noise and random order, which makes them independent of all other draws of a
+case. Any value serves; chosen by hand."""
 
 
 def follow_up(
@@ -57,65 +59,81 @@ def follow_up(
     options: tuple[Workers, bool],
     on_done: Callable[[int, int], None],
 ) -> tuple[FollowUp, ...]:
-    """Follow up the cases with a single concealed effect for which the diagnosis returned more effects than it named,
-    and named any. options: the workers, and whether to keep recordings after they are answered. After an
-    interruption the same call continues. Raises StudyError."""
-    workers, keep = options
-    undecided = [
+    """Seal, diagnose and evaluate follow-up cases of all cases with a single concealed effect for which the diagnosis
+    named an effect and returned more than it named; () without such cases.
+
+    folder: the bank of the first cases; options: the workers, and whether to keep recordings after they are answered;
+    on_done: called with the numbers of answered and of all follow-up cases. After an interruption the same call
+    continues. Raises StudyError, such as for a broken seal.
+    """
+    workers, keep_recordings = options
+    undecided_cases = [
         outcome for outcome in outcomes if outcome.kind == "single" and len(outcome.returned) > len(outcome.named) > 0
     ]
-    if not undecided:
+    if not undecided_cases:
         return ()
-    next_bank = open_proof_folder(folder.path / FOLLOW_UP_FOLDER, plan.seed, plan.brief)
-    with finish_begun_cases(next_bank):
-        for start in undecided:
-            if not next_bank.get_label_file(start.number).exists():
-                _seal(folder, next_bank, plan, start)
-    seal(next_bank)
-    labels = [read_label(next_bank.get_label_file(undecided_case.number)) for undecided_case in undecided]
-    names = [label[key]["name"] for label in labels for key in (PROPOSED_KEY, RANDOM_KEY) if key in label]
-    diagnose_and_count(next_bank, names, workers, on_done, keep=keep)
+    follow_up_bank = open_proof_folder(folder.path / FOLLOW_UP_FOLDER, plan.seed, plan.brief)
+    with finish_begun_cases(follow_up_bank):
+        for case_to_seal in undecided_cases:
+            if not follow_up_bank.get_label_file(case_to_seal.number).exists():
+                _seal_follow_up_cases(folder, follow_up_bank, plan, case_to_seal)
+    seal(follow_up_bank)
+    labels = [read_label(follow_up_bank.get_label_file(undecided_case.number)) for undecided_case in undecided_cases]
+    case_names = [label[key]["name"] for label in labels for key in (PROPOSED_KEY, RANDOM_KEY) if key in label]
+    diagnose_and_count(follow_up_bank, case_names, workers, on_done, keep=keep_recordings)
     return tuple(
-        _follow_up_outcome(next_bank, undecided_case, label)
-        for undecided_case, label in zip(undecided, labels, strict=True)
+        _read_follow_up(follow_up_bank, undecided_case, label)
+        for undecided_case, label in zip(undecided_cases, labels, strict=True)
     )
 
 
-def _seal(folder: ProofFolder, next_bank: ProofFolder, plan: BankPlan, start: Outcome) -> None:
-    """Write both follow-up cases of `start` and their label, which is written last, when both are complete."""
-    first_label = read_label(folder.get_label_file(start.number))
+def _seal_follow_up_cases(
+    folder: ProofFolder, follow_up_bank: ProofFolder, plan: BankPlan, undecided_case: Outcome
+) -> None:
+    """Write the follow-up cases of an undecided case and then, when they are complete, their label; only afterwards are
+    they moved to the open cases. Without a proposal the label has no cases; where no experiment was proposed, only the
+    random one is written."""
+    first_label = read_label(folder.get_label_file(undecided_case.number))
     first_folder = folder.open / first_label["name"]
     proposal = read_answer(first_folder).get("proposal")
-    label: dict[str, Any] = {"number": start.number, "salt": secrets.token_hex(SALT_BYTES)}
+    label: dict[str, Any] = {"number": undecided_case.number, "salt": secrets.token_hex(SALT_BYTES)}
     if proposal is not None:
         model = read_mechanical_model(first_folder / MODEL_FILE)
         menu = list_experiments(model, RATE_HZ, proposal["axis"], proposal["level"])
-        best = proposal["best"]
-        proposed_words = [best] if isinstance(best, str) else best or ()  # a single text in answers of older versions
+        best_words = proposal["best"]
+        # A single text in answers of older versions, None without a proposed experiment.
+        proposed_words = [best_words] if isinstance(best_words, str) else best_words or ()
         proposed = [experiment for experiment in menu if experiment.words in proposed_words]
-        order = np.random.default_rng([plan.seed, start.number, NOISE_SEED]).permutation(len(menu))
-        random_experiments = [menu[number] for number in order[: max(len(proposed), 1)]]
+        random_order = np.random.default_rng([plan.seed, undecided_case.number, NOISE_SEED]).permutation(len(menu))
+        random_experiments = [menu[menu_index] for menu_index in random_order[: max(len(proposed), 1)]]
         experiments_by_key = {RANDOM_KEY: random_experiments} | ({PROPOSED_KEY: proposed} if proposed else {})
         label |= {
-            key: _write_case(next_bank, plan, (first_label, first_folder), experiments)
+            key: _write_case(follow_up_bank, plan, (first_label, first_folder), experiments)
             for key, experiments in experiments_by_key.items()
         }
-    write_text(next_bank.get_label_file(start.number), json.dumps(label, indent=1) + "\n")
+    write_text(follow_up_bank.get_label_file(undecided_case.number), json.dumps(label, indent=1) + "\n")
     for key in {PROPOSED_KEY, RANDOM_KEY} & label.keys():
-        publish_case(next_bank, next_bank.unfinished / label[key]["name"])
+        publish_case(follow_up_bank, follow_up_bank.unfinished / label[key]["name"])
 
 
 def _write_case(
-    next_bank: ProofFolder, plan: BankPlan, start: tuple[dict[str, Any], Path], experiments: Sequence[Experiment]
+    follow_up_bank: ProofFolder,
+    plan: BankPlan,
+    first_case: tuple[dict[str, Any], Path],
+    experiments: Sequence[Experiment],
 ) -> dict[str, Any]:
-    """Write a follow-up case and return its part of the label. `redraw_recording` draws the first recording again and
-    checks it against its label."""
-    label, first_folder = start
-    case_folder = begin_case(next_bank)
-    case = redraw_recording(case_folder, plan, label)
-    for number, experiment in enumerate(experiments):
-        recording = case.record_again(experiment.commands, experiment.kind, experiment.added, NOISE_SEED + number)
-        write_recording(case_folder / FURTHER_RECORDING_FILE.format(number + 2), recording, precision="float32")
+    """Write a follow-up case and return its part of the label. first_case: label and folder of the first case, whose
+    recording `redraw_recording` draws again and checks against its label. Raises StudyError where they differ."""
+    first_label, first_folder = first_case
+    case_folder = begin_case(follow_up_bank)
+    redrawn_case = redraw_recording(case_folder, plan, first_label)
+    for experiment_index, experiment in enumerate(experiments):
+        recording = redrawn_case.record_again(
+            experiment.commands, experiment.kind, experiment.added, NOISE_SEED + experiment_index
+        )
+        write_recording(
+            case_folder / FURTHER_RECORDING_FILE.format(experiment_index + 2), recording, precision="float32"
+        )
     for file_name in (MODEL_FILE, SETTINGS_FILE):
         write_text(case_folder / file_name, read_text(first_folder / file_name))
     return {
@@ -127,20 +145,27 @@ def _write_case(
     }
 
 
-def _follow_up_outcome(next_bank: ProofFolder, start: Outcome, label: dict[str, Any]) -> FollowUp:
-    """The effects returned after the proposed and after the random experiments. Raises StudyError for a broken seal."""
+def _read_follow_up(follow_up_bank: ProofFolder, undecided_case: Outcome, label: dict[str, Any]) -> FollowUp:
+    """Read the effects that are returned after the proposed and after the random experiments; none for a failed
+    diagnosis. Raises StudyError for a broken seal."""
 
-    def read_follow_up(key: str) -> tuple[str, tuple[str, ...]]:
+    def read_description_and_effects(key: str) -> tuple[str, tuple[str, ...]]:
         if key not in label:
             return "", ()
-        answer = read_answer(next_bank.open / label[key]["name"])
+        answer = read_answer(follow_up_bank.open / label[key]["name"])
         if not is_answer_to_sealed_case(label[key], answer):
-            raise make_broken_seal_error([label[key]["name"]], next_bank.path)
+            raise make_broken_seal_error([label[key]["name"]], follow_up_bank.path)
         returned_effects = () if "failed" in answer else diagnosis_from_json(answer["diagnosis"]).returned_set
         return label[key]["words"], returned_effects
 
-    proposed_words, after_proposed = read_follow_up(PROPOSED_KEY)
-    random_words, after_random = read_follow_up(RANDOM_KEY)
+    proposed_words, after_proposed = read_description_and_effects(PROPOSED_KEY)
+    random_words, after_random = read_description_and_effects(RANDOM_KEY)
     return FollowUp(
-        start.number, start.names[0], start.returned, proposed_words, after_proposed, random_words, after_random
+        undecided_case.number,
+        undecided_case.names[0],
+        undecided_case.returned,
+        proposed_words,
+        after_proposed,
+        random_words,
+        after_random,
     )

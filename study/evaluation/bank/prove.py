@@ -1,7 +1,7 @@
-"""Runs a bank of concealed effects, a blind test of the diagnosis (`hapteq prove`).
+"""Run a blind test of the diagnosis: a bank of simulated cases with concealed effects (`hapteq prove`).
 
 Order: draw and seal the cases, diagnose them in separate processes without access to the truth, reveal and pair labels
-with answers, follow up undecided cases, run the controls, score.
+with answers, follow up undecided cases, run the controls, score. Called by `study.cli.prove`.
 """
 
 from collections.abc import Mapping
@@ -36,8 +36,8 @@ from study.evaluation.bank.sealed_bank import (
 )
 
 
-def outcome_of(label: dict[str, Any], answer: dict[str, Any]) -> Outcome:
-    """The outcome of a case from its revealed label and the answer of the diagnosis."""
+def make_outcome(label: dict[str, Any], answer: dict[str, Any]) -> Outcome:
+    """Make the outcome of a case. label: its revealed label (JSON document); answer: that of the diagnosis."""
     concealed = tuple(
         ConcealedEffect(truth["effect"], truth["place"], truth["axis"], {**truth["values"], **truth["unseen"]})
         for truth in label["truth"]
@@ -51,8 +51,8 @@ def outcome_of(label: dict[str, Any], answer: dict[str, Any]) -> Outcome:
     )
 
 
-CONTROL_TURNS = 3
-"""Repetitions of all controls, each with its own seed."""
+CONTROL_REPETITIONS = 3
+"""Number of repetitions of all controls, with the seeds plan.seed, plan.seed + 1, … Chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,19 +73,20 @@ class BlindTest:
     follow_ups: tuple[FollowUp, ...]
     """Cases that were followed up by further experiments."""
     omitted_cases: int
-    """Number of cases of the second physics engine, where it is not installed; else 0."""
+    """Number of cases that were not drawn, because the second physics engine is not installed; else 0."""
 
 
 def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress) -> BlindTest:
-    """Run the bank in the folder `path`, or continue it after an interruption. on_progress: called with the step, the
-    number done and the total. Raises StudyError."""
+    """Run the bank in the folder `path`, or continue it after an interruption. on_progress: called with the name of the
+    step, the number done and the total. Raises StudyError where the folder belongs to another bank, a sealed file has
+    changed, or the run is interrupted."""
     folder = open_proof_folder(path, plan.seed, plan.brief)
     numbers = [case_draw.number for case_draw in list_drawable_cases(plan)]
     with convert_interrupts("The bank is not finished.", f"All that is sealed and answered so far is in {path}."):
         seal = seal_cases(folder, plan, options.workers, lambda done: on_progress("sealing", done, len(numbers)))
         names = read_case_names(folder, numbers)
         _answer_cases(folder, plan, options, dict(zip(names, numbers, strict=True)), on_progress)
-        outcomes = reveal_bank(folder, plan.cases, outcome_of)
+        outcomes = reveal_bank(folder, plan.cases, make_outcome)
         follow_ups = follow_up(
             folder, plan, outcomes, (options.answering, options.keep), partial(on_progress, "following up")
         )
@@ -97,7 +98,7 @@ def prove(path: Path, plan: BankPlan, options: BankOptions, on_progress: Progres
 
 
 def _collect_other_digests(path: Path) -> tuple[str, ...]:
-    """Digests of the code that answered follow-ups and controls."""
+    """Collect the digests of the code that answered follow-ups and controls, sorted, each once."""
     folders = [
         ProofFolder(path / FOLLOW_UP_FOLDER),
         *(ProofFolder(control_folder) for control_folder in sorted(path.glob("controls/*"))),
@@ -113,7 +114,7 @@ def _collect_other_digests(path: Path) -> tuple[str, ...]:
 def _answer_cases(
     folder: ProofFolder, plan: BankPlan, options: BankOptions, numbers: Mapping[str, int], on_progress: Progress
 ) -> None:
-    """Diagnose the open cases without an answer; a deleted recording is drawn again. numbers: case number by name."""
+    """Diagnose the cases that have no answer yet; a deleted recording is drawn again. numbers: case number by name."""
     for name, number in numbers.items():
         if not is_answered(folder.open / name) and not (folder.open / name / RECORDING_FILE).exists():
             redraw_recording(folder.open / name, plan, read_label(folder.get_label_file(number)))
@@ -123,9 +124,9 @@ def _answer_cases(
 def _run_all_controls(
     path: Path, plan: BankPlan, options: BankOptions, on_progress: Progress
 ) -> tuple[ControlOutcome, ...]:
-    """Outcomes of the controls, `CONTROL_TURNS` times, where the options request them."""
+    """Run the controls `CONTROL_REPETITIONS` times; empty where the options do not request them."""
     outcomes: tuple[ControlOutcome, ...] = ()
-    for seed in range(plan.seed, plan.seed + CONTROL_TURNS) if options.controls else ():
+    for seed in range(plan.seed, plan.seed + CONTROL_REPETITIONS) if options.controls else ():
         control_folder = path / "controls" / str(seed)
         outcomes += run_controls(control_folder, seed, options.answering, partial(on_progress, "controls"))
     return outcomes

@@ -36,7 +36,7 @@ from study.evaluation.real.real_folder import RealRecording
 from study.importing.build_recording import build_recording
 from study.importing.map_library import FoundMap
 from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, make_not_diagnosable_error
-from study.workflows.diagnosis.fit_without_model import first_model_of, fit_linear_model
+from study.workflows.diagnosis.fit_without_model import fit_first_model, fit_linear_model
 from study.workflows.forked_map import map_forked
 
 
@@ -176,7 +176,7 @@ def _choose_model(
             return FirstModel(
                 *fit_linear_model(diagnosis_input, lambda share: on_progress("fitting a linear model", 0.1 * share))
             )
-        return first_model_of(diagnosis_input, (), bounds, lambda step, share: on_progress(step, 0.1 * share))
+        return fit_first_model(diagnosis_input, (), bounds, lambda step, share: on_progress(step, 0.1 * share))
     try:
         require_model_of(given_model, (recording,))
     except NothingToDiagnose as refusal:

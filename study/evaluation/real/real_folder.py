@@ -11,7 +11,7 @@ from pathlib import Path
 from analysis.reports.real_report import UnusableInput
 from equalizer.plant.mechanical_model import MechanicalModel
 from study.errors import StudyError
-from study.importing.map_library import FoundMap, find_map, map_by_header
+from study.importing.map_library import FoundMap, find_maps_for_folder, make_map_from_headers
 from study.importing.model_library import model_for
 from study.store.formats.mechanical_model_file import read_mechanical_model
 
@@ -92,7 +92,9 @@ def read_real_folder(folder: Path) -> RealFolder:
     troubles: list[UnusableInput] = []
     for subfolder in subfolders or [folder]:
         try:
-            new_recordings = _select_recordings(subfolder, find_map(subfolder) or (map_by_header(subfolder),))
+            new_recordings = _select_recordings(
+                subfolder, find_maps_for_folder(subfolder) or (make_map_from_headers(subfolder),)
+            )
         except (StudyError, OSError) as problem:
             troubles.append(UnusableInput(subfolder.name, _describe_problem(problem)))
             continue

@@ -33,7 +33,7 @@ from study.evaluation.real.reuse_answers import (
     gather_answer_provenance,
     locate_answer_folder,
 )
-from study.evaluation.real.write_real import PAGE_NAME, RealResults, WrittenReal, write_real
+from study.evaluation.real.write_real import PAGE_NAME, RealResults, WrittenReal, write_real_results
 from study.local_clock import convert_to_machine_zone
 from study.session.views.local_time import format_time_in_zone
 from study.store.disk.file_errors import CannotWriteError
@@ -105,7 +105,7 @@ def diagnose_folder(
             answers = _diagnose_on_executor(plan, real_folder, reused, on_progress, executor)
         injected = _inject_faults(plan, real_folder, answers, on_progress, executor or 2)
         on_progress("writing the page", 0.98)
-        return write_real(
+        return write_real_results(
             plan.out,
             RealResults(answers, real_folder.troubles, injected),
             format_time_in_zone(used_clock.utc(), convert_to_machine_zone),

@@ -30,13 +30,13 @@ class _EarlierAnswer:
 
 
 def locate_answer_folder(out: Path, real_recording: RealRecording) -> Path:
-    """Folder with the results of one recording, in the output folder `out`."""
+    """Return the folder with the results of one recording, in the output folder `out`."""
     return out / real_recording.folder.name / real_recording.name
 
 
 def gather_answer_provenance(real_recording: RealRecording, seconds: float | None) -> Provenance:
-    """Provenance of an answer: hashes of all input files, and settings, on which it depends. seconds: of --seconds;
-    None if left out. Raises CannotReadError."""
+    """Gather the provenance of an answer: SHA-256 of all input files, and settings, on which it depends. seconds: time
+    limit of a diagnosis (--seconds); None if left out. Raises CannotReadError where an input cannot be read."""
     input_files = tuple(dict.fromkeys((*real_recording.parents, *real_recording.tested_on)))
     return gather_provenance(parents=input_files, settings={"seconds": seconds})
 
@@ -44,19 +44,26 @@ def gather_answer_provenance(real_recording: RealRecording, seconds: float | Non
 def find_reusable_answers(
     out: Path, recordings: Sequence[RealRecording], seconds: float | None
 ) -> dict[Path, RealAnswer]:
-    """Earlier answers by the folder of their results; nothing is written. Raises StudyError where an answer is damaged
-    or was given for other inputs or settings."""
-    answered = [recording for recording in recordings if (locate_answer_folder(out, recording) / ANSWER_NAME).is_file()]
-    earlier = [_read_earlier_answer(locate_answer_folder(out, recording), recording, seconds) for recording in answered]
-    if outdated := [answer for answer in earlier if answer.changes]:
-        raise _make_inputs_changed_error(out, outdated)
-    return {answer.folder: answer.answer for answer in earlier}
+    """Find earlier answers, by the folder of their results; nothing is written. seconds: as in
+    `gather_answer_provenance`. Raises StudyError where an answer is damaged or was given for other inputs or settings,
+    and CannotReadError where an input cannot be read."""
+    answered_recordings = [
+        recording for recording in recordings if (locate_answer_folder(out, recording) / ANSWER_NAME).is_file()
+    ]
+    earlier_answers = [
+        _read_earlier_answer(locate_answer_folder(out, recording), recording, seconds)
+        for recording in answered_recordings
+    ]
+    if outdated_answers := [answer for answer in earlier_answers if answer.changes]:
+        raise _make_inputs_changed_error(out, outdated_answers)
+    return {answer.folder: answer.answer for answer in earlier_answers}
 
 
 def _read_earlier_answer(folder: Path, real_recording: RealRecording, seconds: float | None) -> _EarlierAnswer:
-    """The answer in a folder of results, with its changes. Raises StudyError where it is damaged."""
+    """Read the answer in a folder of results, and compare its inputs and settings with the present ones. Raises
+    StudyError where it is damaged."""
     try:
-        answer, origin = read_answer_and_provenance(folder / ANSWER_NAME)
+        answer, stored_provenance = read_answer_and_provenance(folder / ANSWER_NAME)
     except StudyError as error:
         raise StudyError(
             f"{real_recording.folder.name}/{real_recording.name}/{error.title}",
@@ -64,33 +71,39 @@ def _read_earlier_answer(folder: Path, real_recording: RealRecording, seconds: f
             f"Move {folder} away to diagnose it again, or choose another --out.",
             saved="Nothing was written.",
         ) from error
-    current_origin = gather_answer_provenance(real_recording, seconds)
-    files = {(parent.file, parent.sha256) for parent in current_origin.parents}
+    current_provenance = gather_answer_provenance(real_recording, seconds)
+    current_files = {(parent.file, parent.sha256) for parent in current_provenance.parents}
     return _EarlierAnswer(
-        folder, answer, (*_compare_files(_read_parents(origin), files), *_compare_settings(origin, seconds))
+        folder,
+        answer,
+        (
+            *_compare_files(_read_parents(stored_provenance), current_files),
+            *_compare_settings(stored_provenance, seconds),
+        ),
     )
 
 
-def _read_parents(origin: Mapping[str, Any]) -> set[tuple[str, str]]:
-    """(name, SHA-256) of all input files in a stored provenance."""
-    stored = origin.get("parents")
+def _read_parents(provenance: Mapping[str, Any]) -> set[tuple[str, str]]:
+    """Read (name, SHA-256) of all input files from a stored provenance; empty where it lists none."""
+    stored = provenance.get("parents")
     parents = stored if isinstance(stored, list) else []
     return {(str(parent.get("file")), str(parent.get("sha256"))) for parent in parents if isinstance(parent, dict)}
 
 
-def _compare_files(earlier: set[tuple[str, str]], current: set[tuple[str, str]]) -> Iterator[str]:
-    """Clauses about input files that were added, changed or removed. earlier, current: sets of (name, SHA-256)."""
-    earlier_names, current_names = ({name for name, _ in files} for files in (earlier, current))
-    for name in sorted({name for name, _ in earlier ^ current}):
+def _compare_files(earlier_files: set[tuple[str, str]], current_files: set[tuple[str, str]]) -> Iterator[str]:
+    """Yield a clause for each input file that was added, changed or removed. earlier_files, current_files: (name,
+    SHA-256)."""
+    earlier_names, current_names = ({name for name, _ in files} for files in (earlier_files, current_files))
+    for name in sorted({name for name, _ in earlier_files ^ current_files}):
         if name not in earlier_names:
             yield f"{name} is not among its recorded inputs"
         else:
             yield f"{name} has changed" if name in current_names else f"{name} is gone"
 
 
-def _compare_settings(origin: Mapping[str, Any], seconds: float | None) -> Iterator[str]:
-    """A clause where --seconds, the only setting, has changed or was not recorded."""
-    settings = origin.get("settings")
+def _compare_settings(provenance: Mapping[str, Any], seconds: float | None) -> Iterator[str]:
+    """Yield a clause where --seconds, the only setting, has changed or was not recorded."""
+    settings = provenance.get("settings")
     earlier_s = settings.get("seconds", "") if isinstance(settings, dict) else ""
     if not isinstance(earlier_s, int | float | None):
         yield "its --seconds is not recorded"
@@ -99,12 +112,12 @@ def _compare_settings(origin: Mapping[str, Any], seconds: float | None) -> Itera
 
 
 def _format_seconds(limit_s: float | None) -> str:
-    """Text of a value of --seconds."""
+    """Format a value of --seconds; "left out" for None."""
     return "left out" if limit_s is None else f"{limit_s:g}"
 
 
 def _make_inputs_changed_error(out: Path, outdated: Sequence[_EarlierAnswer]) -> StudyError:
-    """The error that lists the changes of all outdated answers, and what to move away."""
+    """Make the error that lists the changes of all outdated answers, and the folders to move away."""
     change_texts = (
         f"{answer.folder.relative_to(out) / ANSWER_NAME}: {', '.join(answer.changes)}." for answer in outdated
     )

@@ -1,5 +1,5 @@
 """Write the results of `hapteq real`, the diagnosis of a folder of recordings of real devices: an HTML page, tables
-(CSV) and figures."""
+(CSV) and figures. Called by `real_recordings`."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +14,12 @@ from study.store.disk.provenance import gather_provenance
 from study.store.disk.text_file import write_text
 from study.workflows.picture_files import write_pictures
 
-PAGE_NAME, TABLE_NAME, INJECTED_NAME, FIGURES_NAME = "report.html", "recordings.csv", "injected.csv", "figures"
+PAGE_NAME, TABLE_NAME, INJECTED_TABLE_NAME, FIGURES_FOLDER_NAME = (
+    "report.html",
+    "recordings.csv",
+    "injected.csv",
+    "figures",
+)
 """Names in the folder for the results: page, table of recordings, table of injected faults, folder of figures."""
 
 
@@ -82,29 +87,31 @@ class WrittenReal:
     table: Path
 
 
-def write_real(folder: Path, results: RealResults, generated: str) -> WrittenReal:
-    """Write page, tables and figures, replacing earlier ones. generated: time shown on the page. Raises
-    CannotWriteError."""
+def write_real_results(folder: Path, results: RealResults, generated: str) -> WrittenReal:
+    """Write page, tables and figures into folder, replacing earlier ones; without injected faults, an earlier table of
+    them is deleted. generated: date and time shown on the page. Raises CannotWriteError."""
     answers = results.answers
     pictures = {(answer.folder, answer.recording): make_real_picture(answer) for answer in answers}
-    write_pictures(folder / FIGURES_NAME, tuple(pictures.values()))
+    write_pictures(folder / FIGURES_FOLDER_NAME, tuple(pictures.values()))
     write_text(
         folder / TABLE_NAME, format_csv_table([_make_row(answer) for answer in answers], RealRow), overwrite=True
     )
-    origin = gather_provenance()
-    origin_texts = {
-        "command": " ".join(origin.command),
-        "versions": ", ".join(f"{name} {version}" for name, version in origin.versions.items()),
+    provenance = gather_provenance()
+    provenance_texts = {
+        "command": " ".join(provenance.command),
+        "versions": ", ".join(f"{name} {version}" for name, version in provenance.versions.items()),
     }
     if results.injected:
         write_text(
-            folder / INJECTED_NAME,
+            folder / INJECTED_TABLE_NAME,
             format_csv_table([_make_injection_row(outcome) for outcome in results.injected], InjectedRow),
             overwrite=True,
         )
     else:
-        _remove_stale(folder / INJECTED_NAME)
-    page = render_real_report(results.answers, results.troubles, results.injected, pictures, origin_texts, generated)
+        _remove_stale(folder / INJECTED_TABLE_NAME)
+    page = render_real_report(
+        results.answers, results.troubles, results.injected, pictures, provenance_texts, generated
+    )
     write_text(folder / PAGE_NAME, page, overwrite=True)
     return WrittenReal(results, folder / PAGE_NAME, folder / TABLE_NAME)
 
@@ -113,26 +120,26 @@ def _remove_stale(path: Path) -> None:
     """Delete a table of an earlier run, if any. Raises CannotWriteError."""
     try:
         path.unlink(missing_ok=True)
-    except OSError as problem:
-        raise CannotWriteError(path, problem) from problem
+    except OSError as error:
+        raise CannotWriteError(path, error) from error
 
 
 def _make_row(real_answer: RealAnswer) -> RealRow:
-    """The row of a recording; its errors are empty without held-out data."""
+    """Make the row of a recording; its errors are None without held-out data."""
     errors = real_answer.held_out
-    given_error, retuned_error, error_with_effects, noise_error = (
+    error_as_given, error_retuned, error_with_effects, noise_floor = (
         (None, None, None, None) if errors is None else (errors.before, errors.retuned, errors.after, errors.noise)
     )
     effects = " ".join(real_answer.effects)
     return RealRow(
         real_answer.folder, real_answer.recording, real_answer.verdict, effects, real_answer.error,
-        given_error, retuned_error, error_with_effects, real_answer.black_box, noise_error, real_answer.seconds,
+        error_as_given, error_retuned, error_with_effects, real_answer.black_box, noise_floor, real_answer.seconds,
         " ".join(candidate.effect for candidate in real_answer.candidates),
     )  # fmt: skip
 
 
 def _make_injection_row(outcome: InjectedOutcome) -> InjectedRow:
-    """The row of an injected fault; "nothing" for the intact recording."""
+    """Make the row of an injected fault; `injected` is "nothing" for the intact recording."""
     values = " ".join(f"{name}={value:.6g}" for name, value in outcome.values.items())
     return InjectedRow(
         outcome.recording, outcome.injected or "nothing", outcome.strength, values, outcome.change,

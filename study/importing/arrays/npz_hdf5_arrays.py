@@ -19,6 +19,7 @@ from study.store.disk.hdf5_contents import iterate_datasets
 from study.store.disk.hdf5_file import open_any_hdf5
 
 Array = npt.NDArray[Any]
+"""Array of any type and shape."""
 _COMPRESSIONS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """Compressions that numpy.savez and numpy.savez_compressed write; no other one is read."""
 _CELL_DESCRIPTION = "a cell, which is read where the file was saved with -v7"
@@ -28,9 +29,9 @@ _NON_NUMERIC = np.array(None, dtype=object)
 
 
 def read_npz_arrays(path: Path) -> dict[str, Array]:
-    """Read arrays by name; that of an NPY file is called `data`. The content decides which of both formats it is.
-    Raises OSError, ValueError, DeclaredSizeError, and for a damaged file another exception of
-    `file_errors.DAMAGE_ERRORS`."""
+    """Read the arrays of an NPZ or NPY file by name; that of an NPY file is called `data`. The first bytes decide which
+    format it is; arrays of Python objects are left out. Raises OSError where it cannot be opened, ValueError or another
+    exception of `file_errors.DAMAGE_ERRORS` where it is damaged, DeclaredSizeError where it is too large."""
     with open_regular(path) as file:
         limit = SizeLimit(path.stat().st_size)
         if file.peek(6)[:6] == b"\x93NUMPY":
@@ -41,8 +42,8 @@ def read_npz_arrays(path: Path) -> dict[str, Array]:
 
 
 def _read_members(archive: zipfile.ZipFile, limit: SizeLimit) -> dict[str, Array]:
-    """Read the members of an archive that end in .npy, except Python objects. Raises ValueError for a compression that
-    numpy does not write, and as `_read_npy`."""
+    """Read the members of an archive whose names end in .npy, except Python objects. Raises ValueError for a
+    compression that numpy does not write, and as `_read_npy`."""
     arrays: dict[str, Array] = {}
     for member in archive.infolist():
         if not member.filename.endswith(".npy"):
@@ -58,8 +59,9 @@ def _read_members(archive: zipfile.ZipFile, limit: SizeLimit) -> dict[str, Array
 
 
 def _read_npy(file: Any, container_bytes: int, limit: SizeLimit, name: str) -> Array | None:
-    """Read one array; None for Python objects. container_bytes: size of the unpacked member or file. Raises ValueError
-    where the declared shape does not fit or the data end early, DeclaredSizeError where it is too large."""
+    """Read one array; None for Python objects. container_bytes: size of the unpacked member or file. name: for
+    messages. Raises ValueError where the declared shape needs more bytes or the data end early, DeclaredSizeError where
+    it is too large."""
     shape, fortran_order, dtype = _read_header(file)
     if dtype.hasobject:
         return None
@@ -89,20 +91,21 @@ def _read_header(file: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
 def read_hdf5_arrays(path: Path, *, transposed: bool) -> dict[str, Array]:
     """Read datasets by path, as in `run1/force`. transposed: a file of Matlab 7.3, whose dimensions are reversed; names
     then have dots in place of slashes. Texts, cells and objects are replaced by placeholders, except one-dimensional
-    arrays of texts, which may be dates. Raises UnusableFileError."""
+    arrays of texts, which may be dates. Left out are datasets without a shape, other types such as compound ones, and
+    names that begin with "#" (internal to Matlab). Raises UnusableFileError where the file cannot be read."""
     arrays: dict[str, Array] = {}
     with open_any_hdf5(path, "HDF5 file") as file:
         for name, entry in iterate_datasets(file):
             if name.startswith("#") or entry.shape is None:
                 continue
-            kind = entry.attrs.get("MATLAB_class", b"")
-            if kind == b"cell" or "MATLAB_object_decode" in entry.attrs:
-                kind_text = (
-                    f"an object of the class {kind.decode('utf-8', 'replace')}"
-                    if kind != b"cell"
+            matlab_class = entry.attrs.get("MATLAB_class", b"")
+            if matlab_class == b"cell" or "MATLAB_object_decode" in entry.attrs:
+                placeholder_text = (
+                    f"an object of the class {matlab_class.decode('utf-8', 'replace')}"
+                    if matlab_class != b"cell"
                     else _CELL_DESCRIPTION
                 )
-                values = np.array(kind_text, dtype=object)
+                values = np.array(placeholder_text, dtype=object)
             elif entry.dtype.kind in "fiub":
                 values = np.asarray(entry[()])
             elif h5py.check_string_dtype(entry.dtype) is not None and entry.ndim == 1 and len(entry):

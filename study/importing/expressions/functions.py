@@ -1,7 +1,8 @@
 """Functions that expressions of a map may call, such as `derivative(x)` and `clip(x, lowest, highest)`.
 
-`FUNCTIONS` lists them with their usage and meaning; `expression` calls them. Functions of time take the times of the
-samples from a `Clock`.
+`FUNCTIONS` lists them with their usage and meaning; `expression` calls them, and `importing_docs` documents them.
+Functions of time take the times of the samples from a `Clock`. Errors of numpy, for example for shapes that do not
+match or fewer than two samples of a derivative, are passed on to `expression`.
 """
 
 from collections.abc import Callable
@@ -12,21 +13,21 @@ import numpy as np
 import numpy.typing as npt
 
 Value = npt.NDArray[np.float64]
-"""Value of an expression: an array, or a number as an array without dimension."""
+"""Value of an expression: an array, or a number as an array of no dimensions."""
 
 
 class Clock(Protocol):
     """Times of the samples that an expression works on."""
 
     def times_s(self, count: int) -> Value:
-        """(count,): times of the samples (s). Raises ValueError if this clock does not know them."""
+        """(count,): times of the samples (s). Raises ValueError where the times of so many samples are not defined."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """A function that expressions may call, with its least and largest number of arguments. usage and meaning: texts
-    for the documentation."""
+    """A function that expressions may call, with its least and largest number of arguments, the clock not counted.
+    usage and meaning: texts for the documentation."""
 
     usage: str
     meaning: str
@@ -36,46 +37,46 @@ class Function:
     """Arguments: the clock, then the values."""
 
 
-def _make_time_independent(usage: str, meaning: str, function: Callable[..., Any], count: int = 1) -> Function:
-    """Make a function that does not depend on time and has a fixed number (`count`) of arguments."""
-    return Function(usage, meaning, count, count, lambda clock, *values: function(*values))
+def _make_time_independent(usage: str, meaning: str, function: Callable[..., Any], argument_count: int = 1) -> Function:
+    """Make a function that does not depend on time and has a fixed number (`argument_count`) of arguments."""
+    return Function(usage, meaning, argument_count, argument_count, lambda clock, *values: function(*values))
 
 
 def _require_vector(values: Value) -> Value:
-    """Return the array. Raises ValueError unless it has one dimension."""
+    """Return the array unchanged. Raises ValueError unless it has one dimension."""
     if np.ndim(values) != 1:
         raise ValueError(f"it needs an array of one dimension, not of shape {np.shape(values)}")
     return values
 
 
 def _compute_differences(values: Value) -> Value:
-    """Differences of neighbouring samples (n,); the first is 0."""
+    """Compute the difference of each sample (n,) from the previous one; the first is 0."""
     return np.diff(_require_vector(values), prepend=values[:1])
 
 
 def _compute_derivative(clock: Clock, values: Value) -> Value:
-    """Derivative (n,) per second, by central differences; one-sided at the ends."""
+    """Compute the derivative (n,), n >= 2, per second, by central differences; one-sided at the ends."""
     derivative: Value = np.gradient(_require_vector(values), clock.times_s(len(values)))
     return derivative
 
 
 def _compute_integral(clock: Clock, values: Value) -> Value:
-    """Integral (n,) over seconds from the first sample, by the trapezoidal rule."""
-    steps = np.diff(clock.times_s(len(_require_vector(values))))
-    return np.concatenate([[0.0], np.cumsum(steps * (values[1:] + values[:-1]) / 2)])
+    """Compute the integral (n,), n >= 1, over time in s from the first sample, by the trapezoidal rule."""
+    intervals_s = np.diff(clock.times_s(len(_require_vector(values))))
+    return np.concatenate([[0.0], np.cumsum(intervals_s * (values[1:] + values[:-1]) / 2)])
 
 
 def _find_onset(clock: Clock, values: Value, threshold: Value) -> int:
-    """Index of the first sample that differs from the mean of the first ten by more than the threshold. Raises
-    ValueError without such a sample."""
+    """Find the index of the first sample whose difference from the mean of the first ten exceeds the threshold in
+    magnitude. Raises ValueError without such a sample, also where one of the ten is NaN."""
     exceeds_threshold = np.abs(_require_vector(values) - np.mean(values[:10])) > float(threshold)
     if not exceeds_threshold.any():
         raise ValueError(f"nothing leaves the mean of the first ten samples by more than {float(threshold):g}")
     return int(np.argmax(exceeds_threshold))
 
 
-def _repeat(values: Value, repetitions: Value) -> Value:
-    """The array (n,), repeated in sequence `repetitions` times."""
+def _repeat_in_sequence(values: Value, repetitions: Value) -> Value:
+    """Repeat an array (n,) in sequence; `repetitions` is truncated to an integer."""
     return np.tile(_require_vector(values), int(repetitions))
 
 
@@ -114,8 +115,8 @@ FUNCTIONS: dict[str, Function] = {
         2,
         _find_onset,
     ),
-    "repeat": _make_time_independent("repeat(x, times)", "x repeated in sequence", _repeat, 2),
+    "repeat": _make_time_independent("repeat(x, times)", "x repeated in sequence", _repeat_in_sequence, 2),
     "flatten": _make_time_independent("flatten(x)", "the rows of a table in sequence", np.ravel),
     "transpose": _make_time_independent("transpose(x)", "rows as columns", np.transpose),
 }
-"""Functions by name. `array("NAME")`, for names that are not identifiers, is evaluated in `expression`."""
+"""Functions by name. `array("NAME")`, for names of arrays that are not identifiers, is evaluated in `expression`."""

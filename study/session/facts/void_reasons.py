@@ -1,8 +1,9 @@
-"""Texts of the reasons for which a trial is void or remarked on, as logged and shown, and sentences made of them.
+"""Reasons for which a trial is void or remarked on: the texts that are logged and shown, and sentences made of them.
 
 Most of these trials are void because the computer was too busy, which delays the 1 kHz control loop or the screen; they
-are repeated. `is_computer_busy` recognises this cause by the text of the logged reason, so that the texts must not
-change. Used by `judge_trial` and `present_trial` (to log), by the screens and by the alarms of `hapteq watch`.
+are repeated. `is_computer_busy` recognises this cause by the text of the logged reason; therefore the texts must not
+change. Used where trials are judged (`judge_trial`, `present_trial`, `timing_verdict`), where a sitting ends
+(`run_session`, `end_sitting`), by the screens and by the alarms of `hapteq watch`.
 """
 
 SCREEN_UNRESPONSIVE = "the screen gave no sign of life"
@@ -12,13 +13,15 @@ SCREEN_DELAYED_BY_LOAD = f"{SCREEN_UNRESPONSIVE}: the computer was too busy"
 PROGRAM_STALLED = "the program gave no sign of life, so the force was faded out"
 """The process of the session did not reset the device's watchdog within its time limit `watchdog_s`."""
 TICKS_MISSED = "of the 1 kHz ticks were missed"
+"""End of the reason, which begins with the share of missed ticks of the control loop in percent."""
 TICKS_LATE = "of the 1 kHz ticks were late or missed"
+"""End of the reason, which begins with the share of late or missed ticks in percent."""
 LATEST_TICK_LATE = "late was the latest 1 kHz tick"
-"""Ends of the reasons for missed or late ticks of the control loop. The logged reason begins with the share in percent,
-for `LATEST_TICK_LATE` with the delay in ms."""
+"""End of the reason, which begins with the delay of the latest tick in ms."""
 
 ACCELERATION_MISSING = "of the acceleration is missing"
-"""End of the reason, which begins with the missing share: packets of the accelerometer were lost or corrupted."""
+"""End of the reason, which begins with the missing share in percent: packets of the accelerometer were lost or
+corrupted."""
 
 TOO_LITTLE_MOTION = "less motion arrived than any hand leaves of the force"
 """Remark on a trial that counts: the measured motion is less than the stimulus force causes with any impedance of the
@@ -28,12 +31,13 @@ LOAD_PER_PROCESSOR = 0.75
 """Load average per processor above which tasks often have to wait for a processor. Chosen by hand."""
 
 ENGINE_LATE_S = 0.1
-"""A delay of the engine's own wake-up (s) that shows a busy computer: more than twice the polling interval."""
+"""Least delay (s) of a wake-up of the session process that shows a busy computer. Chosen: 2.5 times the interval of
+40 ms at which it polls the screen."""
 
 
 def explain_silent_screen(engine_late_s: float, load_per_processor: float | None) -> str:
-    """Return the reason to log where the screen process did not respond. engine_late_s: delay of the engine's own
-    wake-up (s); load_per_processor: load average per processor, None if unknown."""
+    """Return the reason to log where the screen process did not respond. engine_late_s: longest delay (s) of a wake-up
+    of the session process; load_per_processor: load average per processor, None if unknown."""
     is_loaded = load_per_processor is not None and load_per_processor > LOAD_PER_PROCESSOR
     return SCREEN_DELAYED_BY_LOAD if is_loaded or engine_late_s >= ENGINE_LATE_S else SCREEN_UNRESPONSIVE
 
@@ -46,7 +50,7 @@ def is_computer_busy(reason: str) -> bool:
 
 
 TOO_BUSY = "the computer is too busy"
-"""Beginning of the reason for ending a sitting whose void trials the computer caused."""
+"""Beginning of the reason for ending a sitting in which a busy computer caused all the last void trials."""
 
 
 def explain_many_voids(reasons: tuple[str, ...]) -> str:

@@ -4,8 +4,8 @@ realisation.
     rest | fade in and settling | evaluated part | fade out | rest
 
 An analysis uses only the evaluated part: whole periods at constant amplitude (the first period of a sweep contains its
-transient). Each piece is played by itself (`workflows/recording/play_pieces`), and again with less force where the
-accelerometer clipped (`RecordingPiece.at`).
+transient). `workflows.recording.record_device` makes the pieces; `workflows.recording.play_pieces` plays each
+separately, and again with less force where the accelerometer clipped (`RecordingPiece.scale_to`).
 """
 
 from dataclasses import dataclass, replace
@@ -44,7 +44,7 @@ class RecordingPiece:
     """Number of the realisation of a multisine's phases, from 1."""
 
     def scale_to(self, amplitude_n: float) -> "RecordingPiece":
-        """The same excitation, scaled to another peak (N)."""
+        """Scale the excitation to another peak (N)."""
         samples = self.commands.samples * (amplitude_n / self.segment.amplitude)
         return replace(
             self,
@@ -54,14 +54,15 @@ class RecordingPiece:
 
 
 def make_pieces(protocol: RecordingProtocol, sample_rate_hz: float) -> tuple[RecordingPiece, ...]:
-    """All pieces in the order of the protocol's segments, the whole sequence as often as the protocol repeats it.
+    """Make all pieces in the order of the protocol's segments, the whole sequence as often as the protocol repeats it.
     sample_rate_hz: sample rate of the device."""
     sequence: list[RecordingPiece] = []
     for number, segment in enumerate(protocol.segments, start=1):
         match segment:
             case SineSegment():
                 sequence += [
-                    _make_sine_piece(protocol, number, segment, f, sample_rate_hz) for f in segment.frequencies_hz
+                    _make_sine_piece(protocol, number, segment, frequency_hz, sample_rate_hz)
+                    for frequency_hz in segment.frequencies_hz
                 ]
             case SweepSegment():
                 sequence.append(_make_sweep_piece(protocol, number, segment, sample_rate_hz))
@@ -71,7 +72,7 @@ def make_pieces(protocol: RecordingProtocol, sample_rate_hz: float) -> tuple[Rec
 
 
 def make_unit_vector(directions: TestDirections, axis_name: str) -> FloatArray:
-    """Unit vector (3,) of a device axis or of a test direction."""
+    """Make the unit vector, (3,), of a device axis (x, y, z) or of a test direction (direction_1, direction_2)."""
     if axis_name in ("x", "y", "z"):
         axis: FloatArray = np.eye(3)["xyz".index(axis_name)]
         return axis
@@ -81,21 +82,24 @@ def make_unit_vector(directions: TestDirections, axis_name: str) -> FloatArray:
 def _make_sine_piece(
     protocol: RecordingProtocol, number: int, segment: SineSegment, frequency_hz: float, rate_hz: float
 ) -> RecordingPiece:
-    """A sinusoid. The evaluated part is a whole number of loops of whole periods; settling and fades lie outside."""
-    period = count_loop_samples(frequency_hz, rate_hz)
+    """Make the piece of a sinusoid. The evaluated part is a whole number, at least one, of loops: the shortest whole
+    periods that are a whole number of samples (`count_loop_samples`). Settling and fades lie outside."""
+    period_samples = count_loop_samples(frequency_hz, rate_hz)
     fade_samples = round(protocol.fade_s * rate_hz)
     settle_samples = max(fade_samples, round(segment.settle_s * rate_hz))
-    evaluated_samples = max(1, round(segment.duration_s * rate_hz) // period) * period
+    evaluated_samples = max(1, round(segment.duration_s * rate_hz) // period_samples) * period_samples
     wave = make_sine(frequency_hz, segment.amplitude_n, settle_samples + evaluated_samples + fade_samples, rate_hz)
-    vector = make_unit_vector(protocol.directions, segment.along)
-    commands, shift = _add_rests(protocol, apply_fades(wave, fade_samples, fade_samples)[:, None] * vector, rate_hz)
-    start = shift + settle_samples
+    unit_vector = make_unit_vector(protocol.directions, segment.along)
+    commands, rest_samples = _add_rests(
+        protocol, apply_fades(wave, fade_samples, fade_samples)[:, None] * unit_vector, rate_hz
+    )
+    start = rest_samples + settle_samples
     return RecordingPiece(
         commands=commands,
-        segment=Segment(start, start + evaluated_samples, "sine", segment.amplitude_n, period, segment.role),
+        segment=Segment(start, start + evaluated_samples, "sine", segment.amplitude_n, period_samples, segment.role),
         number=number,
         direction_name=segment.along,
-        unit_vector=_to_tuple(vector),
+        unit_vector=_to_tuple(unit_vector),
         frequency_hz=frequency_hz,
     )
 
@@ -103,21 +107,23 @@ def _make_sine_piece(
 def _make_sweep_piece(
     protocol: RecordingProtocol, number: int, segment: SweepSegment, rate_hz: float
 ) -> RecordingPiece:
-    """A sweep. With several periods it is faded in during the first, which contains the transient; every period ends at
-    zero, so that no fade-out is needed."""
-    period = round(segment.duration_s * rate_hz)
+    """Make the piece of a sweep. With several periods it is faded in during the first, which contains the transient;
+    every period ends at zero, so that no fade-out is needed."""
+    period_samples = round(segment.duration_s * rate_hz)
     wave = np.tile(
-        make_log_sweep(segment.from_hz, segment.to_hz, segment.amplitude_n, period, rate_hz), segment.periods
+        make_log_sweep(segment.from_hz, segment.to_hz, segment.amplitude_n, period_samples, rate_hz), segment.periods
     )
-    vector = make_unit_vector(protocol.directions, segment.along)
-    fade_in = round(protocol.fade_s * rate_hz) if segment.periods > 1 else 0
-    commands, start = _add_rests(protocol, apply_fades(wave, min(fade_in, period), 0)[:, None] * vector, rate_hz)
+    unit_vector = make_unit_vector(protocol.directions, segment.along)
+    fade_in_samples = round(protocol.fade_s * rate_hz) if segment.periods > 1 else 0
+    commands, start = _add_rests(
+        protocol, apply_fades(wave, min(fade_in_samples, period_samples), 0)[:, None] * unit_vector, rate_hz
+    )
     return RecordingPiece(
         commands=commands,
-        segment=Segment(start, start + len(wave), "sweep", segment.amplitude_n, period, segment.role),
+        segment=Segment(start, start + len(wave), "sweep", segment.amplitude_n, period_samples, segment.role),
         number=number,
         direction_name=segment.along,
-        unit_vector=_to_tuple(vector),
+        unit_vector=_to_tuple(unit_vector),
         band_hz=(segment.from_hz, segment.to_hz),
     )
 
@@ -125,27 +131,27 @@ def _make_sweep_piece(
 def _make_multisine_pieces(
     protocol: RecordingProtocol, number: int, segment: MultisineSegment, rate_hz: float
 ) -> list[RecordingPiece]:
-    """A piece for each realisation of a multisine. A multisine does not start at zero, so its fades lie outside the
-    evaluated periods."""
-    period, fade = round(segment.duration_s * rate_hz), round(protocol.fade_s * rate_hz)
-    lines = list_lines_between(segment.from_hz, segment.to_hz, period, rate_hz, odd_only=segment.odd_only)
-    vector = None if segment.along == "all" else make_unit_vector(protocol.directions, segment.along)
-    tiles = make_multisines(
-        lines, period, segment.amplitude_n, 3 if vector is None else 1, segment.realisations, segment.seed
+    """Make a piece for each realisation of a multisine. A multisine does not start at zero; therefore fades lie outside
+    the evaluated periods."""
+    period_samples, fade_samples = round(segment.duration_s * rate_hz), round(protocol.fade_s * rate_hz)
+    lines = list_lines_between(segment.from_hz, segment.to_hz, period_samples, rate_hz, odd_only=segment.odd_only)
+    unit_vector = None if segment.along == "all" else make_unit_vector(protocol.directions, segment.along)
+    period_waves = make_multisines(
+        lines, period_samples, segment.amplitude_n, 3 if unit_vector is None else 1, segment.realisations, segment.seed
     )
     pieces = []
-    for realisation, tile in enumerate(tiles, start=1):
-        wave = tile[np.arange(-fade, segment.periods * period + fade) % period]
-        forces = apply_fades(wave if vector is None else wave * vector, fade, fade)
-        commands, shift = _add_rests(protocol, forces, rate_hz)
-        start, stop = shift + fade, shift + fade + segment.periods * period
+    for realisation, period_wave in enumerate(period_waves, start=1):
+        wave = period_wave[np.arange(-fade_samples, segment.periods * period_samples + fade_samples) % period_samples]
+        forces = apply_fades(wave if unit_vector is None else wave * unit_vector, fade_samples, fade_samples)
+        commands, rest_samples = _add_rests(protocol, forces, rate_hz)
+        start, stop = rest_samples + fade_samples, rest_samples + fade_samples + segment.periods * period_samples
         pieces.append(
             RecordingPiece(
                 commands=commands,
-                segment=Segment(start, stop, "multisine", segment.amplitude_n, period, segment.role),
+                segment=Segment(start, stop, "multisine", segment.amplitude_n, period_samples, segment.role),
                 number=number,
                 direction_name=segment.along,
-                unit_vector=None if vector is None else _to_tuple(vector),
+                unit_vector=None if unit_vector is None else _to_tuple(unit_vector),
                 band_hz=(segment.from_hz, segment.to_hz),
                 realisation=realisation,
             )
@@ -154,7 +160,8 @@ def _make_multisine_pieces(
 
 
 def _add_rests(protocol: RecordingProtocol, forces: FloatArray, rate_hz: float) -> tuple[Signal, int]:
-    """Commands of a piece, and the index at which `forces`, (n, 3), begin."""
+    """Add a rest before and after `forces`, (n, 3), N. Returns the commands of the piece and the index at which the
+    forces begin."""
     rest_samples = round(protocol.rest_s * rate_hz)
     samples = np.zeros((len(forces) + 2 * rest_samples, 3))
     samples[rest_samples : rest_samples + len(forces)] = forces
@@ -162,5 +169,5 @@ def _add_rests(protocol: RecordingProtocol, forces: FloatArray, rate_hz: float) 
 
 
 def _to_tuple(vector: FloatArray) -> tuple[float, float, float]:
-    """A vector, (3,), as a tuple."""
+    """Convert a vector, (3,), to a tuple."""
     return float(vector[0]), float(vector[1]), float(vector[2])

@@ -1,6 +1,6 @@
 """Atomic writes: a file appears under its final name complete and synced to disk, or not at all.
 
-Used for result files (text, HDF5, WAV, images), so that a crash or a full disk leaves no partial file.
+Called by the writers of result files (text, HDF5, WAV, images), so that a crash or a full disk leaves no partial file.
 """
 
 import os
@@ -15,13 +15,13 @@ from study.store.disk.privacy import choose_file_mode
 def write_atomically(path: Path, content: bytes, *, overwrite: bool = False) -> None:
     """Write `content` to a temporary file in the same folder, sync it, and move it to `path`; its mode is
     `privacy.choose_file_mode`. overwrite: replace an existing file. Raises AlreadyThereError if the file exists and is
-    not to be replaced, CannotWriteError for any error of the system; the temporary file is removed then."""
+    not to be replaced, CannotWriteError for any error of the operating system; the temporary file is then removed."""
     temporary_path = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
     try:
         if path.exists() and not overwrite:
             raise AlreadyThereError(path)
-        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
-        with os.fdopen(os.open(temporary_path, flags, choose_file_mode(path.parent)), "wb") as file:
+        open_flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
+        with os.fdopen(os.open(temporary_path, open_flags, choose_file_mode(path.parent)), "wb") as file:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
@@ -36,7 +36,7 @@ def write_atomically(path: Path, content: bytes, *, overwrite: bool = False) -> 
 
 def sync_folder(folder: Path) -> None:
     """Sync the entries of a folder to the disk, so that created and renamed files survive a power failure; nothing on
-    systems that cannot open folders (Windows). Raises OSError."""
+    systems that cannot open folders (Windows). Raises OSError where the folder cannot be opened or synced."""
     if not hasattr(os, "O_DIRECTORY"):
         return
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
@@ -47,8 +47,9 @@ def sync_folder(folder: Path) -> None:
 
 
 def _move_into_place(temporary_path: Path, path: Path, overwrite: bool) -> None:
-    """Move the complete file to `path`. Without `overwrite`, raises AlreadyThereError if `path` exists; on file systems
-    without hard links, a file that another program creates between the check and the move is replaced."""
+    """Move the complete file to `path` (without `overwrite`: link it there). Without `overwrite`, raises
+    AlreadyThereError if `path` exists; on file systems without hard links, a file that another program creates between
+    the check and the move is replaced. Other errors are OSError."""
     if overwrite:
         temporary_path.replace(path)
         return

@@ -1,6 +1,7 @@
-"""Mechanical models as TOML files: mass, damping and stiffness matrices, sensor, actuator, and added effects.
+"""Read and write mechanical models as TOML files: mass, damping and stiffness matrices, sensor, actuator, effects.
 
-This module reads and writes the file and describes its keys; `equalizer.plant.mechanical_model_toml` converts the text.
+This module handles the file and describes its keys; `equalizer.plant.mechanical_model_toml` converts the text. Called
+by the workflows of diagnosis and equalization, and by the evaluation of the diagnosis.
 """
 
 from pathlib import Path
@@ -51,11 +52,12 @@ LAYOUT = (
     Entry("tolerance.modes", "number", "relative standard deviation of modal frequencies and masses", False),
     Entry("provenance.…", "anything", "versions, command, seeds, parents", False),
 )
-"""Keys of the file, as docs/formats.md lists them."""
+"""Keys of the file, as docs/formats.md lists them; n coordinates, m commands, p responses."""
 
 
 def read_mechanical_model(path: Path | str) -> MechanicalModel:
-    """Read a model. Raises CannotReadError, and UnusableFileError with all problems."""
+    """Read a model. Raises CannotReadError where the file cannot be read as text, and UnusableFileError with all
+    problems of its content."""
     path = Path(path)
     try:
         return parse_mechanical_model(read_toml_text(path, KIND))
@@ -64,5 +66,5 @@ def read_mechanical_model(path: Path | str) -> MechanicalModel:
 
 
 def write_mechanical_model(path: Path | str, model: MechanicalModel, *, overwrite: bool = False) -> None:
-    """Write a model. Raises AlreadyThereError, CannotWriteError."""
+    """Write a model. Raises AlreadyThereError where the file exists and overwrite is False, and CannotWriteError."""
     write_text(Path(path), format_mechanical_model(model), overwrite=overwrite)

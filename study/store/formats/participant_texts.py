@@ -1,8 +1,9 @@
-"""Tables of the texts that participants read: one TOML file per language, with a text for every key of `ENGLISH`.
+"""Read and print tables of the texts that participants see: one TOML file per language, with a text for every key of
+`ENGLISH`.
 
 A protocol selects a shipped language by its code ("de"), or a laboratory's own table by the path of a file. The texts
 are copied into the protocol, so that its hash and every log contain them. Called by `protocol_files` when a protocol is
-read, and by `study.cli.protocol` to print a table for translation.
+read, by `recognisers` to validate one, and by `study.cli.protocol` to print a table for translation.
 """
 
 import json
@@ -30,9 +31,9 @@ KIND = "table of texts"
 
 
 def read_language(language: str, folder: Path | None = None) -> tuple[str, dict[str, str]]:
-    """Read the language's name, and its texts by key. language: a code such as "de", or the path of a TOML file,
-    relative to `folder`. Raises WrongUseError (no such language), CannotReadError, and UnusableFileError with all keys
-    that are missing or wrong."""
+    """Read a language's name (code, or name of the file without suffix), and its texts by key. language: a code such as
+    "de", or the path of a .toml file, relative to folder (None: the current one). Raises WrongUseError (neither of
+    these), CannotReadError, and UnusableFileError (not TOML, or with all keys that are missing or wrong)."""
     if language == "en":
         return language, dict(ENGLISH)
     if language in LANGUAGES:
@@ -59,8 +60,8 @@ def load_in_language(text: str, source: str, folder: Path | None) -> tuple[Proto
     """Load a protocol and fill in the participants' texts of its language. Returns the protocol and its TOML text:
     `text` itself where no texts had to be filled in.
 
-    text: of the protocol file; source: its name for messages; folder: of the file, None for a shipped protocol. Raises
-    ProtocolError, CannotReadError, UnusableFileError.
+    text: content of the protocol file; source: its name for messages; folder: that of the file, None for a shipped
+    protocol. Raises ProtocolError (invalid protocol, unknown language or text), CannotReadError, UnusableFileError.
     """
     try:
         values = tomllib.loads(text)
@@ -72,17 +73,17 @@ def load_in_language(text: str, source: str, folder: Path | None) -> tuple[Proto
     if language == "en" or own_texts.keys() >= ENGLISH.keys():
         return load_protocol(text, source), text
     try:
-        name, table = read_language(language, folder)
+        language_name, table = read_language(language, folder)
     except WrongUseError as error:
         allowed = f"{list_languages()}, or the path of a .toml file"
         raise ProtocolError(source, (Problem("text.language", f'is "{language}"', allowed),)) from error
-    protocol = protocol_from_values(translate_protocol(values, table, name), source)
+    protocol = protocol_from_values(translate_protocol(values, table, language_name), source)
     return protocol, dump_protocol(protocol)
 
 
 def make_language_template(language: str) -> str:
-    """Make a table as TOML text, to be translated. Above each text that differs from the English text, a comment holds
-    the latter. Raises as `read_language`."""
+    """Make a language's table as TOML text, as a template for a translation. Above each text that differs from the
+    English text, a comment holds the latter. Raises as `read_language`."""
     name, table = read_language(language)
     lines = [f"# Participants' texts of hapteq, {LANGUAGES.get(name, name)}. What stands in braces is filled in."]
     for key, english in ENGLISH.items():

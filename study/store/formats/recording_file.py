@@ -1,4 +1,9 @@
-"""Recordings as HDF5: read into SI units with all checks, written atomically. The format is in `recording_layout`."""
+"""Recordings as HDF5 files: read into SI units with all checks, written atomically.
+
+`recording_layout` defines the format. Called wherever recordings are read or written, for example by
+`study.workflows.recording` and `study.workflows.equalizer`. Helpers that read a part of the file raise ValueError with
+the problem; `read_recording` collects these, so that the user sees all of them at once.
+"""
 
 import json
 from dataclasses import astuple
@@ -38,18 +43,20 @@ without."""
 
 
 def read_recording(path: Path | str) -> Recording:
-    """Read a recording in SI units. Raises CannotReadError, or UnusableFileError with all problems."""
+    """Read a recording in SI units. Raises CannotReadError where the file cannot be opened, UnusableFileError with all
+    problems where it is no valid recording."""
     path = Path(path)
     with open_hdf5(path, KIND, FORMAT, VERSION) as file:
         problems = Problems()
         rate_hz = problems.attempt(lambda: _read_rate(file), 1.0)
 
-        def signal(name: str) -> Signal | None:
+        def read_signal(name: str) -> Signal | None:
+            """Read a signal; None after a problem, which is collected."""
             return problems.attempt(lambda: _read_signal(file, name, rate_hz), None)
 
-        command, response = signal("command"), signal("response")
+        command, response = read_signal("command"), read_signal("response")
         position, excitation, condition = (
-            signal(name) if name in file else None for name in ("position", "excitation", "condition")
+            read_signal(name) if name in file else None for name in ("position", "excitation", "condition")
         )
         device = problems.attempt(lambda: read_text_attribute(file, "device"), "")
         hold = problems.attempt(
@@ -61,8 +68,8 @@ def read_recording(path: Path | str) -> Recording:
     if problems.messages or command is None or response is None:
         raise UnusableFileError(path, KIND, tuple(problems.messages))
     recording = Recording(device, command, response, position, excitation, time_s, hold, segments, meta, condition)
-    if wrong := check_recording(recording):
-        raise UnusableFileError(path, KIND, wrong)
+    if inconsistencies := check_recording(recording):
+        raise UnusableFileError(path, KIND, inconsistencies)
     return recording
 
 
@@ -73,12 +80,14 @@ def write_recording(
     precision: Literal["float32", "float64"] = "float64",
     overwrite: bool = False,
 ) -> None:
-    """Write a recording. `precision` applies to command, response and excitation; position and time are always
-    float64, for micrometres in a large workspace. Raises StudyError; ValueError for an inconsistent recording."""
-    if wrong := check_recording(recording):
-        raise ValueError(f"this recording cannot be written: {'; '.join(wrong)}")
+    """Write a recording. `precision` applies to all signals but position, which like the time is always float64, for
+    micrometres in a large workspace. Raises StudyError where the file cannot be written, or exists and `overwrite` is
+    False; ValueError for an inconsistent recording."""
+    if inconsistencies := check_recording(recording):
+        raise ValueError(f"this recording cannot be written: {'; '.join(inconsistencies)}")
 
     def fill(file: Any) -> None:
+        """Write attributes, signals, time, segments and metadata into the open file."""
         file.attrs.update(
             {"format": FORMAT, "version": VERSION, "sample_rate_hz": recording.sample_rate_hz,
              "device": recording.device, "hold": recording.hold.value}
@@ -97,6 +106,7 @@ def write_recording(
 
 
 def _read_rate(file: Any) -> float:
+    """Read the sample rate (Hz). Raises ValueError unless it is a positive number."""
     (rate_hz,) = read_numbers_attribute(file, "sample_rate_hz", 1)
     if not (np.isfinite(rate_hz) and rate_hz > 0):
         raise ValueError(f"sample_rate_hz is {rate_hz:g}; it must be a positive number")
@@ -104,7 +114,8 @@ def _read_rate(file: Any) -> float:
 
 
 def _read_signal(file: Any, name: str, rate_hz: float) -> Signal:
-    """A signal, converted to SI: samples times factor plus offset of each channel's unit. Raises ValueError."""
+    """Read a signal and convert it to SI: samples times factor plus offset of each channel's unit. Raises ValueError
+    where it is missing, or a unit is unknown or not one of the channel's quantity."""
     samples = read_float_dataset(file, name, "(samples, channels)")
     quantity, unit, channels = (read_texts_attribute(file[name], key) for key in ("quantity", "unit", "channels"))
     channels = _split_channel_names(channels, samples.shape[1])
@@ -112,21 +123,22 @@ def _read_signal(file: Any, name: str, rate_hz: float) -> Signal:
         signal = Signal(samples, rate_hz, collapse_single_text(quantity), collapse_single_text(unit), channels)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from error
-    scale, offset, si = [], [], []
-    for channel, word, text in zip(signal.channels, signal.quantities, signal.units, strict=True):
+    factors, offsets, si_units = [], [], []
+    for channel, channel_quantity, unit_text in zip(signal.channels, signal.quantities, signal.units, strict=True):
         try:
-            parsed = parse_unit(text)
-            check_quantity(word, parsed)
+            parsed_unit = parse_unit(unit_text)
+            check_quantity(channel_quantity, parsed_unit)
         except ValueError as error:
             raise ValueError(f"{name}, channel '{channel}': {error}") from error
-        scale.append(parsed.factor)
-        offset.append(parsed.offset)
-        si.append(parsed.si)
-    return Signal(samples * np.array(scale) + np.array(offset), rate_hz, signal.quantity, tuple(si), channels)
+        factors.append(parsed_unit.factor)
+        offsets.append(parsed_unit.offset)
+        si_units.append(parsed_unit.si)
+    return Signal(samples * np.array(factors) + np.array(offsets), rate_hz, signal.quantity, tuple(si_units), channels)
 
 
 def _split_channel_names(channels: tuple[str, ...], columns: int) -> tuple[str, ...]:
-    """Channel names: one text for several columns either lists them, or is a common name that is numbered."""
+    """Split channel names. A single text for several columns either lists them, separated by commas or spaces, or is a
+    common name that is numbered from 1; other names are returned unchanged."""
     if len(channels) != 1 or columns < 2:
         return channels
     names = tuple(channels[0].replace(",", " ").split())
@@ -134,39 +146,45 @@ def _split_channel_names(channels: tuple[str, ...], columns: int) -> tuple[str, 
 
 
 def _read_time_s(file: Any) -> FloatArray | None:
+    """Read the time stamps (s), (n,), read-only; None where the file has none."""
     if "time_s" not in file:
         return None
-    stamps = read_float_dataset(file, "time_s", "(samples)")
-    stamps.flags.writeable = False
-    return stamps
+    time_stamps_s = read_float_dataset(file, "time_s", "(samples)")
+    time_stamps_s.flags.writeable = False
+    return time_stamps_s
 
 
 def _parse_hold(text: str) -> Hold:
+    """Parse the name of a hold. Raises ValueError for an unknown name."""
     if text not in {hold.value for hold in Hold}:
         raise ValueError(f"hold is '{text}'; allowed are {', '.join(hold.value for hold in Hold)}")
     return Hold(text)
 
 
 def _read_segments(file: Any) -> tuple[Segment, ...]:
+    """Read the segments, with amplitudes in SI units; empty where the file has none. Raises ValueError where fields are
+    missing."""
     if "segments" not in file:
         return ()
     rows = file["segments"][()]
-    names = [entry.name for entry in SEGMENT_FIELDS]
-    missing = [name for name in names if name not in (rows.dtype.names or ())]
-    if missing:
-        raise ValueError(f"segments lacks {', '.join(missing)}; its rows are {', '.join(names)}")
-    scale = _read_amplitude_scale(file)
-    return tuple(_parse_segment(row, scale) for row in rows.ravel())
+    field_names = [entry.name for entry in SEGMENT_FIELDS]
+    missing_fields = [name for name in field_names if name not in (rows.dtype.names or ())]
+    if missing_fields:
+        raise ValueError(f"segments lacks {', '.join(missing_fields)}; its rows are {', '.join(field_names)}")
+    amplitude_factor = _read_amplitude_factor(file)
+    return tuple(_parse_segment(row, amplitude_factor) for row in rows.ravel())
 
 
-def _parse_segment(row: Any, scale: float) -> Segment:
+def _parse_segment(row: Any, amplitude_factor: float) -> Segment:
+    """Parse a row of the dataset `segments`. amplitude_factor: from the unit of the amplitude to SI."""
     start, stop, period = (int(row[name]) for name in ("start", "stop", "period"))
     kind, role = (row[name].decode() if isinstance(row[name], bytes) else str(row[name]) for name in ("kind", "role"))
-    return Segment(start, stop, kind, float(row["amplitude"]) * scale, period, role)
+    return Segment(start, stop, kind, float(row["amplitude"]) * amplitude_factor, period, role)
 
 
-def _read_amplitude_scale(file: Any) -> float:
-    """Factor to SI: amplitudes have the command's unit; unchanged if its channels differ in unit."""
+def _read_amplitude_factor(file: Any) -> float:
+    """Read the factor of the command's unit to SI, which is the unit of the amplitudes; 1 where the factors of its
+    channels differ or a unit is unknown."""
     try:
         factors = {parse_unit(text).factor for text in read_texts_attribute(file.get("command", file), "unit")}
     except ValueError:
@@ -175,17 +193,20 @@ def _read_amplitude_scale(file: Any) -> float:
 
 
 def _read_meta(file: Any) -> dict[str, Any]:
-    values: dict[str, Any] = {}
+    """Read the metadata, each attribute of the group `meta` as JSON; empty without that group. Raises ValueError where
+    an attribute is not JSON."""
+    metadata: dict[str, Any] = {}
     for key in file["meta"].attrs if "meta" in file else ():
-        text = read_text_attribute(file["meta"], key)
+        json_text = read_text_attribute(file["meta"], key)
         try:
-            values[key] = load_json(text)
+            metadata[key] = load_json(json_text)
         except ValueError as error:
             raise ValueError(f"the attribute '{key}' of meta is not JSON: {error}") from error
-    return values
+    return metadata
 
 
 def _write_signal(file: Any, name: str, signal: Signal, precision: str) -> None:
+    """Write a signal as a dataset with its quantity, unit and channel names. precision: a NumPy type."""
     samples = signal.samples.astype(precision)
     compression = {"compression": "gzip", "shuffle": True} if samples.nbytes > _COMPRESS_ABOVE_BYTES else {}
     # The checksum detects samples that were changed on the disk.

@@ -2,7 +2,7 @@
 
 Files of the folder: `trials.csv`, `dictionary.csv` (meaning and unit of every column), `protocol.toml` (the study's own
 text), `facts.json` (study, program, hashes), and `answers.csv` where the protocol asks questions. Tidy: one variable a
-column, one observation a row (Wickham, Journal of Statistical Software 59 (2014), 10).
+column, one observation a row (Wickham, Journal of Statistical Software 59 (2014), 10). Called by `export_study`.
 """
 
 import json
@@ -28,7 +28,7 @@ KIND = "table of exported trials"
 
 
 def is_tidy_csv(folder: Path) -> bool:
-    """Whether the folder contains the four files that every such export has."""
+    """Whether the folder contains the four files of `write_tidy_csv` that do not depend on the protocol."""
     return all((folder / name).is_file() for name in (TRIALS_NAME, DICTIONARY_NAME, PROTOCOL_NAME, FACTS_NAME))
 
 
@@ -41,12 +41,16 @@ def write_tidy_csv(
     answers: AnswerTable = AnswerTable(),  # noqa: B008  frozen
 ) -> tuple[Path, ...]:
     """Write the export and return its files. folder: existing and empty. name: of the study. protocol_text: TOML.
-    facts: JSON values about the study and the program. Raises CannotWriteError."""
-    rows = [["column", "description", "unit"], *([column, *TRIAL_COLUMNS[column]] for column in list_columns(Trial))]
-    rows += [[column.name, column.description, column.question.unit] for column in answers.columns]
+    facts: JSON values about the study and the program. answers: written only if it has columns. Raises
+    CannotWriteError, also where a file exists."""
+    dictionary_rows = [
+        ["column", "description", "unit"],
+        *([column, *TRIAL_COLUMNS[column]] for column in list_columns(Trial)),
+    ]
+    dictionary_rows += [[column.name, column.description, column.question.unit] for column in answers.columns]
     texts = {
         TRIALS_NAME: format_csv_table(trials, Trial),
-        DICTIONARY_NAME: "".join(format_csv_line(row) + "\n" for row in rows),
+        DICTIONARY_NAME: "".join(format_csv_line(row) + "\n" for row in dictionary_rows),
         PROTOCOL_NAME: protocol_text,
         FACTS_NAME: json.dumps({"study": name, **facts}, indent=2, ensure_ascii=False) + "\n",
     }
@@ -60,12 +64,14 @@ def write_tidy_csv(
 def read_tidy_csv(folder: Path) -> ExportedTrials:
     """Read the trials, protocol and facts that `write_tidy_csv` wrote. Raises CannotReadError where a file cannot be
     opened, UnusableFileError where its content is not valid."""
-    path = folder / FACTS_NAME
+    facts_path = folder / FACTS_NAME
     try:
-        facts = load_json(read_text(path))
+        facts = load_json(read_text(facts_path))
     except ValueError as error:
-        raise UnusableFileError(path, KIND, (str(error),)) from error
+        raise UnusableFileError(facts_path, KIND, (str(error),)) from error
     if not isinstance(facts, dict):
-        raise UnusableFileError(path, KIND, ("it is no JSON object",))
-    table = folder / TRIALS_NAME
-    return ExportedTrials(read_described_trials(table, KIND), read_text(folder / PROTOCOL_NAME), facts, (table,))
+        raise UnusableFileError(facts_path, KIND, ("it is no JSON object",))
+    trials_path = folder / TRIALS_NAME
+    return ExportedTrials(
+        read_described_trials(trials_path, KIND), read_text(folder / PROTOCOL_NAME), facts, (trials_path,)
+    )

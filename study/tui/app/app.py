@@ -1,7 +1,7 @@
-"""Application of `hapteq study` on a terminal screen: it draws, reads keys and never blocks.
+"""Full-screen terminal application of `hapteq study` (textual): draws screens, reads keys, and never blocks on work.
 
-A second process, the engine (`study.tui.engine`), drives the device, writes to disk and analyses. `study.cli` runs
-the application.
+A second process, the engine (`study.tui.engine`), controls the device, writes to disk and analyses; both exchange
+messages by `EngineConnection`. Run by `study.cli.screen`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from study.session.watching.requests import NoteAsked, PauseAsked
 from study.tui import home_messages
 from study.tui.app import outcomes
 from study.tui.app.archive_screens import ArchiveScreens
-from study.tui.app.engine_line import EngineLine, EngineMessage
+from study.tui.app.engine_line import EngineConnection, EngineMessage
 from study.tui.app.load_screens import load_screens
 from study.tui.app.sitting_screens import SittingScreens
 from study.tui.app.start_options import StartOptions
@@ -38,12 +38,12 @@ from study.tui.watch.watch_controller import WatchController
 
 
 class HapteqApp(App[None]):
-    """The application of `hapteq study`: draws screens, reads keys, and lets the engine do all other work. On every
-    screen F1 shows its help, F9 changes the colours, Ctrl-C takes the force off, Ctrl-Q leaves; in a sitting F2 shows
-    the experimenter's view, F4 takes a note (with Shift: an adverse event), F7 pauses."""
+    """The application of `hapteq study`; handlers `on_...` and `action_...` are called by textual. On every screen F1
+    shows help, F9 changes the colours, Ctrl-C switches the force off, Ctrl-Q leaves; in a sitting F2 shows the
+    experimenter's view, F4 records a note (with Shift: an adverse event), F7 pauses."""
 
     TITLE = "hapteq"
-    # At the top: the keys and what to press next stand at the bottom.
+    # Notifications are at the top, because the instructions and keys of a screen are at the bottom.
     CSS = "ToastRack { align: right top; } Toast { max-width: 76; }"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("f1,question_mark", "help", "Help", key_display="F1"),
@@ -63,11 +63,11 @@ class HapteqApp(App[None]):
         """Result of the last sitting, which the command line prints after the screen has closed."""
         self._start = start
         self._started_from_terminal = start.first_sitting is not None
-        self._engine = EngineLine(self)
+        self._engine = EngineConnection(self)
         self._archive = ArchiveScreens(self, self._engine.send, start)
         self._sitting: SittingScreens | None = None
-        self._stop_panel: OutcomeScreen | None = None
-        self._watching = WatchController(self)
+        self._stop_screen: OutcomeScreen | None = None
+        self._watch_controller = WatchController(self)
         self._keys = InputQueue(self, super().on_event)
         if "TEXTUAL_ANIMATIONS" not in os.environ:
             self.animation_level = "none"
@@ -98,26 +98,27 @@ class HapteqApp(App[None]):
         return self._engine.pid
 
     def close_engine(self) -> None:
-        """Wait until the device has released the force and the log is closed. Called after `run`."""
-        self._watching.end_feed()
+        """Wait until the force is off and the log is closed, and store the outcome of a sitting that still ran. Called
+        after `run`."""
+        self._watch_controller.end_feed()
         self._engine.close()
         if self._sitting is not None:
             self.outcome = self._engine.last_end
 
     @property
     def _words(self) -> Words:
-        """Texts in the language of the participant of this sitting."""
+        """Texts in the language of this sitting's protocol; English outside a sitting."""
         return ENGLISH_WORDS if self._sitting is None else self._sitting.words
 
-    async def _begin_sitting(self, first: BeginSession | Resume) -> None:
-        """Show the first screen of a sitting, and send its command to the engine. first: the command, new or
-        resumed."""
-        self._started_from_terminal = self._started_from_terminal and first is self._start.first_sitting
-        self.outcome = self._stop_panel = None
+    async def _begin_sitting(self, command: BeginSession | Resume) -> None:
+        """Show the first screen of a sitting, and send its command to the engine. command: to begin or to
+        resume a session."""
+        self._started_from_terminal = self._started_from_terminal and command is self._start.first_sitting
+        self.outcome = self._stop_screen = None
         self._archive.close_screens()
         self._sitting = SittingScreens(self, self._engine.send, self._start.keys, self._keys.discard_earlier_keys)
         await self._sitting.show_preparing()
-        self._engine.send(first)
+        self._engine.send(command)
 
     async def on_engine_message(self, event: EngineMessage) -> None:
         message = event.message
@@ -135,22 +136,23 @@ class HapteqApp(App[None]):
             case _:
                 await self._archive.handle_message(message)
 
-    def _end_sitting(self, outcome: Outcome, end: Finished | Failed) -> None:
-        """End a sitting: show its outcome, or exit where a sitting of the command line could not be begun."""
+    def _end_sitting(self, outcome: Outcome, final_message: Finished | Failed) -> None:
+        """End a sitting: show its outcome, or exit where a sitting requested on the command line could not be begun.
+        final_message: the engine's last message of the sitting."""
         was_opened = self._sitting is not None and self._sitting.path
-        self._sitting = self._stop_panel = None
-        self.outcome = end
+        self._sitting = self._stop_screen = None
+        self.outcome = final_message
         if self._started_from_terminal and not was_opened:
-            # What was typed in the terminal could not be begun: the terminal says why.
+            # The command line prints the reason after the application has closed.
             self.exit()
             return
-        self._watching.close()
+        self._watch_controller.close()
         self._archive.close_screens()
-        self._show_outcome(outcome, end.path)
+        self._show_outcome(outcome, final_message.path)
 
     def _show_outcome(self, outcome: Outcome, path: str) -> OutcomeScreen:
-        """Show the outcome panel and carry out the decision made on it. path: of the session that it may resume or
-        show."""
+        """Show the screen of an outcome and carry out the decision made on it. path: of the session to resume or show;
+        empty without any. Returns the screen."""
 
         async def act_on_decision(decision: Decision | None) -> None:
             match decision:
@@ -163,28 +165,29 @@ class HapteqApp(App[None]):
                 case "quit":
                     self._leave_app(ExitCode.DONE)
 
-        panel = OutcomeScreen(outcome)
-        self.push_screen(panel, act_on_decision)
+        screen = OutcomeScreen(outcome)
+        self.push_screen(screen, act_on_decision)
         self._keys.discard_earlier_keys()
-        return panel
+        return screen
 
     def _leave_app(self, code: ExitCode) -> None:
-        """Exit with this exit code; `close_engine` follows."""
+        """Exit the application with this exit code; the caller of `run` then calls `close_engine`."""
         self.exit(return_code=int(code))
 
     def action_let_go(self) -> None:
-        """Ctrl-C. First press: force off, and a panel. Second press: leave."""
-        if self._sitting is None or self._stop_panel is not None:
+        """Ctrl-C: switch the force off and show the screen of the stop. Without a sitting, or at a second press:
+        leave."""
+        if self._sitting is None or self._stop_screen is not None:
             self._leave_app(ExitCode.INTERRUPTED)
             return
         self._engine.send(LetGo())
-        panel = self._stop_panel = self._show_outcome(outcomes.make_stop_sent_outcome(self._words), "")
-        self.set_timer(outcomes.STOP_REPLY_TIMEOUT_S, lambda: self._report_unanswered_stop(panel))
+        stop_screen = self._stop_screen = self._show_outcome(outcomes.make_stop_sent_outcome(self._words), "")
+        self.set_timer(outcomes.STOP_REPLY_TIMEOUT_S, lambda: self._report_unanswered_stop(stop_screen))
 
-    def _report_unanswered_stop(self, panel: OutcomeScreen) -> None:
-        """Show that the engine did not answer the stop, if `panel` still waits for its answer."""
-        if self._stop_panel is panel:
-            panel.show_outcome(outcomes.make_stop_unanswered_outcome(self._words))
+    def _report_unanswered_stop(self, stop_screen: OutcomeScreen) -> None:
+        """Show that the engine did not answer the stop, if `stop_screen` is still the screen of the current stop."""
+        if self._stop_screen is stop_screen:
+            stop_screen.show_outcome(outcomes.make_stop_unanswered_outcome(self._words))
             self.bell()
 
     async def action_quit(self) -> None:
@@ -204,7 +207,7 @@ class HapteqApp(App[None]):
 
     def action_watch(self) -> None:
         if self._sitting is not None and self._sitting.path:
-            self._watching.toggle_view(self._sitting.path, lambda request: self._engine.send(Relay(request)))
+            self._watch_controller.toggle_view(self._sitting.path, lambda request: self._engine.send(Relay(request)))
 
     def action_pause(self) -> None:
         if self._sitting is not None:
@@ -218,7 +221,7 @@ class HapteqApp(App[None]):
         self.push_screen(NoteScreen(adverse, "experimenter", self._sitting.words), self._send_note)
 
     def _send_note(self, note: NoteAsked | None) -> None:
-        """Send a note to the engine for the session's log; None: the note was cancelled."""
+        """Send a note to the engine for the session's log; None (cancelled): nothing is sent."""
         if note is not None:
             self._engine.send(Relay(note))
             self.notify(self._words["goes_into_log"], markup=False)
@@ -227,7 +230,7 @@ class HapteqApp(App[None]):
         self._engine.send(Relay(event.note))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Actions of a session are available only during one."""
+        """Disable the actions of a sitting (watch, note, pause) outside one."""
         return action not in ("watch", "note", "pause") or self._sitting is not None
 
     def get_system_commands(self, screen: Screen[Any]) -> Iterable[SystemCommand]:
@@ -241,7 +244,7 @@ class HapteqApp(App[None]):
             self._sitting.send_trial_reply(reply)
 
     async def on_begin_requested(self, event: home_messages.BeginRequested) -> None:
-        if self._sitting is not None:  # Enter twice: one sitting
+        if self._sitting is not None:  # a second key press must not begin a second sitting
             return
         start = self._start = replace(self._start, device=event.device)
         order = SessionOrder(event.protocol, event.device, event.subject, start.data, start.seed, event.model)
@@ -262,7 +265,7 @@ class HapteqApp(App[None]):
         await self._archive.start_diagnosis(event.command)
 
     def on_watch_requested(self, event: home_messages.WatchRequested) -> None:
-        self._watching.open_after_confirmation(
+        self._watch_controller.open_after_confirmation(
             event.path, lambda request: self._engine.send(AskOtherSession(event.path, request))
         )
 
@@ -270,4 +273,4 @@ class HapteqApp(App[None]):
         self.action_pause()
 
     def on_watch_screen_left(self) -> None:
-        self._watching.close()
+        self._watch_controller.close()

@@ -27,7 +27,7 @@ class EngineMessage(Message):
         self.message = message
 
 
-class EngineLine:
+class EngineConnection:
     """Sends commands and heartbeats to the engine, and posts its messages to the application as `EngineMessage`."""
 
     def __init__(self, app: App[Any]) -> None:

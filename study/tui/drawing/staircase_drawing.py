@@ -1,7 +1,8 @@
-"""Draw an adaptive staircase as lines of text: force level (N, logarithmic scale) over the number of the trial.
+"""Draw an adaptive staircase as lines of text: force level (N, logarithmic scale) over the trial number.
 
 Braille dots draw the level, the cap (dashed) and the threshold (dotted); a mark at each trial shows whether the answer
-was right, and whether the staircase reversed there. Used by the widget `staircase_plot` and by `hapteq show`.
+was right, and whether the staircase reversed there. Called by the widget `staircase_plot` and by `hapteq show`; the
+marks are also those of `watch.level_history`.
 """
 
 import itertools
@@ -18,10 +19,11 @@ LEGEND = f"{RIGHT_MARK} right  {WRONG_MARK} wrong  {PEAK_MARK} peak  {VALLEY_MAR
 LABEL_COLUMNS = 8
 """Width of the labels of the level axis in characters, including the space after them."""
 _MIN_AXIS_RATIO = 4.0
-"""Smallest ratio of the cap to the lowest level of the axis, so that small changes of the level do not look large."""
+"""Smallest ratio of the cap to the lowest level of the axis, so that small changes of the level do not look large.
+Chosen."""
 _MAX_DOTS_PER_TRIAL = 4.0
-"""Largest horizontal distance between trials, in dots, so that runs of different length are drawn to the same scale
-where they fit."""
+"""Largest horizontal distance between trials, in dots, so that short runs of different length are drawn to the same
+scale. Chosen."""
 _THRESHOLD_DOT_SPACING = 4
 """Distance between the dots of the threshold line, in dots of the canvas."""
 _MARKS_BY_PRIORITY = (RIGHT_MARK, WRONG_MARK, VALLEY_MARK, PEAK_MARK)
@@ -29,18 +31,20 @@ _MARKS_BY_PRIORITY = (RIGHT_MARK, WRONG_MARK, VALLEY_MARK, PEAK_MARK)
 
 
 def draw_staircase(staircase: Staircase, columns: int, rows: int) -> tuple[str, ...]:
-    """Draw the staircase in `rows` lines of at most `columns` characters; the last line is the axis of trials. A single
-    sentence if there is too little room or no answer."""
+    """Draw the staircase in `rows` lines of at most `columns` characters; the last line is the trial axis. A single
+    sentence, which may be wider, if there are fewer than 8 columns beside the labels, fewer than 4 rows, or no
+    answer."""
     if columns < LABEL_COLUMNS + 8 or rows < 4:
         return ("No room to draw.",)
     if not staircase.levels_n:
         return ("Nothing was answered in this run.",)
     canvas = Canvas(columns - LABEL_COLUMNS, rows - 1)
+    # The axis ends at least 15 % below the lowest level, so that its mark is not on the edge.
     lowest_n = min(staircase.cap_n / _MIN_AXIS_RATIO, 0.85 * min(staircase.levels_n))
     dots_per_trial = min(_MAX_DOTS_PER_TRIAL, (canvas.width - 2) / max(1, len(staircase.levels_n) - 1))
 
     def compute_y(level_n: float) -> float:
-        """Compute y in dots of a level: 1 at the cap, two less than the height of the canvas at the lowest level."""
+        """Compute y of a level in dots, downwards: 1 at the cap, canvas.height - 2 at the lowest level of the axis."""
         return 1 + (canvas.height - 3) * math.log(staircase.cap_n / level_n) / math.log(staircase.cap_n / lowest_n)
 
     canvas.draw_line((0, compute_y(staircase.cap_n)), (canvas.width - 1, compute_y(staircase.cap_n)), dashed=True)
@@ -62,8 +66,8 @@ def draw_staircase(staircase: Staircase, columns: int, rows: int) -> tuple[str, 
     return (*lines, _draw_trial_axis(len(staircase.levels_n), round(dots[-1][0]) // 2))
 
 
-def summarize_staircase(staircase: Staircase) -> str:
-    """Summarize the run in one sentence: trials, right answers, reversals, and the threshold (N) if there is one."""
+def summarise_staircase(staircase: Staircase) -> str:
+    """Summarise the run in one sentence: trials, right answers, reversals, and the threshold (N) if there is one."""
     reversal_count = sum(staircase.reversals)
     right_count = sum(staircase.correct)
     counts_text = f"{len(staircase.levels_n)} trials, {right_count} right, {reversal_count} reversals"
@@ -73,7 +77,8 @@ def summarize_staircase(staircase: Staircase) -> str:
 
 
 def _add_marks(lines: list[str], dots: list[tuple[float, float]], staircase: Staircase) -> list[str]:
-    """Put the mark of each trial into the character cell of its dot (x, y)."""
+    """Put the mark of each trial into the character cell of its dot (x, y); a cell has 2 x 4 dots. Where trials share a
+    cell, `_MARKS_BY_PRIORITY` decides."""
     cells = [list(line) for line in lines]
     marks_by_cell: dict[tuple[int, int], str] = {}
     for index, (x, y) in enumerate(dots):
@@ -98,7 +103,8 @@ def _format_level(level_n: float | None) -> str:
 
 
 def _draw_trial_axis(trial_count: int, last_column: int) -> str:
-    """Draw the axis of trials: 1 under the first trial, and the number of the last, ending at its column."""
+    """Draw the trial axis: "1" under the first trial, and from two trials on the label of the last, ending at its
+    column (from 0) where there is room."""
     last_label = f"trial {trial_count}" if trial_count > 1 else ""
     gap_columns = max(1, last_column + 1 - len("1") - len(last_label))
     return f"{'':{LABEL_COLUMNS}}1{'':{gap_columns}}{last_label}".rstrip()

@@ -1,7 +1,7 @@
-"""Client of the engine process, for the screen process: start it, deliver its messages, detect its end.
+"""Client of the engine process in the process that draws the screen: start it, deliver its messages, detect its end.
 
 The engine is the process that drives the device and runs the session; the screen only draws. The drawing thread never
-blocks: one further thread starts the engine and reads from it, another writes to it.
+blocks: one further thread starts the engine and reads from it, another writes to it. Called by `app.engine_line`.
 """
 
 import contextlib
@@ -24,12 +24,12 @@ from study.tui.engine.from_engine import ErrorText, Failed, FromEngine, SessionR
 from study.tui.engine.to_engine import Heartbeat, ToEngine
 
 ENGINE_EXIT_TIMEOUT_S = 6.0
-"""Longest wait (s) for the engine to end; an engine whose screen process has ended exits sooner by itself."""
+"""Longest wait (s) for the engine to end. Chosen: an engine whose screen process has ended exits sooner by itself."""
 
 
 class EngineClient:
     """Connection to one engine process. deliver: called with each message of the engine, from a thread of this client;
-    the last message is a `Failed` if the engine could not be started or ended unexpectedly."""
+    the last one is a `Failed` if the engine could not be started or ended before `close`."""
 
     def __init__(self, deliver: Callable[[FromEngine], None]) -> None:
         self._deliver = deliver
@@ -58,8 +58,8 @@ class EngineClient:
             self._send_queue.put(message)
 
     def close(self, timeout_s: float = ENGINE_EXIT_TIMEOUT_S) -> None:
-        """Close the pipe and wait up to `patience_s` (s) for the engine to release the force, write its last line of
-        the log, and end; then kill it. May be called twice."""
+        """Close the pipe, wait up to `timeout_s` (s) for the engine to release the force, write the last line of the
+        log, and end; then kill it. May be called repeatedly, and before `start`."""
         self._closing = True
         self._send_queue.put(None)
         if self._thread.ident is None:
@@ -92,7 +92,7 @@ class EngineClient:
                 self._deliver(_make_end_failure(exit_code, _read_last_line(output), self._session))
 
     def _deliver_messages(self, connection: Connection) -> None:
-        """Deliver messages until the pipe ends or a message cannot be decoded."""
+        """Deliver messages until the pipe ends, a message cannot be decoded, or `deliver` raises."""
         try:
             while True:
                 message: FromEngine = connection.recv()
@@ -110,12 +110,13 @@ class EngineClient:
             while (message := self._send_queue.get()) is not None:
                 connection.send(message)
         # Only sending is shut down: the engine sees the end of the pipe, and its last messages still arrive here.
-        with contextlib.suppress(OSError), socket.socket(fileno=os.dup(connection.fileno())) as end:
-            end.shutdown(socket.SHUT_WR)
+        with contextlib.suppress(OSError), socket.socket(fileno=os.dup(connection.fileno())) as write_end:
+            write_end.shutdown(socket.SHUT_WR)
 
 
 def _await_exit_code(process: "subprocess.Popen[bytes]") -> int:
-    """Wait for an engine whose pipe has ended, and kill it after `ENGINE_EXIT_TIMEOUT_S` (s). Returns its exit code."""
+    """Wait for an engine whose pipe has ended, and kill it after `ENGINE_EXIT_TIMEOUT_S` (s). Returns its exit code,
+    negative for a signal."""
     try:
         return process.wait(ENGINE_EXIT_TIMEOUT_S)
     except subprocess.TimeoutExpired:
@@ -147,6 +148,6 @@ def _make_end_failure(exit_code: int, last_line: str, session: SessionReady | No
     advice = "Take the hand off the handle until you know that no force is on."
     if session is not None:
         advice += f" Then continue with: {format_resume_command(session.path, session.device)}"
-    saved = "Every answer that was given is on disk." if session is not None else ""
-    text = ErrorText("The device program ended", explanation, saved, advice, int(ExitCode.DEVICE))
-    return Failed(text, session.path if session is not None else "")
+    saved_text = "Every answer that was given is on disk." if session is not None else ""
+    error_text = ErrorText("The device program ended", explanation, saved_text, advice, int(ExitCode.DEVICE))
+    return Failed(error_text, session.path if session is not None else "")

@@ -1,6 +1,7 @@
-"""The main program of the engine: the process that runs sessions, drives the device, writes to disk and analyses.
+"""Main program of the engine process, which runs sessions, drives the device, writes to disk and analyses.
 
-A separate process is used so that none of this can block the screen. It runs as long as the pipe to the screen exists.
+A separate process is used so that none of this can block the screen. It receives commands and sends results through a
+pipe, and runs as long as the pipe exists. `study.tui.engine.client`, in the screen's process, starts it.
 When the screen's process ends for any reason, the device is released, the log records that the session was
 interrupted, and the engine ends.
 """
@@ -32,7 +33,8 @@ ANALYSIS_MODULES = ("study.workflows.results.analyze_data",)
 """Modules of statistics and plots, imported next if no command waits, so that results appear quickly."""
 
 FORCED_EXIT_S = 5.0
-"""Time (s) from the loss of the screen to the forced end of this process. The device was stopped before."""
+"""Time (s) from the loss of the screen to the forced end of this process. The device was stopped before. Chosen by
+hand."""
 
 INTERRUPTED = StudyError(
     "Interrupted", "No force is on.", "Begin again, or leave.", "Every answer that was given is on disk."
@@ -51,7 +53,7 @@ class Engine:
         for signal_name in ("SIGINT", "SIGTERM"):
             signal.signal(getattr(signal, signal_name), self._on_signal)
 
-    def work(self) -> None:
+    def perform_commands(self) -> None:
         """Perform commands until the screen's process has ended."""
         self._link.start()
         while not self._link.ended:
@@ -65,19 +67,19 @@ class Engine:
                     self._report_failure(INTERRUPTED, ExitCode.INTERRUPTED)
 
     def _await_command(self) -> Command | None:
-        """Wait for the next command; None after the end of the screen's process."""
+        """Import modules in advance, then wait for the next command; None after the end of the screen's process."""
         if not self._link.command_waits:
             self._import_in_advance()
         return self._link.wait_for_command()
 
     def _import_in_advance(self) -> None:
-        """Import modules in advance, as long as no command waits."""
+        """Import modules in advance, skipping the rest once a command waits."""
         for module_name in ("study.tui.engine.engine_commands", *SESSION_MODULES, *ANALYSIS_MODULES):
             if not self._link.command_waits:
                 import_module(module_name)
 
     def _perform(self, command: Command) -> None:
-        """Perform a command; an error is sent to the screen as `Failed`."""
+        """Perform a command; an error or an interruption is sent to the screen as `Failed`."""
         commands = self._load_commands()
         try:
             self._busy = True
@@ -88,10 +90,10 @@ class Engine:
         except StudyError as error:
             self._busy = False
             self._report_failure(error, error.exit_code)
-        except Exception as bug:  # noqa: BLE001 - the screen shows it, and the device is closed
+        except Exception as error_in_program:  # noqa: BLE001 - the screen shows it, and the device is closed
             self._busy = False
             traceback.print_exc()
-            self._report_failure(_make_bug_error(bug), ExitCode.ERROR)
+            self._report_failure(_make_bug_error(error_in_program), ExitCode.ERROR)
         finally:
             self._busy = False
 
@@ -104,12 +106,12 @@ class Engine:
         return self._commands
 
     def _report_failure(self, error: StudyError, exit_code: ExitCode) -> None:
-        """Send an error to the screen, with the path of the session that can be resumed, if there is one."""
+        """Send an error to the screen, with the path of the session that can be resumed; "" without one."""
         session_folder = self._commands.session_folder if self._commands is not None else None
         # A withdrawn session cannot be resumed.
-        path = str(session_folder.path) if session_folder is not None and not session_folder.withdrawn else ""
-        text = ErrorText(error.title, error.happened, error.saved, error.do_now, int(exit_code))
-        self._link.send(Failed(text, path))
+        resumable_path = str(session_folder.path) if session_folder is not None and not session_folder.withdrawn else ""
+        error_text = ErrorText(error.title, error.happened, error.saved, error.do_now, int(exit_code))
+        self._link.send(Failed(error_text, resumable_path))
 
     def _interrupt(self) -> None:
         """Interrupt the current command; called from the reading thread. A signal of the operating system is used,
@@ -119,7 +121,7 @@ class Engine:
             signal.pthread_kill(main_thread_id, signal.SIGINT)
 
     def _on_signal(self, signal_number: int, frame: FrameType | None) -> None:
-        """Raise KeyboardInterrupt in the main thread if a command runs, or if the engine shall end."""
+        """Raise KeyboardInterrupt in the main thread if a command runs, or if the engine is to end; SIGTERM ends it."""
         if signal_number == signal.SIGTERM:
             self._link.ended = True
         if self._busy or self._link.ended:
@@ -135,11 +137,11 @@ def _force_exit() -> None:
     os._exit(1)
 
 
-def _make_bug_error(bug: Exception) -> StudyError:
+def _make_bug_error(exception: Exception) -> StudyError:
     """Convert an unexpected exception to an error that the screen can show."""
     return StudyError(
         "Something in hapteq went wrong",
-        f"{type(bug).__name__}: {bug}.",
+        f"{type(exception).__name__}: {exception}.",
         "Resume the session; if it happens again, report it with these words.",
         "Every answer that was given is on disk.",
     )
@@ -149,4 +151,4 @@ def run(descriptor: int) -> None:
     """Main function of the process, which `study.tui.engine.client` starts. descriptor: file descriptor of its end of
     the pipe."""
     faulthandler.enable(sys.stderr)
-    Engine(Connection(descriptor)).work()
+    Engine(Connection(descriptor)).perform_commands()

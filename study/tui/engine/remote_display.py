@@ -38,14 +38,14 @@ from study.workflows.checks.computer_load import get_load_per_processor
 from study.workflows.trial.display import SignOfLife
 
 KEEPALIVE_INTERVAL_S = 0.04
-"""Longest interval (s) between two calls of `sign_of_life`; the port allows 0.1 s."""
+"""Longest interval (s) between two calls of `sign_of_life`. Chosen: the port requires a call every 0.1 s."""
 HANDLE_POLL_INTERVAL_S = 0.1
-"""Interval (s) at which the wait for the handle reads its position again."""
+"""Interval (s) at which the wait for the handle reads its position again. Chosen by hand."""
 SHOW_WAIT_AFTER_S = 1.0
-"""Time (s) from which a wait for the handle is shown even where the handle is in its place."""
+"""Time (s) after which a wait for the handle is shown even where the handle is in its place. Chosen by hand."""
 HEARTBEAT_TIMEOUT_S = 0.5
 """Time (s) without a heartbeat after which the screen counts as suspended, ended or hung. The participant could then
-not stop a stimulus."""
+not stop a stimulus. Chosen by hand."""
 
 ENDED_EARLY = Unanswered("the stimulus ended early", ends_sitting=False)
 """Reply where `sign_of_life` returned False, which ends the wait."""
@@ -54,9 +54,9 @@ TIMED_OUT = Unanswered("no answer within the time limit", ends_sitting=False, ca
 
 
 class RemoteDisplay:
-    """The display port over a pipe; the docstrings of `Display` apply. Any method raises KeyboardInterrupt if the
-    screen process has ended. get_load: returns the load average per processor (see `get_load_per_processor`), None if
-    unknown."""
+    """The display port over a pipe; the docstrings of `Display` describe the methods. Any method raises
+    KeyboardInterrupt if the screen process has ended. get_load: returns the load average per processor (see
+    `get_load_per_processor`), None if unknown."""
 
     def __init__(
         self, link: ScreenLink, clock: Clock, get_load: Callable[[], float | None] = get_load_per_processor
@@ -106,15 +106,15 @@ class RemoteDisplay:
         return None
 
     def await_handle(self, look: Callable[[], HandleView], sign_of_life: SignOfLife) -> Unanswered | None:
-        """As in the port. The wait is shown only if the handle is away from its place or the wait is long, because in
-        most trials the handle is in its place already."""
+        """Wait until the handle is in its place (see the port). The wait is shown only if the handle is away from its
+        place or the wait is long, because in most trials the handle is in its place already."""
         request_number, view, self._wake_delay_s = 0, look(), 0.0
         start_s = read_s = self._clock.now_s()
         while not view.ready:
-            is_wait_shown = (
+            should_show_wait = (
                 math.hypot(*view.offset_mm) > view.radius_mm or self._clock.now_s() - start_s > SHOW_WAIT_AFTER_S
             )
-            if is_wait_shown and not request_number:
+            if should_show_wait and not request_number:
                 request_number = self._send_request(DisplayCall.AWAIT_HANDLE, view)
             reply = self._await_reply(request_number)
             if not sign_of_life():
@@ -158,8 +158,8 @@ class RemoteDisplay:
         self._ask_screen(DisplayCall.PRACTICE_OVER, result)
 
     def rest(self, notice: RestNotice, sign_of_life: SignOfLife) -> float:
-        """As in the port. The duration is enforced here: if the screen replies too early, the remaining time is
-        waited."""
+        """Show a rest and return its duration, s (see the port). The duration is enforced here: if the screen replies
+        too early, the remaining time is waited."""
         request_number = self._send_request(DisplayCall.REST, notice)
         start_s = self._clock.now_s()
         has_replied = False
@@ -190,23 +190,23 @@ class RemoteDisplay:
         self._link.send(UserNotice(sentence))
 
     def _ask_screen(self, call: DisplayCall, content: Any) -> Any:
-        """Show a request and wait without limit for the reply. Only while nothing plays, because the screen may be
-        suspended for any time."""
+        """Show a request and wait without limit for the reply, which is returned. Only while nothing plays, because the
+        screen may be suspended for any time and `sign_of_life` is not called."""
         request_number = self._send_request(call, content)
         while (reply := self._await_reply(request_number)) is None:
             pass
         return reply.value
 
     def _send_request(self, call: DisplayCall, content: Any) -> int:
-        """Send a request to the screen; returns its number, which the reply carries."""
+        """Send a request to the screen and return its number, by which the reply is recognised."""
         self._request_number += 1
         self._wake_delay_s = 0.0
         self._link.send(ScreenRequest(self._request_number, call, content))
         return self._request_number
 
     def _await_reply(self, request_number: int, timeout_s: float = KEEPALIVE_INTERVAL_S) -> Reply | None:
-        """The screen's reply to this request; None if no reply came within `timeout_s` (s), or only a reply to an
-        earlier request."""
+        """Wait for the screen's reply to this request; None if no reply came within `timeout_s` (s), or only a reply to
+        an earlier request. Updates the longest delay of this process's wake-ups."""
         start_s = self._clock.now_s()
         reply = self._link.wait_for_reply(timeout_s)
         self._wake_delay_s = max(self._wake_delay_s, self._clock.now_s() - start_s - timeout_s)

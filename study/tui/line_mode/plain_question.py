@@ -1,6 +1,6 @@
 """Line mode: the instructions, the question of a trial and its reply, and the result of a practice.
 
-Called by `PlainDisplay` (`plain_display`).
+Texts are in the language of the protocol (`Words`). Called by `PlainDisplay` (`plain_display`).
 """
 
 from protocols.trial import VoidCause
@@ -23,7 +23,7 @@ from study.tui.trial_words import describe_plan, format_heading
 from study.workflows.trial.display import SignOfLife
 
 PARTICIPANT_LEFT = Unanswered("the participant left", ends_sitting=True)
-"""Reply for the line q: the participant leaves the sitting."""
+"""Reply for the line "q", which ends the sitting."""
 
 
 def describe_answer_keys(keys: AnswerKeys, words: Words) -> str:
@@ -36,37 +36,39 @@ def draw_direction_picture(picture: DirectionPicture, words: Words) -> tuple[str
     return (*draw_directions(picture), describe_direction(picture, 1, words), describe_direction(picture, 2, words))
 
 
-def show_instructions(notice: Welcome, conversation: Conversation, keys: AnswerKeys) -> None:
-    """Write title, instructions and plan of a sitting, and wait for Enter. Raises KeyboardInterrupt when the
-    participant leaves."""
+def show_instructions(welcome: Welcome, conversation: Conversation, keys: AnswerKeys) -> None:
+    """Write title, instructions and plan of a sitting, and wait for a line. Raises KeyboardInterrupt for "q" and at the
+    end of the input."""
     words = conversation.words
     conversation.discard_early_lines()
-    conversation.say(notice.title, "")
-    if notice.resumed_after:
-        conversation.say(words.fill_count("welcome_back", notice.resumed_after), "")
+    conversation.say(welcome.title, "")
+    if welcome.resumed_after:
+        conversation.say(words.fill_count("welcome_back", welcome.resumed_after), "")
     conversation.say(
         words["line_hold"],
         "",
-        *draw_direction_picture(notice.picture, words),
+        *draw_direction_picture(welcome.picture, words),
         "",
         words["line_how"],
-        describe_plan(notice, words),
+        describe_plan(welcome, words),
         describe_answer_keys(keys, words),
     )
-    if not notice.device_moves:
-        conversation.say("", words.fill("not_felt", {"device": words.translate_fact(notice.device)}))
+    if not welcome.device_moves:
+        conversation.say("", words.fill("not_felt", {"device": words.translate_fact(welcome.device)}))
     conversation.say("", words["enter_begins"])
     conversation.read_line_or_leave()
 
 
 def ask_question(question: Question, conversation: Conversation, keys: AnswerKeys, sign_of_life: SignOfLife) -> Reply:
-    """Ask the question of a trial until there is a reply, the time limit is over, or the stimulus ended early. Other
-    lines are refused, and the question is asked again."""
-    words, key_names = conversation.words, {"keys": keys.describe_keys(conversation.words)}
+    """Ask the question of a trial until there is a reply. It is `Unanswered` where the time limit (none if 0 s) is
+    over, where the sign of life reports that the stimulus ended early, and at the end of the input, which ends the
+    sitting. "?" explains the question; other lines, and "r" without repeats left, are refused; then the question is
+    asked again."""
+    words, key_placeholders = conversation.words, {"keys": keys.describe_keys(conversation.words)}
     conversation.discard_early_lines()
     conversation.say("", format_heading(question, words))
     deadline_s = conversation.clock.now_s() + question.time_limit_s if question.time_limit_s else float("inf")
-    prompt = words.fill("line_which_interval" if question.task is Task.INTERVAL else "line_which", key_names)
+    prompt = words.fill("line_which_interval" if question.task is Task.INTERVAL else "line_which", key_placeholders)
     while True:
         conversation.prompt(prompt)
         line = conversation.wait(sign_of_life, deadline_s)
@@ -76,7 +78,7 @@ def ask_question(question: Question, conversation: Conversation, keys: AnswerKey
         reply = parse_reply(line, keys)
         if reply is REPEAT:
             if question.repeats_left == 0:
-                conversation.say(f"{words['no_repeats']} {words.fill('line_type', key_names)}")
+                conversation.say(f"{words['no_repeats']} {words.fill('line_type', key_placeholders)}")
                 continue
             conversation.say(format_repeat_text(question.repeats_left, words))
         if reply is not None:
@@ -85,18 +87,19 @@ def ask_question(question: Question, conversation: Conversation, keys: AnswerKey
             conversation.say(*_explain_question(question, words), describe_answer_keys(keys, words))
         else:
             refusal = words.fill("no_answer", {"typed": quote_line(line, words)})
-            conversation.say(f"{refusal} {words.fill('line_type', key_names)}")
+            conversation.say(f"{refusal} {words.fill('line_type', key_placeholders)}")
 
 
 def _explain_question(question: Question, words: Words) -> tuple[str, ...]:
-    """Explain the question: the task of intervals, or both directions."""
+    """Explain the question in lines of text: the interval task, or a drawing of both directions."""
     if question.task is Task.INTERVAL:
         return (words["line_intervals"],)
     return draw_direction_picture(question.picture, words)
 
 
 def parse_reply(line: Line, keys: AnswerKeys) -> Reply | None:
-    """Parse the reply in a typed line: an answer, or q (leave), p (pause), r (repeat); None for any other line."""
+    """Parse the reply in a typed line: an answer by its key, else "q" (leave), "p" (pause) or "r" (repeat) in either
+    case; None for any other line."""
     answer = keys.parse_answer(line.text)
     if answer is not None:
         return Answered(answer, line.at_s)
@@ -104,7 +107,8 @@ def parse_reply(line: Line, keys: AnswerKeys) -> Reply | None:
 
 
 def show_practice_result(result: PracticeResult, conversation: Conversation) -> None:
-    """Write the result of a practice, and wait for Enter. Raises KeyboardInterrupt when the participant leaves."""
+    """Write the result of a practice, and wait for a line. Raises KeyboardInterrupt for "q" and at the end of the
+    input."""
     conversation.discard_early_lines()
     conversation.say(
         "", conversation.words.fill("line_practice", {"right": result.correct_count, "asked": result.answer_count})

@@ -2,7 +2,7 @@
 
 The view shows levels and which answers were right; a participant who has seen these is no longer a naive observer.
 Therefore the session's name must be typed: a single key that is pressed by mistake does not open the view. Called by
-`study.tui.watch.watch_controller`.
+`study.tui.watch.watch_controller` and `study.tui.app.archive_screens`.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ VIEW_SHOWN_NOTE = (
 
 
 class ConfirmView(ModalScreen[bool]):
-    """Dialog that asks for the session's name. Enter compares the typed text with the name and returns True if they are
-    equal; Esc returns False."""
+    """Dialog that asks for the session's name. Enter returns True if the typed text without surrounding spaces is the
+    name, and else shows a message; Esc returns False."""
 
     HELP = """\
 # The experimenter's view
@@ -52,7 +52,7 @@ class ConfirmView(ModalScreen[bool]):
 
     def __init__(self, session: str) -> None:
         super().__init__()
-        self._session = session
+        self._session_name = session
 
     def compose(self) -> ComposeResult:
         with Card("For the experimenter"):
@@ -60,17 +60,18 @@ class ConfirmView(ModalScreen[bool]):
             yield LiteralText(
                 "Participants: press Esc. Experimenter: turn the screen away from the participant.", classes="gap"
             )
-            yield LiteralText(f"To open it, type {self._session} and press Enter.", classes="gap strong")
+            yield LiteralText(f"To open it, type {self._session_name} and press Enter.", classes="gap strong")
             yield Input(compact=True)
             yield LiteralText(id="message")
         yield Footer(show_command_palette=False)
 
     @on(Input.Submitted)
     def _check_input(self, event: Input.Submitted) -> None:
-        if event.value.strip() == self._session:
+        """Close the dialog if the name was typed; otherwise say that nothing is opened."""
+        if event.value.strip() == self._session_name:
             dismiss_screen(self, True)
         else:
-            self.query_one("#message", LiteralText).update(f"That is not {self._session}. Nothing is opened.")
+            self.query_one("#message", LiteralText).update(f"That is not {self._session_name}. Nothing is opened.")
 
     def action_help(self) -> None:
         self.app.push_screen(HelpScreen(self.HELP))
@@ -80,9 +81,10 @@ class ConfirmView(ModalScreen[bool]):
 
 
 def confirm_view(app: App[Any], session: str, on_confirmed: Callable[[], object]) -> None:
-    """Open the dialog. session: name to be typed. on_confirmed: called once after the confirmation."""
+    """Open the dialog. session: name to be typed. on_confirmed: called once after the confirmation, not otherwise."""
 
     def act_on_decision(confirmed: bool | None) -> None:
+        """Act on the dialog's result; None where it was closed without one."""
         if confirmed:
             on_confirmed()
 

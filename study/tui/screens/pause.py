@@ -1,6 +1,6 @@
 """Screen of a pause: no stimulus is played until the participant decides to continue, to leave or to withdraw.
 
-A note or an adverse event can be written into the log from here.
+A note or an adverse event can be written into the log from here. Made by `study.tui.app.sitting_screens`.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ from study.tui.translated_screen import TranslatedScreen
 from study.tui.widgets.card import Card
 from study.tui.widgets.literal_text import LiteralText
 
-CHOICES = {
+DECISION_TEXT_KEYS = {
     AfterPause.CONTINUE_SITTING: "pause_go_on",
     AfterPause.END_SITTING: "pause_leave",
     AfterPause.WITHDRAW: "pause_withdraw",
@@ -33,8 +33,8 @@ CHOICES = {
 
 class PauseScreen(TranslatedScreen[AfterPause]):
     """Shows the reason of the pause and the number of saved answers. Arrow keys and Enter choose a decision, which is
-    returned; n writes a note, e an adverse event. leaving: the participant asked to leave, so that this choice is
-    highlighted at first."""
+    returned; n writes a note, e an adverse event (message `NoteWritten`). leave_requested: the participant asked to
+    leave, so that this choice is highlighted at first."""
 
     PAGE = "help_pause"
     DEFAULT_CSS = """
@@ -56,10 +56,10 @@ class PauseScreen(TranslatedScreen[AfterPause]):
 
         note: NoteAsked
 
-    def __init__(self, notice: PauseNotice, leaving: bool = False, words: Words = ENGLISH_WORDS) -> None:
+    def __init__(self, notice: PauseNotice, leave_requested: bool = False, words: Words = ENGLISH_WORDS) -> None:
         super().__init__(words)
         self._notice = notice
-        self._leaving = leaving
+        self._leave_requested = leave_requested
 
     def compose(self) -> ComposeResult:
         words = self.words
@@ -69,16 +69,19 @@ class PauseScreen(TranslatedScreen[AfterPause]):
                 words.fill("pause_reason", {"reason": words.translate_fact(self._notice.reason)}), classes="gap"
             )
             yield LiteralText(words.fill_count("saved", self._notice.answers))
-            yield OptionList(*(Option(words[key], id=choice.value) for choice, key in CHOICES.items()), markup=False)
+            yield OptionList(
+                *(Option(words[key], id=choice.value) for choice, key in DECISION_TEXT_KEYS.items()), markup=False
+            )
             yield LiteralText(id="message")
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        first = AfterPause.END_SITTING if self._leaving else AfterPause.CONTINUE_SITTING
-        self.query_one(OptionList).highlighted = list(CHOICES).index(first)
+        first_choice = AfterPause.END_SITTING if self._leave_requested else AfterPause.CONTINUE_SITTING
+        self.query_one(OptionList).highlighted = list(DECISION_TEXT_KEYS).index(first_choice)
 
     @on(OptionList.OptionSelected)
     def _decide(self, selected: OptionList.OptionSelected) -> None:
+        """Return the chosen decision; a withdrawal after a confirmation only."""
         choice = AfterPause(selected.option.id)
         if choice is AfterPause.WITHDRAW:
             self.app.push_screen(ConfirmWithdrawal(self.words), self._withdraw)

@@ -1,4 +1,7 @@
-"""Screen while a stimulus of fixed duration plays without a question: an interval, a demonstration, or a probe."""
+"""Screen while a stimulus of fixed duration plays without a question: an interval, a demonstration, or a probe.
+
+A probe is a stimulus that measures the device, to which the participant does not respond. Called by `sitting_screens`.
+"""
 
 from typing import ClassVar
 
@@ -17,8 +20,8 @@ from study.tui.widgets.literal_text import LiteralText
 
 
 class PlayingScreen(TranslatedScreen[Unanswered | None]):
-    """Highlights the direction or interval that plays, or names the probe. p pauses, q leaves; the application closes
-    the screen at the end of the stimulus."""
+    """Screen that highlights the direction or interval that plays, or shows the title of the probe. It is dismissed
+    with `PAUSE` (key p) or `LEAVING` (key q); the application closes it at the end of the stimulus, with None."""
 
     PAGE = "help_playing"
     DEFAULT_CSS = """
@@ -53,7 +56,9 @@ class PlayingScreen(TranslatedScreen[Unanswered | None]):
         yield Footer(show_command_palette=False)
 
     def action_pause(self) -> None:
+        """Dismiss the screen with the request to pause."""
         dismiss_screen(self, PAUSE)
 
     def action_leave(self) -> None:
+        """Dismiss the screen with the request to leave the session."""
         dismiss_screen(self, LEAVING)

@@ -1,7 +1,7 @@
-"""A running session as lines of text, for `hapteq watch --plain` and for a terminal without a screen program.
+"""Format a running session as lines of text, for `hapteq watch --plain` and for a terminal without a screen program.
 
-`format_changes` gives one line for each difference between two views, `format_view` the whole view. What a view may
-contain, so that the experimenter cannot give away an answer, is decided in `watch_view`.
+Called by `study.cli.watch`. `format_changes` gives one line for each difference between two views, `format_view` the
+whole view. What a view may contain, so that the experimenter cannot give away an answer, is decided in `watch_view`.
 """
 
 from study.session.watching.watch_view import ClosedTrial, WatchView
@@ -85,22 +85,26 @@ def format_view(view: WatchView) -> list[str]:
 
 
 def _select_new_trials(previous: WatchView, current: WatchView) -> list[ClosedTrial]:
-    """Select the trials that were not in the previous view, oldest first. A trial that is still being measured is left
-    to a later view."""
-    reported_trials = {(t.run, t.trial, t.attempt) for t in previous.last if t.status != "measuring"}
+    """Select the trials that were not in the previous view, oldest first. A trial that is still being measured is
+    reported from a later view. The latest trial of each view comes first."""
+    reported_trials = {
+        (trial.run, trial.trial, trial.attempt) for trial in previous.last if trial.status != "measuring"
+    }
     unreported_trials = [
-        t for t in current.last if (t.run, t.trial, t.attempt) not in reported_trials and t.status != "measuring"
+        trial
+        for trial in current.last
+        if (trial.run, trial.trial, trial.attempt) not in reported_trials and trial.status != "measuring"
     ]
     # A view holds the latest trials only: one before the newest of the previous view was reported long ago.
     newest_reported = (
         (previous.last[0].run, previous.last[0].trial, previous.last[0].attempt) if previous.last else (-1, 0, 0)
     )
-    return [t for t in unreported_trials[::-1] if (t.run, t.trial, t.attempt) >= newest_reported]
+    return [trial for trial in unreported_trials[::-1] if (trial.run, trial.trial, trial.attempt) >= newest_reported]
 
 
 def _format_trial(trial: ClosedTrial) -> str:
-    """Format a trial with its frequency, level, verdict, answer, response time and measured acceleration; numbers from
-    1."""
+    """Format a trial with its number (from 1), frequency, level, verdict, answer, response time, measured acceleration
+    (m/s², along and across the axis), reversal and remark; parts without a value are omitted."""
     parts = [f"trial {trial.trial + 1} at {trial.frequency_hz:g} Hz, {trial.level_n:.3g} N: {name_verdict(trial)}"]
     if trial.answer is not None:
         parts.append(f"shown {trial.shown}, said {trial.answer}" if trial.shown else f"said {trial.answer}")

@@ -1,4 +1,5 @@
-"""Texts of the experimenter's view, shared by its screen (`watch_panels`) and `hapteq watch --plain` (`watch_lines`).
+"""Texts of the experimenter's view of a running session, shared by its screen (`watch_screen`, `watch_panels`) and
+`hapteq watch --plain` (`watch_lines`).
 
 Each function formats a value of a `WatchView` as words or as a number with its unit.
 """
@@ -27,26 +28,26 @@ NOT_MEASURED_LEGEND = "answered too early to measure; counts"
 
 
 def format_local_time(utc: str) -> str:
-    """Local time of a UTC time stamp, without the date: "14:05:10 +01:00". A stamp that is no valid time is returned as
-    it is."""
+    """Format the local time of a UTC time stamp, without the date: "14:05:10 +01:00". A stamp that is no valid time is
+    returned unchanged."""
     date, time, offset = split_time_in_zone(utc, convert_to_machine_zone)
     return f"{time} {offset}" if offset else date
 
 
-def format_duration(seconds: float) -> str:
-    """A duration in words, rounded down: "4 s", "2 min 05 s", "1 h 02 min"."""
-    whole_s = int(seconds)
-    if whole_s < 60:
-        return f"{whole_s} s"
-    minutes, seconds_left = divmod(whole_s, 60)
+def format_duration(duration_s: float) -> str:
+    """Format a duration (s, at least 0), rounded down: "4 s", "2 min 05 s", "1 h 02 min"."""
+    whole_seconds = int(duration_s)
+    if whole_seconds < 60:
+        return f"{whole_seconds} s"
+    minutes, seconds_left = divmod(whole_seconds, 60)
     if minutes < 60:
         return f"{minutes} min {seconds_left:02d} s"
     return f"{minutes // 60} h {minutes % 60:02d} min"
 
 
 def describe_activity(view: WatchView) -> str:
-    """Present activity in words, such as "trial 12 at 0.5 N: waiting for the answer, 4 s". Where the session does not
-    run, the reason."""
+    """Describe the present activity and its duration, such as "trial 12 at 0.5 N: waiting for the answer, 4 s"; where
+    the view has a reason (the session does not run), return it."""
     if view.reason:
         return view.reason
     trial, run = view.open_trial, view.present_run
@@ -61,30 +62,34 @@ def describe_activity(view: WatchView) -> str:
 
 
 def format_run_name(view: WatchView, run: WatchedRun) -> str:
-    """Name of a run, numbered within its phase: "test 2"."""
-    return f"{run.phase} {1 + [r.run for r in view.runs if r.phase == run.phase].index(run.run)}"
+    """Format the name of a run of the view: its phase, and its number in that phase from 1, such as "test 2"."""
+    return (
+        f"{run.phase} {1 + [other_run.run for other_run in view.runs if other_run.phase == run.phase].index(run.run)}"
+    )
 
 
 def format_reversals(run: WatchedRun) -> str:
-    """Number of reversals so far and number that ends the run, such as "3/8"; a dash for a run without reversals."""
+    """Format the number of reversals so far and the number that ends the run, such as "3/8"; a dash where reversals do
+    not end it."""
     return f"{run.reversals}/{run.reversals_needed}" if run.reversals_needed else "–"
 
 
 def format_staircase_title(view: WatchView) -> str:
-    """Title of the plot of the staircase: run, frequency (Hz), reversals, next level (N)."""
+    """Format the title of the staircase plot: run, frequency (Hz), reversals, next level (N) or "run over"; "nothing
+    answered yet" without a run to show."""
     shown_run = next((run for run in view.runs if run.run == view.shown_run), None)
     if shown_run is None:
         return "Staircase: nothing answered yet"
-    level = f", now {view.next_level_n:.3g} N" if view.next_level_n is not None else ", run over"
-    reversals = (
+    level_text = f", now {view.next_level_n:.3g} N" if view.next_level_n is not None else ", run over"
+    reversals_text = (
         f", {shown_run.reversals} of {shown_run.reversals_needed} reversals" if shown_run.reversals_needed else ""
     )
-    return f"{format_run_name(view, shown_run)}, {shown_run.frequency_hz:g} Hz{reversals}{level}"
+    return f"{format_run_name(view, shown_run)}, {shown_run.frequency_hz:g} Hz{reversals_text}{level_text}"
 
 
 def name_verdict(trial: ClosedTrial) -> str:
-    """Result of a trial: right, wrong, void, or "…" while it is not known; a catch trial answered wrongly is a
-    lapse."""
+    """Name the result of a trial: "right", "wrong", "void" (spoiled), "…" while it is not known, or "LAPSE" for a catch
+    trial answered wrongly."""
     if trial.status == "spoiled":
         return "void"
     if trial.correct is None:
@@ -100,44 +105,47 @@ def is_unmeasured(trial: ClosedTrial) -> bool:
 
 
 def describe_elapsed_time(exposure: Exposure) -> str:
-    """Elapsed time of the sitting and its limit (min)."""
+    """Describe the elapsed time of the sitting and its limit (min)."""
     return f"{exposure.elapsed_min:.0f} of {exposure.limit_min:g} min"
 
 
 def describe_dose(exposure: Exposure) -> str:
-    """Vibration dose A(8) and its limit (m/s²)."""
+    """Describe the daily vibration exposure A(8) and its limit (m/s²)."""
     return f"{exposure.dose_a8_mps2:.2f} of {exposure.dose_limit_mps2:g} m/s²"
 
 
 def describe_catch_trials(view: WatchView) -> str:
-    """Number of lapses (catch trials answered wrongly), and number of catch trials that count."""
-    lapses = f"{view.catch_lapses} {'lapse' if view.catch_lapses == 1 else 'lapses'}"
-    return f"{lapses} in {view.catch_given}" if view.catch_given else "none so far"
+    """Describe the number of lapses (catch trials answered wrongly) and of catch trials that count; "none so far"
+    without any."""
+    lapses_text = f"{view.catch_lapses} {'lapse' if view.catch_lapses == 1 else 'lapses'}"
+    return f"{lapses_text} in {view.catch_given}" if view.catch_given else "none so far"
 
 
 def describe_handle(view: WatchView) -> str:
-    """Distance of the handle from its start position (mm), and the largest distance at which a trial may start (mm)."""
+    """Describe the distance of the handle from its start position (mm), and the largest distance at which a trial may
+    start (mm) if there is a limit; "not read now" without a reading."""
     live = view.live
     if live is None or live.offset_mm is None:
         return "not read now"
     if not live.handle_ready:
         return f"{live.offset_mm:.1f} mm: OUT of place"
-    allowed = f", {view.gate_radius_mm:g} allowed" if view.gate_radius_mm else ""
-    return f"{live.offset_mm:.1f} mm off{allowed}"
+    limit_text = f", {view.gate_radius_mm:g} allowed" if view.gate_radius_mm else ""
+    return f"{live.offset_mm:.1f} mm off{limit_text}"
 
 
 def describe_sensor(view: WatchView) -> str:
-    """Acceleration measured by the accelerometer (m/s²), and whether its signal is clipped."""
+    """Describe the magnitude of the measured acceleration (m/s²), and whether the sensor's signal is clipped; "not read
+    now" without a reading."""
     live = view.live
     if live is None or live.acceleration_mps2 is None:
         return "not read now"
-    clipped = " CLIPPED" if live.sensor_clipped else ""
-    return f"{live.acceleration_mps2:.1f} m/s²{clipped}"
+    clipping_text = " CLIPPED" if live.sensor_clipped else ""
+    return f"{live.acceleration_mps2:.1f} m/s²{clipping_text}"
 
 
 def describe_device(view: WatchView) -> str:
-    """Fault of the device; without a fault, the number of ticks that its control loop missed, and whether it is
-    simulated."""
+    """Describe the fault of the device; without a fault, whether it is simulated and the number of ticks that its
+    control loop missed, else "no fault"; "not read now" without a live state."""
     if view.live is None:
         return "not read now"
     if view.live.fault:
@@ -147,8 +155,8 @@ def describe_device(view: WatchView) -> str:
 
 
 def describe_drifts(view: WatchView) -> str:
-    """Number of drifts that the probes show (friction, gain, delay, grip), and how many exceed their limits; empty
-    without probes."""
+    """Describe the number of drifts that the probes show (friction, gain, delay, grip), and how many exceed their
+    limits; empty without probes."""
     if not view.probes:
         return ""
     over_limit = sum(drift.beyond for drift in view.drifts)

@@ -17,7 +17,7 @@ from study.tui.drawing.staircase_drawing import (
     VALLEY_MARK,
     WRONG_MARK,
     draw_staircase,
-    summarize_staircase,
+    summarise_staircase,
 )
 
 _STYLES = {
@@ -49,7 +49,7 @@ class StaircasePlot(Widget):
             [
                 Content.styled(self._staircase.title, "bold"),
                 *map(_apply_styles, lines),
-                Content.styled(summarize_staircase(self._staircase), MUTED_STYLE),
+                Content.styled(summarise_staircase(self._staircase), MUTED_STYLE),
             ]
         )
 

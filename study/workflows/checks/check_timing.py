@@ -2,7 +2,7 @@
 
 Two measures: the ticks that the loop itself counts as late or missed, and the lateness of its readings or, where there
 is no telemetry, of this program's wake-ups. `study.session.stimulus.timing_verdict` holds the limits.
-`check_timing` is part of `hapteq doctor`, `check_computer` of each sitting.
+`examine_setup` (`hapteq doctor`) calls `check_timing`; `prepare_sitting` calls `check_computer` before each sitting.
 """
 
 from collections.abc import Callable
@@ -27,11 +27,11 @@ from study.session.stimulus.timing_verdict import (
 from study.session.views.participant_views import DeviceFinding
 
 ZERO_FORCE_PERIOD_S = 0.1
-"""Length of the period of zero forces that is repeated (s)."""
+"""Length of the period of zero forces that is repeated (s). Any length serves."""
 FADE_S = 0.05
-"""Duration of fade-in and fade-out of the held stimulus (s)."""
+"""Duration of fade-in and fade-out of the held stimulus (s); without effect on zero force."""
 KEEP_ALIVE_TICKS = 50
-"""Number of ticks between two signs of life to the safety layer."""
+"""Number of ticks between two keep-alive calls, which reset the device's watchdog: 50 ms at 1 kHz."""
 
 COMPUTER_CHECK_S = 1.0
 """Duration of the check before a sitting (s). At 1 kHz it has a thousand wake-ups, enough for a 99th percentile: about
@@ -43,11 +43,13 @@ class Timing:
     """Result of `check_timing`: lateness of the device's loop and of the program's wake-ups."""
 
     seconds: float
+    """Requested duration."""
     health: Health
     """Counts of the device's own loop: ticks, late and missed ticks, fault."""
     lateness: Lateness
     """Lateness of the readings or wake-ups, see `check_timing`."""
     findings: tuple[DeviceFinding, ...]
+    """Judgements of loop, missed and late ticks, lateness and force, for the user."""
 
 
 def check_timing(
@@ -76,8 +78,8 @@ def check_timing(
 def check_computer(
     clock: Clock, rate_hz: float, simulated: bool, load_per_processor: float | None
 ) -> tuple[DeviceFinding, ...]:
-    """Check the computer before a sitting: wake-ups at rate_hz, load, priority of the loop. Takes `COMPUTER_CHECK_S`,
-    commands nothing. load_per_processor: None if unknown."""
+    """Check the computer before a sitting: wake-ups at rate_hz, load, and for a real device the priority of the loop.
+    Takes `COMPUTER_CHECK_S`; no device is commanded. load_per_processor: None if unknown."""
     late_s = measure_wake_lateness_s(clock, rate_hz, COMPUTER_CHECK_S, lambda done_s: True)
     lateness = judge_lateness(measure_lateness(np.array(late_s), rate_hz), simulated)
     return (lateness, judge_load(load_per_processor), *(() if simulated else (check_loop_priority(),)))
@@ -87,8 +89,7 @@ def measure_wake_lateness_s(
     clock: Clock, rate_hz: float, seconds: float, should_continue: Callable[[float], bool]
 ) -> list[float]:
     """Sleep until each tick (1 / rate_hz) for `seconds`. Returns the lateness of each wake-up (s), not negative.
-    `should_continue(done_s)` is called every `KEEP_ALIVE_TICKS`
-    wake-ups; the measurement stops if it returns False."""
+    `should_continue(done_s)` is called every `KEEP_ALIVE_TICKS` wake-ups; the measurement stops if it returns False."""
     late_s: list[float] = []
     tick_s = 1.0 / rate_hz
     started_s = clock.now_s()
@@ -104,8 +105,9 @@ def measure_wake_lateness_s(
 def _measure_loop_lateness_s(
     device: Device, clock: Clock, seconds: float, should_continue: Callable[[float], bool]
 ) -> FloatArray:
-    """Measure (n,), s: the lateness of the readings of a real device's loop, from the time stamps of its telemetry;
-    without telemetry, and for a simulated device, of this program's wake-ups.
+    """Measure the lateness (s), (n,), of the readings of a real device's loop, from the time stamps of its telemetry;
+    without telemetry, and for a simulated device, of this program's wake-ups. A single value, `seconds`, where no tick
+    was read.
 
     The lateness of tick k is its time stamp minus k / rate, relative to the smallest such difference. After missed
     ticks it is counted from the time at which the first of them was due.
@@ -131,7 +133,7 @@ def _measure_loop_lateness_s(
 
 
 def _keep_device_alive(device: Device, on_progress: Callable[[float], None], done_s: float) -> bool:
-    """Give a sign of life to the safety layer. Returns False after a fault of the device, which ends the
+    """Reset the device's watchdog and report the progress. Returns False after a fault of the device, which ends the
     measurement."""
     device.keep_alive()
     on_progress(done_s)
@@ -141,7 +143,7 @@ def _keep_device_alive(device: Device, on_progress: Callable[[float], None], don
 def _judge_timing(
     device: Device, seconds: float, health: Health, lateness: Lateness, load_per_processor: float | None
 ) -> tuple[DeviceFinding, ...]:
-    """Judge loop, missed and late ticks, lateness, and that no force was commanded."""
+    """Judge loop, missed ticks, for a real device late ticks, lateness, and whether no force was commanded."""
     simulated, late_ticks = device.info.simulated, health.late_ticks + health.missed_ticks
     late_finding = judge_late_ticks(late_ticks, 1000 * health.latest_s, health.ticks, load_per_processor)
     return (

@@ -1,6 +1,6 @@
-"""Reads clean recordings (`--clean`), made when the device was intact, as the reference for those to be diagnosed.
+"""Read clean recordings (`--clean`), made when the device was intact, as the reference for those to be diagnosed.
 
-Both must have the same channels, units and rate; the same recording cannot serve as both.
+Both must have the same channels, units and rate; the same file cannot be both. Called by `diagnose_recordings`.
 """
 
 from collections.abc import Sequence
@@ -15,13 +15,13 @@ from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, make_not_d
 INCOMPARABLE_ADVICE = (
     "Give clean recordings of the same device, with the same channels, units and rate, or leave --clean out."
 )
-"""Advice where the two sets of recordings differ."""
+"""Remedy in the message where channels, units or rates of the two sets differ."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class InputWithReference:
-    """Input of a diagnosis and its clean reference. Positions and conditions that only some recordings have are
-    removed."""
+    """Input of a diagnosis and its clean reference. Positions and conditions that are not the same in all recordings
+    are removed, with a remark in `diagnosed`."""
 
     diagnosed: DiagnosisInput
     clean: DiagnosisInput
@@ -31,8 +31,8 @@ def read_clean_reference(
     diagnosis_input: DiagnosisInput, sources: Sequence[Path], clean: Sequence[Path], seed: int
 ) -> InputWithReference:
     """Read the reference and reduce both inputs to their common signals. sources: files of `diagnosis_input`; clean:
-    reference recordings, or the folder of a session; seed: see `read_input`. Raises StudyError where a file is in both,
-    or channels, units or rates differ."""
+    reference recordings, or the folder of a session; seed: of the choice among a session's trials (`read_input`).
+    Raises StudyError where a file is in both, cannot be read, or channels, units or rates differ."""
     diagnosed_paths = {source.resolve() for source in sources}
     if (shared_path := next((path for path in clean if path.resolve() in diagnosed_paths), None)) is not None:
         raise StudyError(

@@ -1,6 +1,7 @@
-"""First mechanical model for a diagnosis to which no model was given, fitted to the recordings themselves.
+"""Fit of a first mechanical model to the recordings of a diagnosis to which no model was given.
 
-A refusal of the fit becomes a StudyError that names a remedy.
+Runs the fits of `analysis.diagnosis.first_model` and converts their error for unsuitable recordings into a StudyError
+with a remedy. Called by `diagnose_recordings` and `study.evaluation.real`.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -16,18 +17,20 @@ from equalizer.plant.mechanical_model import MechanicalModel
 from study.workflows.diagnosis.diagnosis_input import DiagnosisInput, make_not_diagnosable_error
 from study.workflows.forked_map import map_forked
 
-GIVE_A_MODEL = "Give a model of the device alone with --model, or a recording that carries one."
+MODEL_REMEDY = "Give a model of the device alone with --model, or a recording that carries one."
+"""Remedy of the error for recordings to which no model can be fitted."""
 
 
-def first_model_of(
+def fit_first_model(
     diagnosis_input: DiagnosisInput,
     excluded_effects: Sequence[str],
     bounds: tuple[TimeBudget, Guard],
     on_progress: Progress,
 ) -> FirstModel:
-    """Fit a first model by force balance or, if that crashes, to spectra. excluded_effects: names of effects that are
-    left out. bounds: remaining time, and the guard that catches crashes. Raises StudyError for unsuitable
-    recordings."""
+    """Fit a first model by force balance or, if that crashes or gives no model, a linear one to the spectra.
+    excluded_effects: names of effects that are left out. bounds: function that tells whether time is left, and the
+    guard that catches crashes. on_progress: called with the step's name and its completed share. Raises StudyError for
+    unsuitable recordings."""
     time_left, guard = bounds
 
     def fit_by_balance() -> FirstModel | None:
@@ -36,8 +39,8 @@ def first_model_of(
         )
 
     with _translate_refusals():
-        first = guard.run(BALANCE, "the first model", fit_by_balance, None, (NothingToDiagnose,))
-    return first or FirstModel(
+        balance_model = guard.run(BALANCE, "the first model", fit_by_balance, None, (NothingToDiagnose,))
+    return balance_model or FirstModel(
         *fit_linear_model(diagnosis_input, lambda share: on_progress("fitting a linear model", share)), ()
     )
 
@@ -45,16 +48,16 @@ def first_model_of(
 def fit_linear_model(
     diagnosis_input: DiagnosisInput, on_progress: Callable[[float], None], origin: str = "these recordings"
 ) -> tuple[MechanicalModel, tuple[str, ...]]:
-    """Fit a linear model to the spectra; also returns remarks. origin: origin of the recordings, for the model's name.
-    Raises StudyError."""
+    """Fit a linear model to the spectra; returns it with remarks. on_progress: called with the completed share, 0 to 1.
+    origin: origin of the recordings, for the model's name. Raises StudyError for unsuitable recordings."""
     with _translate_refusals():
         return fit_without_model.fit_first_linear_model(diagnosis_input.recordings, on_progress, origin)
 
 
 @contextmanager
 def _translate_refusals() -> Iterator[None]:
-    """Turn `NothingToDiagnose` into a StudyError with the same problems and a remedy."""
+    """Convert `NothingToDiagnose` into a StudyError with the same problems and `MODEL_REMEDY`."""
     try:
         yield
     except NothingToDiagnose as refusal:
-        raise make_not_diagnosable_error(refusal.problems, GIVE_A_MODEL) from refusal
+        raise make_not_diagnosable_error(refusal.problems, MODEL_REMEDY) from refusal

@@ -2,7 +2,7 @@
 
 The forces are the feedforward of a finite-horizon LQR tracker (`equalizer.tracking.feedforward`) for identified models
 of the device, under a force cap. With `--physics`, the forces of known nonlinear effects along the predicted motion are
-added. Each error states its cause and a remedy. Called by `study.cli.equalize` and `repeat_trajectory`.
+added along it. Called by `study.cli.equalize` and, for solving without writing, by `repeat_trajectory`.
 """
 
 import math
@@ -28,17 +28,19 @@ from study.workflows.output_paths import require_new_outputs
 MAX_ACCELERATION_MPS2 = 1e4
 """Largest accepted acceleration (m/s^2), a thousand times gravity: larger values indicate a wrong unit in the table."""
 MAX_TRACKING_ERROR = 0.5
-"""Predicted tracking error, relative to the wanted signal, above which forces are refused."""
+"""Largest accepted predicted tracking error, rms relative to that of the target signal. Chosen: at 1/2 the amplitude of
+the motion is wrong by up to 6 dB."""
 MIN_WEIGHT_RATIO = 1e-7
-"""Ratio of the square root of the weight of the forces to the model's peak gain, below which the weight has no effect:
-its square, added to the squared gain, is lost in rounding."""
+"""Least ratio of the square root of the forces' weight to the model's peak gain. Its square is added to the squared
+gain; near the relative spacing of 64-bit floats (2e-16) it would be lost in rounding."""
 
 
 @dataclass(frozen=True, slots=True)
 class EqualizePlan:
     """Request of an equalization. models: files of identified models. trajectory: table of target accelerations. out:
     table of forces to write. at_m: place in the workspace (m), needed for models of several places. cap_n: largest
-    force (N). constrain: keep the forces below the cap at the cost of accuracy, instead of raising an error."""
+    norm of the force (N); the default is the cap of the published study. constrain: keep the forces below the cap at
+    the cost of accuracy, instead of raising an error."""
 
     models: tuple[Path, ...]
     trajectory: Path
@@ -73,7 +75,8 @@ class EqualizedTrajectory:
 
 
 def equalize_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
-    """Read the inputs, solve for the forces and write them. Raises StudyError; nothing is written then."""
+    """Read the inputs, solve for the forces and write them. Raises StudyError, before anything is written, where an
+    output exists, an input is not valid, or the forces are refused (`solve_trajectory`)."""
     check_free(plan.out)
     equalized = solve_trajectory(plan)
     write_trajectory(plan.out, equalized.forces)
@@ -81,7 +84,8 @@ def equalize_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
 
 
 def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
-    """Read the inputs and solve for the forces, without writing. Raises StudyError."""
+    """Read the inputs and solve for the forces, without writing. Raises StudyError where an input cannot be read or
+    used, forces exceed the cap, or the tracking error exceeds `MAX_TRACKING_ERROR`."""
     reference = _read_reference(plan.trajectory)
     models = read_playback_models(plan.models, plan.at_m, plan.weight)
     physics = None if plan.physics is None else read_mechanical_model(plan.physics)
@@ -96,13 +100,13 @@ def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
             "Scale the accelerations, give --constrain, or raise --cap for a device that no hand holds.",
             saved="Nothing was written.",
         ) from limit_error
-    except ValueError as problem:
+    except ValueError as error:
         _require_weight(plan, models)
-        raise _make_table_error(f"{plan.trajectory.name}: {problem}.") from problem
+        raise _make_table_error(f"{plan.trajectory.name}: {error}.") from error
     _require_accuracy(plan, feedforward, in_bands=bands is not None)
     compensation = None
     if physics is not None:
-        compensation = _compensate(plan, feedforward, models.most_weighted, physics, amplitude_n)
+        compensation = _compensate_known_effects(plan, feedforward, models.most_weighted, physics, amplitude_n)
     samples = feedforward.forces.samples if compensation is None else compensation.forces
     forces = replace(feedforward.forces, samples=samples)
     peaks = require_under_cap(samples, plan.cap_n, forces.sample_rate_hz)
@@ -112,7 +116,7 @@ def solve_trajectory(plan: EqualizePlan) -> EqualizedTrajectory:
 
 
 def check_free(out_path: Path, *further_paths: Path) -> None:
-    """Check that no output path exists, before any work. Raises StudyError."""
+    """Check, before any work, that no output path exists. Raises StudyError where one does."""
     require_new_outputs(out_path, *further_paths, title="The forces were not computed", kind="tables")
 
 
@@ -150,8 +154,8 @@ def _require_weight(plan: EqualizePlan, models: PlaybackModels) -> None:
 
 
 def _require_accuracy(plan: EqualizePlan, feedforward: Feedforward, in_bands: bool) -> None:
-    """Raise StudyError if the models cannot reproduce the target signal, see `MAX_TRACKING_ERROR`. Where the cap costs
-    accuracy, the error without the cap decides. in_bands: whether narrow and wide models were combined."""
+    """Raise StudyError if the predicted error exceeds `MAX_TRACKING_ERROR` or is NaN. Where the cap reduces the
+    accuracy, the error without the cap is compared. in_bands: whether narrow and wide models were combined."""
     tracking_error = feedforward.error if feedforward.loss is None else feedforward.loss.error_free
     if not tracking_error <= MAX_TRACKING_ERROR and in_bands:
         raise StudyError(
@@ -185,8 +189,8 @@ def _solve_feedforward(
 
 
 def _read_amplitude_n(model: IdentifiedModel) -> float | None:
-    """Read the force amplitude of the identification (N); None if the effects were removed from its recordings. Raises
-    StudyError where the model does not state it."""
+    """Read the force amplitude of the identification (N); None where the provenance states null, because the effects
+    were removed from its recordings. Raises StudyError where the amplitude is missing or not above 0."""
     amplitude_n = model.provenance.get("amplitude_n", 0.0)
     if amplitude_n is None:
         return None
@@ -201,7 +205,7 @@ def _read_amplitude_n(model: IdentifiedModel) -> float | None:
     return float(amplitude_n)
 
 
-def _compensate(
+def _compensate_known_effects(
     plan: EqualizePlan,
     feedforward: Feedforward,
     model: IdentifiedModel,
@@ -209,23 +213,23 @@ def _compensate(
     amplitude_n: float | None,
 ) -> Compensation:
     """Add the forces of the known effects along the predicted motion. amplitude_n: as from `_read_amplitude_n`. Raises
-    StudyError where the mechanical model does not fit."""
+    StudyError where the mechanical model does not match the identified one."""
     try:
         compensation = compensate(
             feedforward.forces.samples, feedforward.reference, model, physics, amplitude_n, plan.cap_n
         )
-    except ValueError as problem:
+    except ValueError as error:
         raise StudyError(
             "The known physics does not fit the model",
-            f"{plan.physics}: {problem}.",
+            f"{plan.physics}: {error}.",
             "Correct the [[effect]] sections, or leave out --physics.",
             saved="Nothing was written.",
-        ) from problem
+        ) from error
     return compensation
 
 
 def _make_table_error(explanation: str) -> StudyError:
-    """Error for a table that cannot be equalized with the model. explanation: a sentence."""
+    """Make the error for a table that cannot be equalized with the model. explanation: a sentence."""
     return StudyError(
         "The forces were not computed",
         explanation,

@@ -1,4 +1,4 @@
-"""`hapteq contact`: play a recorded transient along the normal of a contact.
+"""Play a recorded acceleration transient along the normal of a contact: `hapteq contact` (`study.cli.contact`).
 
 The causal tracking problem (`equalizer.tracking.lqr.contact`) is solved for each of the three axes before the contact.
 At the contact the normal n is known: the forces are sum_i n_i F_i(t). The comparison is a force along n with one gain.
@@ -42,15 +42,11 @@ from study.workflows.equalizer.play_forces import (
 )
 from study.workflows.equalizer.playback_models import PlaybackModels, Vector, read_playback_models
 
-GAIN_LINES = 100
-"""Number of frequencies in the band, in a geometric series, over which the gain of the comparison is averaged."""
-PADDING = Padding(after_s=0.5)
-"""Time (s) that is played after the recording, in which the handle comes to rest."""
-FADE_S = 0.2
-"""Fade-out (s) at the end: the last forces of a solution with a free end are useless, and would end with a step."""
-RESTART, UNSAVED = "Start again.", "Nothing was written."
-SETTLE_S = 1.0
-"""Time (s) without stimulus before and after each play."""
+GAIN_LINES = 100  # frequencies in the band, a geometric series, over which the gain of the comparison is averaged
+PADDING = Padding(after_s=0.5)  # played after the recording, for the handle to come to rest. Times: chosen by hand
+FADE_S = 0.2  # fade-out at the end, where a solution with a free end has forces of no use that would end with a step
+RESTART, UNSAVED = "Start again.", "Nothing was written."  # remedy and saved data in the error of an interrupted play
+SETTLE_S = 1.0  # time without stimulus before and after each play
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,8 +107,8 @@ def play_contact(
         require_rate(transient, rate_hz)
         recording = plan.scale * transient.signal.samples[:, 0]
         start = prepare_causal_start(make_tracking_problem(model, TrackingWeights(plan.weight)), recording, PADDING)
-    except ValueError as problem:
-        raise _make_play_error(f"{plan.transient.name}: {problem}.", "Correct what is named.") from problem
+    except ValueError as error:
+        raise _make_play_error(f"{plan.transient.name}: {error}.", "Correct what is named.") from error
     feedforward = start.basis.compute_forces(normal)
     reference = _extend_along_normal(recording, normal, len(feedforward))
     forces = (
@@ -133,6 +129,7 @@ def play_contact(
 
 
 def _normalise(normal: Vector) -> FloatArray:
+    """Scale the normal (3,) to length 1. Raises WrongUseError for a length of zero or that is not finite."""
     length = float(np.linalg.norm(normal))
     if not (np.isfinite(length) and length > 0):
         raise WrongUseError(
@@ -142,6 +139,7 @@ def _normalise(normal: Vector) -> FloatArray:
 
 
 def _read_transient(plan: ContactPlan) -> Trajectory:
+    """Read the recorded acceleration. Raises WrongUseError for a table of another kind, StudyError if unreadable."""
     table = read_trajectory(plan.transient)
     if table.kind is not TRANSIENT:
         raise WrongUseError(
@@ -153,37 +151,39 @@ def _read_transient(plan: ContactPlan) -> Trajectory:
     return table
 
 
-def _extend_along_normal(recording: FloatArray, normal: FloatArray, count: int) -> FloatArray:
-    return np.outer(np.pad(recording, (0, count - len(recording))), normal)
+def _extend_along_normal(recording: FloatArray, normal: FloatArray, row_count: int) -> FloatArray:  # (row_count, 3)
+    return np.outer(np.pad(recording, (0, row_count - len(recording))), normal)
 
 
 def _subtract_spring_force(forces: FloatArray, reference: FloatArray, models: PlaybackModels) -> FloatArray:
-    """Commands minus the force that the spring will add along the reference motion."""
+    """Subtract the force that the device's virtual spring adds along the reference motion, (N, 3) in m/s^2."""
     spring, rate_hz = find_acting_spring(models), models.nearest.sample_rate_hz
     return compensate_spring(lambda _: forces, spring, rate_hz, models.band_hz)(reference)
 
 
 def _fade_out(forces: FloatArray, rate_hz: float) -> FloatArray:
+    """Multiply forces (N, 3) by a raised cosine that falls from 1 to 0 over the last FADE_S."""
     remaining_s = np.arange(len(forces))[::-1] / rate_hz
     fade_share = np.clip(remaining_s / FADE_S, 0.0, 1.0)
     return np.asarray(forces * (0.5 - 0.5 * np.cos(np.pi * fade_share))[:, np.newaxis])
 
 
-def _compute_gain_forces(model: IdentifiedModel, reference: FloatArray) -> FloatArray:
+def _compute_gain_forces(model: IdentifiedModel, reference: FloatArray) -> FloatArray:  # the comparison, (N, 3) in N
     return np.asarray(
         make_static_gain_inverse(model, np.geomspace(*model.band_hz, GAIN_LINES)).response[0, 0, 0].real * reference
     )
 
 
 def _require_cap(forces: FloatArray, plan: ContactPlan, rate_hz: float) -> FloatArray:
+    """Return forces (N, 3), N, unchanged. Raises StudyError, with the largest possible --scale, above the cap."""
     try:
         require_under_cap(forces, plan.cap_n, rate_hz)
-    except ForceLimitError as limit:
-        largest_scale = np.floor(1e3 * plan.scale * limit.peaks.largest_scale) / 1e3
+    except ForceLimitError as error:
+        largest_scale = np.floor(1e3 * plan.scale * error.peaks.largest_scale) / 1e3
         raise _make_play_error(
-            f"The forces would reach {limit.peaks.peak_n:.3g} N, above the cap of {plan.cap_n:g} N.",
+            f"The forces would reach {error.peaks.peak_n:.3g} N, above the cap of {plan.cap_n:g} N.",
             f"Give --scale {largest_scale:g} or less, or raise --cap for a device that no hand holds.",
-        ) from limit
+        ) from error
     return forces
 
 
@@ -194,7 +194,7 @@ def _play_both(
     on_progress: Callable[[float], None],
     before_moving: BeforeMoving,
 ) -> list[FloatArray]:
-    """Play each of the forces on one opened device; returns their measured accelerations, (N, 3) in m/s^2."""
+    """Play each of the forces on one device and return the accelerations, (N, 3) in m/s^2. Raises StudyError."""
     clock = RealClock() if needs_real_time(plan.device) else VirtualClock()
     settings = _make_settings(plan, models, forces)
     measured: list[FloatArray] = []
@@ -223,10 +223,10 @@ def _play_both(
 
 
 def _make_settings(plan: ContactPlan, models: PlaybackModels, forces: tuple[FloatArray, FloatArray]) -> DeviceSettings:
-    """Settings of the device. The slew limit allows the initial step: forces begin at the contact without fade-in."""
+    """Make the device's settings. The slew limit allows the initial step: forces begin at contact without fade-in."""
     settings, rate_hz = make_playback_settings(plan.cap_n, models), models.nearest.sample_rate_hz
-    steps = [np.linalg.norm(np.diff(command, axis=0, prepend=0, append=0), axis=1).max() for command in forces]
-    slew_n_per_s = max(settings.limits.slew_n_per_s, float(max(steps)) * rate_hz + SPRING_SLEW_N_PER_S)
+    steps_n = [np.linalg.norm(np.diff(command, axis=0, prepend=0, append=0), axis=1).max() for command in forces]
+    slew_n_per_s = max(settings.limits.slew_n_per_s, float(max(steps_n)) * rate_hz + SPRING_SLEW_N_PER_S)
     return replace(settings, limits=replace(settings.limits, slew_n_per_s=slew_n_per_s))
 
 
@@ -237,7 +237,7 @@ def _play_transient(device: Device, forces: FloatArray, on_share: Callable[[floa
     return read_measured_acceleration(play_forces(device, padded, on_share))[rest_rows : rest_rows + len(forces)]
 
 
-def _write_play(play: ContactPlay, models: PlaybackModels) -> None:
+def _write_play(play: ContactPlay, models: PlaybackModels) -> None:  # tables, figure and contact.json in a new folder
     from analysis.figures.contact_transient import contact_picture
     from study.workflows.picture_files import write_pictures
 
@@ -256,7 +256,7 @@ def _write_play(play: ContactPlay, models: PlaybackModels) -> None:
         write_json(folder / "contact.json", "hapteq-contact", 1, document, overwrite=False)
 
 
-def _list_plays(play: ContactPlay) -> tuple[tuple[str, FloatArray, FloatArray], ...]:
+def _list_plays(play: ContactPlay) -> tuple[tuple[str, FloatArray, FloatArray], ...]:  # title, forces, acceleration
     return (
         ("through the model", play.equalized.forces, play.equalized.measured),
         ("one gain", play.single_gain.forces, play.single_gain.measured),
@@ -264,7 +264,7 @@ def _list_plays(play: ContactPlay) -> tuple[tuple[str, FloatArray, FloatArray], 
 
 
 def summarise_contact(play: ContactPlay) -> dict[str, Any]:
-    """Values of contact.json and `--json`: relative errors in the band (1 = 100 %), and the largest force (N)."""
+    """Collect the values of contact.json and `--json`: relative errors in the band (1 = 100 %), largest force (N)."""
     return {
         "out": str(play.plan.out),
         "normal": play.normal.tolist(),
@@ -279,7 +279,7 @@ def summarise_contact(play: ContactPlay) -> dict[str, Any]:
 
 
 def format_contact(play: ContactPlay) -> tuple[str, ...]:
-    """Lines for the terminal: errors by the model and as measured (%), and the largest force (N)."""
+    """Format lines for the terminal: errors by the model and as measured (%), and the largest force (N)."""
     values = summarise_contact(play)
     low_hz, high_hz = play.band_hz
     return (

@@ -1,7 +1,7 @@
-"""Arguments and result of repeated playback (iterative learning), and their files.
+"""Arguments and result of repeated playback (iterative learning control), and their files.
 
 The best forces are written as a table, with a JSON document next to it. A later run continues from these forces only if
-trajectory, model and table are unchanged (SHA-256).
+trajectory, model and table are unchanged (SHA-256). Called by `repeat_trajectory` and `repeat_playback`.
 """
 
 import hashlib
@@ -24,19 +24,21 @@ from study.store.formats.trajectory_file import read_trajectory, write_trajector
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RepeatPlan:
-    """Arguments of repeated playback: wanted signal, inverse of the model, settings of the device, number of
+    """Arguments of repeated playback: reference motion, inverse of the model, settings of the device, number of
     corrections."""
 
     reference: Trajectory
-    """Wanted accelerations (m/s²), from rest to rest; only their part in the band is played."""
+    """Reference accelerations (m/s²), from rest to rest; only their part in the band is played."""
     inverse: InverseOfLength
-    """Inverse of the model, from wanted accelerations to forces."""
+    """Inverse of the model, from reference accelerations to forces."""
     band_hz: tuple[float, float]
+    """Lower and upper end of the band in which the motion is corrected."""
     model_sha256: str
     """SHA-256 of the models behind the inverse: forces are reused for the same models only."""
     settings: DeviceSettings
     """Settings without a hand on the handle. Every correction respects the cap of the stimulus."""
     device: str
+    """Name of the device, as of the option `--device`."""
     repeats: int = 10
     """Number of corrections after the first play."""
     first_gain: float = 1.0
@@ -44,8 +46,9 @@ class RepeatPlan:
     spring: VirtualSpring = NO_SPRING
     """Spring that acts on the device and is not in the model already."""
     first: FloatArray | None = None
-    """(N, 3), N: forces to start from, row for row with the wanted signal; None: those of the model."""
+    """(N, 3), N: forces of the first play, one row per sample of the reference; None: those of the model."""
     seed: int = 0
+    """Seed of a simulated device."""
     out: Path | None = None
     """Table of forces to write, and the document next to it; None: nothing is written."""
 
@@ -55,26 +58,29 @@ class RepeatResult:
     """Result of repeated playback: the best forces, and the error of each play."""
 
     forces: Trajectory
-    """The best forces, row for row with the wanted signal."""
+    """The best forces, one row per sample of the reference."""
     errors: tuple[float, ...]
-    """Relative error in the band of each play as measured, noise included."""
+    """Relative error in the band of each play as measured (1 = 100 %), noise included."""
     noise_floor: float
     """Relative error that noise alone causes; 0 where it is not known."""
     verdict: Verdict
-    """Why the repetition ended."""
+    """Reason for which the repetition ended."""
     best_play: int
-    """Number of the play with the smallest residual, from 0: that of the forces kept."""
+    """Index of the play with the smallest residual, from 0: that of the best forces."""
     remark: str
+    """As `IterationState.remark`."""
     plays: tuple[PlaybackResult, ...]
+    """Recordings of all plays, in order."""
 
 
 def make_result(plan: RepeatPlan, state: IterationState, plays: list[PlaybackResult]) -> RepeatResult:
-    """The result after the last play; a repetition that could continue counts as ended with the best forces."""
+    """Make the result after the last play, of at least one; a repetition that could continue counts as ended with the
+    best forces."""
     verdict = Verdict.BEST_KEPT if state.verdict is Verdict.CONTINUE else state.verdict
     return RepeatResult(
         forces=_make_force_table(plan, state),
         errors=state.errors,
-        noise_floor=_relative_noise_floor(state),
+        noise_floor=_compute_relative_noise_floor(state),
         verdict=verdict,
         best_play=int(np.argmin(state.residuals)),
         remark=state.remark,
@@ -83,20 +89,20 @@ def make_result(plan: RepeatPlan, state: IterationState, plays: list[PlaybackRes
 
 
 def _make_force_table(plan: RepeatPlan, state: IterationState) -> Trajectory:
-    """The best forces as a trajectory of the length of the reference."""
-    rows, rate_hz = len(plan.reference.signal), plan.reference.signal.sample_rate_hz
-    signal = Signal(state.best_forces[:rows], rate_hz, FORCES.quantity, FORCES.unit, FORCES.header[1:])
+    """Make a table of the best forces, cut to the length of the reference."""
+    sample_count, rate_hz = len(plan.reference.signal), plan.reference.signal.sample_rate_hz
+    signal = Signal(state.best_forces[:sample_count], rate_hz, FORCES.quantity, FORCES.unit, FORCES.header[1:])
     return Trajectory(signal, plan.reference.start_s)
 
 
-def _relative_noise_floor(state: IterationState) -> float:
-    """Noise floor relative to the level of the reference; 0 where it is not known."""
+def _compute_relative_noise_floor(state: IterationState) -> float:
+    """Divide the noise floor by the rms of the reference in the band; 0 where the noise is not known."""
     return (state.noise_floor or 0.0) / state.repetition.level
 
 
 def write_best_forces(plan: RepeatPlan, state: IterationState, interrupted: bool) -> None:
-    """Write the best forces so far and the document to `plan.out`; nothing without such a path. interrupted: whether
-    the repetition was stopped by the user."""
+    """Write the best forces so far to `plan.out`, and the document next to it; nothing where that is None. interrupted:
+    whether the repetition was stopped by the user. Raises CannotWriteError."""
     if plan.out is None:
         return
     table = _make_force_table(plan, state)
@@ -111,7 +117,7 @@ def write_best_forces(plan: RepeatPlan, state: IterationState, interrupted: bool
         band_hz=plan.band_hz,
         errors=state.errors,
         kept=int(np.argmin(state.residuals)),
-        noise_floor=_relative_noise_floor(state),
+        noise_floor=_compute_relative_noise_floor(state),
         gains=state.gains,
         fitted=state.scales,
         verdict=verdict.name.lower(),
@@ -122,15 +128,15 @@ def write_best_forces(plan: RepeatPlan, state: IterationState, interrupted: bool
 
 
 def read_earlier_forces(forces: Path, reference: Trajectory, model_sha256: str) -> FloatArray:
-    """(N, 3), N: forces that an earlier run found for the same trajectory and model. Raises StudyError if one of them
-    differs, or the table was changed."""
+    """Read the forces, (N, 3) in N, that an earlier run found for the same trajectory and model. forces: path of their
+    table. Raises StudyError if trajectory or model differ, the table was changed, or a file cannot be read."""
     document, table = read_repeats(get_repeats_path(forces)), read_trajectory(forces)
     matches_by_subject = {
         "another trajectory": document.trajectory_sha256 == hash_trajectory(reference),
         "another model": document.model_sha256 == model_sha256,
         "a table of forces that was changed since": document.forces_sha256 == _hash_text(format_trajectory_csv(table)),
     }
-    if differing_subjects := [subject for subject, matches in matches_by_subject.items() if not matches]:
+    if differing_subjects := [subject for subject, is_match in matches_by_subject.items() if not is_match]:
         raise StudyError(
             "The repeats cannot continue from the earlier forces",
             f"{get_repeats_path(forces).name} belongs to {' and '.join(differing_subjects)}.",
@@ -141,11 +147,11 @@ def read_earlier_forces(forces: Path, reference: Trajectory, model_sha256: str) 
 
 
 def hash_trajectory(reference: Trajectory) -> str:
-    """SHA-256 of sample rate and samples of a trajectory, by which a later run recognises it."""
-    rate = np.float64(reference.signal.sample_rate_hz).tobytes()
-    return hashlib.sha256(rate + reference.signal.samples.astype("<f8").tobytes()).hexdigest()
+    """Compute the SHA-256 (hexadecimal) of sample rate and samples of a trajectory, as little-endian float64."""
+    rate_bytes = np.float64(reference.signal.sample_rate_hz).tobytes()
+    return hashlib.sha256(rate_bytes + reference.signal.samples.astype("<f8").tobytes()).hexdigest()
 
 
 def _hash_text(text: str) -> str:
-    """SHA-256 of a text in UTF-8, as hexadecimal digits."""
+    """Compute the SHA-256 of a text in UTF-8, in hexadecimal digits."""
     return hashlib.sha256(text.encode()).hexdigest()

@@ -51,7 +51,7 @@ def make_event_schema() -> dict[str, Any]:
 def format_session_log() -> Iterable[str]:
     """Yield heading and paragraphs of docs/formats.md on the session log and its seal."""
     yield "## Session log (`events.jsonl`) and its seal (`seal.json`)"
-    yield from format_text.SESSION_LOG
+    yield from format_text.SESSION_LOG_NOTES
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +109,7 @@ SCHEMAS: tuple[Schema, ...] = (
     ),
     Schema(
         "repeats.json",
-        f"`*{repeats_file.SUFFIX}`, {format_text.REPEATS}",
+        f"`*{repeats_file.SUFFIX}`, {format_text.REPEATS_DESCRIPTION}",
         lambda: make_document_schema(
             repeats_file.REPEATS_VALIDATOR.json_schema(), repeats_file.FORMAT, repeats_file.VERSION
         ),
@@ -125,10 +125,10 @@ SCHEMAS: tuple[Schema, ...] = (
     ),
     Schema(
         "live.json",
-        format_text.LIVE,
+        format_text.LIVE_STATE_DESCRIPTION,
         lambda: make_document_schema(TypeAdapter(Live).json_schema(), live_file.LIVE_FORMAT, live_file.LIVE_VERSION),
     ),
-    Schema("request.json", format_text.REQUEST, make_request_schema),
+    Schema("request.json", format_text.REQUEST_DESCRIPTION, make_request_schema),
 )
 """Schemas of all JSON formats and protocols. Every new JSON format must be added here."""
 
@@ -149,7 +149,7 @@ def compose_formats_page() -> str:
         format_text.EFFECTS_NOTES,
         _format_effects(),
         "## Laws without a name",
-        format_text.LAWS,
+        format_text.LAW_SECTION,
         *_format_csv_tables(),
         *format_session_log(),
         "## JSON documents and protocols",
@@ -176,9 +176,9 @@ def _format_recordings() -> Iterable[str]:
     """Yield the section on the HDF5 file of a recording."""
     yield "## Recording (`.h5`)"
     yield _format_layout(recording_layout.LAYOUT)
-    yield format_text.SIGNAL_ATTRIBUTES
+    yield format_text.SIGNAL_TABLE_NOTE
     yield _format_layout(recording_layout.SIGNAL_ATTRIBUTES)
-    yield format_text.SEGMENT_FIELDS
+    yield format_text.SEGMENT_TABLE_NOTE
     yield _format_layout(recording_layout.SEGMENT_FIELDS)
     yield format_text.RECORDING_NOTES
 
@@ -211,8 +211,8 @@ def _format_effects() -> str:
 
 
 _CSV_TABLES: tuple[tuple[str, type[Trial] | type[Threshold], str], ...] = (
-    ("trials.csv", Trial, format_text.TRIALS),
-    ("thresholds.csv", Threshold, format_text.THRESHOLDS),
+    ("trials.csv", Trial, format_text.TRIALS_NOTES),
+    ("thresholds.csv", Threshold, format_text.THRESHOLDS_NOTES),
 )
 """CSV tables with a row per dataclass instance: file name, dataclass, description."""
 
@@ -223,7 +223,7 @@ def _format_csv_tables() -> Iterable[str]:
     yield _format_markdown_table(
         ("header", "holds"), [(f"`{','.join(kind.header)}`", f"{kind.quantity}, {kind.unit}") for kind in TABLE_KINDS]
     )
-    yield format_text.TABLE_NOTES
+    yield format_text.FORCE_TABLE_NOTES
     for name, row_type, description in _CSV_TABLES:
         yield f"## `{name}`"
         yield description

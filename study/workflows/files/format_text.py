@@ -11,23 +11,23 @@ from equalizer.signals.units import ALLOWED
 from equalizer.tracking.feedforward.trajectory import STEP_TOLERANCE
 from study.session.facts import log_chain
 
-GENERATED = (
+GENERATED_PAGE_NOTE = (
     "This page is generated from the code (`python -m study.workflows.files.format_docs docs`): change the code, not "
     "the page."
 )
-"""Note at the top of a generated page."""
+"""Note at the top of docs/formats.md."""
 
 INTRODUCTION = (
-    f"{GENERATED} `hapteq validate FILE` checks any of these files and lists its problems.",
+    f"{GENERATED_PAGE_NOTE} `hapteq validate FILE` checks any of these files and lists its problems.",
     "Every HDF5 file and every JSON document states its `format` and `version`. TOML and CSV files are recognised by "
     f"their keys or header. Units: {ALLOWED}. `g` is standard gravity. Time is the first dimension of each array.",
 )
 """Paragraphs at the top of the page."""
 
-SIGNAL_ATTRIBUTES = "Each of `command`, `response`, `position`, `excitation`, `condition` has these attributes:"
+SIGNAL_TABLE_NOTE = "Each of `command`, `response`, `position`, `excitation`, `condition` has these attributes:"
 """Sentence above the table of the attributes of a signal."""
 
-SEGMENT_FIELDS = "A row of `segments` has these fields:"
+SEGMENT_TABLE_NOTE = "A row of `segments` has these fields:"
 """Sentence above the table of the fields of a segment."""
 
 RECORDING_NOTES = (
@@ -48,7 +48,7 @@ EFFECTS_NOTES = (
 
 _FUNCTION_NAMES = ", ".join(f"`{name}`" for name in FUNCTIONS if name not in MEMORY_OPERATORS)
 
-LAWS = "\n\n".join(
+LAW_SECTION = "\n\n".join(
     (
         f"A law that is not an effect of the catalogue is an effect `{DISCOVERED_LAW}`. A model states its formula:",
         "```toml\n[[effect]]\n"
@@ -75,15 +75,15 @@ LAWS = "\n\n".join(
         f"{MOST_NODES} parts, and {STACK_SIZE} numbers at once.",
     )
 )
-"""Section on laws without a name: syntax, functions, signals and parameters of their formulas."""
+"""Section on laws that are no effect of the catalogue: syntax, functions, signals and parameters of their formulas."""
 
-TABLE_NOTES = (
+FORCE_TABLE_NOTES = (
     f"The rate is constant (each step within {STEP_TOLERANCE:.0%} of the mean step) and equals the rate of the model. "
     "The rows of forces correspond to the rows of the trajectory."
 )
 """Paragraph below the table of headers of trajectories and forces."""
 
-TRIALS = (
+TRIALS_NOTES = (
     "One row per presentation; further columns may follow. `felt` is false if a person answered while no device moved, "
     "and empty for simulated participants. `direction_shown` and `answer` are numbers on the screen; `angle_deg` is "
     "the direction. In the phase `detection` they are numbers of intervals. In the phase `catch` the level is the cap, "
@@ -91,7 +91,7 @@ TRIALS = (
 )
 """Paragraph above the columns of `trials.csv`."""
 
-THRESHOLDS = (
+THRESHOLDS_NOTES = (
     "One row per run. `threshold_n` is the arithmetic mean of the averaged levels, in newtons. `threshold_db` is the "
     "mean of the same levels in dB re 1 N. With the Psi method both are the posterior mean, taken in dB. "
     "`threshold_mps2` and `threshold_mm` are the same threshold as delivered acceleration in m/s² and as displacement "
@@ -99,7 +99,7 @@ THRESHOLDS = (
 )
 """Paragraph above the columns of `thresholds.csv`."""
 
-SESSION_LOG = (
+SESSION_LOG_NOTES = (
     "One JSON object per line. Lines are appended and never changed. Each line is an event of the schema "
     "`session_event.json`. Times are ISO 8601 with date and UTC offset, durations are in seconds, and file names are "
     "relative to the session's folder.",
@@ -120,16 +120,16 @@ SESSION_LOG = (
 )
 """Paragraphs on the session log, its hash chain and its seal."""
 
-REPEATS = (
+REPEATS_DESCRIPTION = (
     "next to a table of forces found by repetition: errors of each play, and the trajectory, model and device that the "
     "forces belong to"
 )
 """Description of the document of repeats."""
 
-LIVE = "`live.json`, the present state of a running session; replaced several times a second"
+LIVE_STATE_DESCRIPTION = "`live.json`, the present state of a running session; replaced several times a second"
 """Description of the document of a running session's state."""
 
-REQUEST = (
+REQUEST_DESCRIPTION = (
     "a file in a session's folder `requests/`: a request of another program to the session, removed when it is read. A "
     "file name that begins with `stop` is a request to stop, with any content"
 )

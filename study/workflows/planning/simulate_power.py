@@ -1,4 +1,4 @@
-"""Statistical power by number of participants, from simulated studies (`hapteq power`).
+"""Statistical power by number of participants, from simulated studies. Called by `study.cli.power` (`hapteq power`).
 
 The studies are simulated and tested by `analysis.psychophysics.power` in chunks on any executor. Each finished chunk is
 appended to `studies.jsonl`, so that an interrupted simulation continues; power.json and a figure are written last.
@@ -30,7 +30,8 @@ from study.store.disk.text_file import read_text, write_text
 from study.workflows.run_on_executor import run_tasks
 
 STUDIES_PER_CHUNK = 10
-"""Number of studies in a task of a worker process: it takes some seconds, so that an interruption loses little."""
+"""Number of studies in a task of a worker process. Chosen: a task takes some seconds, so that an interruption loses
+little."""
 LATER_CROWD_FIELDS = ("guessers", "criterion_drift_sd", "unsure", "repeats", "delivery", "rove_db")
 """Fields of `Crowd` that were added in later versions. They are left out of the stored plan while they have their
 defaults, so that a folder from an earlier version can be continued."""
@@ -45,7 +46,7 @@ class PowerPlan:
     crowd: Crowd
     rule: StaircaseRule
     people: tuple[int, ...]
-    """Sample sizes."""
+    """Sample sizes: numbers of participants of a study."""
     studies: int
     """Number of studies of each size."""
     seed: int
@@ -71,8 +72,8 @@ def simulate_power(
     on_finished: called with the number of finished studies. The same seed gives the same results on any executor;
     `folder` may contain an interrupted run.
 
-    Raises WrongUseError for a trial limit, StudyError where `folder` belongs to another plan, and CannotWriteError.
-    """
+    Raises WrongUseError for a trial limit without the Psi method, StudyError where `folder` belongs to another plan,
+    and CannotWriteError."""
     if plan.rule.trial_limit and not plan.rule.is_bayesian:
         raise WrongUseError(
             "This staircase has a trial limit",
@@ -80,18 +81,18 @@ def simulate_power(
             "Set staircase.trial_limit to 0 in the protocol.",
         )
     progress_path = folder / PROGRESS_NAME
-    verdicts_by_chunk = _read_finished(progress_path, plan)
+    verdicts_by_chunk = _read_finished_chunks(progress_path, plan)
     remaining_chunks = [
         (sample_size, first_study)
         for sample_size in plan.people
         for first_study in range(0, plan.studies, STUDIES_PER_CHUNK)
         if (sample_size, first_study) not in verdicts_by_chunk
     ]
-    finished_count = sum(len(verdicts) for (people, _), verdicts in verdicts_by_chunk.items() if people in plan.people)
+    finished_count = sum(len(verdicts) for (size, _), verdicts in verdicts_by_chunk.items() if size in plan.people)
     on_finished(finished_count)
     for chunk, verdicts in run_tasks(executor, judge_chunk, ((chunk, (plan, chunk)) for chunk in remaining_chunks)):
         verdicts_by_chunk[chunk] = verdicts
-        _append_line(progress_path, {"piece": chunk, "verdicts": [asdict(verdict) for verdict in verdicts]})
+        _append_json_line(progress_path, {"piece": chunk, "verdicts": [asdict(verdict) for verdict in verdicts]})
         finished_count += len(verdicts)
         on_finished(finished_count)
     # In the order of the plan, not in the order of finishing, so that rounding of sums is the same in every run.
@@ -126,17 +127,18 @@ def _write_figure(folder: Path, plan: PowerPlan, points: Sequence[PowerPoint]) -
 
 
 def judge_chunk(plan: PowerPlan, chunk: StudyChunk) -> list[StudyVerdict]:
-    """Simulate and test the studies of one chunk. Runs in a worker process."""
-    people, first_study = chunk
+    """Simulate and test the studies of one chunk: `STUDIES_PER_CHUNK`, or fewer at the end of a sample size. Runs in a
+    worker process."""
+    sample_size, first_study = chunk
     end_study = min(first_study + STUDIES_PER_CHUNK, plan.studies)
     return [
-        judge_study(plan.crowd, plan.rule, people, (plan.seed, people, study_number), plan.contrast_hz)
+        judge_study(plan.crowd, plan.rule, sample_size, (plan.seed, sample_size, study_number), plan.contrast_hz)
         for study_number in range(first_study, end_study)
     ]
 
 
 def _summarise_plan(plan: PowerPlan) -> dict[str, object]:
-    """The plan as plain values, without its sample sizes: further sizes may be added to a folder later."""
+    """Summarise the plan as JSON values, without its sample sizes: further sizes may be added to a folder later."""
     from pydantic import TypeAdapter
 
     rule = TypeAdapter(StaircaseRule).dump_python(plan.rule, mode="json")
@@ -144,15 +146,16 @@ def _summarise_plan(plan: PowerPlan) -> dict[str, object]:
     for field_name in LATER_CROWD_FIELDS:
         if not crowd[field_name]:
             del crowd[field_name]
-    facts = {"crowd": crowd, "rule": rule, "studies": plan.studies, "seed": plan.seed}
+    plan_values = {"crowd": crowd, "rule": rule, "studies": plan.studies, "seed": plan.seed}
     # The default pair is not stored, so that a folder from a version without a choice of the pair can be continued.
     is_default_pair = plan.pair_hz == find_judged_pair(plan.crowd.frequencies_hz, ())
-    return facts if is_default_pair else {**facts, "contrast_hz": list(plan.pair_hz)}
+    return plan_values if is_default_pair else {**plan_values, "contrast_hz": list(plan.pair_hz)}
 
 
-def _read_finished(path: Path, plan: PowerPlan) -> dict[StudyChunk, list[StudyVerdict]]:
-    """Results of an interrupted run of the same plan, by chunk. An incomplete line is ignored; where the first line,
-    the plan, is missing or incomplete, the file is created anew. Raises StudyError for another plan."""
+def _read_finished_chunks(path: Path, plan: PowerPlan) -> dict[StudyChunk, list[StudyVerdict]]:
+    """Read the verdicts of an interrupted run of the same plan, by chunk. An incomplete line is ignored; where the file
+    is missing, or ends within or after the first line, the plan, it is created anew. Raises StudyError for another
+    plan, CannotReadError and CannotWriteError."""
     text = read_text(path) if path.exists() else ""
     if _format_plan_line(plan).startswith(text):
         _create_progress_file(path, plan)
@@ -176,7 +179,7 @@ def _read_finished(path: Path, plan: PowerPlan) -> dict[StudyChunk, list[StudyVe
 
 
 def _format_plan_line(plan: PowerPlan) -> str:
-    """First line of the file of finished studies: the plan in JSON."""
+    """Format the first line of the file of finished studies: the plan in JSON."""
     return json.dumps({"plan": _summarise_plan(plan)})
 
 
@@ -189,7 +192,7 @@ def _create_progress_file(path: Path, plan: PowerPlan) -> None:
     write_text(path, _format_plan_line(plan), overwrite=True)
 
 
-def _append_line(path: Path, row: dict[str, object]) -> None:
+def _append_json_line(path: Path, row: dict[str, object]) -> None:
     """Append a JSON object as a line. It begins with the line break, so that an incomplete line before it remains
     separate. Raises CannotWriteError."""
     try:
@@ -200,8 +203,9 @@ def _append_line(path: Path, row: dict[str, object]) -> None:
 
 
 def format_power_lines(points: Sequence[PowerPoint], threshold_name: str = REVERSAL_WORDS.means) -> list[str]:
-    """Table for the terminal: power in percent with its 95 % interval, by sample size and analysis; coverage of the 95
-    % interval of the difference; bias in dB. threshold_name: name of the thresholds of single runs, in the plural."""
+    """Format a table for the terminal: power in percent with its 95 % interval, by sample size and analysis; coverage
+    of the 95 % interval of the difference; bias in dB. threshold_name: name of the thresholds of single runs, in the
+    plural."""
     paired_heading = f"{threshold_name}, paired"
     paired_width = max(24, len(paired_heading))
     lines = [
@@ -219,5 +223,5 @@ def format_power_lines(points: Sequence[PowerPoint], threshold_name: str = REVER
 
 
 def _format_percent(share: Share) -> str:
-    """The share and its confidence interval in percent."""
+    """Format a share and its 95 % interval in percent."""
     return f"{100 * share.value:.1f} % ({100 * share.lower:.1f} to {100 * share.upper:.1f})"

@@ -25,7 +25,14 @@ from study.importing.map_format.map_errors import (
     ImportRefusedError,
     MapNeededError,
 )
-from study.importing.map_library import NO_DATA, MapFile, find_map, map_by_header, map_of_files, read_map
+from study.importing.map_library import (
+    NO_DATA,
+    MapFile,
+    find_map_for_files,
+    find_maps_for_folder,
+    make_map_from_headers,
+    read_map,
+)
 from study.importing.map_skeleton import make_map_skeleton
 from study.store.disk.hdf5_file import is_hdf5, read_format
 from study.store.disk.provenance import gather_provenance
@@ -136,11 +143,11 @@ def _import_by_map(source: MapFile, files: Sequence[Path], on_progress: Progress
 def _import_by_found_map(folder: Path, on_progress: Progress) -> Foreign:
     """Import a folder: by the only map that fits it, else by the files' headers. Raises WrongUseError where its maps
     make several recordings."""
-    matching_maps = find_map(folder)
+    matching_maps = find_maps_for_folder(folder)
     if len(matching_maps) == 1:
         return _import_by_map(matching_maps[0].source, matching_maps[0].files, on_progress)
     if not matching_maps:
-        by_header = map_by_header(folder)
+        by_header = make_map_from_headers(folder)
         arrays = read_without_map(by_header.files[0])
         return _with_header(by_header.source.map, arrays, by_header.files, on_progress)
     listed = "; ".join(
@@ -178,7 +185,7 @@ def _import_by_header(files: Sequence[Path], on_progress: Progress) -> Foreign:
     with a draft of a map where neither suffices."""
     arrays = read_without_map(files[0])
     import_map = make_header_map(arrays)
-    if import_map is None and (shipped := map_of_files(files)) is not None:
+    if import_map is None and (shipped := find_map_for_files(files)) is not None:
         imported = _import_by_map(shipped, files, on_progress)
         return replace(
             imported, notes=(f"Imported by our map '{shipped.name}', which fits these files.", *imported.notes)

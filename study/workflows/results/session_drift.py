@@ -36,7 +36,7 @@ staircase. Friction and gain as in the daily check; delay: one tick of the contr
 a light grip."""
 
 WITHOUT_HAND = ("friction", "gain", "delay")
-"""Quantities in which references, recorded without a hand, are compared."""
+"""Quantities that are estimated from references, which are recorded without a hand."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +46,7 @@ class _ProbeLines:
     rate_hz: float
     """Sample rate of the recording."""
     timed_probes: tuple[TimedProbe, ...]
-    """One element for a probe, two for a reference: its two halves."""
+    """One element for a probe; two for a reference: its fit and its test segment."""
 
 
 class DriftReader:
@@ -57,12 +57,12 @@ class DriftReader:
         self._folder = folder
         self._usable_probes: list[tuple[PlayedProbe, _ProbeLines]] = []
         self._read_count = 0
-        self._since_s: dict[tuple[str, str, str], float] = {}
+        self._first_found_s: dict[tuple[str, str, str], float] = {}
         self._records_by_kind: dict[str, tuple[DriftRecord, ...]] = {}
 
     def update(self, probes: tuple[PlayedProbe, ...]) -> tuple[DriftRecord, ...]:
-        """The present drifts: of device and hand within the sitting, from probes; of the device alone over the session,
-        from references. probes: all probes of the session so far, in their order."""
+        """Read new probes and return the present drifts: of device and hand within the sitting, from probes; of the
+        device alone over the session, from references. probes: all probes of the session so far, in their order."""
         for probe in probes[self._read_count :]:
             probe_lines = self._read_probe(probe)
             if probe_lines is not None and probe.kind in ("hand", "reference"):
@@ -71,45 +71,52 @@ class DriftReader:
                     self._make_drift_records(probe.kind, self._compare_probe(probe))
                 )
         self._read_count = len(probes)
-        return tuple(line for lines in self._records_by_kind.values() for line in lines)
+        return tuple(record for records in self._records_by_kind.values() for record in records)
 
-    def _compare_probe(self, newest: PlayedProbe) -> tuple[Drift, ...]:
-        """The newest probe compared with earlier ones: a reference with the session's first reference, a probe with a
-        hand with those of the same sitting. Empty where there is nothing to compare with."""
-        if newest.kind == "reference":
+    def _compare_probe(self, newest_probe: PlayedProbe) -> tuple[Drift, ...]:
+        """Compare the newest probe with earlier ones: the test segment of a reference with both segments of the
+        session's first reference; a probe with a hand with the first probes of the same sitting. Empty where there are
+        too few probes (`find_drifts`)."""
+        if newest_probe.kind == "reference":
             reference_lines = [probe_lines for probe, probe_lines in self._usable_probes if probe.kind == "reference"]
-            first, last = reference_lines[0], reference_lines[-1]
+            first_reference, last_reference = reference_lines[0], reference_lines[-1]
             return (
-                find_drifts((*first.timed_probes, last.timed_probes[-1]), _compute_period(last), WITHOUT_HAND)
-                if last is not first
+                find_drifts(
+                    (*first_reference.timed_probes, last_reference.timed_probes[-1]),
+                    _compute_period(last_reference),
+                    WITHOUT_HAND,
+                )
+                if last_reference is not first_reference
                 else ()
             )
         hand_probe_lines = [
             probe_lines
             for probe, probe_lines in self._usable_probes
-            if (probe.kind, probe.sitting) == ("hand", newest.sitting)
+            if (probe.kind, probe.sitting) == ("hand", newest_probe.sitting)
         ]
         return find_drifts(
-            [timed_probes for probe_lines in hand_probe_lines for timed_probes in probe_lines.timed_probes],
+            [timed_probe for probe_lines in hand_probe_lines for timed_probe in probe_lines.timed_probes],
             _compute_period(hand_probe_lines[-1]),
         )
 
     def _make_drift_records(self, kind: str, present_drifts: tuple[Drift, ...]) -> Iterator[DriftRecord]:
-        """Drifts as sentences for the experimenter, each with the time (s) at which it was first found."""
+        """Yield the drifts as sentences for the experimenter, each with the time (s) at which it was first found."""
         drifts_by_key = {(kind, drift.parameter, drift.axis): drift for drift in present_drifts}
-        # A drift that has disappeared is forgotten: if it returns, its time is that of its return.
-        self._since_s = {
-            key: found_s for key, found_s in self._since_s.items() if key[0] != kind or key in drifts_by_key
+        # The time of a drift that has disappeared is removed: if it returns, its time is that of its return.
+        self._first_found_s = {
+            key: found_s for key, found_s in self._first_found_s.items() if key[0] != kind or key in drifts_by_key
         }
         for key, drift in drifts_by_key.items():
-            since_s = self._since_s.setdefault(key, drift.time_s)
-            drift_text = describe_drift(replace(drift, time_s=since_s))
+            first_found_s = self._first_found_s.setdefault(key, drift.time_s)
+            drift_text = describe_drift(replace(drift, time_s=first_found_s))
             yield DriftRecord(
-                since_s, f"without a hand, {drift_text}" if kind == "reference" else drift_text, exceeds_limit(drift)
+                first_found_s,
+                f"without a hand, {drift_text}" if kind == "reference" else drift_text,
+                exceeds_limit(drift),
             )
 
     def _read_probe(self, probe: PlayedProbe) -> _ProbeLines | None:
-        """Spectral lines of a probe's recording; None where there is no recording, or it cannot be used."""
+        """Read the spectral lines of a probe's recording; None where there is no recording, or it cannot be used."""
         if not probe.recording or probe.trouble:
             return None
         try:
@@ -125,7 +132,8 @@ class DriftReader:
 
 
 def describe_drift(drift: Drift) -> str:
-    """A drift as text with its unit and time, such as "friction along x 0.12 -> 0.20 N at minute 14"."""
+    """Describe a drift with its unit and time, such as "friction along x 0.12 -> 0.20 N at minute 14"; friction with
+    its first and present value where these are known, otherwise with the change."""
     minute_text = f"at minute {drift.time_s / 60:.0f}"
     axis_text = f" along {drift.axis}" if drift.axis else ""
     rivals_text = f" (or {' or '.join(drift.rivals)}: the probes cannot distinguish them)" if drift.rivals else ""
@@ -148,10 +156,10 @@ def exceeds_limit(drift: Drift) -> bool:
 
 
 def _split_reference(recording: Recording) -> tuple[Recording, Recording]:
-    """The fit and the test segment of a reference at full level, as two recordings."""
+    """Split a reference into two recordings: with its first segment (fit) and its second (test), both at full level."""
     return replace(recording, segments=recording.segments[:1]), replace(recording, segments=recording.segments[1:2])
 
 
 def _compute_period(probe_lines: _ProbeLines) -> int:
-    """Period of the probe's excitation in samples."""
+    """Compute the period of the probe's excitation in samples."""
     return round(PERIOD_S * probe_lines.rate_hz)

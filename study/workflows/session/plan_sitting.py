@@ -1,6 +1,7 @@
-"""Plan of a sitting: read the protocol, check the model and the participant code, draw the seed.
+"""Plan a sitting: read the protocol, draw the seed, check the model and the participant code, find unfinished sessions.
 
-Errors in these are raised here, before a device is opened or a session folder is created.
+Errors in these are raised here, before a device is opened or a session folder is created. Called by
+`study.cli.conduct` (`hapteq study` in line mode), and by the engine of the screen program.
 """
 
 from dataclasses import dataclass
@@ -16,10 +17,10 @@ from study.workflows.session.open_session import SessionPlan, draw_seed
 from study.workflows.session.participant_number import read_begun_participant
 
 
-def check_code(data: Path, subject: str, simulated: bool) -> None:
-    """Raise WrongUseError if the participant code is of a participant who withdrew or, by an existing session, of a
-    participant of the other kind (person or simulated)."""
-    for folder in _folders(data, subject):
+def check_participant_code(data: Path, subject: str, simulated: bool) -> None:
+    """Check that a participant code can be used for a new session. Raises WrongUseError if its participant withdrew or,
+    by an existing session, is of the other kind (person or simulated)."""
+    for folder in _list_participant_folders(data, subject):
         if folder.withdrawn:
             raise WrongUseError(
                 f"{subject} withdrew",
@@ -39,17 +40,18 @@ def check_code(data: Path, subject: str, simulated: bool) -> None:
 
 
 def find_unfinished_sessions(data: Path, subject: str, protocol: str) -> tuple[SessionFolder, ...]:
-    """Sessions of this participant and protocol that can be resumed."""
-    return tuple(folder for folder in _folders(data, subject) if _is_resumable(folder, protocol))
+    """Find the sessions of this participant code and protocol name that can be resumed, in order of their folders."""
+    return tuple(folder for folder in _list_participant_folders(data, subject) if _is_resumable(folder, protocol))
 
 
-def _folders(data: Path, subject: str) -> tuple[SessionFolder, ...]:
-    """Session folders of a participant code."""
+def _list_participant_folders(data: Path, subject: str) -> tuple[SessionFolder, ...]:
+    """List the session folders of a participant code."""
     return tuple(folder for folder in list_session_folders(data) if folder.subject == subject)
 
 
 def _is_resumable(folder: SessionFolder, protocol: str) -> bool:
-    """Whether the session can be read, follows this protocol, and is neither closed nor refused."""
+    """Whether the session can be read, follows the protocol of this name, is not closed, and its participant was
+    neither excluded nor refused."""
     try:
         state = fold_session(folder).state
     except StudyError:
@@ -69,13 +71,14 @@ class SittingPlan:
 def plan_sitting(
     protocol_name: str, subject: str, observer: str | None, seed: int | None, data: Path, model: Path | None = None
 ) -> SittingPlan:
-    """The plan. subject: participant code; observer: name of a simulated participant, None for a person; seed: None = a
-    new random one. Raises StudyError if the sitting cannot begin."""
-    source = read_study_protocol(protocol_name, data)
+    """Plan a new session, with a remark for each unfinished one. protocol_name: name or path; subject: participant
+    code; observer: name of a simulated participant, None for a person; seed: None = a new random one; data: data
+    folder; model: file of the identified model for equalization. Raises StudyError if the sitting cannot begin."""
+    protocol_source = read_study_protocol(protocol_name, data)
     plan = SessionPlan(
-        protocol=source.protocol,
-        protocol_text=source.text,
-        protocol_locked=source.locked,
+        protocol=protocol_source.protocol,
+        protocol_text=protocol_source.text,
+        protocol_locked=protocol_source.locked,
         subject=check_subject(subject),
         observer=observer,
         seed=draw_seed() if seed is None else seed,
@@ -83,9 +86,9 @@ def plan_sitting(
         model=model,
     )
     check_model_for_protocol(plan.protocol, model)
-    check_code(data, plan.subject, simulated=observer is not None)
-    unfinished_before = (
+    check_participant_code(data, plan.subject, simulated=observer is not None)
+    unfinished_notes = (
         f"{unfinished.name} is not finished; hapteq resume {unfinished.path} continues it."
-        for unfinished in find_unfinished_sessions(data, plan.subject, source.protocol.name)
+        for unfinished in find_unfinished_sessions(data, plan.subject, protocol_source.protocol.name)
     )
-    return SittingPlan(plan, (*unfinished_before, *filter(None, [format_data_folder_warning(data)])))
+    return SittingPlan(plan, (*unfinished_notes, *filter(None, [format_data_folder_warning(data)])))

@@ -1,7 +1,7 @@
 """Rehearsal of a whole study with simulated participants in parallel processes (`hapteq rehearse`).
 
 Sessions run on the simulated device in virtual time. The same call continues an interrupted rehearsal: unfinished
-sessions are resumed, finished ones are kept.
+sessions are resumed, finished ones are kept. Called by `study.cli.rehearse` and `study.evaluation.reproduction`.
 """
 
 from collections.abc import Callable
@@ -41,7 +41,7 @@ class Rehearsal:
     protocol_text: str
     """The protocol in TOML, as it is written into the logs."""
     subjects: int
-    """Number of participants."""
+    """Number of simulated participants."""
     seed: int
     """Seed of the population and of all draws."""
     data: Path
@@ -56,7 +56,7 @@ class Rehearsal:
 
 
 def make_rehearsed_observer(rehearsal: Rehearsal, number: int) -> Observer:
-    """The observer of participant `number` (from 0). Raises StudyError for an unknown name."""
+    """Make the observer of participant `number` (from 0). Raises StudyError for an unknown name."""
     kind = rehearsal.observer.replace("-", "_")
     if kind in MEMBER_KINDS:
         return make_member(kind, number + 1, rehearsal.seed)
@@ -64,7 +64,7 @@ def make_rehearsed_observer(rehearsal: Rehearsal, number: int) -> Observer:
 
 
 def rehearse_study(rehearsal: Rehearsal, workers: int | Executor, on_finished: Callable[[int], None]) -> None:
-    """Run the sessions of all participants. on_finished: called with the number of finished sessions.
+    """Run the sessions of all participants. on_finished: called after each with the number of finished sessions.
 
     workers: a number of processes of this computer, or an executor, whose workers need not share a disk with it: they
     return the files of whole sessions. On an interruption, running sessions are finished and no other is begun.
@@ -85,20 +85,23 @@ def rehearse_study(rehearsal: Rehearsal, workers: int | Executor, on_finished: C
 
 
 def _rehearse_on_executor(rehearsal: Rehearsal, executor: Executor, on_finished: Callable[[int], None]) -> None:
-    """Run the sessions on an executor. Sessions that were begun in the folder are finished in this process first."""
+    """Run the sessions on an executor. Sessions that were begun in the folder are finished in this process first.
+    Raises StudyError where one does not finish."""
     folders = list_session_folders(rehearsal.data)
     begun_numbers = {
         number
         for number in range(rehearsal.subjects)
         if any(folder.subject == make_subject_code(number) for folder in folders)
     }
-    model = {} if rehearsal.model is None else read_file(rehearsal.model)
+    model_files = {} if rehearsal.model is None else read_file(rehearsal.model)
     remaining = [number for number in range(rehearsal.subjects) if number not in begun_numbers]
     for finished_count, number in enumerate(sorted(begun_numbers), start=1):
         _rehearse_sitting(rehearsal, number)
         on_finished(finished_count)
     results = run_tasks(
-        executor, play_on_worker, ((participant, (rehearsal, model, participant)) for participant in remaining)
+        executor,
+        rehearse_on_worker,
+        ((participant_number, (rehearsal, model_files, participant_number)) for participant_number in remaining),
     )
     for finished_count, (_, (session, files, end_reason)) in enumerate(results, start=len(begun_numbers) + 1):
         make_folder(rehearsal.data, private=True)
@@ -109,18 +112,18 @@ def _rehearse_on_executor(rehearsal: Rehearsal, executor: Executor, on_finished:
 
 
 def make_subject_code(number: int) -> str:
-    """Participant code of a simulated participant; `number` counts from 0, the code from S001."""
+    """Make the code of a simulated participant; `number` counts from 0, the code from S001."""
     return f"S{number + 1:03d}"
 
 
 def list_subject_codes(subjects: int) -> set[str]:
-    """Participant codes of the first `subjects` simulated participants."""
+    """List the codes of the first `subjects` simulated participants."""
     return {make_subject_code(number) for number in range(subjects)}
 
 
 def derive_subject_seed(seed: int, number: int) -> int:
-    """Seed of one participant: a hash of the rehearsal's seed and the number, so that rehearsals with consecutive seeds
-    have no participant in common."""
+    """Derive the 32-bit seed of one participant: a hash of the rehearsal's seed and the number, so that rehearsals with
+    consecutive seeds have no participant in common."""
     from numpy.random import SeedSequence
 
     return int(SeedSequence(seed, spawn_key=(number,)).generate_state(1)[0])
@@ -139,7 +142,7 @@ def _rehearse_sitting(rehearsal: Rehearsal, number: int) -> None:
         return
     begun_session = _find_begun_session(rehearsal.data, make_subject_code(number))
     if begun_session is None:
-        conducted = _play_new_session(rehearsal, number)
+        conducted = _run_new_session(rehearsal, number)
     elif (folded_session := fold_session(begun_session)).state.closed:
         finish_tables(begun_session, folded_session)
         return
@@ -150,18 +153,18 @@ def _rehearse_sitting(rehearsal: Rehearsal, number: int) -> None:
     _require_finished(conducted.folder.name, conducted.end_reason)
 
 
-def play_on_worker(rehearsal: Rehearsal, model: FileContents, number: int) -> tuple[str, FileContents, str]:
-    """Run a new session in a temporary folder of a worker. model: content of the model's file, by name. Returns the
-    name of the session, its files, and why it ended early (empty if it finished)."""
+def rehearse_on_worker(rehearsal: Rehearsal, model_files: FileContents, number: int) -> tuple[str, FileContents, str]:
+    """Run a new session in a temporary folder of a worker process. model_files: content of the model's file by name,
+    empty without a model. Returns the session's name, its files, and why it ended early (empty if it finished)."""
     with TemporaryDirectory() as temporary_folder:
-        write_files(Path(temporary_folder), model)
-        path = None if rehearsal.model is None else Path(temporary_folder) / rehearsal.model.name
-        conducted = _play_new_session(replace(rehearsal, data=Path(temporary_folder) / "data", model=path), number)
+        write_files(Path(temporary_folder), model_files)
+        model_path = None if rehearsal.model is None else Path(temporary_folder) / rehearsal.model.name
+        conducted = _run_new_session(replace(rehearsal, data=Path(temporary_folder) / "data", model=model_path), number)
         write_tables(conducted.folder)
         return conducted.folder.name, read_files(conducted.folder.path), conducted.end_reason
 
 
-def _play_new_session(rehearsal: Rehearsal, number: int) -> ConductedSitting:
+def _run_new_session(rehearsal: Rehearsal, number: int) -> ConductedSitting:
     """Run a new session of participant `number` (from 0) on the simulated device. Raises StudyError."""
     observer, seed = make_rehearsed_observer(rehearsal, number), derive_subject_seed(rehearsal.seed, number)
     plan = SessionPlan(
@@ -190,7 +193,8 @@ def _require_finished(session: str, end_reason: str) -> None:
 
 
 def _find_begun_session(data: Path, subject: str) -> SessionFolder | None:
-    """The participant's last session whose log is not empty: a crash at the start leaves an empty log or none."""
+    """Find the participant's last session whose log is not empty; None without any. A crash at the start leaves an
+    empty log or none."""
     folders = [
         folder
         for folder in list_session_folders(data)
@@ -202,12 +206,12 @@ def _find_begun_session(data: Path, subject: str) -> SessionFolder | None:
 def _require_same_rehearsal(rehearsal: Rehearsal) -> None:
     """Raise StudyError where the folder holds other participants, or sessions with another model, observer, seed or
     protocol."""
-    subject_codes = list_subject_codes(rehearsal.subjects)
-    foreign_sessions = [f.name for f in list_session_folders(rehearsal.data) if f.subject not in subject_codes]
-    if foreign_sessions:
+    codes = list_subject_codes(rehearsal.subjects)
+    other_sessions = [entry.name for entry in list_session_folders(rehearsal.data) if entry.subject not in codes]
+    if other_sessions:
         raise StudyError(
             "This folder holds other sessions",
-            f"In addition to this rehearsal's participants there is {', '.join(foreign_sessions[:5])} in "
+            f"In addition to this rehearsal's participants there is {', '.join(other_sessions[:5])} in "
             f"{rehearsal.data}.",
             "Choose another folder with --out, or at least as many --subjects as were begun.",
             saved="Nothing was changed.",

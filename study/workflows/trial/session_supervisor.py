@@ -1,4 +1,4 @@
-"""Background tasks of a session while it waits: keep-alive calls, requests, buttons of the device, live state.
+"""Periodic tasks of a session while it waits: keep-alive calls, requests, buttons of the device, live state.
 
 `conduct_session` makes one `SessionSupervisor` for each sitting.
 """
@@ -14,7 +14,8 @@ from study.session.watching.requests import NoteAsked, PauseAsked, RequestSource
 from study.workflows.trial.requests_port import RequestPort
 
 LIVE_INTERVAL_S = 0.25
-"""Interval (s) at which the live state is published: often enough for a viewer, with little load on the disk."""
+"""Interval (s) at which the live state is published: often enough for a viewer, with little load on the disk.
+Chosen."""
 
 PLAYING_ACTIVITIES = ("trial", "demo", "probe", "reference")
 """Activities in which the device holds a stimulus: a fault ends their wait."""
@@ -22,7 +23,8 @@ PLAYING_ACTIVITIES = ("trial", "demo", "probe", "reference")
 
 class SessionSupervisor:
     """Supervisor of one sitting. `keep_alive` is the keep-alive callback (`SignOfLife`) of every wait; afterwards
-    `resolve` returns the reply of the wait: the answer, or why it ended without one."""
+    `resolve` returns the reply of the wait: the answer, or the reason why there is none. `stop_requester` and
+    `pause_requester` are None until such a request is taken."""
 
     def __init__(
         self,
@@ -34,7 +36,7 @@ class SessionSupervisor:
         place_m: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
         """publish: called with the live state, for viewers. buttons: numbers of the device's buttons that answer 1, 2.
-        place_m: place of the handle (m), from which `compute_offset_m` measures."""
+        place_m: start position of the handle (m), from which `compute_offset_m` measures."""
         self._device = device
         self._clock = clock
         self._requests = requests
@@ -42,9 +44,9 @@ class SessionSupervisor:
         self._buttons = buttons
         self._place_m = place_m
         self._buttons_released = False
-        self._published_s = float("-inf")
+        self._last_published_s = float("-inf")
         self._activity: Activity = "preparing"
-        self._since_utc = clock.utc()
+        self._activity_start_utc = clock.utc()
         self._handle_ready = True
         self._notes: list[NoteAsked] = []
         self._answer: Answered | None = None
@@ -52,19 +54,20 @@ class SessionSupervisor:
         self.pause_requester: RequestSource | None = None
 
     def start_activity(self, activity: Activity) -> None:
-        """Start a new wait. A button that is still held from the last one does not answer it."""
-        self._activity, self._since_utc = activity, self._clock.utc()
+        """Start a new wait: take pending requests and publish the live state. A button that is still held from the last
+        wait does not answer this one."""
+        self._activity, self._activity_start_utc = activity, self._clock.utc()
         self._buttons_released = False
         self._answer = None
         self._handle_ready = True
-        self._published_s = float("-inf")
+        self._last_published_s = float("-inf")
         self.listen()
         self._publish_live_state()
 
     def keep_alive(self) -> bool:
         """Reset the device's watchdog, take requests and button presses, publish the live state. False where the wait
-        is over: after a fault during a stimulus, a stop or pause request, or an answer by a button; in a pause only
-        after a stop request."""
+        is over: after a fault in `PLAYING_ACTIVITIES`, a stop or pause request, or an answer by a button; in a pause
+        only after a stop request."""
         self._device.keep_alive()
         self.listen()
         self._publish_live_state()
@@ -72,11 +75,12 @@ class SessionSupervisor:
             return self.stop_requester is None
         if self.stop_requester is not None or self.pause_requester is not None or self._answer is not None:
             return False
-        # Between stimuli the fault of the last one is still reported, although it is over.
+        # Between stimuli the device still reports the fault of the last stimulus.
         return self._activity not in PLAYING_ACTIVITIES or self._device.fault() is Fault.NONE
 
     def listen(self) -> None:
-        """Take pending requests. A stop request releases the force at once."""
+        """Take pending requests: stop, pause, notes. A stop request stops the device, which releases the force at
+        once."""
         for request in self._requests.take():
             match request:
                 case StopAsked(who=who):
@@ -88,8 +92,8 @@ class SessionSupervisor:
                     self._notes.append(request)
 
     def resolve(self, reply: Reply) -> Reply:
-        """The reply to a wait: a stop request, the answer, a pause request, in this order; else the reply of the
-        display."""
+        """Choose the reply to a wait, by priority: a stop request, the answer on the display, the answer by a button, a
+        pause request, the other reply of the display."""
         if self.stop_requester is not None:
             return Unanswered(f"the {self.stop_requester} stopped the session", ends_sitting=True)
         if isinstance(reply, Answered):
@@ -107,53 +111,57 @@ class SessionSupervisor:
         self._notes.append(note)
 
     def take_notes(self) -> tuple[NoteAsked, ...]:
-        """Notes since the last call, oldest first."""
+        """Return the notes since the last call, oldest first, and forget them."""
         notes, self._notes = tuple(self._notes), []
         return notes
 
     def set_handle_ready(self, ready: bool) -> None:
-        """Set whether the handle is at its place, which viewers see; True again after the next `start_activity`."""
+        """Set whether the handle is at its start position, for viewers; True again after the next `start_activity`."""
         self._handle_ready = ready
 
     def _publish_live_state(self) -> None:
-        """Publish the live state every `LIVE_INTERVAL_S`, except in virtual time, and read the buttons."""
+        """Publish the live state if `LIVE_INTERVAL_S` has passed and time is not virtual; read the buttons at each
+        call."""
         now_s = self._clock.now_s()
-        is_due = not self._clock.virtual and now_s - self._published_s >= LIVE_INTERVAL_S
+        is_due = not self._clock.virtual and now_s - self._last_published_s >= LIVE_INTERVAL_S
         if not is_due and not self._buttons:
             return
         look = self._device.look()
         self._take_button_answer(look, now_s)
         if is_due:
-            self._published_s = now_s
+            self._last_published_s = now_s
             self._publish(self._make_live_state(look))
 
     def _take_button_answer(self, look: Look, now_s: float) -> None:
-        """Take a newly pressed button as the answer of a trial: exactly one button, after all were released."""
-        pressed = [number for number in self._buttons if number in look.buttons]
-        if not pressed:
+        """Take a newly pressed button as the answer of a trial: exactly one button, after all were released; only the
+        first answer of a trial counts. now_s: monotonic time (s) of the answer."""
+        pressed_buttons = [number for number in self._buttons if number in look.buttons]
+        if not pressed_buttons:
             self._buttons_released = True
-        elif self._buttons_released and len(pressed) == 1 and self._activity == "trial" and self._answer is None:
-            self._answer = Answered(1 + self._buttons.index(pressed[0]), now_s)
+        elif (
+            self._buttons_released and len(pressed_buttons) == 1 and self._activity == "trial" and self._answer is None
+        ):
+            self._answer = Answered(1 + self._buttons.index(pressed_buttons[0]), now_s)
 
     def compute_offset_m(self, look: Look) -> tuple[float, float, float] | None:
-        """Offset (x, y, z) of the handle from its place (m); None without a position reading."""
+        """Compute the offset (x, y, z) of the handle from its start position (m); None without a position reading."""
         if look.position_m is None:
             return None
         (x, y, z), (x0, y0, z0) = look.position_m, self._place_m
         return (x - x0, y - y0, z - z0)
 
     def _make_live_state(self, look: Look) -> Live:
-        """State of device and session for viewers: distance from the place in mm, magnitude of the acceleration in
-        m/s²."""
-        fault, offset_m, acceleration = self._device.fault(), self.compute_offset_m(look), look.acceleration_mps2
+        """Make the state of device and session for viewers: distance from the start position in mm, magnitude of the
+        acceleration in m/s²; None without a reading."""
+        fault, offset_m, acceleration_mps2 = self._device.fault(), self.compute_offset_m(look), look.acceleration_mps2
         return Live(
             utc=self._clock.utc(),
             activity=self._activity,
-            since_utc=self._since_utc,
+            since_utc=self._activity_start_utc,
             fault="" if fault is Fault.NONE else fault.value,
             offset_mm=None if offset_m is None else 1000.0 * math.hypot(*offset_m),
             handle_ready=self._handle_ready,
-            acceleration_mps2=None if acceleration is None else math.hypot(*acceleration),
+            acceleration_mps2=None if acceleration_mps2 is None else math.hypot(*acceleration_mps2),
             sensor_clipped=look.sensor_clipped,
             missed_ticks=look.missed_ticks,
             monotonic_s=self._clock.now_s(),

@@ -1,8 +1,8 @@
-"""The plan of each study in a data folder (`hapteq study-plan`): planned, finished and excluded participants, and the
-order of frequencies that the next participant receives. Only reads files.
+"""Plan of each study in a data folder (`hapteq study-plan`): planned, finished and excluded participants, and the
+order of frequencies that the next participant receives. Only reads files; called by `study.cli.study_plan`.
 
-A participant may have several sessions; the session with the most progress counts. The design is computed by
-`protocols.procedure.study_plan`.
+A participant may have several sessions; the session with the most progress counts. The balanced design is computed by
+`protocols.procedure.study_plan`; a cell of the design is an order of frequencies and a labelling of the answers.
 """
 
 from collections.abc import Sequence
@@ -25,8 +25,8 @@ from study.workflows.session.participant_number import find_participant_number, 
 from study.workflows.views.session_line import make_session_line
 
 PROGRESS_BY_STANDING: dict[str, Progress] = {"finished": "done", "unfinished": "begun", "running": "begun"}
-"""Progress of a participant, by the standing of the best session; with any other standing the participant is left "
-"out."""
+"""Progress of a participant, by the standing of the best session; with any other standing the participant is left
+out."""
 STANDINGS_BEST_FIRST = ("finished", "running", "unfinished")
 """Standings in the order in which the best session of a participant is chosen."""
 
@@ -44,7 +44,7 @@ class PlannedStudy:
 
 @dataclass(frozen=True, slots=True)
 class _StartedSession:
-    """A session that a participant has begun, by its log or its tombstone."""
+    """A session that a participant has begun, according to its log, or to its tombstone after a withdrawal."""
 
     folder: SessionFolder
     protocol: str
@@ -57,9 +57,9 @@ class _StartedSession:
 
 
 def list_planned_studies(data: Path, protocol: str | None, simulated: bool) -> tuple[PlannedStudy, ...]:
-    """The plans of studies in a data folder. protocol: name or file of a protocol; None = all protocols with sessions
-    in `data`. simulated: plan for simulated participants, who are counted separately from people. Raises StudyError
-    where the protocol cannot be read, or there is no session."""
+    """Make the plans of the studies in a data folder. protocol: name or file of a protocol; None = all protocols with
+    sessions in `data`. simulated: plan for simulated participants, who are counted separately from people. Raises
+    StudyError where a protocol cannot be read, or where `protocol` is None and there is no session."""
     started_sessions = _find_started_sessions(data, simulated)
     if protocol is not None:
         study_protocol = read_study_protocol(protocol, data).protocol
@@ -89,7 +89,7 @@ def list_planned_studies(data: Path, protocol: str | None, simulated: bool) -> t
 
 
 def _find_started_sessions(data: Path, simulated: bool) -> list[_StartedSession]:
-    """All sessions of simulated participants, or of people, whose protocol is known."""
+    """Find all sessions of simulated participants, or of people, whose protocol is known."""
     started_sessions = []
     for folder in list_session_folders(data):
         participant = read_begun_participant(folder)
@@ -107,7 +107,7 @@ def _find_started_sessions(data: Path, simulated: bool) -> list[_StartedSession]
 
 
 def _read_protocol_text(folder: SessionFolder) -> str | None:
-    """Text of the protocol from a session's log; None where it cannot be read."""
+    """Read the text of the protocol from a session's log; None where it cannot be read."""
     try:
         session_opened = read_opening(folder.log)
     except (StudyError, OSError, ValueError):
@@ -118,14 +118,14 @@ def _read_protocol_text(folder: SessionFolder) -> str | None:
 def _plan_from_sessions(
     data: Path, protocol: StudyProtocol, started_sessions: Sequence[_StartedSession], simulated: bool
 ) -> PlannedStudy:
-    """The plan of one study from its sessions."""
+    """Plan one study from its sessions."""
     sessions_by_code: dict[str, list[_StartedSession]] = {}
     for session in sorted(started_sessions, key=_make_sort_key):
         sessions_by_code.setdefault(session.folder.subject, []).append(session)
     # The number that a new participant would receive: the empty code belongs to no session folder.
-    number = find_participant_number(data, "", protocol.name, simulated)
+    next_number = find_participant_number(data, "", protocol.name, simulated)
     plan = plan_study(
-        protocol, [_make_participant(code, sessions) for code, sessions in sessions_by_code.items()], number
+        protocol, [_make_participant(code, sessions) for code, sessions in sessions_by_code.items()], next_number
     )
     return PlannedStudy(
         plan, _suggest_unused_code(data, tuple(reversed(sessions_by_code))), _warn_of_different_texts(started_sessions)
@@ -133,20 +133,21 @@ def _plan_from_sessions(
 
 
 def _suggest_unused_code(data: Path, study_codes: tuple[str, ...]) -> str:
-    """An unused participant code that continues those of this study. study_codes: codes of this study, the latest
-    first."""
+    """Suggest an unused participant code that continues those of this study. study_codes: codes of this study, the
+    latest first; without any, the first code of a new study, or one after the others in the folder if "P01" is used."""
     all_codes = tuple(folder.subject for folder in list_session_folders(data))
     return suggest_code((*study_codes, *all_codes)) if study_codes or "P01" in all_codes else suggest_code(())
 
 
 def _make_sort_key(session: _StartedSession) -> tuple[float, str]:
-    """Sorting key of sessions: participant number, then name of the folder; those without a number last. The time of
-    the start cannot be used, because it is erased from a withdrawn session."""
+    """Make the sorting key of a session: participant number, then name of the folder; sessions without a number come
+    last. The time of the start is not used, because it is erased from a withdrawn session."""
     return (float("inf") if session.number is None else session.number, session.folder.name)
 
 
 def _make_participant(code: str, sessions: Sequence[_StartedSession]) -> Participant:
-    """The participant, with the progress of the best session by `STANDINGS_BEST_FIRST`."""
+    """Make the participant with the progress of the best session by `STANDINGS_BEST_FIRST`; where no standing is in it,
+    of the last. sessions: at least one."""
     standings = [session.line.standing for session in sessions]
     numbers = [session.number for session in sessions if session.number is not None]
     best_standing = next((standing for standing in STANDINGS_BEST_FIRST if standing in standings), standings[-1])
@@ -157,7 +158,7 @@ def _make_participant(code: str, sessions: Sequence[_StartedSession]) -> Partici
 
 
 def _load_latest_protocol(name: str, sessions: Sequence[_StartedSession]) -> StudyProtocol:
-    """Protocol of the latest session whose log can be read. Raises WrongUseError where there is none."""
+    """Load the study protocol of the latest session whose log can be read. Raises WrongUseError where there is none."""
     for session in sorted(sessions, key=lambda session: session.line.begun_utc, reverse=True):
         if session.protocol_text is None:
             continue
@@ -175,8 +176,8 @@ def _load_latest_protocol(name: str, sessions: Sequence[_StartedSession]) -> Stu
 
 
 def _warn_of_different_texts(sessions: Sequence[_StartedSession]) -> tuple[str, ...]:
-    """Warning if sessions of this protocol used different texts of it: their orders would be counted together although
-    they may differ."""
+    """Warn if sessions of this protocol used different texts of it: their orders are counted together although they may
+    differ. Empty without a difference."""
     texts = {session.protocol_text for session in sessions if session.protocol_text is not None}
     if len(texts) < 2:
         return ()
@@ -184,7 +185,7 @@ def _warn_of_different_texts(sessions: Sequence[_StartedSession]) -> tuple[str, 
 
 
 def summarise_plans(studies: Sequence[PlannedStudy]) -> dict[str, Any]:
-    """Plans as plain values, for a JSON document."""
+    """Convert plans to plain values, for a JSON document."""
     return {
         "studies": [
             {
@@ -226,13 +227,13 @@ def summarise_plans(studies: Sequence[PlannedStudy]) -> dict[str, Any]:
 
 
 def _summarise_next_order(cell: Cell | None) -> dict[str, Any]:
-    """Order and labelling of the next participant; empty where nothing is balanced."""
+    """Convert order and labelling of the next participant to plain values; empty where nothing is balanced."""
     return {} if cell is None else {"frequencies_hz": list(cell.frequencies_hz), "swapped": cell.swapped}
 
 
 def format_plan_lines(study: PlannedStudy) -> list[str]:
-    """Lines of text for the terminal: progress, participants to resume or left out, orders that lack participants, next
-    participant, warnings."""
+    """Format a plan as lines of text for the terminal: progress, participants to resume or left out, orders that lack
+    participants, next participant, warnings."""
     plan = study.plan
     done_count, begun_count, left_out_count = (plan.count(progress) for progress in ("done", "begun", "left out"))
     planned_text = f" of {plan.planned} planned" if plan.planned else ""
@@ -269,12 +270,12 @@ def format_plan_lines(study: PlannedStudy) -> list[str]:
 
 
 def _format_codes(title: str, codes: Sequence[str]) -> list[str]:
-    """A line with participant codes after a title; empty without codes."""
+    """Format a line with participant codes after a title; empty without codes."""
     return [f"{title}: {', '.join(codes)}"] if codes else []
 
 
 def _describe_next_order(plan: StudyPlan) -> str:
-    """Order of the next participant as text; empty where nothing is balanced."""
+    """Describe the order of the next participant; empty where nothing is balanced."""
     cell = plan.next_cell
     if cell is None:
         return ""
@@ -282,8 +283,8 @@ def _describe_next_order(plan: StudyPlan) -> str:
 
 
 def describe_order(cell: Cell) -> str:
-    """The order of a cell as text, such as "5, 45, 15, 35, 25 Hz, numbers swapped"; "by lot" where the order is
-    random."""
+    """Describe the order of a cell, such as "5, 45, 15, 35, 25 Hz, numbers swapped"; "by lot" where the order is random
+    (no frequencies)."""
     frequencies_text = ", ".join(f"{frequency:g}" for frequency in cell.frequencies_hz)
     order_text = f"{frequencies_text} Hz" if frequencies_text else "by lot"
     return f"{order_text}, numbers swapped" if cell.swapped else order_text

@@ -1,7 +1,8 @@
-"""One line per session in a list (`view_home`, `plan_study`). Only reads files.
+"""Summary line of a session for lists of sessions; called by `view_home`, `view_session` and `plan_study`. Only reads
+files.
 
 A list must be fast: the log of a finished session whose checksums and seal are valid is trusted, and its events are
-counted without parsing them. Every other log is folded.
+counted without parsing them. Every other log is folded: its events are applied one by one to the session's state.
 """
 
 from dataclasses import replace
@@ -29,11 +30,12 @@ MEASURED_EVENT = b',"event":"trial_measured",'
 
 
 def make_session_line(folder: SessionFolder) -> SessionLine:
-    """The line of a session; an unreadable session has a remark. Raises no StudyError and no OSError."""
+    """Make the line of a session. Where its files cannot be read, the line has a remark; no StudyError or OSError is
+    raised."""
     try:
         if folder.withdrawn:
             return _make_withdrawn_line(folder)
-        line = _make_cached_line(folder, _stamp_files(folder))
+        line = _make_cached_line(folder, _read_file_stamps(folder))
     except FileNotFoundError:
         return make_unreadable_line(folder, "It has no log: the program died while it was made.")
     except StudyError as problem:
@@ -44,15 +46,15 @@ def make_session_line(folder: SessionFolder) -> SessionLine:
 
 
 def mark_running(line: SessionLine, folder: SessionFolder) -> SessionLine:
-    """The line, marked `running` if a process is writing the session now. To find out, its lock is taken for some
-    microseconds."""
+    """Mark the line of an unfinished session as `running` if a process has its log open for writing. The test holds the
+    log's lock for some microseconds."""
     if line.standing == "unfinished" and is_log_locked(folder.log):
         return replace(line, standing="running")
     return line
 
 
 def make_line_from_state(state: SessionState, folder: SessionFolder) -> SessionLine:
-    """The line of a session whose log was folded; never `running`, see `mark_running`."""
+    """Make the line of a session from the state of its folded log; never `running`, see `mark_running`."""
     session_opened = state.opened
     return SessionLine(
         name=folder.name,
@@ -69,7 +71,8 @@ def make_line_from_state(state: SessionState, folder: SessionFolder) -> SessionL
 
 
 def make_unreadable_line(folder: SessionFolder, remark: str) -> SessionLine:
-    """Line of an unreadable session. Its start is unknown, so that it is sorted by the last change of its folder."""
+    """Make the line of an unreadable session. Its start is unknown; the last change of its folder takes its place,
+    empty if that is not known. remark: cause, as a sentence."""
     try:
         changed_utc = datetime.fromtimestamp(folder.path.stat().st_mtime, UTC).isoformat(timespec="seconds")
     except OSError:
@@ -80,25 +83,26 @@ def make_unreadable_line(folder: SessionFolder, remark: str) -> SessionLine:
 
 
 def _make_withdrawn_line(folder: SessionFolder) -> SessionLine:
-    """Line of a withdrawn session, from its tombstone or, before that is written, from the record of the withdrawal."""
-    tombstone = read_tombstone(folder)  # its existence is information enough
+    """Make the line of a withdrawn session, from its tombstone (a file that remains after the erasure) or, before that
+    is written, from the record of the intended withdrawal."""
+    tombstone = read_tombstone(folder)
     intent = read_intent(folder.path.parent, folder.subject)
     withdrawn_utc = str(tombstone.get("withdrawn_utc", intent.withdrawn_utc if intent else ""))
     begun_facts = tombstone.get("begun")
     if begun_facts is None and intent is not None and (intended_session := intent.sessions.get(folder.name)):
         begun_facts = {"protocol": intended_session.protocol}
     protocol = str(begun_facts.get("protocol", "")) if isinstance(begun_facts, dict) else ""
-    remark = "The participant withdrew; the data were erased."
+    remark_text = "The participant withdrew; the data were erased."
     if unfinished_text := describe_unfinished(folder):
-        remark = f"The participant withdrew, and not everything is erased. {unfinished_text}"
+        remark_text = f"The participant withdrew, and not everything is erased. {unfinished_text}"
     return SessionLine(
-        folder.name, str(folder.path), folder.subject, protocol, withdrawn_utc, None, 0, 0, 0, "withdrawn", remark
+        folder.name, str(folder.path), folder.subject, protocol, withdrawn_utc, None, 0, 0, 0, "withdrawn", remark_text
     )
 
 
-def _stamp_files(folder: SessionFolder) -> tuple[tuple[str, int, int, int], ...]:
-    """Name, time of modification and of status change (ns) and size (bytes) of all files that determine the line.
-    Raises OSError if there is no log."""
+def _read_file_stamps(folder: SessionFolder) -> tuple[tuple[str, int, int, int], ...]:
+    """Read name, time of modification and of status change (ns) and size (bytes) of all files that determine the line:
+    log, seals and summary. Raises OSError if there is no log."""
     result_files = (path for path in (*find_seals(folder.path).values(), folder.path / SUMMARY_NAME) if path.exists())
     statuses = ((path.name, path.stat()) for path in (folder.log, *result_files))
     return tuple((name, status.st_mtime_ns, status.st_ctime_ns, status.st_size) for name, status in statuses)
@@ -106,8 +110,8 @@ def _stamp_files(folder: SessionFolder) -> tuple[tuple[str, int, int, int], ...]
 
 @lru_cache(maxsize=4096)
 def _make_cached_line(folder: SessionFolder, file_stamp: tuple[tuple[str, int, int, int], ...]) -> SessionLine:
-    """The line of a session that is not withdrawn. file_stamp: key of the cache; the result depends only on the files
-    that it describes. Raises StudyError, OSError."""
+    """Make the line of a session that is not withdrawn. file_stamp: key of the cache (`_read_file_stamps`); the result
+    depends only on these files. Raises StudyError where the log is invalid, OSError where it cannot be read."""
     content = read_regular(folder.log)
     session_opened = read_opening(folder.log)
     is_trusted = (
@@ -115,7 +119,7 @@ def _make_cached_line(folder: SessionFolder, file_stamp: tuple[tuple[str, int, i
         and session_opened.session == folder.name
         and is_sealed(folder.path, content)
     )
-    is_trusted = is_trusted and MEASURED_EVENT in content  # a person who does not take part left a short log
+    is_trusted = is_trusted and MEASURED_EVENT in content  # not so where the participant was excluded before any trial
     name_and_run_count = (
         _read_name_and_run_count(session_opened.protocol_text)
         if is_trusted and isinstance(session_opened, SessionOpened)
@@ -140,10 +144,10 @@ def _make_cached_line(folder: SessionFolder, file_stamp: tuple[tuple[str, int, i
 
 @lru_cache(maxsize=64)
 def _read_name_and_run_count(protocol_text: str) -> tuple[str, int] | None:
-    """Name and number of runs of a study protocol; None for text that is not one."""
+    """Read name and number of runs of a study protocol; None for text that is not one."""
     try:
         protocol = load_protocol(protocol_text, "the log")
     except ProtocolError:
         return None
-    # How many there are depends on neither seed nor participant: only their order does.
+    # Seed and participant number (0, 0) determine the order of the runs, not their number.
     return (protocol.name, len(schedule_runs(protocol, 0, 0))) if isinstance(protocol, StudyProtocol) else None

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from study.errors import WrongUseError
-from study.importing.map_library import find_map, list_shipped_maps, map_of_files, read_map
+from study.importing.map_library import find_map_for_files, find_maps_for_folder, list_shipped_maps, read_map
 from study.store.disk.file_errors import UnusableFileError
 
 OWN = """
@@ -45,7 +45,7 @@ def test_a_map_in_the_folder_goes_before_ours(tmp_path):
         np.savez(tmp_path / name, u=np.zeros(9), y=np.zeros(9))
     (tmp_path / "own.toml").write_text(OWN)
     (tmp_path / "nothing_of_the_kind.toml").write_text("[tool]\n")
-    found = find_map(tmp_path)
+    found = find_maps_for_folder(tmp_path)
     assert [(entry.name, [path.name for path in entry.files]) for entry in found] == [
         ("own_run1", ["run1.npz"]), ("own_run2", ["run2.npz"]),
     ]  # fmt: skip
@@ -54,20 +54,20 @@ def test_a_map_in_the_folder_goes_before_ours(tmp_path):
 def test_a_map_in_the_folder_that_is_wrong_is_reported_and_not_passed_over(tmp_path):
     (tmp_path / "own.toml").write_text(OWN.replace("unit", "uint"))
     with pytest.raises(UnusableFileError, match="did you mean unit"):
-        find_map(tmp_path)
+        find_maps_for_folder(tmp_path)
 
 
 def test_a_file_of_the_same_name_with_other_arrays_is_not_ours(tmp_path):
     for name in ("estimation.npz", "validation.npz"):
         np.savez(tmp_path / name, u=np.zeros(9))
-    assert find_map(tmp_path) == ()
+    assert find_maps_for_folder(tmp_path) == ()
 
 
 def test_half_of_a_recording_is_not_found(tmp_path):
     np.savez(
         tmp_path / "estimation.npz", t_s=np.arange(9.0), u_V=0.0, y_m=0.0, y_ref_m=0.0, gain_N_per_V=1.0, kp=1, kv=1
     )
-    assert find_map(tmp_path) == ()
+    assert find_maps_for_folder(tmp_path) == ()
 
 
 def emps_like(folder, *names):
@@ -80,12 +80,12 @@ def emps_like(folder, *names):
 
 
 def test_files_that_one_map_of_ours_fits_name_it(tmp_path):
-    found = map_of_files(emps_like(tmp_path, "estimation.npz", "validation.npz"))
+    found = find_map_for_files(emps_like(tmp_path, "estimation.npz", "validation.npz"))
     assert found is not None
     assert found.name == "emps"
 
 
 def test_some_files_of_a_map_or_one_more_name_none(tmp_path):
     files = emps_like(tmp_path, "estimation.npz", "validation.npz", "other.npz")
-    assert map_of_files(files[:1]) is None
-    assert map_of_files(files) is None
+    assert find_map_for_files(files[:1]) is None
+    assert find_map_for_files(files) is None

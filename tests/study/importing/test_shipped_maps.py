@@ -5,7 +5,7 @@ import pytest
 
 from equalizer.signals.recording import Hold
 from study.importing.build_recording import build_recording
-from study.importing.map_library import find_map
+from study.importing.map_library import find_maps_for_folder
 from study.store.formats.recording_file import read_recording, write_recording
 from study.workflows.files.validate import validate_file
 
@@ -44,7 +44,7 @@ _built: dict = {}
 def imported(shared):
     def build(folder, name):
         if name not in _built:
-            found = {entry.name: entry for entry in find_map(shared / "recordings" / folder)}
+            found = {entry.name: entry for entry in find_maps_for_folder(shared / "recordings" / folder)}
             _built[name] = build_recording(found[name].source.map, found[name].files)
         return _built[name]
 
@@ -53,7 +53,7 @@ def imported(shared):
 
 @pytest.mark.parametrize("folder", sorted({folder for folder, _ in EXPECTED}))
 def test_all_maps_of_a_folder_are_found(shared, folder):
-    found = [entry.name for entry in find_map(shared / "recordings" / folder)]
+    found = [entry.name for entry in find_maps_for_folder(shared / "recordings" / folder)]
     assert sorted(found) == sorted(name for place, name in EXPECTED if place == folder)
 
 

@@ -20,8 +20,8 @@ from study.evaluation.challenge.injection.drive_injections import (
     DRIVE_INJECTIONS,
     ForceInjection,
     Values,
+    compute_centred_rms,
     compute_force_level,
-    rms,
 )
 
 SIGN_WIDTH_RATIO = 0.05
@@ -34,7 +34,7 @@ def _scale_shape(name: str, shape: Callable[[AxisMotion], FloatArray]) -> ForceI
 
     def draw(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
         """The factor of the shape."""
-        return {"size": compute_force_level(motion, strength) / max(rms(shape(motion)), 1e-300)}
+        return {"size": compute_force_level(motion, strength) / max(compute_centred_rms(shape(motion)), 1e-300)}
 
     return ForceInjection(name, draw, lambda motion, values: motion.command + values["size"] * shape(motion))
 
@@ -69,7 +69,9 @@ def _compute_penetration(motion: AxisMotion, stop_position: float) -> FloatArray
 def _draw_stop(motion: AxisMotion, strength: float, random: np.random.Generator) -> dict[str, float]:
     """Position of the stops, 40 to 90 % of the largest excursion, and their stiffness."""
     stop_position = float(random.uniform(0.4, 0.9)) * float(np.abs(_centre_position(motion)).max())
-    stiffness = compute_force_level(motion, strength) / max(rms(_compute_penetration(motion, stop_position)), 1e-300)
+    stiffness = compute_force_level(motion, strength) / max(
+        compute_centred_rms(_compute_penetration(motion, stop_position)), 1e-300
+    )
     return {"position": stop_position, "stiffness": stiffness}
 
 

@@ -48,8 +48,8 @@ def test_the_error_is_that_of_the_faulty_recording_however_many_clean_ones_there
     for clean in ([rig.record_rig(1)], [rig.record_rig(seed) for seed in (1, 3, 4, 5)]):
         found = rank_faults([rig.record_rig(2, "viscous_damping", 2.0)], clean, frozenset(), lambda: False)
         assert found is not None
-        assert found.faulty_samples == pytest.approx(found.samples / (1 + len(clean)), rel=0.01)
-        assert 1.0 <= found.errors[:CONTRAST_BLOCKS].sum() / found.faulty_samples < 2.0
+        assert found.faulty_sample_count == pytest.approx(found.sample_count / (1 + len(clean)), rel=0.01)
+        assert 1.0 <= found.block_squares[:CONTRAST_BLOCKS].sum() / found.faulty_sample_count < 2.0
 
 
 def read_through_gap(gap: float):

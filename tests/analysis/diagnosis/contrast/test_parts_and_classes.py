@@ -66,7 +66,7 @@ def test_a_law_that_holds_the_named_one_is_of_its_class_where_it_leaves_less_eve
     best = choose_fault(found, 1).named
     assert best is not None and best.fault.effect == "coulomb_friction"
     fault = replace(best.fault, effect="asymmetric_friction", simpler=("coulomb_friction",))
-    finer = replace(best, fault=fault, errors=best.errors * np.resize(times, len(best.errors)))
+    finer = replace(best, fault=fault, block_squares=best.block_squares * np.resize(times, len(best.block_squares)))
     answer = choose_fault(replace(found, faults=(finer, best)), 1)
     assert answer.named is best
     assert ("asymmetric_friction" in answer.equivalents) == belongs
@@ -84,7 +84,7 @@ def test_what_is_as_good_but_not_sure_itself_is_of_the_class(rig):
             fault=replace(best.fault, effect="cogging"),
             values=none,
             gain_low=low,
-            errors=1.001 * best.errors,
+            block_squares=1.001 * best.block_squares,
         )
         assert ("cogging" in choose_fault(replace(found, faults=(best, other)), 1).equivalents) == belongs
 
@@ -94,7 +94,7 @@ def test_a_fault_that_makes_all_errors_of_its_set_larger_shows_in_its_gain(rig):
     assert found is not None
     best = found.faults[0]
     assert best.gain_low > 0.1 > 1.6 * best.control_excess
-    swallowed = replace(found, samples=int(found.errors.sum()))
+    swallowed = replace(found, sample_count=int(found.block_squares.sum()))
     assert not swallowed.sets_differ
     assert swallowed.sets_differ_without(best)
     assert not swallowed.sets_differ_without(replace(best, gain_low=0.01))

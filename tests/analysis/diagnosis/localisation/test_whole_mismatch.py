@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from analysis.diagnosis.localisation.mismatch_maps import STRETCHES, _test_against_noise
+from analysis.diagnosis.localisation.mismatch_maps import STRETCH_COUNT, _test_against_noise
 
-LENGTH = 50 * STRETCHES
+LENGTH = 50 * STRETCH_COUNT
 
 
 def noise_p_value(sizes: np.ndarray, seed: int = 1) -> float:
@@ -21,21 +21,21 @@ def noise_p_value(sizes: np.ndarray, seed: int = 1) -> float:
 
 
 def test_a_few_stretches_that_err_by_far_are_p_value_of_noise():
-    sizes = np.full(STRETCHES, 0.1)
+    sizes = np.full(STRETCH_COUNT, 0.1)
     sizes[-2:] = 30.0, 100.0
     assert noise_p_value(sizes) < 1e-6
 
 
 def test_a_little_more_in_all_stretches_is_p_value_of_noise():
-    assert noise_p_value(np.full(STRETCHES, 1.3)) < 1e-3
+    assert noise_p_value(np.full(STRETCH_COUNT, 1.3)) < 1e-3
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_noise_is_no_p_value_of_noise(seed):
-    assert noise_p_value(np.ones(STRETCHES), seed) > 0.02
+    assert noise_p_value(np.ones(STRETCH_COUNT), seed) > 0.02
 
 
 def test_a_single_stretch_of_twice_the_noise_is_none():
-    sizes = np.ones(STRETCHES)
+    sizes = np.ones(STRETCH_COUNT)
     sizes[3] = 2.0
     assert noise_p_value(sizes) > 0.02

@@ -9,7 +9,7 @@ import pytest
 from analysis.diagnosis.errors.hypothesis import Claim, make_claim_hypothesis
 from analysis.diagnosis.errors.output_error import evaluate_fit, fit
 from analysis.diagnosis.search.compare_candidates import (
-    FULL_FIT_ROUNDS,
+    FULL_FIT_STEPS,
     _fit_full_record,
     _polish,
     refine_with_sensitivity,
@@ -62,6 +62,6 @@ def test_a_fit_to_all_periods_goes_on_while_it_gains(make_context):
     context = make_context((PlacedEffect(EFFECTS["hardening_stiffness"], (0,), {"k3": 2e7}),))
     start = start_fit(context, "hardening_stiffness", {"k3": 4e6})
     known = compute_sensitivity(context, start.deviations, start.hypothesis)
-    two = fit(context.measure, context.tuning, start, known, FULL_FIT_ROUNDS)
+    two = fit(context.measure, context.tuning, start, known, FULL_FIT_STEPS)
     whole = _fit_full_record(context, start, known)
     assert whole.cost < 0.7 * two.cost

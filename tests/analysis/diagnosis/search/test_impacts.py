@@ -18,7 +18,7 @@ from analysis.diagnosis.errors.output_error import evaluate_fit
 from analysis.diagnosis.errors.tuning import make_tuning
 from analysis.diagnosis.result.assemble_findings import list_impact_remainder
 from analysis.diagnosis.result.wording import write_summary_lines
-from analysis.diagnosis.search.band_power_comparison import make_comparison
+from analysis.diagnosis.search.band_power_comparison import make_band_power_comparison
 from analysis.diagnosis.search.explain import Explanation
 from analysis.diagnosis.search.identifiability import find_undetermined
 from analysis.diagnosis.search.impacts import _needs_gap, explain_impacts, is_irregular
@@ -154,7 +154,7 @@ def asks_gap(real, gap_m, supposed_m):
     problem = BandPowerProblem(BandPower(context.measure), context.tuning, map)
     supposed = make_claim_hypothesis(Claim(PLAY, "one", (AXIS,)), [{**played.values, "gap": supposed_m}])
     fitted = evaluate_hypothesis(problem, np.zeros(len(context.tuning.names)), supposed)
-    return _needs_gap(make_comparison(context, fitted), problem, fitted)
+    return _needs_gap(make_band_power_comparison(context, fitted), problem, fitted)
 
 
 @pytest.mark.slow

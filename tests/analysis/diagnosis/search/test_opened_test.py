@@ -28,7 +28,7 @@ def sweep_recording():
 
 def test_all_but_the_loudest_is_opened_and_the_loudest_stays_sealed(sweep_recording):
     context, known = arena_of(sweep_recording)
-    opened = context.open_milder(known.retuned)
+    opened = context.open_quieter_segments(known.retuned)
     assert opened is not None
     sweep, loud = (slice(s.start, s.stop) for s in sweep_recording.segments[-2:])
     record = opened.full_measure.records[0]
@@ -39,9 +39,9 @@ def test_all_but_the_loudest_is_opened_and_the_loudest_stays_sealed(sweep_record
 
 def test_nothing_is_opened_of_a_test_of_one_level_or_where_the_milder_part_shows_nothing(sweep_recording):
     context, known = arena_of(recorded((CUBIC,), 3, plan=ONE_LEVEL))
-    assert context.open_milder(known.retuned) is None
+    assert context.open_quieter_segments(known.retuned) is None
     context, known = arena_of(recorded((), 3, plan=SWEEP_AND_LOUDER))
-    assert context.open_milder(known.retuned) is None
+    assert context.open_quieter_segments(known.retuned) is None
 
 
 def test_the_milder_part_is_opened_only_for_what_the_test_shows_most(sweep_recording):
@@ -51,9 +51,11 @@ def test_the_milder_part_is_opened_only_for_what_the_test_shows_most(sweep_recor
     louder = replace(known.retuned.fitted, residuals=(residuals,))
     most = known.retuned.score.test.copy()
     position = replace(known.retuned, fitted=louder)
-    assert context.open_milder(replace(position, score=replace(position.score, test=most * [0, 1]))) is not None
+    assert (
+        context.open_quieter_segments(replace(position, score=replace(position.score, test=most * [0, 1]))) is not None
+    )
     # and the whole shows most in the acceleration.
-    assert context.open_milder(replace(position, score=replace(position.score, test=most * [1, 0]))) is None
+    assert context.open_quieter_segments(replace(position, score=replace(position.score, test=most * [1, 0]))) is None
 
 
 def test_the_milder_part_is_opened_only_where_the_loudest_can_confirm(sweep_recording):
@@ -61,8 +63,8 @@ def test_the_milder_part_is_opened_only_where_the_loudest_can_confirm(sweep_reco
     residuals = known.retuned.fitted.residuals[0].copy()
     residuals[sweep_recording.segments[-1].start :] *= 1e-3
     quiet = replace(known.retuned, fitted=replace(known.retuned.fitted, residuals=(residuals,)))
-    assert context.open_milder(known.retuned) is not None
-    assert context.open_milder(quiet) is None
+    assert context.open_quieter_segments(known.retuned) is not None
+    assert context.open_quieter_segments(quiet) is None
 
 
 def test_opened_samples_are_to_fit_and_the_last_third_to_choose_by(sweep_recording):
@@ -90,13 +92,13 @@ def test_a_law_that_only_the_test_shows_is_named_and_proved_by_the_loudest(sweep
 
 def test_stretches_that_show_it_in_one_half_alone_are_opened_in_finer_parts(sweep_recording):
     context, known = arena_of(sweep_recording)
-    _, parts = context.open_alternate(known.retuned)
+    _, parts = context.open_alternate_parts(known.retuned)
     assert parts == HALVES
     residuals = known.retuned.fitted.residuals[0].copy()
     for stretch in sweep_recording.segments[-2:]:
         residuals[(stretch.start + stretch.stop) // 2 : stretch.stop] *= 1e-3
     early = replace(known.retuned, fitted=replace(known.retuned.fitted, residuals=(residuals,)))
-    opened, parts = context.open_alternate(early)
+    opened, parts = context.open_alternate_parts(early)
     assert parts == FINER_PARTS[0]
     record, before = opened.full_measure.records[0], context.full_measure.records[0]
     loud = sweep_recording.segments[-1]

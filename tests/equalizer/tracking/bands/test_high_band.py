@@ -52,7 +52,9 @@ def test_one_degree_of_freedom_at_once_keeps_energy_and_onset():
 
 @pytest.mark.parametrize("shared", [True, False])
 def test_the_device_vibrates_as_strongly_as_wanted_at_every_line(plants, source, burst, shared):
-    forces = compute_high_band_forces(burst, RATE_HZ, source, settings=HighBandSettings(shared=shared)).forces
+    forces = compute_high_band_forces(
+        burst, RATE_HZ, source, settings=HighBandSettings(oblique_directions=shared)
+    ).forces
     played, wanted = levels(plants.omega_like().play(forces)), levels(burst)
     strong = wanted > 0.05 * wanted.max()
     assert np.abs(20 * np.log10(played / wanted)[strong]).max() < 1.0
@@ -67,7 +69,7 @@ def test_from_a_contact_on_no_force_comes_early_and_the_level_is_matched(plants,
 
 
 def test_the_direction_with_the_least_peak_force_is_taken(source, burst):
-    single = compute_high_band_forces(burst, RATE_HZ, source, settings=HighBandSettings(shared=False))
+    single = compute_high_band_forces(burst, RATE_HZ, source, settings=HighBandSettings(oblique_directions=False))
     shared = compute_high_band_forces(burst, RATE_HZ, source)
     assert single.peak_n == single.peak_by_axis_n.min() < 0.8 * single.peak_by_axis_n.max()
     assert shared.peak_n < single.peak_n
@@ -75,11 +77,11 @@ def test_the_direction_with_the_least_peak_force_is_taken(source, burst):
 
 
 def test_an_axis_that_is_near_its_limit_is_spared(source, burst):
-    alone = compute_high_band_forces(burst, RATE_HZ, source, settings=HighBandSettings(shared=False))
+    alone = compute_high_band_forces(burst, RATE_HZ, source, settings=HighBandSettings(oblique_directions=False))
     busy = int(np.abs(alone.direction).argmax())
     others = np.zeros((len(burst), 3))
     others[:, busy] = 4 * alone.peak_n
-    beside = compute_high_band_forces(burst, RATE_HZ, source, others, HighBandSettings(shared=False))
+    beside = compute_high_band_forces(burst, RATE_HZ, source, others, HighBandSettings(oblique_directions=False))
     assert int(np.abs(beside.direction).argmax()) != busy
     assert beside.peak_n < np.linalg.norm(alone.forces + others, axis=1).max()
     assert beside.peak_n == pytest.approx(np.linalg.norm(beside.forces + others, axis=1).max())
@@ -88,8 +90,12 @@ def test_an_axis_that_is_near_its_limit_is_spared(source, burst):
 def test_a_response_measured_at_lines_serves_like_a_model(device_model, source, burst):
     lines = np.arange(1.0, 500.0, 0.25)
     measured = MeasuredResponse(lines, compute_model_response(device_model, lines))
-    by_lines = compute_high_band_forces(burst, RATE_HZ, measured, settings=HighBandSettings(shared=False)).forces
-    by_model = compute_high_band_forces(burst, RATE_HZ, source, settings=HighBandSettings(shared=False)).forces
+    by_lines = compute_high_band_forces(
+        burst, RATE_HZ, measured, settings=HighBandSettings(oblique_directions=False)
+    ).forces
+    by_model = compute_high_band_forces(
+        burst, RATE_HZ, source, settings=HighBandSettings(oblique_directions=False)
+    ).forces
     assert np.linalg.norm(by_lines - by_model) < 0.02 * np.linalg.norm(by_model)
 
 

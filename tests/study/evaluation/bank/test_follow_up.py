@@ -22,7 +22,7 @@ from study.evaluation.bank.proof_folder import (
     ProofFolder,
     open_proof_folder,
 )
-from study.evaluation.bank.prove import outcome_of
+from study.evaluation.bank.prove import make_outcome
 from study.evaluation.bank.seal_cases import BankPlan, format_settings, write_sealed_case
 from study.evaluation.challenge.draw_bank import draw_case_plan
 from study.store.disk.provenance import compute_sha256
@@ -66,7 +66,7 @@ def started(path, best):
     (place / SETTINGS_FILE).write_text(format_settings(without))
     menu = list_experiments(read_mechanical_model(place / MODEL_FILE), 1000.0, 0, LEVEL_N)
     answer(place, best=menu[0].words if best else "")
-    outcome = outcome_of(label, json.loads((place / ANSWER_FILE).read_text()))
+    outcome = make_outcome(label, json.loads((place / ANSWER_FILE).read_text()))
     (place / RECORDING_FILE).unlink()  # as a bank leaves it
     return folder, outcome, menu
 
@@ -149,7 +149,7 @@ def test_a_start_with_one_name_is_not_taken_up_again(tmp_path):
     place = folder.open / json.loads(folder.get_label_file(NUMBER).read_text())["name"]
     said = json.loads((place / ANSWER_FILE).read_text())
     said["diagnosis"]["effects"][0]["rivals"] = []
-    alone = outcome_of(json.loads(folder.get_label_file(NUMBER).read_text()), said)
+    alone = make_outcome(json.loads(folder.get_label_file(NUMBER).read_text()), said)
     assert follow_up(folder, PLAN, (alone,), (1, False), lambda done, of: None) == ()
 
 

@@ -13,7 +13,7 @@ from study.errors import StudyError, UserInterruptError
 from study.evaluation.bank.proof_folder import ANSWER_FILE, RECORDING_FILE, ProofFolder, open_proof_folder
 from study.evaluation.bank.proof_seals import read_answer
 from study.evaluation.bank.proof_summary import format_blind_test, summarise_blind_test
-from study.evaluation.bank.prove import outcome_of, prove
+from study.evaluation.bank.prove import make_outcome, prove
 from study.evaluation.bank.seal_cases import BankPlan, list_drawable_cases
 from study.evaluation.bank.sealed_bank import BankOptions, reveal_bank
 from study.evaluation.bank.write_proof import read_current_commit, write_proof, write_table
@@ -137,7 +137,7 @@ def test_a_label_that_was_changed_afterwards_breaks_its_seal(copied):
     path = next(folder.sealed.glob("*.json"))
     path.write_text(path.read_text().replace('"kind"', '"kind" '))
     with pytest.raises(StudyError, match="A seal is broken"):
-        reveal_bank(folder, 100, outcome_of)
+        reveal_bank(folder, 100, make_outcome)
     sealed = folder.seals_file.read_text()
     with pytest.raises(StudyError, match="A seal is broken"):
         prove(folder.path, PLAN, BankOptions(), lambda *_: None)
@@ -156,7 +156,7 @@ def test_an_answer_that_does_not_say_what_it_is_to_breaks_the_seal(copied, witho
     said = json.loads(path.read_text())
     path.write_text(json.dumps({key: value for key, value in said.items() if key != without}))
     with pytest.raises(StudyError, match="A seal is broken"):
-        reveal_bank(copied, 100, outcome_of)
+        reveal_bank(copied, 100, make_outcome)
 
 
 @pytest.mark.parametrize("torn", [ANSWER_FILE, "label"])
@@ -172,7 +172,7 @@ def test_an_error_that_is_not_known_is_read(copied):
     said = json.loads(path.read_text())
     path.write_text(json.dumps(said | {"channel_errors": {"retuned": {"ax": float("nan")}}}))
     assert "NaN" in path.read_text()
-    assert len(reveal_bank(copied, 100, outcome_of)) == len(list_drawable_cases(PLAN))
+    assert len(reveal_bank(copied, 100, make_outcome)) == len(list_drawable_cases(PLAN))
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from study.errors import StudyError, UserInterruptError
 from study.evaluation.real.real_folder import read_real_folder
 from study.evaluation.real.real_recordings import RealPlan, diagnose_folder, diagnose_sent_recording
 from study.evaluation.real.real_summary import real_lines
-from study.evaluation.real.write_real import INJECTED_NAME, RealResults, write_real
+from study.evaluation.real.write_real import INJECTED_TABLE_NAME, RealResults, write_real_results
 from study.importing.model_library import list_shipped_models, model_for
 from study.store.disk.folder_contents import read_files, write_files
 from study.store.formats.mechanical_model_file import read_mechanical_model
@@ -186,10 +186,10 @@ def test_faults_are_injected_under_a_seal_and_counted(folder: Path, tmp_path: Pa
 
 
 def test_a_table_of_faults_of_an_earlier_run_is_removed(tmp_path: Path) -> None:
-    (tmp_path / INJECTED_NAME).write_text("recording,injected\nold,mass\n")
-    done = write_real(tmp_path, RealResults((), ()), "2024-03-01")
+    (tmp_path / INJECTED_TABLE_NAME).write_text("recording,injected\nold,mass\n")
+    done = write_real_results(tmp_path, RealResults((), ()), "2024-03-01")
     assert done.page.is_file() and done.table.is_file()
-    assert not (tmp_path / INJECTED_NAME).exists()
+    assert not (tmp_path / INJECTED_TABLE_NAME).exists()
 
 
 def test_every_folder_of_public_recordings_is_understood(shared: Path) -> None:

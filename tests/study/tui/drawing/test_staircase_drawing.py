@@ -12,7 +12,7 @@ from study.tui.drawing.staircase_drawing import (
     VALLEY_MARK,
     WRONG_MARK,
     draw_staircase,
-    summarize_staircase,
+    summarise_staircase,
 )
 
 SMALL = Staircase("Run", (1.0, 1.0, 0.5, 1.0), (True, True, False, True), (False, True, True, False), 0.75, 3.0)
@@ -63,5 +63,5 @@ def test_without_room_or_answers_it_says_so():
 
 
 def test_the_summary_counts():
-    assert summarize_staircase(SMALL) == "4 trials, 3 right, 2 reversals; threshold 0.750 N."
-    assert summarize_staircase(replace(SMALL, threshold_n=None)) == "4 trials, 3 right, 2 reversals."
+    assert summarise_staircase(SMALL) == "4 trials, 3 right, 2 reversals; threshold 0.750 N."
+    assert summarise_staircase(replace(SMALL, threshold_n=None)) == "4 trials, 3 right, 2 reversals."

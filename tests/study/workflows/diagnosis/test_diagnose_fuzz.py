@@ -15,7 +15,7 @@ from study.errors import StudyError
 from study.store.formats.recording_file import write_recording
 from study.workflows.diagnosis.diagnose_recordings import DiagnosePlan, diagnose_recordings
 from study.workflows.diagnosis.diagnosis_input import DiagnosisInput
-from study.workflows.diagnosis.fit_without_model import first_model_of
+from study.workflows.diagnosis.fit_without_model import fit_first_model
 
 VERDICTS = set(Verdict.__args__)
 QUANTITIES = (("position", "m"), ("velocity", "m/s"), ("acceleration", "m/s^2"), ("angle", "rad"), ("unknown", "1"))
@@ -92,12 +92,12 @@ def test_where_the_force_balance_crashes_a_model_is_fitted_without_it_and_the_cr
     monkeypatch.setattr(fit_without_model, "fit_first_model", broken)
     monkeypatch.setattr(fit_without_model, "fit_first_linear_model", lambda *arguments: ("a model", ("how",)))
     guard, given = Guard(enabled=True), DiagnosisInput((), (), (), ())
-    first = first_model_of(given, (), (lambda: True, guard), quiet)
+    first = fit_first_model(given, (), (lambda: True, guard), quiet)
     assert (first.model, first.remarks, first.balances) == ("a model", ("how",), ())
     (said,) = guard.sentences
     assert said.startswith("The force balance was left out") and "broadcast" in said
     with pytest.raises(ValueError, match="broadcast"):
-        first_model_of(given, (), (lambda: True, Guard()), quiet)
+        fit_first_model(given, (), (lambda: True, Guard()), quiet)
 
 
 def test_a_refusal_in_the_force_balance_is_no_crash(monkeypatch):
@@ -107,5 +107,5 @@ def test_a_refusal_in_the_force_balance_is_no_crash(monkeypatch):
     monkeypatch.setattr(fit_without_model, "fit_first_model", refused)
     guard = Guard(enabled=True)
     with pytest.raises(StudyError):
-        first_model_of(DiagnosisInput((), (), (), ()), (), (lambda: True, guard), quiet)
+        fit_first_model(DiagnosisInput((), (), (), ()), (), (lambda: True, guard), quiet)
     assert guard.sentences == ()

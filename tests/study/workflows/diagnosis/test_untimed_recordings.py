@@ -16,7 +16,7 @@ from equalizer.plant.effect_vocabulary import find_matrix_unit
 from equalizer.signals.recording import Recording
 from equalizer.signals.signal import Signal
 from study.workflows.diagnosis.diagnosis_input import DiagnosisInput
-from study.workflows.diagnosis.fit_without_model import first_model_of
+from study.workflows.diagnosis.fit_without_model import fit_first_model
 
 STIFFNESS, FRICTION = 500.0, 2.0
 
@@ -37,7 +37,7 @@ def recording() -> Recording:
 @pytest.fixture(scope="module")
 def first(recording):
     given = DiagnosisInput((recording,), ("spring",), (), ())
-    return first_model_of(given, (), (lambda: True, Guard()), lambda what, share: None)
+    return fit_first_model(given, (), (lambda: True, Guard()), lambda what, share: None)
 
 
 def test_the_first_model_is_a_spring(first, recording):

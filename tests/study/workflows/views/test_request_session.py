@@ -20,7 +20,7 @@ from study.workflows.files.validate import validate_file
 from study.workflows.results.fold_session import fold_session
 from study.workflows.views.send_request import send_request
 from study.workflows.views.take_note import take_note
-from study.workflows.views.watch_session import ask, follow
+from study.workflows.views.watch_session import follow, send_session_request
 
 pytestmark = pytest.mark.real_time
 
@@ -49,7 +49,7 @@ def test_a_fresh_live_state_saves_the_look_at_the_lock(sitter):
 
 
 def test_what_is_asked_lands_in_the_sessions_inbox(whole):
-    name = ask(whole.path, PAUSE)
+    name = send_session_request(whole.path, PAUSE)
     assert RequestInbox(whole.path).is_unread(name)
     assert RequestInbox(whole.path).take() == (PAUSE,)
 
