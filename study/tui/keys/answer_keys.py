@@ -49,7 +49,7 @@ def parse_keys(text: str) -> AnswerKeys:
         if len(key) != 1:
             raise _make_keys_error(f"'{key}' is {'nothing' if not key else 'more than one character'}")
         if not key.isprintable():
-            raise _make_keys_error(f"{ascii(key)} is not printable")
+            raise _make_keys_error(f"{key!a} is not printable")
         if key in RESERVED_KEYS:
             raise _make_keys_error(f"'{key}' has another meaning in a trial")
     if first == second:
