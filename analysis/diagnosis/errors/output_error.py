@@ -13,8 +13,7 @@ the maximum a posteriori estimate. One step solves, with S = [de/dd, de/dp],
 
 with growing multiples of the matrix's diagonal added until J falls (Marquardt's damping). de/dd costs one simulation
 per parameter of the model, so it is computed once and kept; de/dp is recomputed at each step, by finite differences.
-Standard errors: `standard_errors`. Sources: Ljung, System Identification (1999), sec. 10.2; Marquardt, J. SIAM 11:431
-(1963).
+Standard errors: `standard_errors`. Source: Ljung, System Identification (1999), 10.2; Marquardt, J. SIAM 11:431 (1963).
 """
 
 from collections.abc import Sequence

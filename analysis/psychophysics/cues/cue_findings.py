@@ -44,7 +44,7 @@ class CueFinding:
     abilities: tuple[float, ...]
     """Median over participants of the d' of the cue alone, for each internal noise of `INTERNAL_NOISE_DB`."""
     observed_d_prime: float | None
-    """Mean over participants of the d' of their answers at this frequency, whatever cues they used; None where no
+    """Mean over participants of the d' of their answers at this frequency, with any cues; None where no
     participant was shown both directions."""
     noticed_by: tuple[str, ...]
     """Participants for whom even the end of the difference's interval nearer to 0 gives a d' of 1 or more, with an

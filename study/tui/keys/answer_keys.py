@@ -46,8 +46,10 @@ def parse_keys(text: str) -> AnswerKeys:
         raise _make_keys_error(f"'{text}' names {len(keys)} of them")
     first, second = keys
     for key in keys:
-        if len(key) != 1 or not key.isprintable():
+        if len(key) != 1:
             raise _make_keys_error(f"'{key}' is {'nothing' if not key else 'more than one character'}")
+        if not key.isprintable():
+            raise _make_keys_error(f"{key!a} is not printable")
         if key in RESERVED_KEYS:
             raise _make_keys_error(f"'{key}' has another meaning in a trial")
     if first == second:

@@ -31,6 +31,7 @@ def test_the_digits_alone_may_be_named_too():
         ("f,F", "'f' cannot stand for both."),
         ("f,", "'' is nothing."),
         ("left,j", "'left' is more than one character."),
+        ("\x01,j", r"'\x01' is not printable."),
         ("2,j", "The digits 1 and 2 always stand for themselves."),
         ("f,1", "The digits 1 and 2 always stand for themselves."),
         *((f"f,{key}", f"'{key}' has another meaning in a trial.") for key in "pqrn?"),
