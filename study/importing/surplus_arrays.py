@@ -152,11 +152,12 @@ def has_time_line(array: Array) -> bool:
 def _is_same_clock(by_name: Mapping[str, Array], first: str, second: str) -> bool:
     """Whether two time columns are equal to `SAME_CLOCK_TOLERANCE`, apart from their starts and the ratio of their
     units; where a name states no unit, the ratio of `_USUAL_UNIT_RATIOS` that fits the end best. False for different
-    shapes and where a first or last value is not finite."""
+    shapes, for fewer than two times, and where a first or last value is not finite."""
     first_times, second_times = (by_name[name].astype(float) for name in (first, second))
     if (
         first_times.shape != second_times.shape
         or first_times.ndim != 1
+        or len(first_times) < 2
         or not np.isfinite([first_times[[0, -1]], second_times[[0, -1]]]).all()
     ):
         return False

@@ -8,7 +8,7 @@ only, below which noise would dominate the position (`band.py` computes both end
 `balances`, by `contrast`, `confirm` and `first_model`.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -259,7 +259,7 @@ def differentiate(samples: FloatArray, rate_hz: float, band_hz: float, order: in
 
 
 def filter_spectrum(
-    samples: FloatArray, rate_hz: float, compute_gain: object, subtract_line: bool = True
+    samples: FloatArray, rate_hz: float, compute_gain: Callable[[FloatArray], FloatArray], subtract_line: bool = True
 ) -> FloatArray:
     """Filter samples (n, k) in the frequency domain. compute_gain: function of the frequencies in Hz (lines,) that
     returns the frequency response (lines,). Samples are continued beyond both ends by an odd extension. subtract_line:
@@ -268,9 +268,8 @@ def filter_spectrum(
     extended = extend_as_odd(samples - end_line)
     spectrum = rfft(extended, axis=0)
     frequency_hz = rfftfreq(len(extended), 1 / rate_hz)
-    return np.asarray(
-        irfft(compute_gain(frequency_hz)[:, None] * spectrum, len(extended), axis=0)[: len(samples)] + end_line
-    )  # type: ignore[operator]
+    filtered = irfft(compute_gain(frequency_hz)[:, None] * spectrum, len(extended), axis=0)
+    return np.asarray(filtered[: len(samples)] + end_line)
 
 
 def _fit_end_line(samples: FloatArray, rate_hz: float) -> tuple[FloatArray, FloatArray]:

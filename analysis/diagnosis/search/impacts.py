@@ -97,9 +97,8 @@ def explain_impacts(
     play_fit = refine_band_power(chance_weighted, axis_fits[0], time_left)
     rivals = list(axis_fits[1:])
     if RIVAL_EFFECT in effects:
-        rivals.append(
-            _fit_claim(problem, evidence, Claim(effects[RIVAL_EFFECT], "one", play_fit.hypothesis.claims[0].sites))
-        )
+        rival_claim = Claim(effects[RIVAL_EFFECT], "one", play_fit.hypothesis.claims[0].sites)
+        rivals.append(_fit_claim(problem, evidence, rival_claim))
     rival_hypotheses = [rival.hypothesis for rival in rivals if rival.hypothesis.claims and np.isfinite(rival.cost)]
     play_comparison = make_band_power_comparison(context, play_fit)
     play_candidate = play_comparison.score_candidate(play_fit.deviations, play_fit.hypothesis)
