@@ -103,7 +103,7 @@ def test_the_special_case_is_named_where_it_leaves_hardly_more(monkeypatch, left
     monkeypatch.setattr(by_balance, "find_open_refinements", lambda found, constants: (0,))
     monkeypatch.setattr(by_balance, "find_special_case", lambda balances, kept, law: (0, "coulomb"))
     monkeypatch.setattr(by_balance, "_confirm_by_simulation", lambda begun, named: (plain, named[:held]))
-    found = _prefer_special_case(SimpleNamespace(balances=(), constants=1), whole, [(0, "bending")])
+    found = _prefer_special_case(SimpleNamespace(balances=(), constant_count=1), whole, [(0, "bending")])
     assert found is (plain if preferred else whole)
 
 
