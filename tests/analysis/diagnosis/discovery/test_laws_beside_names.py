@@ -124,7 +124,7 @@ def test_a_law_whose_rivals_were_not_fitted_is_a_candidate(hardening_context):
     for discovery, is_named in ((found, True), (begun, False)):
         said = check_laws(SearchResult(context, names, judge(names)), discovery, always)
         assert any(law is not None for law in list_fitted_laws(said.found.after.fitted.hypothesis)) == is_named
-    assert any("time ended" in each.why_not for each in said.unconfirmed)
+    assert any("time limit was reached" in each.why_not for each in said.unconfirmed)
 
 
 @pytest.mark.slow
