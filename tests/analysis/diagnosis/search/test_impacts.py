@@ -224,7 +224,7 @@ def looked(loose, told, monkeypatch):
 def test_play_is_looked_for_before_a_third_effect_and_once(loose, told, looked):
     context, (impacts, asked) = loose[0], looked
     few = [EFFECTS["coulomb_friction"], EFFECTS["added_mass"]]
-    thirds = FurtherSearches(before_thirds=impacts.before_thirds)
+    thirds = FurtherSearches(before_thirds=impacts.explain_before_third_effect)
     result = search_effects(context, few, lambda said, share: None, further=thirds)
     assert (result.found, result.judgement.verdict) == (told, "explained")
     assert len(asked) == 1 and len(asked[0].steps) <= 2
