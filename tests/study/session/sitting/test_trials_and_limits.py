@@ -150,7 +150,9 @@ def test_a_sitting_that_is_too_long_ends_between_two_trials(begun, small_protoco
 def test_a_hand_that_had_its_dose_rests_for_the_day(begun, small_protocol):
     protocol = replace(small_protocol, limits=SittingLimits(dose_a8_mps2=0.01))
     state = begun(protocol)
-    shaken = replace(state.sitting, dose=replace(state.sitting.dose, squared_s=100.0), still_s=0.0, last_moment=Moment(UTC))
+    shaken = replace(
+        state.sitting, dose=replace(state.sitting.dose, squared_s=100.0), still_s=0.0, last_moment=Moment(UTC)
+    )
     tired = replace(state, sitting=shaken)
     assert "vibration dose for today" in find_next_action(tired, LATER).reason
     assert not isinstance(find_next_action(tired, LATER.replace("01-01", "01-02")), EndSitting)
