@@ -190,9 +190,9 @@ MOST_BETWEEN_SEGMENTS = 5.0
 PROBABILITY_SCALE = 0.002
 # probability that no candidate is right: with noise alone left, and with much more left
 NO_CANDIDATE_LEAST, NO_CANDIDATE_MOST = 0.01, 0.8
-# error above the noise halfway between these (or a share of the mismatch of 1 - CONVINCING_SHARE, whichever is met
-# later: bank 104100), and steepness of the transition
-NO_CANDIDATE_HALFWAY, NO_CANDIDATE_STEEPNESS = 0.35, 1.5
+# error above the noise halfway between these, and the share of the re-tuned model's excess rms error that counts as
+# much (bank 104100); steepness of the transition
+NO_CANDIDATE_HALFWAY, NO_CANDIDATE_HALFWAY_SHARE, NO_CANDIDATE_STEEPNESS = 0.35, 0.07, 1.5
 
 # Limits of statements and proposals (`wording`, `unit_doubt`, `next_experiment`). By hand.
 SAME_TO_READERS = 1.05  # ratio of errors up to which they count as the same

@@ -66,7 +66,7 @@ def search_best_sums(base: NormalEquations, terms: Sequence[Term], time_left: Ti
             term_order = _rank_terms(add_columns(base, selected_columns), columns)
             extended += _fit_best_shapes(base, beam_sum.terms, finite_terms, term_order, time_left)[:LAW_BEAM]
         extended = sorted(extended, key=lambda term_sum: term_sum.cross_validated)
-        if not extended or not _is_worth_extending(best, extended[0]):
+        if not extended or not is_worth_adding(best.cross_validated, extended[0].cross_validated):
             break
         all_sums += extended
         beam = tuple(extended)
@@ -104,11 +104,10 @@ def _fit_without_variables(
     return _fit_best_shapes(base, (), terms, reduced_order, time_left)[:_RIVAL_COUNT]
 
 
-def _is_worth_extending(current: Sum, extended: Sum) -> bool:
-    """Whether a further term removes at least `LAW_WORTH_SHARE` of the error above the noise."""
-    return current.cross_validated - extended.cross_validated > LAW_WORTH_SHARE * max(
-        current.cross_validated - 1.0, 0.0
-    )
+def is_worth_adding(error_without: float, error_with: float) -> bool:
+    """Whether a term removes more than `LAW_WORTH_SHARE` of the error above the noise. The errors are held-out squares
+    over the noise's, without and with the term."""
+    return error_without - error_with > LAW_WORTH_SHARE * max(error_without - 1.0, 0.0)
 
 
 def _make_information_criterion(view: View) -> Callable[[Sum], float]:

@@ -13,7 +13,7 @@ from analysis.diagnosis.discovery.antisymmetric_pairs import (
     find_antisymmetric_pairs,
     make_antisymmetric,
 )
-from analysis.diagnosis.discovery.beam import search_best_sums
+from analysis.diagnosis.discovery.beam import is_worth_adding, search_best_sums
 from analysis.diagnosis.discovery.evaluate_shape import evaluate_shape
 from analysis.diagnosis.discovery.fit_laws import fit_sums, put_simplest_first, run_within_time
 from analysis.diagnosis.discovery.fit_sum import Sum, fit_constant
@@ -37,7 +37,6 @@ from analysis.diagnosis.settings import (
     LAW_FITTED,
     LAW_FITTED_WITHIN,
     LAW_MOST_ROUNDS,
-    LAW_WORTH_SHARE,
     NOISE_ALONE,
 )
 from analysis.diagnosis.types import Progress, TimeBudget
@@ -189,7 +188,7 @@ def _find_constant_forces(views: Sequence[View]) -> list[Sum]:
         for constant in constants
         if constant is not None
         and constant.base_error > LAW_ALMOST_NOISE
-        and constant.base_error - constant.cross_validated > LAW_WORTH_SHARE * (constant.base_error - 1)
+        and is_worth_adding(constant.base_error, constant.cross_validated)
     ]
 
 

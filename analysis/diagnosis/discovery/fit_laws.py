@@ -45,9 +45,7 @@ def fit_sums(
 ) -> tuple[tuple[FittedCandidate, Sum], ...]:
     """The sums fitted by output error. The best sum, and simpler sums that are inseparable from it, are fitted to
     convergence, the others for a few steps. When the time ends, those begun by then; empty where none can be fitted."""
-    fit_few_steps = run_within_time(lambda: _prepare_first_fits(context, base), None)
-    if fit_few_steps is None:
-        return ()
+    fit_few_steps = _prepare_first_fits(context, base)
     fits = [
         (run_within_time(partial(fit_few_steps, start), start), term_sum)
         for term_sum in sums

@@ -16,11 +16,11 @@ from analysis.diagnosis.search.parsimony import is_equal_rival, is_refined_candi
 from analysis.diagnosis.search.search_context import FittedCandidate
 from analysis.diagnosis.search.verdict import compute_step_shares
 from analysis.diagnosis.settings import (
-    CONVINCING_SHARE,
     EXPLAINED_BY_CHANCE,
     INTERVAL_SHARE,
     MOST_RIVALS,
     NO_CANDIDATE_HALFWAY,
+    NO_CANDIDATE_HALFWAY_SHARE,
     NO_CANDIDATE_LEAST,
     NO_CANDIDATE_MOST,
     NO_CANDIDATE_STEEPNESS,
@@ -275,6 +275,6 @@ def compute_none_probability(error: float, remaining_share: float = 1.0) -> floa
     remaining share if that gives less, from NO_CANDIDATE_LEAST to NO_CANDIDATE_MOST. A right law of a strong effect
     leaves a small share, which may still be more than noise. error: of the explanation in the worst channel, in units
     of the noise; remaining_share: share of the mismatch that the explanation leaves."""
-    excess = min(max(error - 1.0, 0.0) / NO_CANDIDATE_HALFWAY, remaining_share / (1 - CONVINCING_SHARE))
+    excess = min(max(error - 1.0, 0.0) / NO_CANDIDATE_HALFWAY, remaining_share / NO_CANDIDATE_HALFWAY_SHARE)
     odds = excess**NO_CANDIDATE_STEEPNESS
     return float(NO_CANDIDATE_LEAST + (NO_CANDIDATE_MOST - NO_CANDIDATE_LEAST) * odds / (1 + odds))
